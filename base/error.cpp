@@ -1,0 +1,17 @@
+#include "base/error.h"
+
+#include <fmt/core.h>
+
+namespace vgyro {
+
+std::string Error::message() const {
+  std::string text = where.empty() ? what : fmt::format("{}: {}", where, what);
+  if (!remedy.empty()) text += "; " + remedy;
+  return text;
+}
+
+std::string at_line(const std::string& file, unsigned line) {
+  return fmt::format("{}:{}", file, line);
+}
+
+}  // namespace vgyro

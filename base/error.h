@@ -1,0 +1,31 @@
+#pragma once
+
+// Bad input as a value: where it is, what is wrong, and what would be right.
+
+#include <string>
+#include <utility>
+
+#include <tl/expected.hpp>
+
+namespace vgyro {
+
+struct Error {
+  std::string where;   ///< "file:line", a file, an interface; empty when `what` says it all
+  std::string what;    ///< one sentence, no full stop
+  std::string remedy;  ///< what would be right; empty when `what` implies it
+
+  /// "where: what; remedy", as the programs print it.
+  [[nodiscard]] std::string message() const;
+};
+
+template <class T>
+using Expected = tl::expected<T, Error>;
+
+inline tl::unexpected<Error> fail(std::string where, std::string what, std::string remedy = {}) {
+  return tl::unexpected<Error>(Error{std::move(where), std::move(what), std::move(remedy)});
+}
+
+/// "file:line"
+std::string at_line(const std::string& file, unsigned line);
+
+}  // namespace vgyro

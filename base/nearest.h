@@ -1,0 +1,22 @@
+#pragma once
+
+// The valid name that a mistyped one most likely meant.
+
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace vgyro {
+
+/// Edits (insert, delete, replace, swap of neighbours) that turn `a` into `b`, letter case ignored.
+std::size_t edit_distance(std::string_view a, std::string_view b);
+
+/// The nearest of `candidates`, or nothing when none is close enough to be a typing error.
+std::optional<std::string> nearest_name(std::string_view name,
+                                        const std::vector<std::string>& candidates);
+
+/// `did you mean "X"?`, or `one of: A, B, C` when nothing is near; empty without candidates.
+std::string suggest_name(std::string_view name, const std::vector<std::string>& candidates);
+
+}  // namespace vgyro

@@ -1,0 +1,26 @@
+# One place for flags, so that a layer's CMakeLists.txt says only what it is made of.
+
+add_library(vgyro_flags INTERFACE)
+target_include_directories(vgyro_flags INTERFACE ${PROJECT_SOURCE_DIR})
+target_compile_options(vgyro_flags INTERFACE
+  -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wsign-conversion -Wnon-virtual-dtor -Werror
+  # A fused multiply-add rounds differently from machine to machine: same input, same bytes out.
+  -ffp-contract=off)
+if(VGYRO_SANITIZE)
+  target_compile_options(vgyro_flags INTERFACE -fsanitize=${VGYRO_SANITIZE} -fno-sanitize-recover=all -fno-omit-frame-pointer)
+  target_link_options(vgyro_flags INTERFACE -fsanitize=${VGYRO_SANITIZE})
+  if(CMAKE_CXX_COMPILER_ID STREQUAL GNU)
+    # With a sanitizer GCC 12 warns of uninitialised use inside std::optional and std::regex where there is none.
+    target_compile_options(vgyro_flags INTERFACE -Wno-maybe-uninitialized)
+  endif()
+endif()
+if(VGYRO_FUZZERS)
+  target_compile_options(vgyro_flags INTERFACE -fsanitize=fuzzer-no-link)
+endif()
+
+# vgyro_layer(NAME SOURCES ... LINKS ...): a static library vgyro_NAME.
+function(vgyro_layer name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;LINKS" ${ARGN})
+  add_library(vgyro_${name} STATIC ${ARG_SOURCES})
+  target_link_libraries(vgyro_${name} PUBLIC vgyro_flags ${ARG_LINKS})
+endfunction()
