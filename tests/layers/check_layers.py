@@ -1,0 +1,139 @@
+#!/usr/bin/python3
+"""Fails when a source includes what its layer must not know: another layer against the arrows, the
+operating system's CAN, systemd, Eigen, iostreams, or a clock."""
+
+import argparse
+import os
+import re
+import sys
+import tempfile
+from pathlib import Path
+
+# Layer → the layers whose headers it may include.
+ARROWS = {
+    "base": {"base"},
+    "can": {"base", "can"},
+    "dbc": {"base", "dbc"},
+    "fusion": {"base", "fusion"},
+    "gateway": {"base", "can", "dbc", "fusion", "gateway"},
+    "daemon": {"base", "can", "dbc", "gateway", "daemon"},
+    "cli": {"base", "can", "dbc", "fusion", "gateway", "cli"},
+}
+
+# What, as a pattern of an included header → the files that may include it.
+SYSTEM_HEADERS = (
+    (r"linux/can.*|sys/socket\.h|net/if\.h", r"can/socket\.(h|cpp)"),
+    (r"systemd/.*", r"daemon/.*"),
+    (r"Eigen/.*|unsupported/Eigen/.*", r"(fusion|gateway|model)/.*"),
+    (r"iostream|istream|ostream|fstream|sstream|iomanip", r"(base|daemon|cli)/.*"),
+)
+
+CLOCK = re.compile(r"(?:::|\.)now\s*\(|\bnow\s*\(\s*\)|\bclock_gettime\s*\(|\bgettimeofday\s*\(|(?<![\w.>])(?:std::|::)?time\s*\(|\btimespec_get\s*\(")
+CLOCK_FILES = re.compile(r"(daemon|cli)/.*")
+
+INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]')
+COMMENT_OR_STRING = re.compile(r'//[^\n]*|/\*.*?\*/|"(?:\\.|[^"\\\n])*"', re.DOTALL)
+
+
+def without_comments_and_strings(text):
+    """Blanked out, line numbers kept."""
+    return COMMENT_OR_STRING.sub(lambda m: "\n" * m.group().count("\n"), text)
+
+
+def sources(root):
+    for layer in ARROWS:
+        for path in sorted((root / layer).rglob("*")):
+            if path.suffix in (".h", ".cpp"):
+                yield layer, path
+
+
+def include_complaint(root, layer, name, quote, header):
+    for pattern, allowed in SYSTEM_HEADERS:
+        if re.fullmatch(pattern, header) and not re.fullmatch(allowed, name):
+            return f"includes <{header}>, which only {allowed} may"
+    first = header.split("/")[0]
+    if first in ARROWS and "/" in header:
+        if first not in ARROWS[layer]:
+            return f"{layer} includes {header}; it may include {', '.join(sorted(ARROWS[layer]))} only"
+    elif quote == '"':
+        return f'includes "{header}", which is no path from the root such as "{layer}/{Path(header).name}"'
+    return None
+
+
+def complaints(root):
+    """All breaches below root, as "file:line: what"."""
+    found = []
+    for layer, path in sources(root):
+        name = path.relative_to(root).as_posix()
+        text = path.read_text(encoding="utf-8")
+        for number, line in enumerate(text.splitlines(), 1):
+            match = INCLUDE.match(line)
+            what = match and include_complaint(root, layer, name, *match.groups())
+            if what:
+                found.append(f"{name}:{number}: {what}")
+        if not CLOCK_FILES.fullmatch(name):
+            for number, line in enumerate(without_comments_and_strings(text).splitlines(), 1):
+                if CLOCK.search(line):
+                    found.append(f"{name}:{number}: reads a clock; time enters through the drivers only")
+    return found
+
+
+PLANTED = (  # file, text, is it a breach?
+    ("base/a.h", '#include "can/frame.h"', True),
+    ("can/a.cpp", '#include "dbc/codec.h"', True),
+    ("dbc/a.cpp", '#  include "can/frame.h"', True),
+    ("fusion/a.cpp", '#include "dbc/codec.h"', True),
+    ("fusion/b.cpp", '#include "gateway/plan.h"', True),
+    ("gateway/a.cpp", '#include "daemon/loop.h"', True),
+    ("gateway/b.cpp", '#include <cli/replay.h>', True),
+    ("daemon/a.cpp", '#include "fusion/mutual.h"', True),
+    ("cli/a.cpp", '#include "daemon/loop.h"', True),
+    ("can/b.cpp", "#include <linux/can/raw.h>", True),
+    ("gateway/c.cpp", "#include <sys/socket.h>", True),
+    ("can/c.cpp", "#include <net/if.h>", True),
+    ("cli/b.cpp", "#include <systemd/sd-event.h>", True),
+    ("dbc/b.cpp", "#include <Eigen/Dense>", True),
+    ("gateway/d.cpp", "#include <iostream>", True),
+    ("gateway/e.cpp", '#include "plan.h"', True),
+    ("fusion/c.cpp", "auto t = std::chrono::steady_clock::now();", True),
+    ("can/d.cpp", "clock_gettime(CLOCK_REALTIME, &t);", True),
+    ("can/e.cpp", "seed = time(nullptr);", True),
+    ("gateway/f.cpp", "seed = std::time (nullptr);", True),
+    ("gateway/sub/g.cpp", '#include "daemon/loop.h"', True),
+    ("can/socket.cpp", "#include <linux/can/raw.h>\n#include <sys/socket.h>\n#include <net/if.h>", False),
+    ("daemon/b.cpp", "#include <systemd/sd-event.h>\nauto t = BusClock::now();", False),
+    ("fusion/d.cpp", '#include <Eigen/Dense>\n#include "base/time.h"\n#include "fusion/window.h"', False),
+    ("gateway/h.cpp", '// no now() here\nconst char* s = "now()"; double x = lead_time(1); f.time(3); /* time(0)\n now() */', False),
+    ("base/b.cpp", "std::vector<int> now(size);\n#include <fstream>", False),
+    ("cli/c.cpp", '#include "fusion/allan.h"\n#include <iostream>', False),
+)
+
+
+def self_test():
+    failed = []
+    for name, text, is_breach in PLANTED:
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / name
+            path.parent.mkdir(parents=True)
+            path.write_text(text + "\n", encoding="utf-8")
+            found = complaints(Path(folder))
+        if bool(found) != is_breach:
+            failed.append(f"{name} ({text!r}): {'missed' if is_breach else found}")
+    return failed
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    default = os.environ.get("VGYRO_SOURCE", Path(__file__).resolve().parents[2])
+    parser.add_argument("root", nargs="?", type=Path, default=Path(default))
+    root = parser.parse_args().root
+    problems = [f"self-test: {f}" for f in self_test()] + complaints(root)
+    checked = sum(1 for _ in sources(root))
+    if checked == 0:
+        problems.append(f"{root}: no sources found")
+    print("\n".join(problems) if problems else f"{checked} sources, {len(PLANTED)} planted cases: no breach")
+    return 1 if problems else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
