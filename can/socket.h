@@ -1,0 +1,87 @@
+#pragma once
+
+// One raw SocketCAN socket on one interface; with socket.cpp the only place that knows linux/can.
+// The kernel filters for exactly the wanted identifiers, and frames come in batches with the
+// kernel's stamps. Never blocks and never allocates once open. Other programs on the host keep
+// seeing what it sends; it does not see its own frames.
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+
+#include "base/error.h"
+#include "base/time.h"
+#include "can/frame.h"
+#include "can/sender.h"
+
+namespace vgyro::can {
+
+/// Matches when (frame.id & mask) == (id & mask) and the format agrees.
+struct Filter {
+  std::uint32_t id = 0;
+  std::uint32_t mask = 0;
+  bool extended = false;
+};
+
+struct SocketOptions {
+  int receive_buffer_bytes = 2 << 20;  ///< the kernel may grant less
+  int send_buffer_bytes = 0;           ///< 0: the kernel's default
+};
+
+struct Received {
+  Frame frame;
+  TimePoint stamp;     ///< kernel's software stamp, host clock
+  TimePoint hardware;  ///< controller's own clock, whatever its epoch; 0 where it has none
+};
+
+enum class ReceiveStatus : std::uint8_t {
+  kMore,        ///< the batch was full: ask again
+  kDrained,     ///< nothing is left for now
+  kLinkDown,    ///< told once; the same socket goes on when the link is up again
+  kDeviceGone,  ///< told once; the socket is dead, open a new one
+  kFailed       ///< see last_errno()
+};
+
+struct Batch {
+  std::span<const Received> frames;  ///< valid until the next receive()
+  ReceiveStatus status = ReceiveStatus::kDrained;
+};
+
+class Socket final : public Sender {
+ public:
+  static constexpr std::size_t kBatchFrames = 64;
+
+  /// Without filters the socket only writes.
+  static Expected<Socket> open(const std::string& interface, std::span<const Filter> filters,
+                               const SocketOptions& options = {});
+  Socket(Socket&& other) noexcept;
+  Socket& operator=(Socket&& other) noexcept;
+  ~Socket() override;
+
+  Batch receive();
+  SendResult send(const Frame& frame) override;
+
+  [[nodiscard]] int fd() const { return fd_; }
+  [[nodiscard]] bool fd_frames() const { return fd_frames_; }
+  /// Received frames that the kernel dropped because the buffer was full, as far as it has told.
+  [[nodiscard]] std::uint64_t drops() const { return drops_; }
+  [[nodiscard]] int receive_buffer_bytes() const { return receive_buffer_bytes_; }
+  /// Of the last call that returned kFailed.
+  [[nodiscard]] int last_errno() const { return last_errno_; }
+
+ private:
+  struct Buffers;
+  Socket(int fd, bool fd_frames);
+  void read_control(std::size_t index, Received& out);
+
+  int fd_ = -1;
+  bool fd_frames_ = false;
+  int receive_buffer_bytes_ = 0;
+  int last_errno_ = 0;
+  std::uint32_t kernel_drops_ = 0;
+  std::uint64_t drops_ = 0;
+  std::unique_ptr<Buffers> buffers_;
+};
+
+}  // namespace vgyro::can

@@ -1,0 +1,207 @@
+#include "can/transmit.h"
+
+#include <deque>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+namespace vgyro::can {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr TimePoint at(Duration since_start) {
+  return time_from_ns(1'700'000'000'000'000'000) + since_start;
+}
+
+Frame numbered(std::uint32_t id) {
+  Frame frame;
+  frame.id = id;
+  return frame;
+}
+
+/// Answers with the scripted results, then with kSent; keeps the ids that it took.
+class FakeSender final : public Sender {
+ public:
+  std::deque<SendResult> answers;
+  SendResult afterwards = SendResult::kSent;
+  std::vector<std::uint32_t> taken;
+  int attempts = 0;
+
+  SendResult send(const Frame& frame) override {
+    ++attempts;
+    SendResult result = afterwards;
+    if (!answers.empty()) {
+      result = answers.front();
+      answers.pop_front();
+    }
+    if (result == SendResult::kSent) taken.push_back(frame.id);
+    return result;
+  }
+};
+
+using Ids = std::vector<std::uint32_t>;
+
+TEST(TransmitQueue, SendsInTheOrderOfPushing) {
+  TransmitQueue queue;
+  FakeSender sender;
+  for (std::uint32_t id : {3U, 1U, 2U})
+    queue.push(numbered(id), at(10ms));
+  queue.drain(at(0ms), sender);
+  EXPECT_EQ(sender.taken, (Ids{3, 1, 2}));
+  EXPECT_EQ(queue.counts().sent, 3U);
+  EXPECT_EQ(queue.counts().retries, 0U);
+  EXPECT_EQ(queue.next_deadline(), std::nullopt);
+}
+
+TEST(TransmitQueue, KeepsTheFrameAndBacksOffWhenTheDeviceQueueIsFull) {
+  TransmitQueue queue({.capacity = 8, .first_retry = 1ms, .last_retry = 4ms});
+  FakeSender sender;
+  sender.answers = {SendResult::kNoBuffer};
+  queue.push(numbered(1), at(50ms));
+  queue.drain(at(0ms), sender);
+  EXPECT_TRUE(sender.taken.empty());
+  EXPECT_FALSE(queue.wants_writable()) << "poll says writable although the queue is full";
+  EXPECT_EQ(queue.next_deadline(), at(1ms));
+
+  queue.drain(at(1ms) - 1ns, sender);
+  EXPECT_EQ(sender.attempts, 1) << "tried again before the time";
+  queue.drain(at(1ms), sender);
+  EXPECT_EQ(sender.taken, (Ids{1}));
+  EXPECT_EQ(queue.counts().retries, 1U);
+}
+
+TEST(TransmitQueue, DoublesTheWaitUpToTheLimit) {
+  TransmitQueue queue({.capacity = 8, .first_retry = 1ms, .last_retry = 4ms});
+  FakeSender sender;
+  sender.afterwards = SendResult::kNoBuffer;
+  queue.push(numbered(1), at(1s));
+  TimePoint now = at(0ms);
+  std::vector<Duration> waits;
+  for (int i = 0; i < 5; ++i) {
+    queue.drain(now, sender);
+    waits.push_back(*queue.next_deadline() - now);
+    now = *queue.next_deadline();
+  }
+  EXPECT_EQ(waits, (std::vector<Duration>{1ms, 2ms, 4ms, 4ms, 4ms}));
+}
+
+TEST(TransmitQueue, StartsWithTheShortestWaitAgainAfterASuccess) {
+  TransmitQueue queue({.capacity = 8, .first_retry = 1ms, .last_retry = 64ms});
+  FakeSender sender;
+  sender.answers = {SendResult::kNoBuffer, SendResult::kNoBuffer, SendResult::kSent,
+                    SendResult::kNoBuffer};
+  queue.push(numbered(1), at(1s));
+  queue.push(numbered(2), at(1s));
+  queue.drain(at(0ms), sender);
+  queue.drain(at(1ms), sender);
+  queue.drain(at(3ms), sender);
+  EXPECT_EQ(sender.taken, (Ids{1}));
+  EXPECT_EQ(queue.next_deadline(), at(4ms));
+}
+
+TEST(TransmitQueue, NeverSendsAStaleFrameWhenTheBusReturns) {
+  TransmitQueue queue;
+  FakeSender sender;
+  sender.afterwards = SendResult::kNoBuffer;
+  const auto push_and_drain = [&](std::uint32_t i) {
+    queue.push(numbered(i), at(i * 2ms + 4ms));
+    queue.drain(at(i * 2ms), sender);
+  };
+  for (std::uint32_t i = 0; i < 100; ++i)
+    push_and_drain(i);
+  sender.afterwards = SendResult::kSent;
+  for (std::uint32_t i = 100; i < 150; ++i)
+    push_and_drain(i);
+
+  ASSERT_FALSE(sender.taken.empty());
+  EXPECT_GE(sender.taken.front(), 98U) << "a frame from before the bus returned";
+  EXPECT_LE(sender.taken.front(), 116U) << "waited longer than the longest back-off";
+  EXPECT_EQ(sender.taken.back(), 149U);
+  EXPECT_EQ(sender.taken.size() + queue.counts().dropped_stale, 150U);
+}
+
+TEST(TransmitQueue, SendsAFrameThatIsExactlyAtItsLimit) {
+  TransmitQueue queue;
+  FakeSender sender;
+  queue.push(numbered(1), at(4ms));
+  queue.push(numbered(2), at(4ms) - 1ns);
+  queue.push(numbered(3), at(4ms));
+  queue.drain(at(4ms), sender);
+  EXPECT_EQ(sender.taken, (Ids{1, 3}));
+  EXPECT_EQ(queue.counts().dropped_stale, 1U);
+}
+
+TEST(TransmitQueue, WaitsForPollWhenTheSocketBufferIsFull) {
+  TransmitQueue queue;
+  FakeSender sender;
+  sender.answers = {SendResult::kWouldBlock};
+  queue.push(numbered(1), at(50ms));
+  queue.drain(at(0ms), sender);
+  EXPECT_TRUE(queue.wants_writable());
+  queue.drain(at(40ms), sender);
+  EXPECT_EQ(sender.attempts, 1) << "tried although poll did not say writable";
+  queue.on_writable();
+  EXPECT_FALSE(queue.wants_writable());
+  queue.drain(at(41ms), sender);
+  EXPECT_EQ(sender.taken, (Ids{1}));
+}
+
+TEST(TransmitQueue, DropsStaleFramesEvenWhileTheSocketBufferIsFull) {
+  TransmitQueue queue;
+  FakeSender sender;
+  sender.answers = {SendResult::kWouldBlock};
+  queue.push(numbered(1), at(5ms));
+  queue.drain(at(0ms), sender);
+  ASSERT_TRUE(queue.next_deadline());
+  queue.drain(*queue.next_deadline(), sender);
+  EXPECT_EQ(queue.size(), 0U);
+  EXPECT_EQ(queue.counts().dropped_stale, 1U);
+  EXPECT_FALSE(queue.wants_writable());
+}
+
+TEST(TransmitQueue, DropsTheOldestWhenFull) {
+  TransmitQueue queue({.capacity = 3});
+  FakeSender sender;
+  for (std::uint32_t id = 0; id < 5; ++id)
+    queue.push(numbered(id), at(50ms));
+  queue.drain(at(0ms), sender);
+  EXPECT_EQ(sender.taken, (Ids{2, 3, 4}));
+  EXPECT_EQ(queue.counts().dropped_overflow, 2U);
+}
+
+TEST(TransmitQueue, SkipsAFrameThatTheLinkCannotCarry) {
+  TransmitQueue queue;
+  FakeSender sender;
+  sender.answers = {SendResult::kUnsupported, SendResult::kFailed};
+  for (std::uint32_t id = 0; id < 3; ++id)
+    queue.push(numbered(id), at(50ms));
+  queue.drain(at(0ms), sender);
+  EXPECT_EQ(sender.taken, (Ids{2}));
+  EXPECT_EQ(queue.counts().dropped_failed, 2U);
+}
+
+TEST(TransmitQueue, SaysThatTheLinkIsDownUntilAFrameGoesOut) {
+  TransmitQueue queue;
+  FakeSender sender;
+  sender.answers = {SendResult::kLinkDown};
+  queue.push(numbered(1), at(50ms));
+  queue.drain(at(0ms), sender);
+  EXPECT_TRUE(queue.link_down());
+  queue.drain(at(1ms), sender);
+  EXPECT_FALSE(queue.link_down());
+  EXPECT_EQ(sender.taken, (Ids{1}));
+}
+
+TEST(TransmitQueue, TriesAgainWhenTheClockWasSetBack) {
+  TransmitQueue queue;
+  FakeSender sender;
+  sender.answers = {SendResult::kNoBuffer};
+  queue.push(numbered(1), at(1h));
+  queue.drain(at(1h), sender);
+  queue.drain(at(0ms), sender);
+  EXPECT_EQ(sender.taken, (Ids{1}));
+}
+
+}  // namespace
+}  // namespace vgyro::can
