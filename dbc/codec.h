@@ -1,0 +1,106 @@
+#pragma once
+
+// One signal of one message, its bit positions resolved once: payload bytes to value and back.
+// A payload shorter than the signal is never read: the caller asks fits() first.
+
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <optional>
+#include <span>
+#include <string>
+
+#include "base/error.h"
+#include "dbc/database.h"
+
+namespace vgyro::dbc {
+
+struct Reading {
+  /// Bit pattern as a number; for floats the IEEE bits, for 64-bit unsigned two's complement.
+  std::int64_t raw = 0;
+  double value = 0.0;  ///< physical: raw · factor + offset (of the float value, where it is one)
+};
+
+class SignalCodec {
+ public:
+  /// Error when the signal is longer than 64 bits, of zero length, not inside `message_bytes`, or
+  /// a float of another length than 32 or 64. `where` names the place in messages.
+  static Expected<SignalCodec> make(const Signal& signal, std::size_t message_bytes,
+                                    const std::string& where);
+
+  [[nodiscard]] bool fits(std::size_t payload_bytes) const {
+    return payload_bytes >= bytes_needed_;
+  }
+  [[nodiscard]] std::size_t bytes_needed() const { return bytes_needed_; }
+
+  /// Precondition: fits(payload.size()).
+  [[nodiscard]] Reading decode(std::span<const std::uint8_t> payload) const;
+
+  /// Rounds to the nearest raw value and saturates at the signal's range of raw values; NaN is an
+  /// error of the caller (it encodes as the smallest raw value). Precondition:
+  /// fits(payload.size()).
+  void encode(double value, std::span<std::uint8_t> payload) const;
+  /// Writes the lowest bits of `raw`. Precondition: fits(payload.size()).
+  void encode_raw(std::uint64_t raw, std::span<std::uint8_t> payload) const;
+
+  /// Physical values of the smallest and the largest raw value (of floats: ±largest finite).
+  [[nodiscard]] double representable_min() const;
+  [[nodiscard]] double representable_max() const;
+
+ private:
+  SignalCodec() = default;
+
+  void place(const Signal& signal);
+  [[nodiscard]] bool is_float() const;
+  [[nodiscard]] std::uint64_t load_window(const std::uint8_t* payload) const;
+  [[nodiscard]] std::uint64_t gather(const std::uint8_t* payload) const;
+  [[nodiscard]] double number(std::int64_t raw) const;
+  [[nodiscard]] std::uint64_t nearest_raw(double value) const;
+  [[nodiscard]] double number_min() const;
+  [[nodiscard]] double number_max() const;
+
+  double factor_ = 1.0;
+  double offset_ = 0.0;
+  std::size_t bytes_needed_ = 0;
+  // The eight bytes that end with the signal's last byte (or the payload's first eight) hold the
+  // whole signal, unless it straddles nine bytes: then the window ends beyond any payload.
+  std::size_t window_byte_ = 0;
+  std::size_t window_end_ = 0;
+  std::size_t lowest_byte_ = 0;  ///< holds the least significant bit
+  std::uint8_t lowest_bit_ = 0;  ///< of that byte
+  std::uint8_t span_bytes_ = 0;
+  std::uint8_t shift_up_ = 0;    ///< brings the signal to the top of the window
+  std::uint8_t shift_down_ = 0;  ///< from the top of a word to its bottom
+  ByteOrder byte_order_ = ByteOrder::kIntel;
+  ValueType type_ = ValueType::kUnsigned;
+};
+
+inline std::uint64_t SignalCodec::load_window(const std::uint8_t* payload) const {
+  std::uint64_t word = 0;
+  std::memcpy(&word, payload + window_byte_, sizeof word);
+  const bool host_is_intel = std::endian::native == std::endian::little;
+  return (byte_order_ == ByteOrder::kIntel) == host_is_intel ? word : __builtin_bswap64(word);
+}
+
+inline double SignalCodec::number(std::int64_t raw) const {
+  if (type_ == ValueType::kSigned) return static_cast<double>(raw);
+  if (type_ == ValueType::kUnsigned) {
+    // Cheaper than the unsigned conversion, and the same below 2^63.
+    return raw >= 0 ? static_cast<double>(raw)
+                    : static_cast<double>(static_cast<std::uint64_t>(raw));
+  }
+  if (type_ == ValueType::kFloat32) return std::bit_cast<float>(static_cast<std::uint32_t>(raw));
+  return std::bit_cast<double>(raw);
+}
+
+inline Reading SignalCodec::decode(std::span<const std::uint8_t> payload) const {
+  const std::uint64_t top = payload.size() >= window_end_ ? load_window(payload.data()) << shift_up_
+                                                          : gather(payload.data()) << shift_down_;
+  const std::int64_t raw = type_ == ValueType::kSigned
+                               ? static_cast<std::int64_t>(top) >> shift_down_
+                               : static_cast<std::int64_t>(top >> shift_down_);
+  return {raw, number(raw) * factor_ + offset_};
+}
+
+}  // namespace vgyro::dbc

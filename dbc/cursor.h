@@ -1,0 +1,78 @@
+#pragma once
+
+// A place in DBC text and the small things that can be read there. The first thing that is not
+// as asked is remembered; from then on reads return nothing and move nothing, so a statement is
+// written down as a sequence and asked once at its end whether it worked.
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <string_view>
+
+namespace vgyro::dbc {
+
+class Cursor {
+ public:
+  explicit Cursor(std::string_view text) : text_(text) {}
+
+  [[nodiscard]] bool at_end();
+  [[nodiscard]] unsigned line() const { return line_; }
+  [[nodiscard]] bool failed() const { return !error_.empty(); }
+  [[nodiscard]] const std::string& error() const { return error_; }
+  void fail(std::string what);
+
+  /// What comes next, read past blanks and newlines, without taking it.
+  [[nodiscard]] char peek();
+  [[nodiscard]] std::string_view peek_word();
+  [[nodiscard]] bool peek_number();
+
+  bool accept(char c);
+  bool accept_word(std::string_view word);
+  void expect(char c, std::string_view after);
+
+  /// Letters, digits, '_' and everything beyond ASCII; may begin with a digit.
+  std::string_view word(std::string_view what);
+  std::uint32_t integer(std::string_view what, std::uint32_t max);
+  std::uint64_t integer64(std::string_view what);
+  /// Overflow gives an infinity, underflow zero.
+  double number(std::string_view what);
+  /// An integer that may be negative, beyond 2^63 (two's complement), or written as "3.0".
+  std::int64_t label_value();
+  enum class Wrap : bool { kNo, kYes };
+  /// Unescaped text between quotes, over several lines where it may wrap.
+  std::string quoted(std::string_view what, Wrap wrap);
+  /// Empty when the line ends here.
+  std::string_view word_on_this_line();
+
+  /// Up to the end of the line, the newline itself left.
+  void skip_line();
+  /// Goes to the next line if a word stands alone on it.
+  bool next_line_is_one_word();
+  /// Takes everything up to and with the next ';' outside quotes, or up to a line that begins
+  /// with a keyword.
+  void skip_statement();
+
+  /// Forgets the error and goes on at the first line after `line_start` that begins with one.
+  struct Mark {
+    std::size_t position;
+    unsigned line;
+  };
+  [[nodiscard]] Mark mark();
+  void resume_after(const Mark& statement_start);
+
+ private:
+  void skip_blanks();
+  void step();
+  [[nodiscard]] bool line_begins_with_keyword() const;
+  [[nodiscard]] std::size_t closing_quote(std::size_t open) const;
+
+  std::string_view text_;
+  std::size_t position_ = 0;
+  unsigned line_ = 1;
+  std::string error_;
+};
+
+/// Is it the first word of a DBC section?
+bool is_keyword(std::string_view word);
+
+}  // namespace vgyro::dbc

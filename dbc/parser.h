@@ -1,0 +1,19 @@
+#pragma once
+
+// Reads DBC text as it is found in the wild. Never rejects a file for an odd line: the line gets a
+// diagnostic and the rest is kept. Hostile text costs time and memory linear in its size.
+
+#include <string>
+#include <string_view>
+
+#include "dbc/database.h"
+
+namespace vgyro::dbc {
+
+/// `path` is used in messages only.
+Database parse(std::string_view text, std::string path);
+
+/// Error when the file cannot be read or holds no message at all.
+Expected<Database> load(const std::string& path);
+
+}  // namespace vgyro::dbc
