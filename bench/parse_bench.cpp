@@ -1,5 +1,5 @@
-// What each stage costs per frame: the log's text, a signal's bits, the whole pipeline, the output's
-// text. Works on examples/twin.log.xz, unpacked into memory beforehand.
+// What each stage costs per frame: the log's text, a signal's bits, the whole pipeline, the
+// output's text. Works on examples/twin.log.xz, unpacked into memory beforehand.
 
 #include <algorithm>
 #include <cstdint>
@@ -43,8 +43,9 @@ Recording load_recording() {
   char line[can::kLineBytesMax];
   while (reader.next(record)) {
     out.records.push_back(record);
-    const std::size_t size = can::format_line(line, record.stamp, reader.interfaces().name(record.bus),
-                                              record.frame, record.fraction_digits);
+    const std::size_t size =
+        can::format_line(line, record.stamp, reader.interfaces().name(record.bus), record.frame,
+                         record.fraction_digits);
     out.text.append(line, size);
   }
   if (reader.error()) give_up(reader.error()->message());
@@ -97,7 +98,8 @@ void decode_rate(benchmark::State& state) {
   const auto& codec = plan.gyros.at(static_cast<std::size_t>(state.range(0))).rate.codec;
   const auto& records = recording().records;
   for (auto _ : state) {
-    for (const can::LogRecord& r : records) benchmark::DoNotOptimize(codec.decode(r.frame.payload()).value);
+    for (const can::LogRecord& r : records)
+      benchmark::DoNotOptimize(codec.decode(r.frame.payload()).value);
   }
   state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(records.size()));
 }

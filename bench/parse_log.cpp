@@ -19,7 +19,8 @@ int main(int argc, char** argv) {
   vgyro::can::LogReader reader(std::move(*source));
   vgyro::can::LogRecord record;
   unsigned long long id_sum = 0;  // printed, so that nothing of the parsing can be left out
-  while (reader.next(record)) id_sum += record.frame.id + record.frame.data[0];
+  while (reader.next(record))
+    id_sum += record.frame.id + record.frame.data[0];
   std::printf("%llu frames (sum %llu)\n", static_cast<unsigned long long>(reader.counts().frames),
               id_sum);
   return reader.error() ? 1 : 0;
