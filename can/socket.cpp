@@ -15,6 +15,7 @@
 #include <net/if_arp.h>
 #include <sys/ioctl.h>
 #include <sys/socket.h>
+#include <system_error>
 #include <unistd.h>
 #include <utility>
 #include <vector>
@@ -33,8 +34,8 @@ struct Link {
 };
 
 std::string reason(int error) {
-  return std::strerror(error);
-}  // NOLINT(concurrency-mt-unsafe)
+  return std::generic_category().message(error);
+}
 
 template <class T>
 bool set_option(int fd, int level, int name, const T& value) {
@@ -187,7 +188,7 @@ Expected<Socket> Socket::open(const std::string& interface, std::span<const Filt
                               const SocketOptions& options) {
   const Expected<int> fd = open_raw(interface);
   if (!fd) return tl::unexpected(fd.error());
-  Socket socket(*fd, false);
+  Socket socket(interface, *fd);
   const Expected<Link> link = find_link(*fd, interface);
   if (!link) return tl::unexpected(link.error());
   socket.fd_frames_ = link->fd_frames;
@@ -206,11 +207,12 @@ Expected<Socket> Socket::open(const std::string& interface, std::span<const Filt
   return socket;
 }
 
-Socket::Socket(int fd, bool fd_frames)
-    : fd_(fd), fd_frames_(fd_frames), buffers_(std::make_unique<Buffers>()) {}
+Socket::Socket(std::string interface, int fd)
+    : interface_(std::move(interface)), fd_(fd), buffers_(std::make_unique<Buffers>()) {}
 
 Socket::Socket(Socket&& other) noexcept
     : Sender(other),
+      interface_(std::move(other.interface_)),
       fd_(std::exchange(other.fd_, -1)),
       fd_frames_(other.fd_frames_),
       receive_buffer_bytes_(other.receive_buffer_bytes_),
@@ -220,6 +222,7 @@ Socket::Socket(Socket&& other) noexcept
       buffers_(std::move(other.buffers_)) {}
 
 Socket& Socket::operator=(Socket&& other) noexcept {
+  std::swap(interface_, other.interface_);
   std::swap(fd_, other.fd_);
   std::swap(buffers_, other.buffers_);
   fd_frames_ = other.fd_frames_;
@@ -232,6 +235,11 @@ Socket& Socket::operator=(Socket&& other) noexcept {
 
 Socket::~Socket() {
   if (fd_ >= 0) ::close(fd_);
+}
+
+bool Socket::link_up() const {
+  ifreq request = request_for(interface_);
+  return ::ioctl(fd_, SIOCGIFFLAGS, &request) == 0 && (request.ifr_flags & IFF_UP) != 0;
 }
 
 Batch Socket::receive() {

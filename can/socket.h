@@ -64,6 +64,7 @@ class Socket final : public Sender {
 
   [[nodiscard]] int fd() const { return fd_; }
   [[nodiscard]] bool fd_frames() const { return fd_frames_; }
+  [[nodiscard]] bool link_up() const;
   /// Received frames that the kernel dropped because the buffer was full, as far as it has told.
   [[nodiscard]] std::uint64_t drops() const { return drops_; }
   [[nodiscard]] int receive_buffer_bytes() const { return receive_buffer_bytes_; }
@@ -72,9 +73,10 @@ class Socket final : public Sender {
 
  private:
   struct Buffers;
-  Socket(int fd, bool fd_frames);
+  Socket(std::string interface, int fd);
   void read_control(std::size_t index, Received& out);
 
+  std::string interface_;
   int fd_ = -1;
   bool fd_frames_ = false;
   int receive_buffer_bytes_ = 0;
