@@ -1,0 +1,561 @@
+#include "can/candump.h"
+
+#include <algorithm>
+#include <bit>
+#include <cstring>
+
+#if defined(__SSE2__)
+#include <emmintrin.h>
+#endif
+
+#include <fmt/format.h>
+
+namespace vgyro::can {
+
+namespace {
+
+constexpr std::size_t kInterfaceNameMax = 31;  // the kernel allows 15; logs of other tools a little more
+// Beyond this a stamp in nanoseconds would not fit 64 bits.
+constexpr std::int64_t kSecondsMax = 9'000'000'000;
+// parse_usual() looks no further than this behind the start of a line.
+constexpr std::ptrdiff_t kLookaheadBytes = 96;
+
+constexpr std::array<std::int8_t, 256> make_hex_values() {
+  std::array<std::int8_t, 256> table{};
+  for (auto& entry : table) entry = -1;
+  for (int i = 0; i < 10; ++i) table[static_cast<std::size_t>('0' + i)] = static_cast<std::int8_t>(i);
+  for (int i = 0; i < 6; ++i) {
+    table[static_cast<std::size_t>('a' + i)] = static_cast<std::int8_t>(10 + i);
+    table[static_cast<std::size_t>('A' + i)] = static_cast<std::int8_t>(10 + i);
+  }
+  return table;
+}
+constexpr auto kHexValues = make_hex_values();
+
+constexpr std::array<char, 512> make_hex_pairs() {
+  constexpr char kDigits[] = "0123456789ABCDEF";
+  std::array<char, 512> table{};
+  for (std::size_t i = 0; i < 256; ++i) {
+    table[2 * i] = kDigits[i >> 4U];
+    table[2 * i + 1] = kDigits[i & 15U];
+  }
+  return table;
+}
+constexpr auto kHexPairs = make_hex_pairs();
+
+constexpr std::array<char, 200> make_decimal_pairs() {
+  std::array<char, 200> table{};
+  for (std::size_t i = 0; i < 100; ++i) {
+    table[2 * i] = static_cast<char>('0' + i / 10);
+    table[2 * i + 1] = static_cast<char>('0' + i % 10);
+  }
+  return table;
+}
+constexpr auto kDecimalPairs = make_decimal_pairs();
+
+int hex_value(char c) { return kHexValues[static_cast<unsigned char>(c)]; }
+bool is_digit(char c) { return c >= '0' && c <= '9'; }
+
+std::uint64_t load_word(const char* p) {
+  std::uint64_t word = 0;
+  std::memcpy(&word, p, sizeof word);
+  return word;
+}
+
+// Eight ASCII digits, the first in the lowest byte.
+bool all_digits(std::uint64_t word) {
+  return (((word + 0x4646464646464646U) | (word - 0x3030303030303030U)) & 0x8080808080808080U) == 0;
+}
+std::uint64_t digits_value(std::uint64_t word) {
+  word = (word & 0x0F0F0F0F0F0F0F0FU) * 2561U >> 8U;
+  word = (word & 0x00FF00FF00FF00FFU) * 6553601U >> 16U;
+  return (word & 0x0000FFFF0000FFFFU) * 42949672960001U >> 32U;
+}
+
+#if defined(__SSE2__)
+// Packs the hex digits at `p` (16 characters are readable) into bytes at `out`; returns how many
+// leading characters are hex digits.
+unsigned unpack_hex16(const char* p, std::uint8_t* out) {
+  const __m128i text = _mm_loadu_si128(reinterpret_cast<const __m128i*>(p));
+  const __m128i digit = _mm_sub_epi8(text, _mm_set1_epi8('0'));
+  const __m128i letter = _mm_sub_epi8(_mm_or_si128(text, _mm_set1_epi8(0x20)), _mm_set1_epi8('a'));
+  const __m128i is_dec = _mm_cmpeq_epi8(_mm_min_epu8(digit, _mm_set1_epi8(9)), digit);
+  const __m128i is_hex = _mm_cmpeq_epi8(_mm_min_epu8(letter, _mm_set1_epi8(5)), letter);
+  const __m128i nibble =
+      _mm_or_si128(_mm_and_si128(is_dec, digit),
+                   _mm_and_si128(is_hex, _mm_add_epi8(letter, _mm_set1_epi8(10))));
+  const __m128i pairs = _mm_and_si128(
+      _mm_or_si128(_mm_slli_epi16(nibble, 4), _mm_srli_epi16(nibble, 8)), _mm_set1_epi16(0xFF));
+  _mm_storel_epi64(reinterpret_cast<__m128i*>(out), _mm_packus_epi16(pairs, pairs));
+  const auto valid = static_cast<unsigned>(_mm_movemask_epi8(_mm_or_si128(is_dec, is_hex)));
+  return static_cast<unsigned>(std::countr_one(valid));
+}
+#else
+unsigned unpack_hex16(const char* p, std::uint8_t* out) {
+  unsigned count = 0;
+  while (count < 16 && hex_value(p[count]) >= 0) ++count;
+  for (unsigned i = 0; i + 1 < count; i += 2) {
+    out[i / 2] = static_cast<std::uint8_t>(hex_value(p[i]) << 4 | hex_value(p[i + 1]));
+  }
+  return count;
+}
+#endif
+
+// A cursor over one line; every step says whether it could be taken.
+class Cursor {
+ public:
+  explicit Cursor(std::string_view text) : text_(text) {}
+  [[nodiscard]] bool at_end() const { return text_.empty(); }
+  [[nodiscard]] char peek() const { return text_.empty() ? '\0' : text_.front(); }
+  [[nodiscard]] std::string_view rest() const { return text_; }
+  bool skip(char c) {
+    if (peek() != c || text_.empty()) return false;
+    text_.remove_prefix(1);
+    return true;
+  }
+  void skip_blanks() {
+    while (peek() == ' ' || peek() == '\t') text_.remove_prefix(1);
+  }
+  std::string_view word() {
+    const std::size_t end = std::min(text_.find_first_of(" \t"), text_.size());
+    const std::string_view found = text_.substr(0, end);
+    text_.remove_prefix(end);
+    return found;
+  }
+  std::string_view digits() { return take_while(is_digit); }
+  std::string_view hex() {
+    return take_while([](char c) { return hex_value(c) >= 0; });
+  }
+
+ private:
+  template <class Predicate>
+  std::string_view take_while(Predicate accept) {
+    std::size_t end = 0;
+    while (end < text_.size() && accept(text_[end])) ++end;
+    const std::string_view found = text_.substr(0, end);
+    text_.remove_prefix(end);
+    return found;
+  }
+  std::string_view text_;
+};
+
+std::uint32_t hex_number(std::string_view digits) {
+  std::uint32_t value = 0;
+  for (const char c : digits) value = value << 4U | static_cast<std::uint32_t>(hex_value(c));
+  return value;
+}
+
+const char* parse_stamp(Cursor& at, LogRecord& record) {
+  const std::string_view whole = at.digits();
+  if (whole.empty() || whole.size() > 10) return "stamp: the seconds are no number";
+  std::int64_t seconds = 0;
+  for (const char c : whole) seconds = seconds * 10 + (c - '0');
+  if (seconds > kSecondsMax) return "stamp: beyond the year 2255";
+  if (!at.skip('.')) return "stamp: no decimal point";
+  const std::string_view fraction = at.digits();
+  if (fraction.empty() || fraction.size() > 9) return "stamp: the fraction needs 1 to 9 digits";
+  std::int64_t ns = 0;
+  for (std::size_t i = 0; i < 9; ++i) ns = ns * 10 + (i < fraction.size() ? fraction[i] - '0' : 0);
+  if (!at.skip(')')) return "stamp: no closing parenthesis";
+  record.stamp = time_from_ns(seconds * 1'000'000'000 + ns);
+  record.fraction_digits = fraction.size() > 6 ? 9 : 6;
+  return nullptr;
+}
+
+const char* set_id(std::string_view digits, Frame& frame) {
+  const std::uint32_t value = hex_number(digits);
+  if (digits.size() == 3) {
+    if (value > kStandardIdMax) return "identifier: above 7FF needs 8 digits";
+    frame.id = value;
+    return nullptr;
+  }
+  if (digits.size() != 8) return "identifier: neither 3 nor 8 hex digits";
+  constexpr std::uint32_t kErrorBit = 0x20000000U;
+  if ((value & ~(kErrorBit | kExtendedIdMax)) != 0) return "identifier: above 1FFFFFFF";
+  frame.id = value & kExtendedIdMax;
+  frame.flags = (value & kErrorBit) != 0 ? kError : kExtended;
+  return nullptr;
+}
+
+// Bytes as hex pairs, optionally with dots between them.
+const char* parse_bytes(Cursor& at, std::uint8_t* out, std::size_t bytes_max, std::size_t& count) {
+  count = 0;
+  while (true) {
+    if (count > 0) at.skip('.');
+    if (hex_value(at.peek()) < 0 || at.at_end()) return nullptr;
+    const int high = hex_value(at.peek());
+    at.skip(at.peek());
+    if (at.at_end() || hex_value(at.peek()) < 0) return "payload: an odd number of hex digits";
+    const int low = hex_value(at.peek());
+    at.skip(at.peek());
+    if (count == bytes_max) return "payload: more bytes than the frame can hold";
+    out[count++] = static_cast<std::uint8_t>(high << 4 | low);
+  }
+}
+
+const char* parse_raw_dlc(Cursor& at, Frame& frame) {
+  if (!at.skip('_')) return nullptr;
+  const int dlc = hex_value(at.peek());
+  if (at.at_end() || dlc < 9) return "raw DLC: \"_\" needs 9 to F behind it";
+  at.skip(at.peek());
+  if (frame.length != kClassicBytesMax) return "raw DLC: only with 8 bytes";
+  frame.raw_dlc = static_cast<std::uint8_t>(dlc);
+  return nullptr;
+}
+
+const char* parse_remote(Cursor& at, Frame& frame) {
+  frame.flags |= kRemote;
+  if (is_digit(at.peek())) {
+    if (at.peek() > '8') return "remote frame: length above 8";
+    frame.length = static_cast<std::uint8_t>(at.peek() - '0');
+    at.skip(at.peek());
+  }
+  return parse_raw_dlc(at, frame);
+}
+
+const char* parse_classic(Cursor& at, Frame& frame) {
+  if (at.skip('R') || at.skip('r')) return parse_remote(at, frame);
+  std::size_t count = 0;
+  const char* why = parse_bytes(at, frame.data.data(), kClassicBytesMax, count);
+  frame.length = static_cast<std::uint8_t>(count);
+  return why != nullptr ? why : parse_raw_dlc(at, frame);
+}
+
+const char* parse_fd(Cursor& at, Frame& frame) {
+  constexpr int kBrsNibble = 1;
+  constexpr int kEsiNibble = 2;
+  const int nibble = hex_value(at.peek());
+  if (at.at_end() || nibble < 0) return "FD frame: no flags behind \"##\"";
+  at.skip(at.peek());
+  frame.flags |= kFd;
+  if ((nibble & kBrsNibble) != 0) frame.flags |= kBitRateSwitch;
+  if ((nibble & kEsiNibble) != 0) frame.flags |= kErrorStateIndicator;
+  std::size_t count = 0;
+  const char* why = parse_bytes(at, frame.data.data(), kFdBytesMax, count);
+  frame.length = static_cast<std::uint8_t>(count);
+  return why;
+}
+
+// VVPPP#FF:SS:AAAAAAAA#DATA, with VV and PPP already read as `id`.
+const char* parse_xl(std::string_view id, Cursor& at, XlFrame& xl) {
+  const std::string_view flags = at.hex();
+  const bool first = flags.size() == 2 && at.skip(':');
+  const std::string_view sdt = at.hex();
+  const bool second = first && sdt.size() == 2 && at.skip(':');
+  const std::string_view acceptance = at.hex();
+  if (!second || acceptance.size() != 8 || !at.skip('#')) return "XL frame: not VVPPP#FF:SS:AAAAAAAA#";
+  xl.vcid = static_cast<std::uint8_t>(hex_number(id.substr(0, 2)));
+  xl.priority = static_cast<std::uint16_t>(hex_number(id.substr(2)));
+  if (xl.priority > kStandardIdMax) return "XL frame: priority above 7FF";
+  xl.flags = static_cast<std::uint8_t>(hex_number(flags));
+  xl.sdt = static_cast<std::uint8_t>(hex_number(sdt));
+  xl.acceptance = hex_number(acceptance);
+  std::size_t count = 0;
+  const char* why = parse_bytes(at, xl.data.data(), kXlBytesMax, count);
+  xl.length = static_cast<std::uint16_t>(count);
+  return why;
+}
+
+const char* parse_frame_text(Cursor& at, LogRecord& record, XlFrame& xl) {
+  Frame& frame = record.frame;
+  frame.flags = 0;
+  frame.length = 0;
+  frame.raw_dlc = 0;
+  frame.id = 0;
+  const std::string_view id = at.hex();
+  if (!at.skip('#')) return "no \"#\" behind the identifier";
+  if (id.size() == 5) {
+    record.is_xl = true;
+    return parse_xl(id, at, xl);
+  }
+  if (const char* why = set_id(id, frame)) return why;
+  return at.skip('#') ? parse_fd(at, frame) : parse_classic(at, frame);
+}
+
+const char* parse_direction(Cursor& at, LogRecord& record) {
+  at.skip_blanks();
+  if (at.skip('R')) record.direction = Direction::kReceived;
+  if (at.skip('T')) record.direction = Direction::kTransmitted;
+  at.skip_blanks();
+  return at.at_end() ? nullptr : "something stands behind the frame";
+}
+
+}  // namespace
+
+std::optional<BusIndex> InterfaceTable::index_of(std::string_view name) {
+  const auto found = std::find(names_.begin(), names_.end(), name);
+  if (found != names_.end()) return static_cast<BusIndex>(found - names_.begin());
+  if (names_.size() == kMax) return std::nullopt;
+  names_.emplace_back(name);
+  return static_cast<BusIndex>(names_.size() - 1);
+}
+
+LineResult parse_line(std::string_view line, InterfaceTable& interfaces, LogRecord& record,
+                      XlFrame& xl) {
+  if (!line.empty() && line.back() == '\r') line.remove_suffix(1);
+  Cursor at(line);
+  if (!at.skip('(')) return {LineKind::kOther, ""};
+  record.is_xl = false;
+  record.direction = Direction::kUnknown;
+  if (const char* why = parse_stamp(at, record)) return {LineKind::kMalformed, why};
+  at.skip_blanks();
+  const std::string_view name = at.word();
+  if (name.empty() || name.size() > kInterfaceNameMax || name.find('#') != name.npos) {
+    return {LineKind::kMalformed, "no interface name"};
+  }
+  at.skip_blanks();
+  if (const char* why = parse_frame_text(at, record, xl)) return {LineKind::kMalformed, why};
+  if (const char* why = parse_direction(at, record)) return {LineKind::kMalformed, why};
+  const auto bus = interfaces.index_of(name);
+  if (!bus) return {LineKind::kMalformed, "more than 64 different interfaces"};
+  record.bus = *bus;
+  return {record.is_xl ? LineKind::kXl : LineKind::kFrame, ""};
+}
+
+LogReader::LogReader(std::unique_ptr<LogSource> source)
+    : source_(std::move(source)), xl_(std::make_unique<XlFrame>()) {}
+
+const LogReader::KnownInterface* LogReader::known_interface(std::uint64_t word) const {
+  for (std::size_t i = 0; i < known_count_; ++i) {
+    if ((word & known_[i].mask) == known_[i].word) return &known_[i];
+  }
+  return nullptr;
+}
+
+void LogReader::remember_interface(BusIndex bus) {
+  const std::string& name = interfaces_.name(bus);
+  // Only the first few names of up to seven characters take the quick way.
+  if (bus != known_count_ || known_count_ == known_.size() || name.size() > 7) return;
+  KnownInterface& known = known_[known_count_++];
+  char text[8] = {};
+  std::memcpy(text, name.data(), name.size());
+  text[name.size()] = ' ';
+  known.length = static_cast<std::uint8_t>(name.size() + 1);
+  known.mask = known.length == 8 ? ~0ULL : (1ULL << (8U * known.length)) - 1;
+  known.word = load_word(text) & known.mask;
+  known.bus = bus;
+}
+
+// "(SSSSSSSSSS.FFFFFF) IFACE ID#HEX\n" as candump writes it nearly always. Returns the start of
+// the next line, or null where the line is of another form, which is for parse_line() to judge.
+// Precondition: kLookaheadBytes are readable at `p`.
+const char* LogReader::parse_usual(const char* p, LogRecord& record) {
+  if constexpr (std::endian::native != std::endian::little) return nullptr;
+  if (p[0] != '(' || p[11] != '.' || p[18] != ')' || p[19] != ' ') return nullptr;
+  const std::uint64_t high = load_word(p + 1);
+  const std::uint64_t low = load_word(p + 3);
+  if (high != seconds_text_[0] || low != seconds_text_[1]) {
+    if (!all_digits(high) || !all_digits(low)) return nullptr;
+    const auto seconds = static_cast<std::int64_t>(digits_value(high) * 100 + digits_value(low) % 100);
+    if (seconds > kSecondsMax) return nullptr;
+    seconds_ns_ = seconds * 1'000'000'000;
+    seconds_text_[0] = high;
+    seconds_text_[1] = low;
+  }
+  const std::uint64_t fraction = load_word(p + 12) << 16U | 0x3030U;
+  const KnownInterface* known = known_interface(load_word(p + 20));
+  if (!all_digits(fraction) || known == nullptr) return nullptr;
+
+  Frame& frame = record.frame;
+  p += 20 + known->length;
+  if (p[3] == '#') {
+    const int a = hex_value(p[0]);
+    const int b = hex_value(p[1]);
+    const int c = hex_value(p[2]);
+    if ((a | b | c) < 0 || a > 7) return nullptr;
+    frame.id = static_cast<std::uint32_t>(a << 8 | b << 4 | c);
+    frame.flags = 0;
+    p += 4;
+  } else if (p[8] == '#') {
+    std::uint8_t bytes[8];
+    if (unpack_hex16(p, bytes) != 8 || bytes[0] > 0x1F) return nullptr;
+    frame.id = static_cast<std::uint32_t>(bytes[0]) << 24U | static_cast<std::uint32_t>(bytes[1]) << 16U |
+               static_cast<std::uint32_t>(bytes[2]) << 8U | bytes[3];
+    frame.flags = kExtended;
+    p += 9;
+  } else {
+    return nullptr;
+  }
+  const unsigned digits = unpack_hex16(p, frame.data.data());
+  if (digits % 2 != 0 || p[digits] != '\n') return nullptr;
+  frame.length = static_cast<std::uint8_t>(digits / 2);
+  frame.raw_dlc = 0;
+  record.stamp = time_from_ns(seconds_ns_ + static_cast<std::int64_t>(digits_value(fraction)) * 1000);
+  record.bus = known->bus;
+  record.fraction_digits = 6;
+  record.direction = Direction::kUnknown;
+  record.is_xl = false;
+  return p + digits + 1;
+}
+
+void LogReader::count_malformed(const char* why) {
+  ++counts_.malformed_lines;
+  if (counts_.first_malformed.size() < LogCounts::kFirstMalformedMax) {
+    counts_.first_malformed.push_back({counts_.lines, why});
+  }
+}
+
+bool LogReader::refill() {
+  while (at_ == end_) {
+    if (source_ == nullptr) return false;
+    const auto block = source_->next();
+    if (!block) {
+      error_ = block.error();
+      source_.reset();
+      return false;
+    }
+    if (block->overlong) {
+      ++counts_.lines;
+      count_malformed("the line is longer than any frame");
+    }
+    at_ = block->text.data();
+    end_ = at_ + block->text.size();
+    if (block->cut_off) ++counts_.cut_off_lines;
+    // The block lives in the source's buffer, so the source stays until it has been used up.
+    if (block->end && at_ == end_) {
+      source_.reset();
+      return false;
+    }
+  }
+  return true;
+}
+
+bool LogReader::next(LogRecord& record) {
+  while (true) {
+    if (at_ == end_ && !refill()) return false;
+    ++counts_.lines;
+    if (end_ - at_ >= kLookaheadBytes) {
+      if (const char* next_line = parse_usual(at_, record)) {
+        at_ = next_line;
+        ++counts_.frames;
+        return true;
+      }
+    }
+    const auto* newline =
+        static_cast<const char*>(std::memchr(at_, '\n', static_cast<std::size_t>(end_ - at_)));
+    const std::string_view line(at_, static_cast<std::size_t>(newline - at_));
+    at_ = newline + 1;
+    const std::size_t interfaces_before = interfaces_.names().size();
+    const LineResult result = parse_line(line, interfaces_, record, *xl_);
+    if (interfaces_.names().size() > interfaces_before) {
+      remember_interface(static_cast<BusIndex>(interfaces_before));
+    }
+    switch (result.kind) {
+      case LineKind::kFrame:
+        ++counts_.frames;
+        return true;
+      case LineKind::kXl:
+        ++counts_.xl_frames;
+        return true;
+      case LineKind::kOther:
+        ++counts_.other_lines;
+        break;
+      case LineKind::kMalformed:
+        count_malformed(result.why);
+        break;
+    }
+  }
+}
+
+namespace {
+
+char* put_decimal(char* out, std::uint64_t value, unsigned digits) {
+  for (unsigned i = digits; i >= 2; i -= 2) {
+    std::memcpy(out + i - 2, &kDecimalPairs[2 * (value % 100)], 2);
+    value /= 100;
+  }
+  if (digits % 2 != 0) out[0] = static_cast<char>('0' + value % 10);
+  return out + digits;
+}
+
+char* put_hex(char* out, std::uint32_t value, unsigned digits) {
+  for (unsigned i = digits; i-- > 0; value >>= 4U) out[i] = kHexPairs[2 * (value & 15U) + 1];
+  return out + digits;
+}
+
+char* put_bytes(char* out, const std::uint8_t* data, std::size_t count) {
+  for (std::size_t i = 0; i < count; ++i) {
+    std::memcpy(out, &kHexPairs[2 * static_cast<std::size_t>(data[i])], 2);
+    out += 2;
+  }
+  return out;
+}
+
+char* put_prefix(char* out, TimePoint stamp, std::string_view interface, unsigned fraction_digits) {
+  const auto ns = static_cast<std::uint64_t>(std::max<std::int64_t>(to_ns(stamp), 0));
+  const std::uint64_t seconds = ns / 1'000'000'000;
+  const std::uint64_t rest = ns % 1'000'000'000;
+  *out++ = '(';
+  out = put_decimal(out, seconds, 10);
+  *out++ = '.';
+  out = fraction_digits == 9 ? put_decimal(out, rest, 9) : put_decimal(out, rest / 1000, 6);
+  *out++ = ')';
+  *out++ = ' ';
+  const std::size_t length = std::min(interface.size(), kInterfaceNameMax);
+  std::memcpy(out, interface.data(), length);
+  out += length;
+  *out++ = ' ';
+  return out;
+}
+
+char* put_direction(char* out, Direction direction) {
+  if (direction != Direction::kUnknown) {
+    *out++ = ' ';
+    *out++ = direction == Direction::kReceived ? 'R' : 'T';
+  }
+  *out++ = '\n';
+  return out;
+}
+
+char* put_frame(char* out, const Frame& frame) {
+  constexpr std::uint32_t kErrorBit = 0x20000000U;
+  if (frame.has(kError)) {
+    out = put_hex(out, frame.id | kErrorBit, 8);
+  } else {
+    out = put_hex(out, frame.id, frame.has(kExtended) ? 8 : 3);
+  }
+  *out++ = '#';
+  if (frame.has(kFd)) {
+    *out++ = '#';
+    const unsigned nibble = (frame.has(kBitRateSwitch) ? 1U : 0U) |
+                            (frame.has(kErrorStateIndicator) ? 2U : 0U);
+    out = put_hex(out, nibble, 1);
+    return put_bytes(out, frame.data.data(), std::min<std::size_t>(frame.length, kFdBytesMax));
+  }
+  const std::size_t length = std::min<std::size_t>(frame.length, kClassicBytesMax);
+  if (frame.has(kRemote)) {
+    *out++ = 'R';
+    if (length > 0) *out++ = static_cast<char>('0' + length);
+  } else {
+    out = put_bytes(out, frame.data.data(), length);
+  }
+  if (frame.raw_dlc > 8 && length == kClassicBytesMax) {
+    *out++ = '_';
+    out = put_hex(out, frame.raw_dlc, 1);
+  }
+  return out;
+}
+
+}  // namespace
+
+std::size_t format_line(char* out, TimePoint stamp, std::string_view interface, const Frame& frame,
+                        unsigned fraction_digits, Direction direction) {
+  char* at = put_prefix(out, stamp, interface, fraction_digits);
+  at = put_frame(at, frame);
+  at = put_direction(at, direction);
+  return static_cast<std::size_t>(at - out);
+}
+
+std::string format_xl_line(TimePoint stamp, std::string_view interface, const XlFrame& frame,
+                           unsigned fraction_digits, Direction direction) {
+  std::string text(kLineBytesMax + 2 * kXlBytesMax, '\0');
+  char* at = put_prefix(text.data(), stamp, interface, fraction_digits);
+  at = fmt::format_to(at, "{:02X}{:03X}#{:02X}:{:02X}:{:08X}#", frame.vcid, frame.priority,
+                      frame.flags, frame.sdt, frame.acceptance);
+  at = put_bytes(at, frame.data.data(), std::min<std::size_t>(frame.length, kXlBytesMax));
+  at = put_direction(at, direction);
+  text.resize(static_cast<std::size_t>(at - text.data()));
+  return text;
+}
+
+}  // namespace vgyro::can

@@ -1,0 +1,100 @@
+#pragma once
+
+// Two gyros' samples, each at its own rate and phase, become pairs at common instants. One gyro
+// paces: pairs stand at its stamps, and the other is brought there: by linear interpolation between
+// its two neighbours, or, where it is at least kAverageRatio times faster, by the mean of its
+// interpolant over one pace interval, so that none of its information is lost and nothing aliases.
+// A pair is complete with the first sample of the other gyro at or behind it; that is the latency.
+// Buffers are bounded; a sample that can no longer be paired is counted, never used.
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+#include "base/time.h"
+
+namespace vgyro::fusion {
+
+struct AlignedPair {
+  TimePoint t;                      ///< the instant that both rates refer to
+  TimePoint complete;               ///< stamp of the sample that completed the pair
+  std::array<double, 2> rate_dps{};
+};
+
+class Aligner {
+ public:
+  static constexpr std::size_t kCapacity = 512;
+  /// Samples of each gyro before the pacing gyro is chosen.
+  static constexpr std::size_t kSamplesToChoose = 8;
+  /// An interval longer than this many of its own usual ones is a gap: nothing is interpolated in it.
+  static constexpr double kGapIntervals = 4.0;
+  static constexpr double kAverageRatio = 1.5;
+
+  /// False when the sample is older than what has already been used.
+  bool push(std::size_t gyro, TimePoint t, double rate_dps);
+
+  /// The next complete pair; t grows from pair to pair.
+  bool pop(AlignedPair& pair);
+
+  /// Forget all samples, keep the choice: after a step of the clock.
+  void clear();
+
+  struct Counts {
+    /// Of the gyro that sets the instants: inside a gap of the other one, or pushed out of the buffer
+    /// by waiting for it.
+    std::array<std::uint64_t, 2> unpaired{};
+  };
+  [[nodiscard]] const Counts& counts() const { return counts_; }
+
+  [[nodiscard]] bool chosen() const { return chosen_; }
+  /// Gyro at whose stamps the pairs stand. Precondition of both: chosen().
+  [[nodiscard]] std::size_t pacing_gyro() const { return pace_; }
+  [[nodiscard]] Duration interval(std::size_t gyro) const { return interval_[gyro]; }
+
+ private:
+  struct Sample {
+    TimePoint t;
+    double rate_dps = 0.0;
+  };
+  class Ring {
+   public:
+    [[nodiscard]] std::size_t size() const { return size_; }
+    [[nodiscard]] bool empty() const { return size_ == 0; }
+    [[nodiscard]] const Sample& operator[](std::size_t i) const {
+      return samples_[(head_ + i) & (kCapacity - 1)];
+    }
+    [[nodiscard]] const Sample& back() const { return (*this)[size_ - 1]; }
+    void pop_front(std::size_t count = 1) {
+      head_ = (head_ + count) & (kCapacity - 1);
+      size_ -= count;
+    }
+    void clear() { size_ = 0; }
+    /// Keeps the stamps ascending. Precondition: size() < kCapacity, no equal stamp inside.
+    void insert(const Sample& sample);
+    [[nodiscard]] bool contains(TimePoint t) const;
+
+   private:
+    static_assert((kCapacity & (kCapacity - 1)) == 0);
+    std::array<Sample, kCapacity> samples_;
+    std::size_t head_ = 0;
+    std::size_t size_ = 0;
+  };
+
+  void choose_pace();
+  [[nodiscard]] Duration mean_wait(std::size_t pace) const;
+  bool interpolate(const Ring& other, AlignedPair& pair, std::size_t other_index, bool& wait);
+  bool average(const Ring& other, AlignedPair& pair, std::size_t other_index, bool& wait);
+
+  std::array<Ring, 2> rings_;
+  std::array<Duration, 2> interval_{};
+  std::array<Duration, 2> gap_{};
+  std::array<TimePoint, 2> used_until_{};  ///< samples at or before this come too late
+  std::array<bool, 2> any_used_{};
+  TimePoint burst_until_{};  ///< pairs of the start-up buffer became complete only then
+  Duration half_window_{0};  ///< of the averaging; 0 where interpolation does
+  std::size_t pace_ = 0;
+  bool chosen_ = false;
+  Counts counts_;
+};
+
+}  // namespace vgyro::fusion

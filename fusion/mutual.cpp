@@ -1,0 +1,97 @@
+#include <cmath>
+#include <limits>
+
+#include "fusion/corrector.h"
+#include "fusion/least_squares.h"
+
+// The paper's steps, per window i, with P_k the fitted and p_k the predicted (extrapolated) drifts:
+//   cross drifts   d₁ = y₁ − (y₂ − p₂) = δ + p₂,   d₂ = −δ + p₁,   δ = y₁ − y₂
+//   fit            P₁ⁱ = D + p₂, P₂ⁱ = −D + p₁      with D the fit of δ: a fit of a polynomial is itself
+//   average        c₁ = ½(p₁ + P₁ⁱ) = ½(S + D),     c₂ = ½(S − D),  S = p₁ + p₂
+//   virtual gyro   Ω = ½(y₁ + y₂) − ½(c₁ + c₂) = ½(y₁ + y₂) − ½S
+// and P₁ⁱ + P₂ⁱ = p₁ + p₂ = S is the calibration's sum, extrapolated for ever. So S from the
+// calibration and one fit D per window are the whole method; docs/mutual.md has the derivation, and
+// the tests hold it against the literal steps.
+
+namespace vgyro::fusion {
+
+namespace {
+
+constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+
+class MutualCorrector final : public Corrector {
+ public:
+  MutualCorrector(int order, double window_s)
+      : order_(order), window_s_(window_s), window_(order, 0.0, window_s) {}
+
+  [[nodiscard]] bool needs_calibration() const override { return true; }
+
+  void start(const Calibration& calibration) override {
+    sum_ = calibration.sum;
+    difference_ = calibration.difference;
+    open_window(calibration.end_s);
+  }
+
+  VirtualRate update(const RatePair& pair) override {
+    if (pair.t_s >= window_end_s_) close_window(pair.t_s);
+    window_.add(pair.t_s, pair.rate_dps[0] - pair.rate_dps[1]);
+    const double sum = sum_.at(pair.t_s);
+    const double difference = difference_.at(pair.t_s);
+    return {0.5 * (pair.rate_dps[0] + pair.rate_dps[1]) - 0.5 * sum,
+            kNone,
+            {pair.rate_dps[0] - 0.5 * (sum + difference),
+             pair.rate_dps[1] - 0.5 * (sum - difference)}};
+  }
+
+  [[nodiscard]] VirtualRate carry_on(std::size_t gyro, double t_s, double rate_dps) const override {
+    VirtualRate alone{rate_dps - drift(t_s).bias_dps[gyro], kNone, {kNone, kNone}};
+    alone.corrected_dps[gyro] = alone.rate_dps;
+    return alone;
+  }
+
+  [[nodiscard]] Drift drift(double t_s) const override {
+    const double sum = sum_.at(t_s);
+    const double difference = difference_.at(t_s);
+    return {{0.5 * (sum + difference), 0.5 * (sum - difference)},
+            0.5 * sum_.slope_at(t_s),
+            kNone,
+            kNone};
+  }
+
+  [[nodiscard]] WindowCounts windows() const override { return counts_; }
+
+ private:
+  void open_window(double from_s) {
+    window_end_s_ = from_s + window_s_;
+    window_ = LeastSquares(order_, from_s, window_s_);
+  }
+
+  void close_window(double t_s) {
+    if (const auto fit = window_.fit()) {
+      difference_ = fit->polynomial;
+      ++counts_.completed;
+    } else {
+      ++counts_.skipped;
+    }
+    // After a gap of any length the windows stay on their grid.
+    const double behind = std::floor((t_s - window_end_s_) / window_s_);
+    counts_.skipped += static_cast<std::uint64_t>(behind);
+    open_window(window_end_s_ + behind * window_s_);
+  }
+
+  int order_;
+  double window_s_;
+  LeastSquares window_;
+  double window_end_s_ = 0.0;
+  Polynomial sum_;         ///< S
+  Polynomial difference_;  ///< D of the last completed window; of the calibration before the first
+  WindowCounts counts_;
+};
+
+}  // namespace
+
+std::unique_ptr<Corrector> make_mutual_corrector(int order, double window_s) {
+  return std::make_unique<MutualCorrector>(order, window_s);
+}
+
+}  // namespace vgyro::fusion

@@ -1,0 +1,47 @@
+#pragma once
+
+// Raw stamps in, monotone time out. Stamps come from a clock that may be set, and from frames that
+// may be garbage: one stamp far off its neighbours is refused; three in a row that agree with each
+// other are believed. Set back by more than the reorder limit, the common offset takes it up, so
+// that time as the estimation sees it never runs backwards. One guard serves all streams of a host.
+
+#include <array>
+#include <cstdint>
+
+#include "base/time.h"
+
+namespace vgyro::fusion {
+
+class StampGuard {
+ public:
+  static constexpr std::size_t kStreams = 3;
+  /// Only the first streams, the gyros, may move the clock; a reference that jumps back waits.
+  static constexpr std::size_t kLeaders = 2;
+  static constexpr Duration kReorderMax = std::chrono::milliseconds(250);
+  static constexpr Duration kForwardMax = std::chrono::seconds(10);
+  static constexpr Duration kConfirmWithin = std::chrono::seconds(1);
+  static constexpr int kConfirmations = 3;
+
+  enum class Verdict : std::uint8_t { kAccepted, kRepeated, kUnconfirmed, kClockStep };
+
+  /// The stamp on the monotone axis goes to `time` unless the verdict is kUnconfirmed or kRepeated.
+  /// kClockStep: accepted, and all streams' earlier samples are of the time before the step.
+  Verdict check(std::size_t stream, TimePoint raw, TimePoint& time);
+
+  /// monotone = raw + offset
+  [[nodiscard]] Duration offset() const { return offset_; }
+
+ private:
+  struct Stream {
+    bool seen = false;
+    TimePoint last;       ///< newest accepted, monotone
+    TimePoint candidate;  ///< newest stamp that waits for confirmation, monotone
+    int confirmations = 0;
+  };
+  Verdict consider(std::size_t stream_index, TimePoint& time);
+
+  std::array<Stream, kStreams> streams_;
+  Duration offset_{0};
+};
+
+}  // namespace vgyro::fusion

@@ -1,0 +1,428 @@
+#include "gateway/config.h"
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <numbers>
+
+#include <fmt/core.h>
+
+#include "base/file.h"
+#include "base/nearest.h"
+#include "fusion/polynomial.h"
+#include "gateway/signal_resolver.h"
+#include "gateway/toml_reader.h"
+
+namespace vgyro::gateway {
+
+namespace {
+
+// IERS: the Earth turns 7.292115e-5 rad/s against the stars.
+constexpr double kEarthRate_dps = 7.292115e-5 * 180.0 / std::numbers::pi;
+constexpr double kRestMax_s = 86'400.0;
+constexpr double kWindowMax_s = 3'600.0;
+
+struct Context {
+  std::string file;
+  std::string folder;
+  std::vector<Error> errors;
+  Resolved resolved;
+  DatabaseCache cache{resolved.warnings};
+};
+
+// "Status == 0"
+struct ComparisonText {
+  std::string signal;
+  Comparison comparison = Comparison::kEqual;
+  double value = 0.0;
+};
+
+std::optional<ComparisonText> parse_comparison(std::string_view text) {
+  struct Operator {
+    std::string_view sign;
+    Comparison comparison;
+  };
+  // Two-character operators first: "<=" begins with "<".
+  constexpr Operator kOperators[] = {
+      {"==", Comparison::kEqual},        {"!=", Comparison::kNotEqual}, {"<=", Comparison::kLessEqual},
+      {">=", Comparison::kGreaterEqual}, {"<", Comparison::kLess},      {">", Comparison::kGreater}};
+  const auto trimmed = [](std::string_view part) {
+    const std::size_t first = part.find_first_not_of(" \t");
+    if (first == part.npos) return std::string();
+    return std::string(part.substr(first, part.find_last_not_of(" \t") - first + 1));
+  };
+  for (const Operator& op : kOperators) {
+    const std::size_t at = text.find(op.sign);
+    if (at == text.npos) continue;
+    ComparisonText result{trimmed(text.substr(0, at)), op.comparison, 0.0};
+    const std::string number = trimmed(text.substr(at + op.sign.size()));
+    char* end = nullptr;
+    result.value = std::strtod(number.c_str(), &end);
+    const bool whole = !number.empty() && end == number.c_str() + number.size();
+    if (result.signal.empty() || !whole || !std::isfinite(result.value)) return std::nullopt;
+    return result;
+  }
+  return std::nullopt;
+}
+
+void read_sign(TomlReader& reader, Quantity& rate) {
+  const auto sign = reader.integer("sign");
+  if (!sign) return;
+  if (*sign != 1 && *sign != -1) {
+    reader.complain(reader.where("sign"), fmt::format("sign is {}", *sign),
+                    "1, or -1 to flip the axis");
+    return;
+  }
+  rate.scale *= static_cast<double>(*sign);
+}
+
+void read_source_address(TomlReader& reader, const dbc::Message& message, FrameMatch& match) {
+  const auto address = reader.integer("source_address");
+  if (!address) return;
+  if (!message.is_j1939 || *address < 0 || *address > 255) {
+    reader.complain(reader.where("source_address"),
+                    "source_address is 0 to 255, for a J1939 message",
+                    "a message is J1939 when its DBC attribute VFrameFormat is J1939PG");
+    return;
+  }
+  match.id = (match.id & ~0xFFU) | static_cast<std::uint32_t>(*address);
+  match.mask |= 0xFFU;
+}
+
+// Helper signals are read from every frame, so they must stand on every page that has the rate.
+bool same_page(TomlReader& reader, std::string_view key, const dbc::Signal& helper,
+               const dbc::Signal& rate) {
+  if (!helper.condition || rate.condition) return true;
+  reader.complain(reader.where(key),
+                  fmt::format("{} is multiplexed and {} is not", helper.name, rate.name));
+  return false;
+}
+
+std::optional<AliveCounter> read_counter(TomlReader& reader, SignalResolver& resolver,
+                                         const dbc::Signal& rate) {
+  const dbc::Signal* signal = resolver.signal("counter", false);
+  if (signal == nullptr || !same_page(reader, "counter", *signal, rate)) return std::nullopt;
+  const auto codec = resolver.codec(*signal);
+  if (!codec) return std::nullopt;
+  const bool is_integer =
+      signal->type == dbc::ValueType::kSigned || signal->type == dbc::ValueType::kUnsigned;
+  if (!is_integer || signal->length_bits > 31 || signal->length_bits < 2) {
+    reader.complain(reader.where("counter"),
+                    fmt::format("{} is no alive counter: it has {} bits", signal->name,
+                                signal->length_bits),
+                    "an integer signal of 2 to 31 bits");
+    return std::nullopt;
+  }
+  AliveCounter counter{signal->name, *codec, 1U << signal->length_bits};
+  // AUTOSAR counters leave the last value out; any other range is not about the counter.
+  if (signal->maximum == counter.modulus - 2.0) counter.modulus -= 1;
+  return counter;
+}
+
+std::optional<Condition> read_condition(TomlReader& reader, SignalResolver& resolver,
+                                        const dbc::Signal& rate) {
+  const auto text = reader.text("valid");
+  if (!text) return std::nullopt;
+  const auto parsed = parse_comparison(*text);
+  if (!parsed) {
+    reader.complain(reader.where("valid"), fmt::format("\"{}\" is no comparison", *text),
+                    "for example valid = \"Status == 0\"; ==, !=, <, <=, >, >= and a number");
+    return std::nullopt;
+  }
+  const dbc::Signal* signal = resolver.signal_named(parsed->signal, "valid");
+  if (signal == nullptr || !same_page(reader, "valid", *signal, rate)) return std::nullopt;
+  const auto codec = resolver.codec(*signal);
+  if (!codec) return std::nullopt;
+  return Condition{*codec, parsed->comparison, parsed->value, *text};
+}
+
+std::optional<GyroPlan> read_gyro(const toml::table& table, std::size_t index, Context& context) {
+  TomlReader reader(table, context.file, "[[gyro]]", context.errors);
+  const std::size_t errors_before = context.errors.size();
+  const std::string name = reader.text("name").value_or(index == 0 ? "a" : "b");
+  SignalResolver resolver(reader, context.cache, context.folder, context.resolved.plan.buses,
+                          context.resolved.warnings);
+  const dbc::Signal* rate_signal = resolver.signal("rate", true);
+  const dbc::Signal* sign_signal = resolver.signal("sign_signal", false);
+  const dbc::Signal* temperature_signal = resolver.signal("temperature", false);
+  const auto unit = reader.text("unit");
+  std::optional<GyroPlan> gyro;
+  std::optional<Quantity> rate;
+  if (rate_signal != nullptr) rate = resolver.quantity(*rate_signal, "rate", Dimension::kRate, unit);
+  if (rate) {
+    gyro.emplace(GyroPlan{.name = name,
+                          .bus = resolver.bus(),
+                          .message = resolver.message().name,
+                          .match = resolver.match(),
+                          .rate = *rate,
+                          .sign = {},
+                          .temperature = {},
+                          .counter = {},
+                          .valid = {}});
+    read_sign(reader, gyro->rate);
+    read_source_address(reader, resolver.message(), gyro->match);
+    gyro->counter = read_counter(reader, resolver, *rate_signal);
+    gyro->valid = read_condition(reader, resolver, *rate_signal);
+    if (sign_signal != nullptr && same_page(reader, "sign_signal", *sign_signal, *rate_signal)) {
+      gyro->sign = resolver.codec(*sign_signal);
+    }
+    if (temperature_signal != nullptr) {
+      gyro->temperature =
+          resolver.quantity(*temperature_signal, "temperature", Dimension::kTemperature);
+    }
+  } else {
+    // Ask for the rest, so that a good key is not called unknown on top of the real trouble.
+    reader.forgive({"sign", "source_address", "counter", "valid"});
+  }
+  reader.finish();
+  if (context.errors.size() > errors_before) return std::nullopt;
+  return gyro;
+}
+
+void read_gyros(TomlReader& root, Context& context) {
+  const toml::array* tables = root.array("gyro");
+  const std::size_t count = tables == nullptr ? 0 : tables->size();
+  if (count != 2) {
+    root.complain(count == 0 ? context.file : root.where("gyro"),
+                  fmt::format("there are {} [[gyro]] tables", count), "exactly two are needed");
+    return;
+  }
+  std::vector<GyroPlan> gyros;
+  for (std::size_t i = 0; i < count; ++i) {
+    const toml::table* table = tables->get(i)->as_table();
+    if (table == nullptr) {
+      root.complain(root.where("gyro"), "gyro must be written as [[gyro]] tables");
+      return;
+    }
+    if (auto gyro = read_gyro(*table, i, context)) gyros.push_back(std::move(*gyro));
+  }
+  if (gyros.size() != 2) return;
+  const FrameMatch& a = gyros[0].match;
+  const FrameMatch& b = gyros[1].match;
+  if (a.bus == b.bus && a.extended == b.extended && ((a.id ^ b.id) & a.mask & b.mask) == 0) {
+    root.complain(root.where("gyro"),
+                  fmt::format("both gyros are read from the same frame: {} on {}",
+                              gyros[0].message, gyros[0].bus),
+                  "two different gyros are needed; J1939 gyros of one PGN are told apart by "
+                  "source_address = N");
+    return;
+  }
+  context.resolved.plan.gyros.assign(gyros.begin(), gyros.end());
+}
+
+template <class Read>
+void read_optional(TomlReader& root, std::string_view key, Context& context, Read read) {
+  const toml::table* table = root.table(key);
+  if (table == nullptr) return;
+  TomlReader reader(*table, context.file, fmt::format("[{}]", key), context.errors);
+  SignalResolver resolver(reader, context.cache, context.folder, context.resolved.plan.buses,
+                          context.resolved.warnings);
+  read(reader, resolver);
+  reader.finish();
+}
+
+void read_reference(TomlReader& reader, SignalResolver& resolver, Plan& plan) {
+  const dbc::Signal* signal = resolver.signal("rate", true);
+  const auto unit = reader.text("unit");
+  if (signal == nullptr) {
+    reader.forgive({"sign"});
+    return;
+  }
+  auto rate = resolver.quantity(*signal, "rate", Dimension::kRate, unit);
+  if (!rate) return;
+  read_sign(reader, *rate);
+  plan.reference = ReferencePlan{resolver.bus(), resolver.message().name, resolver.match(), *rate};
+}
+
+void read_accelerometer(TomlReader& /*reader*/, SignalResolver& resolver, Plan& plan) {
+  std::vector<Quantity> axes;
+  for (const char* key : {"x", "y", "z"}) {
+    const dbc::Signal* signal = resolver.signal(key, true);
+    if (signal == nullptr) continue;
+    if (auto axis = resolver.quantity(*signal, key, Dimension::kAcceleration)) axes.push_back(*axis);
+  }
+  if (axes.size() != 3) return;
+  plan.accelerometer = AccelerometerPlan{
+      resolver.bus(), resolver.message().name, resolver.match(), {axes[0], axes[1], axes[2]}};
+}
+
+void read_speed(TomlReader& /*reader*/, SignalResolver& resolver, Plan& plan) {
+  const dbc::Signal* signal = resolver.signal("signal", true);
+  if (signal == nullptr) return;
+  const auto speed = resolver.quantity(*signal, "signal", Dimension::kSpeed);
+  if (speed) {
+    plan.speed = SpeedPlan{resolver.bus(), resolver.message().name, resolver.match(), *speed};
+  }
+}
+
+// A number inside limits, or the default after a complaint.
+double number_within(TomlReader& reader, std::string_view key, double fallback, double above,
+                     double up_to, std::string_view unit) {
+  const auto value = reader.number(key);
+  if (!value) return fallback;
+  if (*value > above && *value <= up_to) return *value;
+  reader.complain(reader.where(key), fmt::format("{} is {:g} {}", key, *value, unit),
+                  fmt::format("above {:g} and up to {:g}", above, up_to));
+  return fallback;
+}
+
+void read_calibration(TomlReader& root, Context& context) {
+  CalibrationPlan& plan = context.resolved.plan.calibration;
+  const toml::table* table = root.table("calibration");
+  if (table == nullptr) return;
+  TomlReader reader(*table, context.file, "[calibration]", context.errors);
+  plan.rest_s = number_within(reader, "rest_s", plan.rest_s, 0.0, kRestMax_s, "s");
+  const auto rate = reader.number("rate_dps");
+  const auto latitude = reader.number("latitude_deg");
+  if (rate && latitude) {
+    reader.complain(reader.where("latitude_deg"), "rate_dps and latitude_deg both say the true rate",
+                    "keep one of them");
+  }
+  if (latitude && !(std::abs(*latitude) <= 90.0)) {
+    reader.complain(reader.where("latitude_deg"), fmt::format("latitude_deg is {:g}", *latitude),
+                    "-90 to 90");
+  }
+  if (rate && !(std::abs(*rate) < 1e5)) {
+    reader.complain(reader.where("rate_dps"), fmt::format("rate_dps is {:g}", *rate),
+                    "the platform's true rate while calibrating, in deg/s");
+  }
+  if (rate) plan.rate_dps = *rate;
+  if (latitude) plan.rate_dps = kEarthRate_dps * std::sin(*latitude * std::numbers::pi / 180.0);
+  const std::string source = reader.text("source").value_or("rest");
+  plan.from_reference = source == "reference";
+  if (source != "rest" && source != "reference") {
+    reader.complain(reader.where("source"), fmt::format("source is \"{}\"", source),
+                    suggest_name(source, {"rest", "reference"}));
+  }
+  if (plan.from_reference && !root.has("reference")) {
+    reader.complain(reader.where("source"), "source = \"reference\" needs a [reference] table");
+  }
+  reader.finish();
+}
+
+void read_corrector(TomlReader& root, Context& context, const ConfigOverrides& overrides) {
+  CorrectorPlan& plan = context.resolved.plan.corrector;
+  if (overrides.method) plan.method = *overrides.method;
+  const toml::table* table = root.table("corrector");
+  if (table == nullptr) return;
+  TomlReader reader(*table, context.file, "[corrector]", context.errors);
+  if (const auto name = reader.text("method")) {
+    const auto method = method_from(*name);
+    if (method && !overrides.method) plan.method = *method;
+    if (!method && *name == "optimal") {
+      if (!overrides.method) {
+        reader.complain(reader.where("method"), "method \"optimal\" is not in this version yet",
+                        "set method = \"mutual\" (the paper's method) or \"mean\", or say "
+                        "--method mutual");
+      }
+    } else if (!method) {
+      reader.complain(reader.where("method"), fmt::format("there is no method \"{}\"", *name),
+                      suggest_name(*name, {"mutual", "mean"}));
+    }
+  }
+  plan.window_s = number_within(reader, "window_s", plan.window_s, 0.0, kWindowMax_s, "s");
+  if (const auto order = reader.integer("order")) {
+    if (*order < 0 || *order > fusion::kOrderMax) {
+      reader.complain(reader.where("order"), fmt::format("order is {}", *order),
+                      "0 (constant drift), 1 (linear), 2 or 3");
+    } else {
+      plan.order = static_cast<int>(*order);
+    }
+  }
+  reader.finish();
+}
+
+std::uint32_t read_output_id(TomlReader& reader, std::string_view key, std::uint32_t fallback) {
+  const auto id = reader.integer(key);
+  if (!id) return fallback;
+  if (*id >= 1 && *id <= static_cast<std::int64_t>(can::kStandardIdMax)) {
+    return static_cast<std::uint32_t>(*id);
+  }
+  reader.complain(reader.where(key), fmt::format("{} is {:#x}", key, *id),
+                  "an 11-bit identifier, 0x001 to 0x7FF");
+  return fallback;
+}
+
+void check_output_ids(TomlReader& reader, const Plan& plan) {
+  const OutputPlan& output = plan.output;
+  if (output.rate_id == output.bias_id || output.rate_id == output.model_id ||
+      output.bias_id == output.model_id) {
+    reader.complain(reader.where(), "two output frames have the same identifier");
+  }
+  for (const FrameMatch& input : plan.gyros.empty() ? std::vector<FrameMatch>{} : plan.inputs()) {
+    for (const std::uint32_t id : {output.rate_id, output.bias_id, output.model_id}) {
+      if (input.bus != output.bus || input.extended || ((id ^ input.id) & input.mask) != 0) continue;
+      reader.complain(reader.where(),
+                      fmt::format("output identifier {:#x} is also an input on {}", id,
+                                  plan.buses[input.bus]),
+                      "choose rate_id, bias_id and model_id that nobody else sends");
+    }
+  }
+}
+
+void read_output(TomlReader& root, Context& context) {
+  Plan& plan = context.resolved.plan;
+  const toml::table* table = root.table("output");
+  if (table == nullptr) {
+    if (!root.has("output")) {
+      root.complain(context.file, "there is no [output] table",
+                    "for example [output] with bus = \"can0\"");
+    }
+    return;
+  }
+  TomlReader reader(*table, context.file, "[output]", context.errors);
+  const std::string bus = reader.required_text("bus", "can0");
+  if (!bus.empty()) plan.output.bus = bus_index(plan.buses, bus);
+  plan.output.rate_id = read_output_id(reader, "rate_id", plan.output.rate_id);
+  plan.output.bias_id = read_output_id(reader, "bias_id", plan.output.bias_id);
+  plan.output.model_id = read_output_id(reader, "model_id", plan.output.model_id);
+  plan.output.fd = reader.boolean("fd").value_or(false);
+  check_output_ids(reader, plan);
+  reader.finish();
+}
+
+}  // namespace
+
+std::optional<Method> method_from(std::string_view name) {
+  if (name == "mean") return Method::kMean;
+  if (name == "mutual") return Method::kMutual;
+  return std::nullopt;
+}
+
+std::string_view to_string(Method method) { return method == Method::kMean ? "mean" : "mutual"; }
+
+ConfigResult load_config(const std::string& path, const ConfigOverrides& overrides) {
+  const auto text = read_file(path);
+  if (!text) return tl::unexpected(std::vector<Error>{text.error()});
+  const toml::parse_result parsed = toml::parse(*text, path);
+  if (!parsed) {
+    const toml::parse_error& error = parsed.error();
+    return tl::unexpected(std::vector<Error>{
+        {at_line(path, static_cast<unsigned>(error.source().begin.line)),
+         std::string(error.description()), "strings stand in quotes, tables in [brackets]"}});
+  }
+  Context context{.file = path,
+                  .folder = std::filesystem::path(path).parent_path().string(),
+                  .errors = {},
+                  .resolved = {}};
+  Plan& plan = context.resolved.plan;
+  TomlReader root(parsed.table(), path, "the file", context.errors);
+  read_gyros(root, context);
+  read_optional(root, "reference", context, [&](TomlReader& reader, SignalResolver& resolver) {
+    read_reference(reader, resolver, plan);
+  });
+  read_optional(root, "accelerometer", context, [&](TomlReader& reader, SignalResolver& resolver) {
+    read_accelerometer(reader, resolver, plan);
+  });
+  read_optional(root, "speed", context, [&](TomlReader& reader, SignalResolver& resolver) {
+    read_speed(reader, resolver, plan);
+  });
+  read_calibration(root, context);
+  read_corrector(root, context, overrides);
+  read_output(root, context);
+  root.finish();
+  if (!context.errors.empty()) return tl::unexpected(std::move(context.errors));
+  return std::move(context.resolved);
+}
+
+}  // namespace vgyro::gateway

@@ -1,0 +1,35 @@
+#pragma once
+
+// vgyro.toml and the DBC files it names → a Plan. Every complaint carries file and line and what
+// would be right; all complaints of a file are reported at once. Nothing is guessed.
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <tl/expected.hpp>
+
+#include "base/error.h"
+#include "gateway/plan.h"
+
+namespace vgyro::gateway {
+
+struct Resolved {
+  Plan plan;
+  std::vector<Error> warnings;  ///< usable, but the user should know
+};
+
+using ConfigResult = tl::expected<Resolved, std::vector<Error>>;
+
+struct ConfigOverrides {
+  std::optional<Method> method;  ///< instead of [corrector] method
+};
+
+/// Reads the file; DBC paths inside are relative to it.
+ConfigResult load_config(const std::string& path, const ConfigOverrides& overrides = {});
+
+/// The methods of this build by name; nothing for any other word.
+std::optional<Method> method_from(std::string_view name);
+std::string_view to_string(Method method);
+
+}  // namespace vgyro::gateway

@@ -1,0 +1,47 @@
+#pragma once
+
+// One gyro's frames → rates in deg/s, or the cause why a frame cannot be used. Checks what the frame
+// itself tells: length, `valid` comparison, alive counter, finite and in range. Stamps are judged
+// elsewhere.
+
+#include <cstdint>
+#include <optional>
+
+#include "can/frame.h"
+#include "gateway/plan.h"
+#include "gateway/status.h"
+
+namespace vgyro::gateway {
+
+class GyroInput {
+ public:
+  explicit GyroInput(const GyroPlan& plan);
+
+  struct Result {
+    std::optional<Reject> reject;  ///< set: the frame is not used
+    double rate_dps = 0.0;
+    std::uint32_t missing = 0;     ///< frames that the alive counter says were lost before this one
+  };
+  Result decode(const can::Frame& frame);
+
+  /// After a silence the counter says nothing about how many frames are missing.
+  void forget_counter() { counter_known_ = false; }
+
+  [[nodiscard]] double temperature_c() const { return temperature_c_; }
+
+ private:
+  /// False when the counter stands still.
+  bool count(std::span<const std::uint8_t> payload, std::uint32_t& missing);
+
+  const GyroPlan& plan_;
+  std::size_t bytes_needed_;
+  double temperature_c_;
+  std::uint32_t counter_ = 0;
+  bool counter_known_ = false;
+};
+
+/// A quantity's value in the product's unit, or the cause why it is none.
+std::optional<Reject> decode_quantity(const Quantity& quantity, const can::Frame& frame,
+                                      double& value);
+
+}  // namespace vgyro::gateway

@@ -1,0 +1,409 @@
+#include "gateway/pipeline.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "fusion/alignment.h"
+#include "fusion/calibration.h"
+#include "fusion/corrector.h"
+#include "fusion/stamp_guard.h"
+#include "gateway/gyro_input.h"
+#include "gateway/output_frames.h"
+#include "gateway/reference_calibration.h"
+#include "gateway/router.h"
+
+namespace vgyro::gateway {
+
+namespace {
+
+constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+constexpr std::size_t kReferenceStream = 2;
+constexpr std::size_t kNobody = 2;
+
+// A gyro that is silent for this many of its usual intervals is missing, within these limits.
+constexpr int kTimeOutIntervals = 10;
+constexpr Duration kTimeOutMin = std::chrono::milliseconds(100);
+constexpr Duration kTimeOutMax = std::chrono::seconds(1);
+
+// VG_Bias stands on a grid of the bus's time. Samples drive it; the timer steps in only when none
+// came for half a period more, so that a replay sends the same frames at the same places.
+constexpr Duration kBiasPeriod = std::chrono::milliseconds(100);
+constexpr Duration kBiasGrace = std::chrono::milliseconds(50);
+
+TimePoint whole_microseconds(TimePoint t) {
+  return TimePoint{Duration{to_ns(t) - to_ns(t) % 1000}};
+}
+
+TimePoint next_on_grid(TimePoint t) {
+  const std::int64_t period = kBiasPeriod.count();
+  return TimePoint{Duration{to_ns(t) / period * period + period}};
+}
+
+std::unique_ptr<fusion::Corrector> make_corrector(const CorrectorPlan& plan) {
+  if (plan.method == Method::kMean) return fusion::make_mean_corrector();
+  return fusion::make_mutual_corrector(plan.order, plan.window_s);
+}
+
+}  // namespace
+
+struct Pipeline::Impl {
+  explicit Impl(const Plan& the_plan);
+
+  void receive(can::BusIndex bus, const can::Frame& frame, TimePoint stamp, FrameSink& sink);
+  void advance(TimePoint now, FrameSink& sink);
+  const Status& refreshed_status();
+
+  void receive_gyro(std::size_t gyro, const can::Frame& frame, TimePoint stamp, FrameSink& sink);
+  void receive_reference(const can::Frame& frame, TimePoint stamp, FrameSink& sink);
+  void take_sample(std::size_t gyro, TimePoint t, double rate_dps, TimePoint stamp, FrameSink& sink);
+  void take_pair(const fusion::AlignedPair& pair, TimePoint stamp, FrameSink& sink);
+  void take_single(std::size_t gyro, TimePoint t, double rate_dps, TimePoint stamp, FrameSink& sink);
+  void calibrate(const fusion::AlignedPair& pair);
+  void calibrate_with(const fusion::AlignedPair& pair, double true_rate_dps);
+
+  void do_what_is_due(TimePoint t, TimePoint stamp, FrameSink& sink);
+  void enter_state(TimePoint stamp, FrameSink& sink);
+  [[nodiscard]] State present_state() const;
+  [[nodiscard]] Duration time_out(std::size_t gyro) const;
+  [[nodiscard]] Duration bias_grace() const;
+  [[nodiscard]] bool single_is_wanted(std::size_t gyro, TimePoint t) const;
+
+  void send_rate(const fusion::VirtualRate& rate, bool valid, TimePoint t, Duration age,
+                 TimePoint stamp, FrameSink& sink);
+  void send_bias(TimePoint stamp, FrameSink& sink);
+  void send_bias_when_due(TimePoint t, TimePoint stamp, FrameSink& sink);
+  [[nodiscard]] Quality quality() const;
+  [[nodiscard]] BiasMode bias_mode() const;
+  [[nodiscard]] std::uint8_t health() const;
+  [[nodiscard]] double seconds(TimePoint t) const { return to_seconds(t - origin); }
+
+  const Plan plan;
+  Router router;
+  std::array<GyroInput, 2> inputs;
+  fusion::StampGuard guard;
+  fusion::Aligner aligner;
+  fusion::Calibrator calibrator;
+  ReferenceCalibration reference;
+  std::unique_ptr<fusion::Corrector> corrector;
+  OutputEncoder encoder;
+  Status status;
+
+  bool calibrated = false;
+  bool pairing = false;  ///< pairs flow: both gyros are in use
+  std::array<bool, 2> heard{};
+  std::array<TimePoint, 2> last_heard{};
+  TimePoint first_heard{};
+  TimePoint origin{};       ///< zero of the estimation's seconds: the first pair
+  TimePoint newest = TimePoint::min();  ///< newest instant given to the output
+  std::size_t alone = kNobody;  ///< gyro that speaks alone
+  TimePoint next_bias{};
+  TimePoint deadline{};     ///< nothing is due before; may lie too early, never too late
+};
+
+Pipeline::Impl::Impl(const Plan& the_plan)
+    : plan(the_plan),
+      router(plan),
+      inputs{GyroInput(plan.gyros[0]), GyroInput(plan.gyros[1])},
+      calibrator(plan.corrector.order, plan.calibration.rest_s),
+      corrector(make_corrector(plan.corrector)),
+      encoder(plan.output) {
+  calibrated = !corrector->needs_calibration();
+  status.rate_dps = kNone;
+  for (GyroStatus& gyro : status.gyros) {
+    gyro.last_rate_dps = kNone;
+    gyro.bias_dps = kNone;
+    gyro.temperature_c = kNone;
+  }
+}
+
+// --- frames in -----------------------------------------------------------------------------------
+
+void Pipeline::Impl::receive(can::BusIndex bus, const can::Frame& frame, TimePoint stamp,
+                             FrameSink& sink) {
+  const std::uint8_t roles = router.roles(bus, frame);
+  if (roles == 0) {
+    advance(stamp, sink);
+    return;
+  }
+  stamp = whole_microseconds(stamp);
+  if ((roles & kReference) != 0) receive_reference(frame, stamp, sink);
+  if ((roles & kGyro1) != 0) receive_gyro(0, frame, stamp, sink);
+  if ((roles & kGyro2) != 0) receive_gyro(1, frame, stamp, sink);
+}
+
+void Pipeline::Impl::receive_gyro(std::size_t gyro, const can::Frame& frame, TimePoint stamp,
+                                  FrameSink& sink) {
+  GyroStatus& own = status.gyros[gyro];
+  ++own.frames;
+  const auto refuse = [&](Reject why) { ++own.rejected[static_cast<std::size_t>(why)]; };
+  const GyroInput::Result input = inputs[gyro].decode(frame);
+  own.missing += input.missing;
+  if (input.reject) {
+    refuse(*input.reject);
+    advance(stamp, sink);
+    return;
+  }
+  TimePoint t;
+  switch (guard.check(gyro, stamp, t)) {
+    case fusion::StampGuard::Verdict::kRepeated:
+      refuse(Reject::kStampRepeated);
+      return;
+    case fusion::StampGuard::Verdict::kUnconfirmed:
+      refuse(Reject::kStampJump);
+      return;
+    case fusion::StampGuard::Verdict::kClockStep:
+      ++status.clock_steps;
+      aligner.clear();
+      break;
+    case fusion::StampGuard::Verdict::kAccepted:
+      break;
+  }
+  if (!aligner.push(gyro, t, input.rate_dps)) {
+    refuse(Reject::kLate);
+    return;
+  }
+  ++own.samples;
+  own.last_rate_dps = input.rate_dps;
+  take_sample(gyro, t, input.rate_dps, stamp, sink);
+}
+
+void Pipeline::Impl::receive_reference(const can::Frame& frame, TimePoint stamp, FrameSink& sink) {
+  ++status.reference_frames;
+  double rate_dps = 0.0;
+  TimePoint t;
+  const bool usable = !decode_quantity(plan.reference->rate, frame, rate_dps);
+  const auto verdict =
+      usable ? guard.check(kReferenceStream, stamp, t) : fusion::StampGuard::Verdict::kUnconfirmed;
+  if (verdict == fusion::StampGuard::Verdict::kUnconfirmed ||
+      verdict == fusion::StampGuard::Verdict::kRepeated) {
+    ++status.reference_rejected;
+    advance(stamp, sink);
+    return;
+  }
+  if (verdict == fusion::StampGuard::Verdict::kClockStep) {
+    ++status.clock_steps;
+    aligner.clear();
+  }
+  reference.add_reference(t, rate_dps);
+  while (!calibrated && plan.calibration.from_reference) {
+    const auto ready = reference.next();
+    if (!ready) break;
+    calibrate_with(ready->pair, ready->true_rate_dps);
+    if (calibrated) enter_state(stamp, sink);
+  }
+  advance(stamp, sink);
+}
+
+void Pipeline::Impl::take_sample(std::size_t gyro, TimePoint t, double rate_dps, TimePoint stamp,
+                                 FrameSink& sink) {
+  if (!heard[0] && !heard[1] && status.pairs == 0) first_heard = t;
+  heard[gyro] = true;
+  last_heard[gyro] = std::max(last_heard[gyro], t);
+  if (t >= deadline) do_what_is_due(t, stamp, sink);
+  fusion::AlignedPair pair;
+  while (aligner.pop(pair)) take_pair(pair, stamp, sink);
+  if (!pairing && single_is_wanted(gyro, t)) take_single(gyro, t, rate_dps, stamp, sink);
+}
+
+// --- estimation ----------------------------------------------------------------------------------
+
+void Pipeline::Impl::take_pair(const fusion::AlignedPair& pair, TimePoint stamp, FrameSink& sink) {
+  if (status.pairs == 0) origin = pair.t;
+  ++status.pairs;
+  if (!pairing) {
+    pairing = true;
+    alone = kNobody;
+    enter_state(stamp, sink);
+  }
+  const bool was_calibrated = calibrated;
+  if (!calibrated) calibrate(pair);
+  if (calibrated && !was_calibrated) enter_state(stamp, sink);
+  fusion::VirtualRate rate;
+  if (calibrated) rate = corrector->update({seconds(pair.t), pair.rate_dps});
+  // While one gyro was missing the other spoke alone, perhaps for later instants than this.
+  if (pair.t <= newest) return;
+  newest = pair.t;
+  send_rate(rate, calibrated, pair.t, pair.complete - pair.t, stamp, sink);
+  send_bias_when_due(pair.t, stamp, sink);
+}
+
+void Pipeline::Impl::take_single(std::size_t gyro, TimePoint t, double rate_dps, TimePoint stamp,
+                                 FrameSink& sink) {
+  if (t <= newest) return;
+  newest = t;
+  alone = gyro;
+  fusion::VirtualRate rate;
+  if (calibrated) rate = corrector->carry_on(gyro, seconds(t), rate_dps);
+  enter_state(stamp, sink);
+  send_rate(rate, calibrated, t, Duration::zero(), stamp, sink);
+  send_bias_when_due(t, stamp, sink);
+}
+
+void Pipeline::Impl::calibrate(const fusion::AlignedPair& pair) {
+  if (!plan.calibration.from_reference) {
+    calibrate_with(pair, plan.calibration.rate_dps);
+    return;
+  }
+  reference.add_pair(pair);
+  while (const auto ready = reference.next()) {
+    calibrate_with(ready->pair, ready->true_rate_dps);
+    if (calibrated) return;
+  }
+}
+
+void Pipeline::Impl::calibrate_with(const fusion::AlignedPair& pair, double true_rate_dps) {
+  const bool used = calibrator.add(seconds(pair.t), pair.rate_dps, true_rate_dps);
+  status.calibrated_s = calibrator.covered_s();
+  if (used) return;
+  corrector->start(calibrator.result());
+  calibrated = true;
+  status.moved_in_calibration =
+      !plan.calibration.from_reference && calibrator.result().platform_moved();
+}
+
+// --- states --------------------------------------------------------------------------------------
+
+State Pipeline::Impl::present_state() const {
+  if (!calibrated) return pairing ? State::kCalibrating : State::kWaiting;
+  if (pairing) return State::kRunning;
+  if (status.pairs == 0) return State::kWaiting;
+  return heard[0] || heard[1] ? State::kDegraded : State::kLost;
+}
+
+void Pipeline::Impl::enter_state(TimePoint stamp, FrameSink& sink) {
+  const State state = present_state();
+  if (state == status.state) return;
+  status.state = state;
+  send_bias(stamp, sink);
+}
+
+// Samples of a slow gyro keep their right to drive VG_Bias.
+Duration Pipeline::Impl::bias_grace() const {
+  if (!aligner.chosen()) return kBiasGrace;
+  return std::max<Duration>(kBiasGrace, 2 * aligner.interval(aligner.pacing_gyro()));
+}
+
+Duration Pipeline::Impl::time_out(std::size_t gyro) const {
+  if (!aligner.chosen()) return kTimeOutMax;
+  return std::clamp<Duration>(kTimeOutIntervals * aligner.interval(gyro), kTimeOutMin, kTimeOutMax);
+}
+
+// A gyro speaks alone only when the other one has really gone: not while pairs are about to start.
+bool Pipeline::Impl::single_is_wanted(std::size_t gyro, TimePoint t) const {
+  if (heard[1 - gyro]) return gyro == alone;  // the other one is back, but not paired yet
+  return status.pairs > 0 || t - first_heard > kTimeOutMax;
+}
+
+void Pipeline::Impl::do_what_is_due(TimePoint t, TimePoint stamp, FrameSink& sink) {
+  TimePoint next = TimePoint::max();
+  for (std::size_t gyro = 0; gyro < 2; ++gyro) {
+    if (!heard[gyro]) continue;
+    const TimePoint until = last_heard[gyro] + time_out(gyro);
+    if (t >= until) {
+      heard[gyro] = false;
+      pairing = false;
+      ++status.gyros[gyro].time_outs;
+      inputs[gyro].forget_counter();
+    } else {
+      next = std::min(next, until);
+    }
+  }
+  enter_state(stamp, sink);
+  if (t >= next_bias + bias_grace()) {
+    send_bias(stamp, sink);
+    next_bias = next_on_grid(t);
+  }
+  deadline = std::min(next, next_bias + bias_grace());
+}
+
+void Pipeline::Impl::advance(TimePoint now, FrameSink& sink) {
+  const TimePoint t = whole_microseconds(now) + guard.offset();
+  if (t >= deadline) do_what_is_due(t, now, sink);
+}
+
+// --- frames out ----------------------------------------------------------------------------------
+
+Quality Pipeline::Impl::quality() const {
+  if (!pairing) return Quality::kOneGyro;
+  return status.moved_in_calibration ? Quality::kCalibrationUncertain : Quality::kTwoGyros;
+}
+
+BiasMode Pipeline::Impl::bias_mode() const {
+  if (!corrector->needs_calibration()) return BiasMode::kNone;
+  if (!calibrated) return pairing ? BiasMode::kCalibrating : BiasMode::kNone;
+  return pairing ? BiasMode::kTracking : BiasMode::kHold;
+}
+
+std::uint8_t Pipeline::Impl::health() const {
+  return static_cast<std::uint8_t>((heard[0] ? 0 : kGyro1Missing) | (heard[1] ? 0 : kGyro2Missing));
+}
+
+void Pipeline::Impl::send_rate(const fusion::VirtualRate& rate, bool valid, TimePoint t,
+                               Duration age, TimePoint stamp, FrameSink& sink) {
+  const bool carried = valid && encoder.can_carry(rate.rate_dps);
+  ++status.rates_out;
+  if (carried) ++status.rates_out_valid;
+  if (valid && !carried) ++status.rates_out_of_range;
+  status.rate_dps = carried ? rate.rate_dps : kNone;
+  sink.put(encoder.rate({.valid = carried,
+                         .rate_dps = rate.rate_dps,
+                         .sigma_dps = rate.sigma_dps,
+                         .corrected_dps = rate.corrected_dps,
+                         .state = status.state,
+                         .quality = quality(),
+                         .health = health(),
+                         .age = age,
+                         .instant = t - guard.offset()}),
+           stamp);
+}
+
+void Pipeline::Impl::send_bias(TimePoint stamp, FrameSink& sink) {
+  ++status.biases_out;
+  const fusion::Drift drift = calibrated && status.pairs > 0
+                                  ? corrector->drift(seconds(newest))
+                                  : fusion::Drift{{kNone, kNone}, kNone, kNone, kNone};
+  sink.put(encoder.bias({drift.bias_dps, bias_mode(), health()}), stamp);
+  sink.put(encoder.model({drift.slope_dps_s, drift.bias_sigma_dps, drift.slope_sigma_dps_s}), stamp);
+}
+
+void Pipeline::Impl::send_bias_when_due(TimePoint t, TimePoint stamp, FrameSink& sink) {
+  if (t < next_bias) return;
+  send_bias(stamp, sink);
+  next_bias = next_on_grid(t);
+}
+
+const Status& Pipeline::Impl::refreshed_status() {
+  const fusion::Drift drift = calibrated && status.pairs > 0
+                                  ? corrector->drift(seconds(newest))
+                                  : fusion::Drift{{kNone, kNone}, kNone, kNone, kNone};
+  for (std::size_t gyro = 0; gyro < 2; ++gyro) {
+    status.gyros[gyro].bias_dps = drift.bias_dps[gyro];
+    status.gyros[gyro].heard = heard[gyro];
+    status.gyros[gyro].temperature_c = inputs[gyro].temperature_c();
+    status.gyros[gyro].unpaired = aligner.counts().unpaired[gyro];
+  }
+  status.windows = corrector->windows().completed;
+  status.windows_skipped = corrector->windows().skipped;
+  return status;
+}
+
+// --- the public face -----------------------------------------------------------------------------
+
+Pipeline::Pipeline(const Plan& plan) : impl_(std::make_unique<Impl>(plan)) {}
+Pipeline::Pipeline(Pipeline&&) noexcept = default;
+Pipeline& Pipeline::operator=(Pipeline&&) noexcept = default;
+Pipeline::~Pipeline() = default;
+
+void Pipeline::receive(can::BusIndex bus, const can::Frame& frame, TimePoint stamp,
+                       FrameSink& out) {
+  impl_->receive(bus, frame, stamp, out);
+}
+
+void Pipeline::advance(TimePoint now, FrameSink& out) { impl_->advance(now, out); }
+
+TimePoint Pipeline::next_deadline() const { return impl_->deadline - impl_->guard.offset(); }
+
+const Status& Pipeline::status() const { return impl_->refreshed_status(); }
+
+}  // namespace vgyro::gateway

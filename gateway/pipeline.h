@@ -1,0 +1,53 @@
+#pragma once
+
+// The gateway itself: frames and time in, frames out. Decode → align → correct → encode.
+// One object behind the daemon, the replay and the tests; it opens nothing, reads no clock and,
+// once constructed, allocates nothing. The states and their transitions are in ARCHITECTURE.md.
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "base/time.h"
+#include "can/frame.h"
+#include "gateway/plan.h"
+#include "gateway/status.h"
+
+namespace vgyro::gateway {
+
+/// Where the pipeline's frames go. The stamp is that of the input frame (or of the time-out) that
+/// caused the output.
+class FrameSink {
+ public:
+  virtual ~FrameSink() = default;
+  virtual void put(const can::Frame& frame, TimePoint stamp) = 0;
+};
+
+class Pipeline {
+ public:
+  explicit Pipeline(const Plan& plan);
+  Pipeline(Pipeline&&) noexcept;
+  Pipeline& operator=(Pipeline&&) noexcept;
+  ~Pipeline();
+
+  /// One received frame. `bus` indexes Plan::buses. Stamps are used in whole microseconds, the
+  /// resolution of a candump log, so that a replay of what candump saw repeats the run bit for bit.
+  void receive(can::BusIndex bus, const can::Frame& frame, TimePoint stamp, FrameSink& out);
+
+  /// Time passed without a frame: time-outs and the heartbeat of VG_Bias. Cheap when nothing is due.
+  void advance(TimePoint now, FrameSink& out);
+
+  /// When advance() has to be called next, at the latest.
+  [[nodiscard]] TimePoint next_deadline() const;
+
+  [[nodiscard]] const Status& status() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace vgyro::gateway

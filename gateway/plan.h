@@ -1,0 +1,124 @@
+#pragma once
+
+// A configuration after everything in it has been resolved: which bits of which frame on which bus
+// are which quantity. Built by gateway/config.h from files, or by tests by hand.
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "can/frame.h"
+#include "dbc/codec.h"
+#include "dbc/multiplex.h"
+
+namespace vgyro::gateway {
+
+enum class Method : std::uint8_t { kMean, kMutual };
+
+/// A frame identifier on a bus: matches when (id & mask) == (frame.id & mask) and the format agrees.
+struct FrameMatch {
+  can::BusIndex bus = 0;
+  std::uint32_t id = 0;
+  std::uint32_t mask = 0;
+  bool extended = false;
+};
+
+/// A physical quantity in a frame.
+struct Quantity {
+  std::string name;        ///< of the signal
+  std::string unit;        ///< as in the DBC file
+  dbc::SignalCodec codec;
+  dbc::Presence presence;  ///< of a multiplexed signal: the page it stands on
+  double scale = 1.0;      ///< value · scale + shift is in the product's unit: deg/s, degC, g, m/s;
+  double shift = 0.0;      ///< the sign of the configuration is part of the scale
+  double minimum = 0.0;    ///< accepted values, in the DBC's unit
+  double maximum = 0.0;
+  std::string layout;      ///< for people: "32 bits from bit 0, Intel, signed, x 1e-06"
+};
+
+enum class Comparison : std::uint8_t { kEqual, kNotEqual, kLess, kLessEqual, kGreater, kGreaterEqual };
+
+/// `valid = "Status == 0"`
+struct Condition {
+  dbc::SignalCodec codec;
+  Comparison comparison = Comparison::kEqual;
+  double value = 0.0;
+  std::string text;  ///< as configured
+};
+
+struct AliveCounter {
+  std::string name;
+  dbc::SignalCodec codec;
+  std::uint32_t modulus = 256;  ///< values it runs through: 0 … modulus − 1
+};
+
+struct GyroPlan {
+  std::string name;
+  std::string bus;
+  std::string message;
+  FrameMatch match;
+  Quantity rate;
+  std::optional<dbc::SignalCodec> sign;  ///< separate sign bit: 1 means negative
+  std::optional<Quantity> temperature;
+  std::optional<AliveCounter> counter;
+  std::optional<Condition> valid;
+};
+
+struct ReferencePlan {
+  std::string bus;
+  std::string message;
+  FrameMatch match;
+  Quantity rate;
+};
+
+struct AccelerometerPlan {
+  std::string bus;
+  std::string message;
+  FrameMatch match;
+  std::array<Quantity, 3> axes;  ///< x, y, z
+};
+
+struct SpeedPlan {
+  std::string bus;
+  std::string message;
+  FrameMatch match;
+  Quantity speed;
+};
+
+struct CalibrationPlan {
+  double rest_s = 60.0;
+  double rate_dps = 0.0;        ///< true rate along the axis while calibrating at rest
+  bool from_reference = false;  ///< calibrate against [reference] instead
+};
+
+struct CorrectorPlan {
+  Method method = Method::kMutual;
+  double window_s = 10.0;
+  int order = 1;
+};
+
+struct OutputPlan {
+  can::BusIndex bus = 0;
+  std::uint32_t rate_id = 0x610;
+  std::uint32_t bias_id = 0x611;
+  std::uint32_t model_id = 0x612;
+  bool fd = false;
+};
+
+struct Plan {
+  std::vector<std::string> buses;  ///< BusIndex → interface name, without repetition
+  std::vector<GyroPlan> gyros;     ///< exactly two, once resolved
+  std::optional<ReferencePlan> reference;
+  std::optional<AccelerometerPlan> accelerometer;  ///< resolved and checked; the pipeline reads neither
+  std::optional<SpeedPlan> speed;
+  CalibrationPlan calibration;
+  CorrectorPlan corrector;
+  OutputPlan output;
+
+  /// Every frame that the pipeline wants to receive: the kernel filters.
+  [[nodiscard]] std::vector<FrameMatch> inputs() const;
+};
+
+}  // namespace vgyro::gateway

@@ -1,0 +1,182 @@
+#include "gateway/signal_resolver.h"
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <limits>
+
+#include <fmt/core.h>
+
+#include "base/nearest.h"
+#include "dbc/parser.h"
+
+namespace vgyro::gateway {
+
+namespace {
+
+constexpr std::size_t kInterfaceNameMax = 15;  // IFNAMSIZ less the closing zero
+constexpr std::size_t kDiagnosticsShown = 5;
+// No gyro turns faster; what lies beyond is a bit pattern, not a rate.
+constexpr double kRateLimit_dps = 100'000.0;
+
+std::string layout_of(const dbc::Signal& signal) {
+  const char* type = "unsigned";
+  if (signal.type == dbc::ValueType::kSigned) type = "signed";
+  if (signal.type == dbc::ValueType::kFloat32) type = "float";
+  if (signal.type == dbc::ValueType::kFloat64) type = "double";
+  std::string text = fmt::format(
+      "bit {}, {} bits, {} {}, x {:g}", signal.start_bit, signal.length_bits,
+      signal.byte_order == dbc::ByteOrder::kIntel ? "Intel" : "Motorola", type, signal.factor);
+  if (signal.offset != 0.0) text += fmt::format(" {:+g}", signal.offset);
+  return text;
+}
+
+}  // namespace
+
+can::BusIndex bus_index(std::vector<std::string>& buses, const std::string& name) {
+  const auto found = std::find(buses.begin(), buses.end(), name);
+  if (found != buses.end()) return static_cast<can::BusIndex>(found - buses.begin());
+  buses.push_back(name);
+  return static_cast<can::BusIndex>(buses.size() - 1);
+}
+
+const dbc::Database* DatabaseCache::get(const std::string& path, TomlReader& reader) {
+  const auto known = files_.find(path);
+  if (known != files_.end()) return known->second.get();
+  auto loaded = dbc::load(path);
+  if (!loaded) {
+    reader.complain(reader.where("dbc"), loaded.error().message(),
+                    "dbc is a path relative to the configuration file");
+    return (files_[path] = nullptr).get();
+  }
+  for (std::size_t i = 0; i < std::min(loaded->diagnostics.size(), kDiagnosticsShown); ++i) {
+    const dbc::Diagnostic& odd = loaded->diagnostics[i];
+    warnings_.push_back({at_line(path, odd.line), odd.what, {}});
+  }
+  if (loaded->diagnostics.size() > kDiagnosticsShown) {
+    warnings_.push_back({path, fmt::format("{} more odd lines, the rest of the file is used",
+                                           loaded->diagnostics.size() - kDiagnosticsShown), {}});
+  }
+  return (files_[path] = std::make_unique<dbc::Database>(std::move(*loaded))).get();
+}
+
+SignalResolver::SignalResolver(TomlReader& reader, DatabaseCache& cache,
+                               const std::string& config_folder, std::vector<std::string>& buses,
+                               std::vector<Error>& warnings)
+    : reader_(reader), warnings_(warnings) {
+  bus_ = reader.required_text("bus", "can0");
+  const std::string dbc = reader.required_text("dbc", "bench.dbc");
+  const std::string message = reader.required_text("message", "GYRO_A");
+  if (bus_.size() > kInterfaceNameMax) {
+    reader.complain(reader.where("bus"), fmt::format("\"{}\" is no interface name", bus_),
+                    "at most 15 characters, as `ip link` shows them");
+  }
+  if (bus_.empty() || dbc.empty() || message.empty()) return;
+  bus_index_ = bus_index(buses, bus_);
+  dbc_path_ = (std::filesystem::path(config_folder) / dbc).lexically_normal().string();
+  find_message(message, cache);
+}
+
+void SignalResolver::find_message(std::string_view name, DatabaseCache& cache) {
+  const dbc::Database* database = cache.get(dbc_path_, reader_);
+  if (database == nullptr) return;
+  message_ = database->find_message(name);
+  if (message_ == nullptr) {
+    reader_.complain(reader_.where("message"),
+                     fmt::format("{} has no message \"{}\"", dbc_path_, name),
+                     suggest_name(name, database->message_names()));
+  }
+}
+
+FrameMatch SignalResolver::match() const {
+  return {bus_index_, message_->id, message_->id_mask(), message_->extended};
+}
+
+const dbc::Signal* SignalResolver::signal(std::string_view key, bool required) {
+  const auto name = required ? std::optional(reader_.required_text(key, "RateZ")) : reader_.text(key);
+  if (!name || name->empty() || !usable()) return nullptr;
+  return signal_named(*name, key);
+}
+
+const dbc::Signal* SignalResolver::signal_named(std::string_view name, std::string_view key) {
+  const dbc::Signal* found = message_->find_signal(name);
+  if (found == nullptr) {
+    reader_.complain(reader_.where(key),
+                     fmt::format("message {} in {} has no signal \"{}\"", message_->name,
+                                 at_line(dbc_path_, message_->line), name),
+                     suggest_name(name, message_->signal_names()));
+  }
+  return found;
+}
+
+std::string SignalResolver::signal_place(const dbc::Signal& signal) const {
+  return at_line(dbc_path_, signal.line);
+}
+
+std::optional<dbc::SignalCodec> SignalResolver::codec(const dbc::Signal& signal) {
+  auto made = dbc::SignalCodec::make(signal, message_->size_bytes, signal_place(signal));
+  if (made) return std::move(*made);
+  reader_.complain(made.error().where, made.error().what, made.error().remedy);
+  return std::nullopt;
+}
+
+std::optional<Quantity> SignalResolver::quantity(const dbc::Signal& signal, std::string_view key,
+                                                 Dimension dimension,
+                                                 const std::optional<std::string>& unit) {
+  auto bits = codec(signal);
+  auto presence = dbc::Presence::make(*message_, signal, signal_place(signal));
+  if (!presence) {
+    reader_.complain(presence.error().where, presence.error().what, presence.error().remedy);
+  }
+  const std::string& spelling = unit ? *unit : signal.unit;
+  const auto conversion = convert_unit(dimension, spelling);
+  if (!conversion) {
+    const std::string remedy =
+        fmt::format("units that are: {}{}", recommended_units(dimension),
+                    dimension == Dimension::kRate && !unit
+                        ? "; where the DBC file is wrong, set unit = \"deg/s\" here"
+                        : "");
+    reader_.complain(reader_.where(unit ? "unit" : key),
+                     fmt::format("{} ({}) has the unit \"{}\", which this quantity cannot have",
+                                 signal.name, signal_place(signal), spelling),
+                     remedy);
+  }
+  if (!bits || !presence || !conversion) return std::nullopt;
+  Quantity quantity{.name = signal.name,
+                    .unit = spelling,
+                    .codec = *bits,
+                    .presence = *presence,
+                    .scale = conversion->scale,
+                    .shift = conversion->shift,
+                    .layout = layout_of(signal)};
+  set_limits(quantity, signal, dimension);
+  return quantity;
+}
+
+// The DBC's range is believed only where the signal can reach it: files in the wild carry ranges
+// that contradict their own scale, and believing those would throw good samples away.
+void SignalResolver::set_limits(Quantity& quantity, const dbc::Signal& signal,
+                                Dimension dimension) {
+  const double widest = dimension == Dimension::kRate ? kRateLimit_dps / quantity.scale
+                                                      : std::numeric_limits<double>::max();
+  quantity.minimum = -widest;
+  quantity.maximum = widest;
+  if (signal.minimum == signal.maximum) return;
+  const double lowest = quantity.codec.representable_min();
+  const double highest = quantity.codec.representable_max();
+  const double slack = std::abs(signal.factor);
+  const bool plausible = signal.minimum < signal.maximum && signal.minimum >= lowest - slack &&
+                         signal.maximum <= highest + slack;
+  if (plausible) {
+    quantity.minimum = std::max(-widest, signal.minimum);
+    quantity.maximum = std::min(widest, signal.maximum);
+    return;
+  }
+  warnings_.push_back({signal_place(signal),
+                       fmt::format("the range [{:g}|{:g}] of {} does not fit its scale, which gives "
+                                   "{:g} to {:g}: not used as a limit",
+                                   signal.minimum, signal.maximum, signal.name, lowest, highest),
+                       {}});
+}
+
+}  // namespace vgyro::gateway

@@ -1,0 +1,69 @@
+#pragma once
+
+// Names in a configuration → bits in frames: finds message and signal in the DBC file, turns the
+// unit into the product's own, and decides which values can be believed. Complaints go to the
+// reader's list, with the line of the key that was wrong.
+
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "dbc/database.h"
+#include "gateway/plan.h"
+#include "gateway/toml_reader.h"
+#include "gateway/units.h"
+
+namespace vgyro::gateway {
+
+/// Loaded DBC files by path, each read once.
+class DatabaseCache {
+ public:
+  explicit DatabaseCache(std::vector<Error>& warnings) : warnings_(warnings) {}
+  /// Null after a complaint.
+  const dbc::Database* get(const std::string& path, TomlReader& reader);
+
+ private:
+  std::map<std::string, std::unique_ptr<dbc::Database>> files_;
+  std::vector<Error>& warnings_;
+};
+
+/// One message of one table of the configuration.
+class SignalResolver {
+ public:
+  /// Reads the keys bus, dbc, message of the table.
+  SignalResolver(TomlReader& reader, DatabaseCache& cache, const std::string& config_folder,
+                 std::vector<std::string>& buses, std::vector<Error>& warnings);
+
+  [[nodiscard]] bool usable() const { return message_ != nullptr; }
+  [[nodiscard]] const std::string& bus() const { return bus_; }
+  [[nodiscard]] const dbc::Message& message() const { return *message_; }
+  [[nodiscard]] FrameMatch match() const;
+  [[nodiscard]] const std::string& dbc_path() const { return dbc_path_; }
+
+  /// The signal that `key` names; null after a complaint, or when the key is not there.
+  const dbc::Signal* signal(std::string_view key, bool required);
+  const dbc::Signal* signal_named(std::string_view name, std::string_view key);
+
+  std::optional<Quantity> quantity(const dbc::Signal& signal, std::string_view key,
+                                   Dimension dimension, const std::optional<std::string>& unit = {});
+  std::optional<dbc::SignalCodec> codec(const dbc::Signal& signal);
+
+ private:
+  [[nodiscard]] std::string signal_place(const dbc::Signal& signal) const;
+  void set_limits(Quantity& quantity, const dbc::Signal& signal, Dimension dimension);
+  void find_message(std::string_view name, DatabaseCache& cache);
+
+  TomlReader& reader_;
+  std::vector<Error>& warnings_;
+  std::string bus_;
+  can::BusIndex bus_index_ = 0;
+  std::string dbc_path_;
+  const dbc::Message* message_ = nullptr;
+};
+
+/// Adds the name when it is new.
+can::BusIndex bus_index(std::vector<std::string>& buses, const std::string& name);
+
+}  // namespace vgyro::gateway

@@ -1,0 +1,20 @@
+#include "gateway/status.h"
+
+#include <array>
+
+namespace vgyro::gateway {
+
+std::string_view to_string(State state) {
+  constexpr std::array<std::string_view, 5> kNames{"waiting", "calibrating", "running", "degraded",
+                                                   "lost"};
+  return kNames[static_cast<std::size_t>(state)];
+}
+
+std::string_view to_string(Reject reject) {
+  constexpr std::array<std::string_view, kRejectCount> kNames{
+      "not_data",     "other_page",       "truncated",        "flagged_invalid", "not_finite", "out_of_range",
+      "counter_repeated", "stamp_repeated", "late",            "stamp_jump"};
+  return kNames[static_cast<std::size_t>(reject)];
+}
+
+}  // namespace vgyro::gateway

@@ -1,0 +1,71 @@
+#pragma once
+
+// What the pipeline knows of itself: state, biases, and a counter for every cause by which a frame
+// was not used. Read by the daemon's STATUS line, the replay's summary and the tests.
+
+#include <array>
+#include <cstdint>
+#include <string_view>
+
+#include "base/time.h"
+
+namespace vgyro::gateway {
+
+/// VG_State on the wire; the transition table is in ARCHITECTURE.md.
+enum class State : std::uint8_t {
+  kWaiting = 0,      ///< at least one gyro has not been heard since the start
+  kCalibrating = 1,  ///< both heard, initial calibration not complete
+  kRunning = 2,      ///< both gyros in use
+  kDegraded = 3,     ///< one gyro in use, the other timed out
+  kLost = 4          ///< calibrated, but no gyro is heard
+};
+std::string_view to_string(State state);
+
+/// Why a frame of a configured identifier was not used.
+enum class Reject : std::uint8_t {
+  kNotData,          ///< remote or error frame with the gyro's identifier
+  kOtherPage,        ///< multiplexed message on a page without the rate
+  kTruncated,        ///< payload shorter than the signal
+  kFlaggedInvalid,   ///< the `valid` comparison is false
+  kNotFinite,        ///< NaN or infinity
+  kOutOfRange,       ///< outside the DBC's range, or no rate that a gyro can have
+  kCounterRepeated,  ///< the alive counter did not move
+  kStampRepeated,    ///< same stamp as the sample before
+  kLate,             ///< older than a sample already used
+  kStampJump         ///< stamp far from its neighbours, not confirmed by the following ones
+};
+inline constexpr std::size_t kRejectCount = 10;
+std::string_view to_string(Reject reject);
+
+struct GyroStatus {
+  std::uint64_t frames = 0;    ///< received with the gyro's identifier
+  std::uint64_t samples = 0;   ///< of these, handed to the alignment
+  std::uint64_t missing = 0;   ///< frames lost on the way, by the alive counter
+  std::uint64_t time_outs = 0;
+  std::array<std::uint64_t, kRejectCount> rejected{};
+  std::uint64_t unpaired = 0;  ///< samples that found no partner: the other gyro had a gap
+  bool heard = false;            ///< a sample arrived within the time-out
+  double last_rate_dps = 0.0;
+  double bias_dps = 0.0;  ///< NaN until calibrated, and for `mean`, which has none
+  double temperature_c = 0.0;  ///< NaN when there is none
+};
+
+struct Status {
+  State state = State::kWaiting;
+  std::array<GyroStatus, 2> gyros;
+  std::uint64_t reference_frames = 0;
+  std::uint64_t reference_rejected = 0;
+  std::uint64_t pairs = 0;
+  std::uint64_t clock_steps = 0;  ///< times the stamps were set back
+  std::uint64_t rates_out = 0;
+  std::uint64_t rates_out_valid = 0;
+  std::uint64_t rates_out_of_range = 0;  ///< virtual rate beyond what VG_Rate can carry
+  std::uint64_t biases_out = 0;
+  std::uint64_t windows = 0;           ///< corrector windows completed
+  std::uint64_t windows_skipped = 0;   ///< too few pairs in the window: drift held
+  double rate_dps = 0.0;               ///< last virtual rate; NaN when invalid
+  double calibrated_s = 0.0;           ///< calibration progress
+  bool moved_in_calibration = false;   ///< both gyros turned together while at "rest"
+};
+
+}  // namespace vgyro::gateway

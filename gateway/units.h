@@ -1,0 +1,26 @@
+#pragma once
+
+// Units as DBC files spell them → the product's own: deg/s, degC, g, m/s.
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace vgyro::gateway {
+
+enum class Dimension : std::uint8_t { kRate, kTemperature, kAcceleration, kSpeed };
+
+struct Conversion {
+  double scale = 1.0;  ///< own = value · scale + shift
+  double shift = 0.0;
+};
+
+/// Letter case and blanks do not matter. Nothing for a unit of another dimension or none at all.
+std::optional<Conversion> convert_unit(Dimension dimension, std::string_view unit);
+
+/// The spellings to recommend, e.g. "deg/s, rad/s, deg/h".
+std::string_view recommended_units(Dimension dimension);
+
+}  // namespace vgyro::gateway
