@@ -39,18 +39,17 @@ Expected<SignalCodec> SignalCodec::make(const Signal& signal, std::size_t messag
 void SignalCodec::place(const Signal& signal) {
   const BitPlace bits = bit_place(signal);
   const bool intel = byte_order_ == ByteOrder::kIntel;
-  bytes_needed_ = bits.last_byte + 1;
+  bytes_needed_ = static_cast<std::uint32_t>(bits.last_byte + 1);
   span_bytes_ = static_cast<std::uint8_t>(bits.last_byte - bits.first_byte + 1);
-  lowest_byte_ = intel ? bits.first_byte : bits.last_byte;
+  lowest_byte_ = static_cast<std::uint32_t>(intel ? bits.first_byte : bits.last_byte);
   lowest_bit_ = bits.lowest_bit;
   shift_down_ = static_cast<std::uint8_t>(64 - signal.length_bits);
 
-  if (span_bytes_ > 8) {
-    window_end_ = std::numeric_limits<std::size_t>::max();
+  if (span_bytes_ > kWindowBytes) {
+    window_byte_ = kNoWindow;
     return;
   }
-  window_byte_ = bits.last_byte < 7 ? 0 : bits.last_byte - 7;
-  window_end_ = window_byte_ + 8;
+  window_byte_ = bytes_needed_ < kWindowBytes ? 0 : bytes_needed_ - kWindowBytes;
   const std::size_t bytes_below =
       intel ? lowest_byte_ - window_byte_ : window_byte_ + 7 - lowest_byte_;
   shift_up_ = static_cast<std::uint8_t>(shift_down_ - 8 * bytes_below - lowest_bit_);

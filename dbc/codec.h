@@ -60,15 +60,17 @@ class SignalCodec {
   [[nodiscard]] double number_min() const;
   [[nodiscard]] double number_max() const;
 
+  static constexpr std::uint32_t kWindowBytes = 8;
+  static constexpr std::uint32_t kNoWindow = 0xFFFFFFFF;  ///< beyond any payload
+
   double factor_ = 1.0;
   double offset_ = 0.0;
-  std::size_t bytes_needed_ = 0;
   // The eight bytes that end with the signal's last byte (or the payload's first eight) hold the
-  // whole signal, unless it straddles nine bytes: then the window ends beyond any payload.
-  std::size_t window_byte_ = 0;
-  std::size_t window_end_ = 0;
-  std::size_t lowest_byte_ = 0;  ///< holds the least significant bit
-  std::uint8_t lowest_bit_ = 0;  ///< of that byte
+  // whole signal, unless it straddles nine.
+  std::uint32_t window_byte_ = 0;
+  std::uint32_t bytes_needed_ = 0;
+  std::uint32_t lowest_byte_ = 0;  ///< holds the least significant bit
+  std::uint8_t lowest_bit_ = 0;    ///< of that byte
   std::uint8_t span_bytes_ = 0;
   std::uint8_t shift_up_ = 0;    ///< brings the signal to the top of the window
   std::uint8_t shift_down_ = 0;  ///< from the top of a word to its bottom
@@ -95,8 +97,9 @@ inline double SignalCodec::number(std::int64_t raw) const {
 }
 
 inline Reading SignalCodec::decode(std::span<const std::uint8_t> payload) const {
-  const std::uint64_t top = payload.size() >= window_end_ ? load_window(payload.data()) << shift_up_
-                                                          : gather(payload.data()) << shift_down_;
+  const std::uint64_t top = payload.size() >= std::size_t{window_byte_} + kWindowBytes
+                                ? load_window(payload.data()) << shift_up_
+                                : gather(payload.data()) << shift_down_;
   const std::int64_t raw = type_ == ValueType::kSigned
                                ? static_cast<std::int64_t>(top) >> shift_down_
                                : static_cast<std::int64_t>(top >> shift_down_);
