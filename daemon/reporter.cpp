@@ -1,0 +1,134 @@
+#include "daemon/reporter.h"
+
+#include <cmath>
+#include <utility>
+
+#include <fmt/format.h>
+
+namespace vgyro::daemon {
+namespace {
+
+constexpr double kDegPerHour = 3600.0;
+
+std::string bias_text(double bias_dps) {
+  return std::isfinite(bias_dps) ? fmt::format("{:.2f}", bias_dps * kDegPerHour) : "unknown";
+}
+
+}  // namespace
+
+Reporter::Reporter(const gateway::Plan& plan, Log& log) : plan_(plan), log_(log) {}
+
+void Reporter::state_changed(const gateway::Status& status) {
+  const gateway::State before = std::exchange(state_, status.state);
+  if (state_lines_left_ == 0) {
+    ++state_lines_held_;
+    return;
+  }
+  --state_lines_left_;
+  std::string silent;
+  for (std::size_t k = 0; k < plan_.gyros.size(); ++k) {
+    if (!status.gyros[k].heard) silent += fmt::format(", gyro {} is silent", plan_.gyros[k].name);
+  }
+  log_.notice("{} (was {}){}", to_string(status.state), to_string(before), silent);
+}
+
+std::string Reporter::second_passed(const gateway::Status& status, const Traffic& traffic) {
+  ++second_;
+  if (second_ % kRepeatSeconds == 0) {
+    if (state_lines_held_ > 0) {
+      log_.warning("{} more changes of state in the last minute", state_lines_held_);
+    }
+    state_lines_held_ = 0;
+    state_lines_left_ = kStateLinesMost;
+  }
+  for (std::size_t k = 0; k < gyros_.size(); ++k) {
+    tell_gyro(plan_.gyros[k], status.gyros[k], gyros_[k]);
+  }
+  tell_pipeline(status);
+  tell_traffic(traffic);
+
+  std::string doing{to_string(status.state)};
+  if (status.state == gateway::State::kCalibrating) {
+    doing += fmt::format(" ({:.1f} of {:g} s)", status.calibrated_s, plan_.calibration.rest_s);
+  } else if (std::isfinite(status.rate_dps)) {
+    doing += fmt::format(", {:.5f} deg/s", status.rate_dps);
+  }
+  const std::uint64_t received = traffic.received - std::exchange(last_received_, traffic.received);
+  const std::uint64_t sent =
+      traffic.transmitted.sent - std::exchange(last_sent_, traffic.transmitted.sent);
+  return fmt::format("{}; bias {} deg/h; {} frames/s in, {} out", doing, biases(status), received,
+                     sent);
+}
+
+std::uint64_t Reporter::news(Told& told, std::uint64_t count) const {
+  const bool first = told.count == 0;
+  if (count <= told.count || (!first && second_ < told.second + kRepeatSeconds)) return 0;
+  told.second = second_;
+  return count - std::exchange(told.count, count);
+}
+
+void Reporter::tell_gyro(const gateway::GyroPlan& plan, const gateway::GyroStatus& gyro,
+                         GyroTold& told) {
+  for (std::size_t cause = 0; cause < gateway::kRejectCount; ++cause) {
+    if (const std::uint64_t n = news(told.rejected[cause], gyro.rejected[cause]); n > 0) {
+      log_.warning("gyro {}: {} frames not used: {}", plan.name, n,
+                   to_string(static_cast<gateway::Reject>(cause)));
+    }
+  }
+  if (const std::uint64_t n = news(told.missing, gyro.missing); n > 0) {
+    log_.warning("gyro {}: {} frames missing by its counter", plan.name, n);
+  }
+  if (const std::uint64_t n = news(told.unpaired, gyro.unpaired); n > 0) {
+    log_.warning("gyro {}: {} samples found no partner: the other gyro had a gap", plan.name, n);
+  }
+}
+
+void Reporter::tell_pipeline(const gateway::Status& status) {
+  if (const std::uint64_t n = news(clock_steps_, status.clock_steps); n > 0) {
+    log_.warning("the stamps were set back {} times", n);
+  }
+  if (const std::uint64_t n = news(rates_out_of_range_, status.rates_out_of_range); n > 0) {
+    log_.warning("{} virtual rates were beyond what VG_Rate can carry", n);
+  }
+  if (const std::uint64_t n = news(reference_rejected_, status.reference_rejected); n > 0) {
+    log_.warning("{} frames of the reference not used", n);
+  }
+  if (const std::uint64_t n = news(windows_skipped_, status.windows_skipped); n > 0) {
+    log_.warning("{} windows had too few pairs: drifts held", n);
+  }
+  if (status.moved_in_calibration && !std::exchange(told_of_motion_, true)) {
+    log_.warning("both gyros turned together while calibrating at rest");
+  }
+}
+
+void Reporter::tell_traffic(const Traffic& traffic) {
+  if (const std::uint64_t n = news(lost_by_kernel_, traffic.lost_by_kernel); n > 0) {
+    log_.warning("{} received frames lost: the socket's buffer was full", n);
+  }
+  if (const std::uint64_t n = news(stale_, traffic.transmitted.dropped_stale); n > 0) {
+    log_.warning("{} frames dropped: the bus did not take them in time", n);
+  }
+  if (const std::uint64_t n = news(overflow_, traffic.transmitted.dropped_overflow); n > 0) {
+    log_.warning("{} frames dropped: too many waited for the bus", n);
+  }
+  if (const std::uint64_t n = news(failed_, traffic.transmitted.dropped_failed); n > 0) {
+    log_.warning("{} frames dropped: the link does not carry them", n);
+  }
+}
+
+std::string Reporter::biases(const gateway::Status& status) const {
+  return fmt::format("{} {}, {} {}", plan_.gyros[0].name, bias_text(status.gyros[0].bias_dps),
+                     plan_.gyros[1].name, bias_text(status.gyros[1].bias_dps));
+}
+
+void Reporter::summarize(const gateway::Status& status, const Traffic& traffic) {
+  const can::TransmitCounts& sent = traffic.transmitted;
+  log_.notice(
+      "stopped: {} frames in ({} lost by the kernel), {} pairs, {} virtual rates ({} valid), "
+      "{} frames out ({} stale, {} overflowed, {} refused, {} retries); bias {} deg/h",
+      traffic.received, traffic.lost_by_kernel, status.pairs, status.rates_out,
+      status.rates_out_valid, sent.sent, sent.dropped_stale, sent.dropped_overflow,
+      sent.dropped_failed, sent.retries, biases(status));
+}
+
+}  // namespace vgyro::daemon

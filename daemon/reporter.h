@@ -1,0 +1,75 @@
+#pragma once
+
+// Tells people what the gateway does: changes of state, the first of each kind of trouble, a status
+// line, a summary at the end. Every kind of message has a limit on how often it comes. Clock-free:
+// second_passed() is its clock.
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "can/transmit.h"
+#include "daemon/log.h"
+#include "gateway/plan.h"
+#include "gateway/status.h"
+
+namespace vgyro::daemon {
+
+/// What went through the sockets since the start.
+struct Traffic {
+  std::uint64_t received = 0;
+  std::uint64_t lost_by_kernel = 0;  ///< dropped because the receive buffer was full
+  can::TransmitCounts transmitted;
+};
+
+class Reporter {
+ public:
+  Reporter(const gateway::Plan& plan, Log& log);
+
+  /// Logs a change of state. Cheap when there is none.
+  void check_state(const gateway::Status& status) {
+    if (status.state != state_) state_changed(status);
+  }
+
+  /// To be called about once a second: logs troubles that are new, returns the status line.
+  std::string second_passed(const gateway::Status& status, const Traffic& traffic);
+
+  void summarize(const gateway::Status& status, const Traffic& traffic);
+
+ private:
+  static constexpr std::uint64_t kRepeatSeconds = 60;
+  static constexpr int kStateLinesMost = 10;
+
+  /// A counter of troubles, and how much of it has been told.
+  struct Told {
+    std::uint64_t count = 0;
+    std::uint64_t second = 0;
+  };
+  struct GyroTold {
+    std::array<Told, gateway::kRejectCount> rejected;
+    Told missing, unpaired;
+  };
+
+  void state_changed(const gateway::Status& status);
+  std::uint64_t news(Told& told, std::uint64_t count) const;
+  void tell_gyro(const gateway::GyroPlan& plan, const gateway::GyroStatus& gyro, GyroTold& told);
+  void tell_pipeline(const gateway::Status& status);
+  void tell_traffic(const Traffic& traffic);
+  [[nodiscard]] std::string biases(const gateway::Status& status) const;
+
+  const gateway::Plan& plan_;
+  Log& log_;
+  gateway::State state_ = gateway::State::kWaiting;
+  int state_lines_left_ = kStateLinesMost;
+  std::uint64_t state_lines_held_ = 0;
+  std::uint64_t second_ = 0;
+  std::array<GyroTold, 2> gyros_;
+  Told clock_steps_, rates_out_of_range_, reference_rejected_, windows_skipped_;
+  Told lost_by_kernel_, stale_, overflow_, failed_;
+  bool told_of_motion_ = false;
+  std::uint64_t last_received_ = 0;
+  std::uint64_t last_sent_ = 0;
+};
+
+}  // namespace vgyro::daemon
