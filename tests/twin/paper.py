@@ -38,7 +38,7 @@ def scored_from_s(run):
 
 def errors_of(run, rate):
     rate_dps = make_twin.EARTH_DPS + (50.0 if run == "turn" else 0.0)
-    at_s = (rate.stamps_us - rate.age_us - rate.stamps_us[0]) * 1e-6
+    at_s = (rate.stamps_us - rate.age_us) * 1e-6 - make_twin.Options().start_s
     after_s = at_s - scored_from_s(run)
     scored = (after_s >= 0.0) & (after_s < RUNS[run])
     error = rate.rate_dps[scored] - rate_dps
