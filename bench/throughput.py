@@ -5,6 +5,7 @@ Needs Debian's packages time, can-utils, python3-can and python3-numpy."""
 
 import argparse
 import dataclasses
+import math
 import os
 import platform
 import shutil
@@ -29,6 +30,7 @@ class Row:
     from_pipe: bool = False
     prints_seconds: bool = False  # of its loop, which then count instead of the process's
     times_s: list = dataclasses.field(default_factory=list)
+    cpu_s: float = math.inf
     rss_max_kb: int = 0
 
     @property
@@ -53,7 +55,7 @@ def make_log(path, frames):
     return path
 
 
-def measure(row, core, other_core, rss_file):
+def measure(row, core, other_core, usage_file):
     """One run, wall time from start to exit; the feeding `cat` of a pipe runs on the other core. The
     kernel counts a process's memory from before its exec: /usr/bin/time is small, Python is not."""
     feeder = None
@@ -63,7 +65,7 @@ def measure(row, core, other_core, rss_file):
         feeder = subprocess.Popen(["taskset", "-c", str(other_core), "cat", str(row.log)], stdout=subprocess.PIPE)
         stdin = feeder.stdout
     process = subprocess.Popen(
-        ["taskset", "-c", str(core), "/usr/bin/time", "-q", "-f", "%M", "-o", str(rss_file), *map(str, row.command)],
+        ["taskset", "-c", str(core), "/usr/bin/time", "-q", "-f", "%M %U %S", "-o", str(usage_file), *map(str, row.command)],
         stdin=stdin, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
     )
     if feeder:
@@ -75,7 +77,9 @@ def measure(row, core, other_core, rss_file):
     if process.returncode != 0:
         raise RuntimeError(f"{row.command}: exit code {process.returncode}\n{complaint.decode(errors='replace')}")
     row.times_s.append(float(output.split()[1]) if row.prints_seconds else seconds)
-    row.rss_max_kb = max(row.rss_max_kb, int(rss_file.read_text(encoding="ascii")))
+    rss_kb, user_s, system_s = usage_file.read_text(encoding="ascii").split()
+    row.rss_max_kb = max(row.rss_max_kb, int(rss_kb))
+    row.cpu_s = min(row.cpu_s, float(user_s) + float(system_s))
 
 
 def rows(bin_dir, long_log, short_log, out):
@@ -101,10 +105,10 @@ def print_table(measured, rounds, core):
     reference = measured[0].frames_per_s
     print(f"{FRAMES_LONG / 1e6:g} million frames ({measured[0].log.stat().st_size / 1e6:.0f} MB), best of {rounds}, "
           f"pinned to core {core} of {os.cpu_count()}, {cpu_name()}, Linux {platform.release()}.\n")
-    print("| program | million frames/s | seconds | of `wc -l` | peak memory, MB |")
-    print("|---|---:|---:|---:|---:|")
+    print("| program | million frames/s | seconds | of these, CPU | of `wc -l` | peak memory, MB |")
+    print("|---|---:|---:|---:|---:|---:|")
     for row in measured:
-        print(f"| {row.name} | {row.frames_per_s / 1e6:.3g} | {min(row.times_s):.3f} | "
+        print(f"| {row.name} | {row.frames_per_s / 1e6:.3g} | {min(row.times_s):.3f} | {row.cpu_s:.2f} | "
               f"{row.frames_per_s / reference:.2g} | {row.rss_max_kb / 1024:.1f} |")
     print(f"\n¹ on {FRAMES_SHORT / 1e6:g} million frames, time of the loop alone.")
 
@@ -138,7 +142,7 @@ def main():
         for number in range(a.rounds):
             for row in measured:
                 print(f"round {number + 1} of {a.rounds}: {row.name}", file=sys.stderr)
-                measure(row, core, other_core, Path(folder) / "rss")
+                measure(row, core, other_core, Path(folder) / "usage")
     print_table(measured, a.rounds, core)
 
 
