@@ -17,17 +17,18 @@ namespace {
 
 // Overlaps are looked for in what one frame can carry; longer (transported) messages have no more
 // than their first 64 bytes looked at.
-constexpr std::size_t kCheckedBits = 64 * 8;
+constexpr std::size_t kCheckedBits = 512;
 using Bits = std::bitset<kCheckedBits>;
 using Owners = std::array<const Signal*, kCheckedBits>;
 
 Bits bits_of(const Signal& signal) {
   Bits bits;
   const bool intel = signal.byte_order == ByteOrder::kIntel;
-  const std::size_t from_top = 7U - signal.start_bit % 8U;
+  const std::size_t start = signal.start_bit;
+  const std::size_t from_first_top = start / 8 * 8 + 7 - start % 8;
   for (std::size_t i = 0; i < signal.length_bits; ++i) {
-    const std::size_t place = signal.start_bit / 8U * 8U + from_top + i;
-    const std::size_t bit = intel ? signal.start_bit + i : place / 8 * 8 + 7 - place % 8;
+    const std::size_t place = from_first_top + i;
+    const std::size_t bit = intel ? start + i : place / 8 * 8 + 7 - place % 8;
     if (bit < kCheckedBits) bits.set(bit);
   }
   return bits;

@@ -326,10 +326,11 @@ void Parser::attribute_default() {
   AttributeValue value = attribute_value();
   end_of_statement();
   if (cursor_.failed()) return;
-  if (name == kFrameFormat)
+  if (name == kFrameFormat) {
     contents_.frame_format_default = std::move(value);
-  else if (name == kProtocol)
+  } else if (name == kProtocol) {
     contents_.protocol_default = std::move(value.text);
+  }
 }
 
 /// BA_ "VFrameFormat" BO_ 2566844926 3;

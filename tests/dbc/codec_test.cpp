@@ -43,7 +43,8 @@ std::uint64_t bits_of(const Signal& signal, const Bytes& payload) {
   std::uint64_t bits = 0;
   for (std::size_t weight = 0; weight < signal.length_bits; ++weight) {
     const std::size_t bit = bit_position(signal, weight);
-    bits |= static_cast<std::uint64_t>(payload[bit / 8] >> (bit % 8) & 1U) << weight;
+    const std::uint64_t byte = payload[bit / 8];
+    bits |= (byte >> (bit % 8) & 1U) << weight;
   }
   return bits;
 }
@@ -54,7 +55,7 @@ std::int64_t expected_raw(const Signal& signal, const Bytes& payload) {
   if (signal.type != ValueType::kSigned || !negative || signal.length_bits == 64) {
     return static_cast<std::int64_t>(bits);
   }
-  return static_cast<std::int64_t>(bits) - (std::int64_t{1} << signal.length_bits);
+  return static_cast<std::int64_t>(bits - (std::uint64_t{1} << signal.length_bits));
 }
 
 Bytes random_bytes(std::mt19937& rng, std::size_t size) {
