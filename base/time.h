@@ -21,9 +21,15 @@ struct BusClock {
 /// Nanoseconds since the epoch of the host (live) or of the log (which may start at 0).
 using TimePoint = BusClock::time_point;
 
-constexpr TimePoint time_from_ns(std::int64_t ns) { return TimePoint{Duration{ns}}; }
-constexpr std::int64_t to_ns(TimePoint t) { return t.time_since_epoch().count(); }
-constexpr double to_seconds(Duration d) { return static_cast<double>(d.count()) * 1e-9; }
+constexpr TimePoint time_from_ns(std::int64_t ns) {
+  return TimePoint{Duration{ns}};
+}
+constexpr std::int64_t to_ns(TimePoint t) {
+  return t.time_since_epoch().count();
+}
+constexpr double to_seconds(Duration d) {
+  return static_cast<double>(d.count()) * 1e-9;
+}
 /// Rounds to the nanosecond; the caller keeps |s| below 9e9 s.
 constexpr Duration from_seconds(double s) {
   return Duration{static_cast<std::int64_t>(s * 1e9 + (s < 0 ? -0.5 : 0.5))};

@@ -14,7 +14,8 @@ namespace vgyro::can {
 
 namespace {
 
-constexpr std::size_t kInterfaceNameMax = 31;  // the kernel allows 15; logs of other tools a little more
+constexpr std::size_t kInterfaceNameMax =
+    31;  // the kernel allows 15; logs of other tools a little more
 // Beyond this a stamp in nanoseconds would not fit 64 bits.
 constexpr std::int64_t kSecondsMax = 9'000'000'000;
 // parse_usual() looks no further than this behind the start of a line.
@@ -22,8 +23,10 @@ constexpr std::ptrdiff_t kLookaheadBytes = 96;
 
 constexpr std::array<std::int8_t, 256> make_hex_values() {
   std::array<std::int8_t, 256> table{};
-  for (auto& entry : table) entry = -1;
-  for (int i = 0; i < 10; ++i) table[static_cast<std::size_t>('0' + i)] = static_cast<std::int8_t>(i);
+  for (auto& entry : table)
+    entry = -1;
+  for (int i = 0; i < 10; ++i)
+    table[static_cast<std::size_t>('0' + i)] = static_cast<std::int8_t>(i);
   for (int i = 0; i < 6; ++i) {
     table[static_cast<std::size_t>('a' + i)] = static_cast<std::int8_t>(10 + i);
     table[static_cast<std::size_t>('A' + i)] = static_cast<std::int8_t>(10 + i);
@@ -53,8 +56,12 @@ constexpr std::array<char, 200> make_decimal_pairs() {
 }
 constexpr auto kDecimalPairs = make_decimal_pairs();
 
-int hex_value(char c) { return kHexValues[static_cast<unsigned char>(c)]; }
-bool is_digit(char c) { return c >= '0' && c <= '9'; }
+int hex_value(char c) {
+  return kHexValues[static_cast<unsigned char>(c)];
+}
+bool is_digit(char c) {
+  return c >= '0' && c <= '9';
+}
 
 std::uint64_t load_word(const char* p) {
   std::uint64_t word = 0;
@@ -81,9 +88,8 @@ unsigned unpack_hex16(const char* p, std::uint8_t* out) {
   const __m128i letter = _mm_sub_epi8(_mm_or_si128(text, _mm_set1_epi8(0x20)), _mm_set1_epi8('a'));
   const __m128i is_dec = _mm_cmpeq_epi8(_mm_min_epu8(digit, _mm_set1_epi8(9)), digit);
   const __m128i is_hex = _mm_cmpeq_epi8(_mm_min_epu8(letter, _mm_set1_epi8(5)), letter);
-  const __m128i nibble =
-      _mm_or_si128(_mm_and_si128(is_dec, digit),
-                   _mm_and_si128(is_hex, _mm_add_epi8(letter, _mm_set1_epi8(10))));
+  const __m128i nibble = _mm_or_si128(
+      _mm_and_si128(is_dec, digit), _mm_and_si128(is_hex, _mm_add_epi8(letter, _mm_set1_epi8(10))));
   const __m128i pairs = _mm_and_si128(
       _mm_or_si128(_mm_slli_epi16(nibble, 4), _mm_srli_epi16(nibble, 8)), _mm_set1_epi16(0xFF));
   _mm_storel_epi64(reinterpret_cast<__m128i*>(out), _mm_packus_epi16(pairs, pairs));
@@ -93,7 +99,8 @@ unsigned unpack_hex16(const char* p, std::uint8_t* out) {
 #else
 unsigned unpack_hex16(const char* p, std::uint8_t* out) {
   unsigned count = 0;
-  while (count < 16 && hex_value(p[count]) >= 0) ++count;
+  while (count < 16 && hex_value(p[count]) >= 0)
+    ++count;
   for (unsigned i = 0; i + 1 < count; i += 2) {
     out[i / 2] = static_cast<std::uint8_t>(hex_value(p[i]) << 4 | hex_value(p[i + 1]));
   }
@@ -114,7 +121,8 @@ class Cursor {
     return true;
   }
   void skip_blanks() {
-    while (peek() == ' ' || peek() == '\t') text_.remove_prefix(1);
+    while (peek() == ' ' || peek() == '\t')
+      text_.remove_prefix(1);
   }
   std::string_view word() {
     const std::size_t end = std::min(text_.find_first_of(" \t"), text_.size());
@@ -131,7 +139,8 @@ class Cursor {
   template <class Predicate>
   std::string_view take_while(Predicate accept) {
     std::size_t end = 0;
-    while (end < text_.size() && accept(text_[end])) ++end;
+    while (end < text_.size() && accept(text_[end]))
+      ++end;
     const std::string_view found = text_.substr(0, end);
     text_.remove_prefix(end);
     return found;
@@ -141,7 +150,8 @@ class Cursor {
 
 std::uint32_t hex_number(std::string_view digits) {
   std::uint32_t value = 0;
-  for (const char c : digits) value = value << 4U | static_cast<std::uint32_t>(hex_value(c));
+  for (const char c : digits)
+    value = value << 4U | static_cast<std::uint32_t>(hex_value(c));
   return value;
 }
 
@@ -149,13 +159,15 @@ const char* parse_stamp(Cursor& at, LogRecord& record) {
   const std::string_view whole = at.digits();
   if (whole.empty() || whole.size() > 10) return "stamp: the seconds are no number";
   std::int64_t seconds = 0;
-  for (const char c : whole) seconds = seconds * 10 + (c - '0');
+  for (const char c : whole)
+    seconds = seconds * 10 + (c - '0');
   if (seconds > kSecondsMax) return "stamp: beyond the year 2255";
   if (!at.skip('.')) return "stamp: no decimal point";
   const std::string_view fraction = at.digits();
   if (fraction.empty() || fraction.size() > 9) return "stamp: the fraction needs 1 to 9 digits";
   std::int64_t ns = 0;
-  for (std::size_t i = 0; i < 9; ++i) ns = ns * 10 + (i < fraction.size() ? fraction[i] - '0' : 0);
+  for (std::size_t i = 0; i < 9; ++i)
+    ns = ns * 10 + (i < fraction.size() ? fraction[i] - '0' : 0);
   if (!at.skip(')')) return "stamp: no closing parenthesis";
   record.stamp = time_from_ns(seconds * 1'000'000'000 + ns);
   record.fraction_digits = fraction.size() > 6 ? 9 : 6;
@@ -243,7 +255,8 @@ const char* parse_xl(std::string_view id, Cursor& at, XlFrame& xl) {
   const std::string_view sdt = at.hex();
   const bool second = first && sdt.size() == 2 && at.skip(':');
   const std::string_view acceptance = at.hex();
-  if (!second || acceptance.size() != 8 || !at.skip('#')) return "XL frame: not VVPPP#FF:SS:AAAAAAAA#";
+  if (!second || acceptance.size() != 8 || !at.skip('#'))
+    return "XL frame: not VVPPP#FF:SS:AAAAAAAA#";
   xl.vcid = static_cast<std::uint8_t>(hex_number(id.substr(0, 2)));
   xl.priority = static_cast<std::uint16_t>(hex_number(id.substr(2)));
   if (xl.priority > kStandardIdMax) return "XL frame: priority above 7FF";
@@ -346,7 +359,8 @@ const char* LogReader::parse_usual(const char* p, LogRecord& record) {
   const std::uint64_t low = load_word(p + 3);
   if (high != seconds_text_[0] || low != seconds_text_[1]) {
     if (!all_digits(high) || !all_digits(low)) return nullptr;
-    const auto seconds = static_cast<std::int64_t>(digits_value(high) * 100 + digits_value(low) % 100);
+    const auto seconds =
+        static_cast<std::int64_t>(digits_value(high) * 100 + digits_value(low) % 100);
     if (seconds > kSecondsMax) return nullptr;
     seconds_ns_ = seconds * 1'000'000'000;
     seconds_text_[0] = high;
@@ -369,7 +383,8 @@ const char* LogReader::parse_usual(const char* p, LogRecord& record) {
   } else if (p[8] == '#') {
     std::uint8_t bytes[8];
     if (unpack_hex16(p, bytes) != 8 || bytes[0] > 0x1F) return nullptr;
-    frame.id = static_cast<std::uint32_t>(bytes[0]) << 24U | static_cast<std::uint32_t>(bytes[1]) << 16U |
+    frame.id = static_cast<std::uint32_t>(bytes[0]) << 24U |
+               static_cast<std::uint32_t>(bytes[1]) << 16U |
                static_cast<std::uint32_t>(bytes[2]) << 8U | bytes[3];
     frame.flags = kExtended;
     p += 9;
@@ -380,7 +395,8 @@ const char* LogReader::parse_usual(const char* p, LogRecord& record) {
   if (digits % 2 != 0 || p[digits] != '\n') return nullptr;
   frame.length = static_cast<std::uint8_t>(digits / 2);
   frame.raw_dlc = 0;
-  record.stamp = time_from_ns(seconds_ns_ + static_cast<std::int64_t>(digits_value(fraction)) * 1000);
+  record.stamp =
+      time_from_ns(seconds_ns_ + static_cast<std::int64_t>(digits_value(fraction)) * 1000);
   record.bus = known->bus;
   record.fraction_digits = 6;
   record.direction = Direction::kUnknown;
@@ -469,7 +485,8 @@ char* put_decimal(char* out, std::uint64_t value, unsigned digits) {
 }
 
 char* put_hex(char* out, std::uint32_t value, unsigned digits) {
-  for (unsigned i = digits; i-- > 0; value >>= 4U) out[i] = kHexPairs[2 * (value & 15U) + 1];
+  for (unsigned i = digits; i-- > 0; value >>= 4U)
+    out[i] = kHexPairs[2 * (value & 15U) + 1];
   return out + digits;
 }
 
@@ -517,8 +534,8 @@ char* put_frame(char* out, const Frame& frame) {
   *out++ = '#';
   if (frame.has(kFd)) {
     *out++ = '#';
-    const unsigned nibble = (frame.has(kBitRateSwitch) ? 1U : 0U) |
-                            (frame.has(kErrorStateIndicator) ? 2U : 0U);
+    const unsigned nibble =
+        (frame.has(kBitRateSwitch) ? 1U : 0U) | (frame.has(kErrorStateIndicator) ? 2U : 0U);
     out = put_hex(out, nibble, 1);
     return put_bytes(out, frame.data.data(), std::min<std::size_t>(frame.length, kFdBytesMax));
   }

@@ -1,13 +1,12 @@
 #include "can/log_source.h"
 
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
 #include <fcntl.h>
 #include <lzma.h>
 #include <sys/stat.h>
 #include <unistd.h>
-
-#include <algorithm>
-#include <cerrno>
-#include <cstring>
 
 #include <fmt/core.h>
 
@@ -21,6 +20,7 @@ Expected<LogBlock> LogSource::next() {
   handed_ = 0;
   LogBlock block;
   while (true) {
+    if (before_wait_) before_wait_();
     const auto got = read(buffer_.get() + used_, kBufferBytes - used_);
     if (!got) return tl::unexpected(got.error());
     const std::size_t searched = used_;

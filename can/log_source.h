@@ -4,6 +4,7 @@
 // the way. Memory stays the same however long the log is.
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -26,6 +27,8 @@ class LogSource {
 
   virtual ~LogSource() = default;
   Expected<LogBlock> next();
+  /// Called before bytes are fetched, which may wait for a live source: the moment to flush output.
+  void before_wait(std::function<void()> callback) { before_wait_ = std::move(callback); }
 
   /// Bytes taken in so far and in total, of the packed file where it is packed; 0 when unknown.
   [[nodiscard]] virtual std::uint64_t bytes_read() const = 0;
@@ -37,6 +40,7 @@ class LogSource {
   virtual Expected<std::size_t> read(char* to, std::size_t size) = 0;
 
  private:
+  std::function<void()> before_wait_;
   std::unique_ptr<char[]> buffer_;
   std::size_t used_ = 0;    ///< bytes in the buffer
   std::size_t handed_ = 0;  ///< of these, in the block handed out last

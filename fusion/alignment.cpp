@@ -12,7 +12,8 @@ constexpr double kSameRate = 1.1;
 
 double line_at(TimePoint t, TimePoint t0, double y0, TimePoint t1, double y1) {
   if (t == t1) return y1;
-  const double share = static_cast<double>((t - t0).count()) / static_cast<double>((t1 - t0).count());
+  const double share =
+      static_cast<double>((t - t0).count()) / static_cast<double>((t1 - t0).count());
   return y0 + share * (y1 - y0);
 }
 
@@ -59,7 +60,8 @@ Duration Aligner::mean_wait(std::size_t pace) const {
   Duration::rep waited = 0;
   std::size_t next = 0;
   for (std::size_t i = 0; i < own.size(); ++i) {
-    while (next < other.size() && other[next].t < own[i].t) ++next;
+    while (next < other.size() && other[next].t < own[i].t)
+      ++next;
     if (next == 0 || next == other.size()) continue;
     sum += other[next].t - own[i].t;
     ++waited;
@@ -68,10 +70,9 @@ Duration Aligner::mean_wait(std::size_t pace) const {
 }
 
 void Aligner::choose_pace() {
-  const bool enough =
-      std::min(rings_[0].size(), rings_[1].size()) >= kSamplesToChoose ||
-      (std::max(rings_[0].size(), rings_[1].size()) == kCapacity - 1 &&
-       std::min(rings_[0].size(), rings_[1].size()) >= 2);
+  const bool enough = std::min(rings_[0].size(), rings_[1].size()) >= kSamplesToChoose ||
+                      (std::max(rings_[0].size(), rings_[1].size()) == kCapacity - 1 &&
+                       std::min(rings_[0].size(), rings_[1].size()) >= 2);
   if (!enough) return;
   for (std::size_t gyro = 0; gyro < 2; ++gyro) {
     const Ring& ring = rings_[gyro];
@@ -101,16 +102,16 @@ bool Aligner::pop(AlignedPair& pair) {
     // Samples of the other gyro that no later pair can need.
     const TimePoint needed = pair.t - half_window_;
     std::size_t stale = 0;
-    while (stale + 1 < other.size() && other[stale + 1].t <= needed) ++stale;
+    while (stale + 1 < other.size() && other[stale + 1].t <= needed)
+      ++stale;
     if (stale > 0) {
       used_until_[1 - pace_] = other[stale - 1].t;
       any_used_[1 - pace_] = true;
       other.pop_front(stale);
     }
     bool wait = false;
-    const bool paired = half_window_ == Duration::zero()
-                            ? interpolate(other, pair, 1 - pace_, wait)
-                            : average(other, pair, 1 - pace_, wait);
+    const bool paired = half_window_ == Duration::zero() ? interpolate(other, pair, 1 - pace_, wait)
+                                                         : average(other, pair, 1 - pace_, wait);
     if (wait) return false;
     pair.rate_dps[pace_] = own[0].rate_dps;
     used_until_[pace_] = pair.t;
@@ -127,7 +128,8 @@ bool Aligner::pop(AlignedPair& pair) {
   return false;
 }
 
-bool Aligner::interpolate(const Ring& other, AlignedPair& pair, std::size_t other_index, bool& wait) {
+bool Aligner::interpolate(const Ring& other, AlignedPair& pair, std::size_t other_index,
+                          bool& wait) {
   wait = other.empty() || other.back().t < pair.t;
   if (wait || other[0].t > pair.t) return false;
   // pop() has left the last sample at or before the pair in front.
@@ -171,7 +173,8 @@ bool Aligner::average(const Ring& other, AlignedPair& pair, std::size_t other_in
 }
 
 void Aligner::clear() {
-  for (Ring& ring : rings_) ring.clear();
+  for (Ring& ring : rings_)
+    ring.clear();
   any_used_ = {};
   burst_until_ = TimePoint{};
 }

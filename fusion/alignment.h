@@ -16,8 +16,8 @@
 namespace vgyro::fusion {
 
 struct AlignedPair {
-  TimePoint t;                      ///< the instant that both rates refer to
-  TimePoint complete;               ///< stamp of the sample that completed the pair
+  TimePoint t;         ///< the instant that both rates refer to
+  TimePoint complete;  ///< stamp of the sample that completed the pair
   std::array<double, 2> rate_dps{};
 };
 
@@ -26,7 +26,8 @@ class Aligner {
   static constexpr std::size_t kCapacity = 512;
   /// Samples of each gyro before the pacing gyro is chosen.
   static constexpr std::size_t kSamplesToChoose = 8;
-  /// An interval longer than this many of its own usual ones is a gap: nothing is interpolated in it.
+  /// An interval longer than this many of its own usual ones is a gap: nothing is interpolated in
+  /// it.
   static constexpr double kGapIntervals = 4.0;
   static constexpr double kAverageRatio = 1.5;
 
@@ -40,8 +41,8 @@ class Aligner {
   void clear();
 
   struct Counts {
-    /// Of the gyro that sets the instants: inside a gap of the other one, or pushed out of the buffer
-    /// by waiting for it.
+    /// Of the gyro that sets the instants: inside a gap of the other one, or pushed out of the
+    /// buffer by waiting for it.
     std::array<std::uint64_t, 2> unpaired{};
   };
   [[nodiscard]] const Counts& counts() const { return counts_; }

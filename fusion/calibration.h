@@ -13,9 +13,9 @@
 namespace vgyro::fusion {
 
 struct Calibration {
-  double end_s = 0.0;     ///< the first window starts here
-  Polynomial sum;         ///< P₁⁰ + P₂⁰, deg/s
-  Polynomial difference;  ///< P₁⁰ − P₂⁰, deg/s
+  double end_s = 0.0;                ///< the first window starts here
+  Polynomial sum;                    ///< P₁⁰ + P₂⁰, deg/s
+  Polynomial difference;             ///< P₁⁰ − P₂⁰, deg/s
   double common_variance = 0.0;      ///< of y₁ + y₂ − 2Ω about its polynomial, (deg/s)²
   double difference_variance = 0.0;  ///< of y₁ − y₂ about its polynomial, (deg/s)²
 

@@ -19,8 +19,8 @@ struct RatePair {
 
 struct VirtualRate {
   double rate_dps = 0.0;
-  double sigma_dps = 0.0;                    ///< NaN where the method makes no statement
-  std::array<double, 2> corrected_dps{};     ///< each gyro less its own drift
+  double sigma_dps = 0.0;                 ///< NaN where the method makes no statement
+  std::array<double, 2> corrected_dps{};  ///< each gyro less its own drift
 };
 
 struct Drift {
@@ -45,7 +45,8 @@ class Corrector {
   /// The next pair; t_s grows from call to call.
   virtual VirtualRate update(const RatePair& pair) = 0;
   /// One gyro alone, its drift as last known.
-  [[nodiscard]] virtual VirtualRate carry_on(std::size_t gyro, double t_s, double rate_dps) const = 0;
+  [[nodiscard]] virtual VirtualRate carry_on(std::size_t gyro, double t_s,
+                                             double rate_dps) const = 0;
   [[nodiscard]] virtual Drift drift(double t_s) const = 0;
   [[nodiscard]] virtual WindowCounts windows() const = 0;
 };

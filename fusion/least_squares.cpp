@@ -25,13 +25,15 @@ std::optional<LeastSquares::Fit> LeastSquares::fit() const {
   const int size = order_ + 1;
   if (count_ < 2U * static_cast<unsigned>(size)) return std::nullopt;
   if (x_max_ - x_min_ < 2.0 * kCoverageMin) return std::nullopt;
-  using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kOrderMax + 1, kOrderMax + 1>;
+  using Matrix =
+      Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kOrderMax + 1, kOrderMax + 1>;
   using Vector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kOrderMax + 1, 1>;
   Matrix normal(size, size);
   Vector right(size);
   for (int i = 0; i < size; ++i) {
     right(i) = products_[static_cast<std::size_t>(i)];
-    for (int j = 0; j < size; ++j) normal(i, j) = moments_[static_cast<std::size_t>(i + j)];
+    for (int j = 0; j < size; ++j)
+      normal(i, j) = moments_[static_cast<std::size_t>(i + j)];
   }
   const Vector solution = normal.ldlt().solve(right);
   Fit result;

@@ -29,6 +29,8 @@ class MeanCorrector final : public Corrector {
 
 }  // namespace
 
-std::unique_ptr<Corrector> make_mean_corrector() { return std::make_unique<MeanCorrector>(); }
+std::unique_ptr<Corrector> make_mean_corrector() {
+  return std::make_unique<MeanCorrector>();
+}
 
 }  // namespace vgyro::fusion

@@ -6,9 +6,9 @@
 
 // The paper's steps, per window i, with P_k the fitted and p_k the predicted (extrapolated) drifts:
 //   cross drifts   d₁ = y₁ − (y₂ − p₂) = δ + p₂,   d₂ = −δ + p₁,   δ = y₁ − y₂
-//   fit            P₁ⁱ = D + p₂, P₂ⁱ = −D + p₁      with D the fit of δ: a fit of a polynomial is itself
-//   average        c₁ = ½(p₁ + P₁ⁱ) = ½(S + D),     c₂ = ½(S − D),  S = p₁ + p₂
-//   virtual gyro   Ω = ½(y₁ + y₂) − ½(c₁ + c₂) = ½(y₁ + y₂) − ½S
+//   fit            P₁ⁱ = D + p₂, P₂ⁱ = −D + p₁      with D the fit of δ: a fit of a polynomial is
+//   itself average        c₁ = ½(p₁ + P₁ⁱ) = ½(S + D),     c₂ = ½(S − D),  S = p₁ + p₂ virtual gyro
+//   Ω = ½(y₁ + y₂) − ½(c₁ + c₂) = ½(y₁ + y₂) − ½S
 // and P₁ⁱ + P₂ⁱ = p₁ + p₂ = S is the calibration's sum, extrapolated for ever. So S from the
 // calibration and one fit D per window are the whole method; docs/mutual.md has the derivation, and
 // the tests hold it against the literal steps.
@@ -37,10 +37,10 @@ class MutualCorrector final : public Corrector {
     window_.add(pair.t_s, pair.rate_dps[0] - pair.rate_dps[1]);
     const double sum = sum_.at(pair.t_s);
     const double difference = difference_.at(pair.t_s);
-    return {0.5 * (pair.rate_dps[0] + pair.rate_dps[1]) - 0.5 * sum,
-            kNone,
-            {pair.rate_dps[0] - 0.5 * (sum + difference),
-             pair.rate_dps[1] - 0.5 * (sum - difference)}};
+    return {
+        0.5 * (pair.rate_dps[0] + pair.rate_dps[1]) - 0.5 * sum,
+        kNone,
+        {pair.rate_dps[0] - 0.5 * (sum + difference), pair.rate_dps[1] - 0.5 * (sum - difference)}};
   }
 
   [[nodiscard]] VirtualRate carry_on(std::size_t gyro, double t_s, double rate_dps) const override {

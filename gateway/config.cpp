@@ -44,8 +44,9 @@ std::optional<ComparisonText> parse_comparison(std::string_view text) {
   };
   // Two-character operators first: "<=" begins with "<".
   constexpr Operator kOperators[] = {
-      {"==", Comparison::kEqual},        {"!=", Comparison::kNotEqual}, {"<=", Comparison::kLessEqual},
-      {">=", Comparison::kGreaterEqual}, {"<", Comparison::kLess},      {">", Comparison::kGreater}};
+      {"==", Comparison::kEqual},     {"!=", Comparison::kNotEqual},
+      {"<=", Comparison::kLessEqual}, {">=", Comparison::kGreaterEqual},
+      {"<", Comparison::kLess},       {">", Comparison::kGreater}};
   const auto trimmed = [](std::string_view part) {
     const std::size_t first = part.find_first_not_of(" \t");
     if (first == part.npos) return std::string();
@@ -107,10 +108,10 @@ std::optional<AliveCounter> read_counter(TomlReader& reader, SignalResolver& res
   const bool is_integer =
       signal->type == dbc::ValueType::kSigned || signal->type == dbc::ValueType::kUnsigned;
   if (!is_integer || signal->length_bits > 31 || signal->length_bits < 2) {
-    reader.complain(reader.where("counter"),
-                    fmt::format("{} is no alive counter: it has {} bits", signal->name,
-                                signal->length_bits),
-                    "an integer signal of 2 to 31 bits");
+    reader.complain(
+        reader.where("counter"),
+        fmt::format("{} is no alive counter: it has {} bits", signal->name, signal->length_bits),
+        "an integer signal of 2 to 31 bits");
     return std::nullopt;
   }
   AliveCounter counter{signal->name, *codec, 1U << signal->length_bits};
@@ -148,7 +149,8 @@ std::optional<GyroPlan> read_gyro(const toml::table& table, std::size_t index, C
   const auto unit = reader.text("unit");
   std::optional<GyroPlan> gyro;
   std::optional<Quantity> rate;
-  if (rate_signal != nullptr) rate = resolver.quantity(*rate_signal, "rate", Dimension::kRate, unit);
+  if (rate_signal != nullptr)
+    rate = resolver.quantity(*rate_signal, "rate", Dimension::kRate, unit);
   if (rate) {
     gyro.emplace(GyroPlan{.name = name,
                           .bus = resolver.bus(),
@@ -201,8 +203,8 @@ void read_gyros(TomlReader& root, Context& context) {
   const FrameMatch& b = gyros[1].match;
   if (a.bus == b.bus && a.extended == b.extended && ((a.id ^ b.id) & a.mask & b.mask) == 0) {
     root.complain(root.where("gyro"),
-                  fmt::format("both gyros are read from the same frame: {} on {}",
-                              gyros[0].message, gyros[0].bus),
+                  fmt::format("both gyros are read from the same frame: {} on {}", gyros[0].message,
+                              gyros[0].bus),
                   "two different gyros are needed; J1939 gyros of one PGN are told apart by "
                   "source_address = N");
     return;
@@ -239,7 +241,8 @@ void read_accelerometer(TomlReader& /*reader*/, SignalResolver& resolver, Plan& 
   for (const char* key : {"x", "y", "z"}) {
     const dbc::Signal* signal = resolver.signal(key, true);
     if (signal == nullptr) continue;
-    if (auto axis = resolver.quantity(*signal, key, Dimension::kAcceleration)) axes.push_back(*axis);
+    if (auto axis = resolver.quantity(*signal, key, Dimension::kAcceleration))
+      axes.push_back(*axis);
   }
   if (axes.size() != 3) return;
   plan.accelerometer = AccelerometerPlan{
@@ -275,8 +278,8 @@ void read_calibration(TomlReader& root, Context& context) {
   const auto rate = reader.number("rate_dps");
   const auto latitude = reader.number("latitude_deg");
   if (rate && latitude) {
-    reader.complain(reader.where("latitude_deg"), "rate_dps and latitude_deg both say the true rate",
-                    "keep one of them");
+    reader.complain(reader.where("latitude_deg"),
+                    "rate_dps and latitude_deg both say the true rate", "keep one of them");
   }
   if (latitude && !(std::abs(*latitude) <= 90.0)) {
     reader.complain(reader.where("latitude_deg"), fmt::format("latitude_deg is {:g}", *latitude),
@@ -351,11 +354,12 @@ void check_output_ids(TomlReader& reader, const Plan& plan) {
   }
   for (const FrameMatch& input : plan.gyros.empty() ? std::vector<FrameMatch>{} : plan.inputs()) {
     for (const std::uint32_t id : {output.rate_id, output.bias_id, output.model_id}) {
-      if (input.bus != output.bus || input.extended || ((id ^ input.id) & input.mask) != 0) continue;
-      reader.complain(reader.where(),
-                      fmt::format("output identifier {:#x} is also an input on {}", id,
-                                  plan.buses[input.bus]),
-                      "choose rate_id, bias_id and model_id that nobody else sends");
+      if (input.bus != output.bus || input.extended || ((id ^ input.id) & input.mask) != 0)
+        continue;
+      reader.complain(
+          reader.where(),
+          fmt::format("output identifier {:#x} is also an input on {}", id, plan.buses[input.bus]),
+          "choose rate_id, bias_id and model_id that nobody else sends");
     }
   }
 }
@@ -389,7 +393,9 @@ std::optional<Method> method_from(std::string_view name) {
   return std::nullopt;
 }
 
-std::string_view to_string(Method method) { return method == Method::kMean ? "mean" : "mutual"; }
+std::string_view to_string(Method method) {
+  return method == Method::kMean ? "mean" : "mutual";
+}
 
 ConfigResult load_config(const std::string& path, const ConfigOverrides& overrides) {
   const auto text = read_file(path);

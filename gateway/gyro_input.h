@@ -1,8 +1,8 @@
 #pragma once
 
-// One gyro's frames → rates in deg/s, or the cause why a frame cannot be used. Checks what the frame
-// itself tells: length, `valid` comparison, alive counter, finite and in range. Stamps are judged
-// elsewhere.
+// One gyro's frames → rates in deg/s, or the cause why a frame cannot be used. Checks what the
+// frame itself tells: length, `valid` comparison, alive counter, finite and in range. Stamps are
+// judged elsewhere.
 
 #include <cstdint>
 #include <optional>
@@ -20,7 +20,7 @@ class GyroInput {
   struct Result {
     std::optional<Reject> reject;  ///< set: the frame is not used
     double rate_dps = 0.0;
-    std::uint32_t missing = 0;     ///< frames that the alive counter says were lost before this one
+    std::uint32_t missing = 0;  ///< frames that the alive counter says were lost before this one
   };
   Result decode(const can::Frame& frame);
 

@@ -36,7 +36,8 @@ std::uint64_t sigma_field(double scaled, unsigned bits) {
 }
 
 void store_word(std::uint8_t* to, std::uint64_t word) {
-  for (unsigned i = 0; i < 8; ++i) to[i] = static_cast<std::uint8_t>(word >> (8U * i));
+  for (unsigned i = 0; i < 8; ++i)
+    to[i] = static_cast<std::uint8_t>(word >> (8U * i));
 }
 
 std::uint64_t age_field(Duration age) {
@@ -92,10 +93,9 @@ void OutputEncoder::put_classic_rate(const RateOutput& output) {
   const std::uint64_t rate = valid ? signed_field(output.rate_dps * kRatePerDps, 24) : kInvalid;
   const std::uint64_t sigma = valid ? sigma_field(output.sigma_dps * kSigmaPerDps, 12) : 0xFFF;
   const auto quality = static_cast<std::uint64_t>(valid ? output.quality : Quality::kUnusable);
-  store_word(rate_.data.data(), rate << 16U | sigma << 40U |
-                                    static_cast<std::uint64_t>(output.state) << 52U |
-                                    (valid ? 1ULL << 55U : 0) | quality << 56U |
-                                    age_field(output.age) << 60U);
+  store_word(rate_.data.data(),
+             rate << 16U | sigma << 40U | static_cast<std::uint64_t>(output.state) << 52U |
+                 (valid ? 1ULL << 55U : 0) | quality << 56U | age_field(output.age) << 60U);
 }
 
 void OutputEncoder::put_fd_rate(const RateOutput& output) {
@@ -129,10 +129,10 @@ const can::Frame& OutputEncoder::bias(const BiasOutput& output) {
 }
 
 const can::Frame& OutputEncoder::model(const ModelOutput& output) {
-  store_word(model_.data.data(),
-             signed_field(output.slope_dps_s * kSlopePerDpsS, 24) << 16U |
-                 sigma_field(output.bias_sigma_dps * kBiasPerDps, 12) << 40U |
-                 sigma_field(output.slope_sigma_dps_s * kSlopePerDpsS, 12) << 52U);
+  store_word(model_.data.data(), signed_field(output.slope_dps_s * kSlopePerDpsS, 24) << 16U |
+                                     sigma_field(output.bias_sigma_dps * kBiasPerDps, 12) << 40U |
+                                     sigma_field(output.slope_sigma_dps_s * kSlopePerDpsS, 12)
+                                         << 52U);
   model_protection_.protect(classic_payload(model_));
   return model_;
 }

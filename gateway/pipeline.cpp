@@ -56,9 +56,11 @@ struct Pipeline::Impl {
 
   void receive_gyro(std::size_t gyro, const can::Frame& frame, TimePoint stamp, FrameSink& sink);
   void receive_reference(const can::Frame& frame, TimePoint stamp, FrameSink& sink);
-  void take_sample(std::size_t gyro, TimePoint t, double rate_dps, TimePoint stamp, FrameSink& sink);
+  void take_sample(std::size_t gyro, TimePoint t, double rate_dps, TimePoint stamp,
+                   FrameSink& sink);
   void take_pair(const fusion::AlignedPair& pair, TimePoint stamp, FrameSink& sink);
-  void take_single(std::size_t gyro, TimePoint t, double rate_dps, TimePoint stamp, FrameSink& sink);
+  void take_single(std::size_t gyro, TimePoint t, double rate_dps, TimePoint stamp,
+                   FrameSink& sink);
   void calibrate(const fusion::AlignedPair& pair);
   void calibrate_with(const fusion::AlignedPair& pair, double true_rate_dps);
 
@@ -87,6 +89,7 @@ struct Pipeline::Impl {
   ReferenceCalibration reference;
   std::unique_ptr<fusion::Corrector> corrector;
   OutputEncoder encoder;
+  RateObserver* observer = nullptr;
   Status status;
 
   bool calibrated = false;
@@ -94,11 +97,11 @@ struct Pipeline::Impl {
   std::array<bool, 2> heard{};
   std::array<TimePoint, 2> last_heard{};
   TimePoint first_heard{};
-  TimePoint origin{};       ///< zero of the estimation's seconds: the first pair
+  TimePoint origin{};                   ///< zero of the estimation's seconds: the first pair
   TimePoint newest = TimePoint::min();  ///< newest instant given to the output
-  std::size_t alone = kNobody;  ///< gyro that speaks alone
+  std::size_t alone = kNobody;          ///< gyro that speaks alone
   TimePoint next_bias{};
-  TimePoint deadline{};     ///< nothing is due before; may lie too early, never too late
+  TimePoint deadline{};  ///< nothing is due before; may lie too early, never too late
 };
 
 Pipeline::Impl::Impl(const Plan& the_plan)
@@ -202,7 +205,8 @@ void Pipeline::Impl::take_sample(std::size_t gyro, TimePoint t, double rate_dps,
   last_heard[gyro] = std::max(last_heard[gyro], t);
   if (t >= deadline) do_what_is_due(t, stamp, sink);
   fusion::AlignedPair pair;
-  while (aligner.pop(pair)) take_pair(pair, stamp, sink);
+  while (aligner.pop(pair))
+    take_pair(pair, stamp, sink);
   if (!pairing && single_is_wanted(gyro, t)) take_single(gyro, t, rate_dps, stamp, sink);
 }
 
@@ -224,6 +228,9 @@ void Pipeline::Impl::take_pair(const fusion::AlignedPair& pair, TimePoint stamp,
   // While one gyro was missing the other spoke alone, perhaps for later instants than this.
   if (pair.t <= newest) return;
   newest = pair.t;
+  if (observer != nullptr) {
+    observer->on_rate(pair.t - guard.offset(), pair.rate_dps, calibrated ? rate.rate_dps : kNone);
+  }
   send_rate(rate, calibrated, pair.t, pair.complete - pair.t, stamp, sink);
   send_bias_when_due(pair.t, stamp, sink);
 }
@@ -236,6 +243,11 @@ void Pipeline::Impl::take_single(std::size_t gyro, TimePoint t, double rate_dps,
   fusion::VirtualRate rate;
   if (calibrated) rate = corrector->carry_on(gyro, seconds(t), rate_dps);
   enter_state(stamp, sink);
+  if (observer != nullptr) {
+    std::array<double, 2> raw_dps{kNone, kNone};
+    raw_dps[gyro] = rate_dps;
+    observer->on_rate(stamp, raw_dps, calibrated ? rate.rate_dps : kNone);
+  }
   send_rate(rate, calibrated, t, Duration::zero(), stamp, sink);
   send_bias_when_due(t, stamp, sink);
 }
@@ -364,7 +376,8 @@ void Pipeline::Impl::send_bias(TimePoint stamp, FrameSink& sink) {
                                   ? corrector->drift(seconds(newest))
                                   : fusion::Drift{{kNone, kNone}, kNone, kNone, kNone};
   sink.put(encoder.bias({drift.bias_dps, bias_mode(), health()}), stamp);
-  sink.put(encoder.model({drift.slope_dps_s, drift.bias_sigma_dps, drift.slope_sigma_dps_s}), stamp);
+  sink.put(encoder.model({drift.slope_dps_s, drift.bias_sigma_dps, drift.slope_sigma_dps_s}),
+           stamp);
 }
 
 void Pipeline::Impl::send_bias_when_due(TimePoint t, TimePoint stamp, FrameSink& sink) {
@@ -400,10 +413,20 @@ void Pipeline::receive(can::BusIndex bus, const can::Frame& frame, TimePoint sta
   impl_->receive(bus, frame, stamp, out);
 }
 
-void Pipeline::advance(TimePoint now, FrameSink& out) { impl_->advance(now, out); }
+void Pipeline::advance(TimePoint now, FrameSink& out) {
+  impl_->advance(now, out);
+}
 
-TimePoint Pipeline::next_deadline() const { return impl_->deadline - impl_->guard.offset(); }
+TimePoint Pipeline::next_deadline() const {
+  return impl_->deadline - impl_->guard.offset();
+}
 
-const Status& Pipeline::status() const { return impl_->refreshed_status(); }
+const Status& Pipeline::status() const {
+  return impl_->refreshed_status();
+}
+
+void Pipeline::observe(RateObserver* observer) {
+  impl_->observer = observer;
+}
 
 }  // namespace vgyro::gateway

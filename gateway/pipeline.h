@@ -26,6 +26,14 @@ class FrameSink {
   virtual void put(const can::Frame& frame, TimePoint stamp) = 0;
 };
 
+/// For those who draw or add up: every virtual rate with what it was made of, before it is
+/// quantised into a frame. NaN stands for a missing gyro and for an invalid rate.
+class RateObserver {
+ public:
+  virtual ~RateObserver() = default;
+  virtual void on_rate(TimePoint t, const std::array<double, 2>& raw_dps, double virtual_dps) = 0;
+};
+
 class Pipeline {
  public:
   explicit Pipeline(const Plan& plan);
@@ -37,13 +45,17 @@ class Pipeline {
   /// resolution of a candump log, so that a replay of what candump saw repeats the run bit for bit.
   void receive(can::BusIndex bus, const can::Frame& frame, TimePoint stamp, FrameSink& out);
 
-  /// Time passed without a frame: time-outs and the heartbeat of VG_Bias. Cheap when nothing is due.
+  /// Time passed without a frame: time-outs and the heartbeat of VG_Bias. Cheap when nothing is
+  /// due.
   void advance(TimePoint now, FrameSink& out);
 
   /// When advance() has to be called next, at the latest.
   [[nodiscard]] TimePoint next_deadline() const;
 
   [[nodiscard]] const Status& status() const;
+
+  /// Null to take it off again.
+  void observe(RateObserver* observer);
 
  private:
   struct Impl;

@@ -17,7 +17,8 @@ namespace vgyro::gateway {
 
 enum class Method : std::uint8_t { kMean, kMutual };
 
-/// A frame identifier on a bus: matches when (id & mask) == (frame.id & mask) and the format agrees.
+/// A frame identifier on a bus: matches when (id & mask) == (frame.id & mask) and the format
+/// agrees.
 struct FrameMatch {
   can::BusIndex bus = 0;
   std::uint32_t id = 0;
@@ -27,18 +28,25 @@ struct FrameMatch {
 
 /// A physical quantity in a frame.
 struct Quantity {
-  std::string name;        ///< of the signal
-  std::string unit;        ///< as in the DBC file
+  std::string name;  ///< of the signal
+  std::string unit;  ///< as in the DBC file
   dbc::SignalCodec codec;
   dbc::Presence presence;  ///< of a multiplexed signal: the page it stands on
-  double scale = 1.0;      ///< value · scale + shift is in the product's unit: deg/s, degC, g, m/s;
-  double shift = 0.0;      ///< the sign of the configuration is part of the scale
-  double minimum = 0.0;    ///< accepted values, in the DBC's unit
+  double scale = 1.0;    ///< value · scale + shift is in the product's unit: deg/s, degC, g, m/s;
+  double shift = 0.0;    ///< the sign of the configuration is part of the scale
+  double minimum = 0.0;  ///< accepted values, in the DBC's unit
   double maximum = 0.0;
-  std::string layout;      ///< for people: "32 bits from bit 0, Intel, signed, x 1e-06"
+  std::string layout;  ///< for people: "32 bits from bit 0, Intel, signed, x 1e-06"
 };
 
-enum class Comparison : std::uint8_t { kEqual, kNotEqual, kLess, kLessEqual, kGreater, kGreaterEqual };
+enum class Comparison : std::uint8_t {
+  kEqual,
+  kNotEqual,
+  kLess,
+  kLessEqual,
+  kGreater,
+  kGreaterEqual
+};
 
 /// `valid = "Status == 0"`
 struct Condition {
@@ -111,7 +119,8 @@ struct Plan {
   std::vector<std::string> buses;  ///< BusIndex → interface name, without repetition
   std::vector<GyroPlan> gyros;     ///< exactly two, once resolved
   std::optional<ReferencePlan> reference;
-  std::optional<AccelerometerPlan> accelerometer;  ///< resolved and checked; the pipeline reads neither
+  std::optional<AccelerometerPlan>
+      accelerometer;  ///< resolved and checked; the pipeline reads neither
   std::optional<SpeedPlan> speed;
   CalibrationPlan calibration;
   CorrectorPlan corrector;

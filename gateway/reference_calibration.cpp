@@ -23,8 +23,7 @@ std::optional<ReferenceCalibration::Ready> ReferenceCalibration::next() {
     if (pair.t > newest_->t) return std::nullopt;
     head_ = (head_ + 1) % kPendingMax;
     --size_;
-    const bool covered =
-        before_ && pair.t >= before_->t && newest_->t - before_->t <= kGapMax;
+    const bool covered = before_ && pair.t >= before_->t && newest_->t - before_->t <= kGapMax;
     if (!covered) continue;
     const double share = static_cast<double>((pair.t - before_->t).count()) /
                          static_cast<double>((newest_->t - before_->t).count());

@@ -54,8 +54,10 @@ const dbc::Database* DatabaseCache::get(const std::string& path, TomlReader& rea
     warnings_.push_back({at_line(path, odd.line), odd.what, {}});
   }
   if (loaded->diagnostics.size() > kDiagnosticsShown) {
-    warnings_.push_back({path, fmt::format("{} more odd lines, the rest of the file is used",
-                                           loaded->diagnostics.size() - kDiagnosticsShown), {}});
+    warnings_.push_back({path,
+                         fmt::format("{} more odd lines, the rest of the file is used",
+                                     loaded->diagnostics.size() - kDiagnosticsShown),
+                         {}});
   }
   return (files_[path] = std::make_unique<dbc::Database>(std::move(*loaded))).get();
 }
@@ -93,7 +95,8 @@ FrameMatch SignalResolver::match() const {
 }
 
 const dbc::Signal* SignalResolver::signal(std::string_view key, bool required) {
-  const auto name = required ? std::optional(reader_.required_text(key, "RateZ")) : reader_.text(key);
+  const auto name =
+      required ? std::optional(reader_.required_text(key, "RateZ")) : reader_.text(key);
   if (!name || name->empty() || !usable()) return nullptr;
   return signal_named(*name, key);
 }
@@ -172,11 +175,12 @@ void SignalResolver::set_limits(Quantity& quantity, const dbc::Signal& signal,
     quantity.maximum = std::min(widest, signal.maximum);
     return;
   }
-  warnings_.push_back({signal_place(signal),
-                       fmt::format("the range [{:g}|{:g}] of {} does not fit its scale, which gives "
-                                   "{:g} to {:g}: not used as a limit",
-                                   signal.minimum, signal.maximum, signal.name, lowest, highest),
-                       {}});
+  warnings_.push_back(
+      {signal_place(signal),
+       fmt::format("the range [{:g}|{:g}] of {} does not fit its scale, which gives "
+                   "{:g} to {:g}: not used as a limit",
+                   signal.minimum, signal.maximum, signal.name, lowest, highest),
+       {}});
 }
 
 }  // namespace vgyro::gateway

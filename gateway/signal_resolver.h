@@ -47,7 +47,8 @@ class SignalResolver {
   const dbc::Signal* signal_named(std::string_view name, std::string_view key);
 
   std::optional<Quantity> quantity(const dbc::Signal& signal, std::string_view key,
-                                   Dimension dimension, const std::optional<std::string>& unit = {});
+                                   Dimension dimension,
+                                   const std::optional<std::string>& unit = {});
   std::optional<dbc::SignalCodec> codec(const dbc::Signal& signal);
 
  private:

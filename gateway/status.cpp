@@ -12,8 +12,9 @@ std::string_view to_string(State state) {
 
 std::string_view to_string(Reject reject) {
   constexpr std::array<std::string_view, kRejectCount> kNames{
-      "not_data",     "other_page",       "truncated",        "flagged_invalid", "not_finite", "out_of_range",
-      "counter_repeated", "stamp_repeated", "late",            "stamp_jump"};
+      "not_data",   "other_page",   "truncated",        "flagged_invalid",
+      "not_finite", "out_of_range", "counter_repeated", "stamp_repeated",
+      "late",       "stamp_jump"};
   return kNames[static_cast<std::size_t>(reject)];
 }
 

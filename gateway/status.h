@@ -38,15 +38,15 @@ inline constexpr std::size_t kRejectCount = 10;
 std::string_view to_string(Reject reject);
 
 struct GyroStatus {
-  std::uint64_t frames = 0;    ///< received with the gyro's identifier
-  std::uint64_t samples = 0;   ///< of these, handed to the alignment
-  std::uint64_t missing = 0;   ///< frames lost on the way, by the alive counter
+  std::uint64_t frames = 0;   ///< received with the gyro's identifier
+  std::uint64_t samples = 0;  ///< of these, handed to the alignment
+  std::uint64_t missing = 0;  ///< frames lost on the way, by the alive counter
   std::uint64_t time_outs = 0;
   std::array<std::uint64_t, kRejectCount> rejected{};
   std::uint64_t unpaired = 0;  ///< samples that found no partner: the other gyro had a gap
-  bool heard = false;            ///< a sample arrived within the time-out
+  bool heard = false;          ///< a sample arrived within the time-out
   double last_rate_dps = 0.0;
-  double bias_dps = 0.0;  ///< NaN until calibrated, and for `mean`, which has none
+  double bias_dps = 0.0;       ///< NaN until calibrated, and for `mean`, which has none
   double temperature_c = 0.0;  ///< NaN when there is none
 };
 
@@ -61,11 +61,11 @@ struct Status {
   std::uint64_t rates_out_valid = 0;
   std::uint64_t rates_out_of_range = 0;  ///< virtual rate beyond what VG_Rate can carry
   std::uint64_t biases_out = 0;
-  std::uint64_t windows = 0;           ///< corrector windows completed
-  std::uint64_t windows_skipped = 0;   ///< too few pairs in the window: drift held
-  double rate_dps = 0.0;               ///< last virtual rate; NaN when invalid
-  double calibrated_s = 0.0;           ///< calibration progress
-  bool moved_in_calibration = false;   ///< both gyros turned together while at "rest"
+  std::uint64_t windows = 0;          ///< corrector windows completed
+  std::uint64_t windows_skipped = 0;  ///< too few pairs in the window: drift held
+  double rate_dps = 0.0;              ///< last virtual rate; NaN when invalid
+  double calibrated_s = 0.0;          ///< calibration progress
+  bool moved_in_calibration = false;  ///< both gyros turned together while at "rest"
 };
 
 }  // namespace vgyro::gateway

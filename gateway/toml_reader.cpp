@@ -30,8 +30,8 @@ const toml::node* TomlReader::node(std::string_view key, const char* wanted, tom
   asked_.emplace_back(key);
   const toml::node* found = table_.get(key);
   if (found == nullptr) return nullptr;
-  const bool fits = found->type() == type ||
-                    (type == toml::node_type::floating_point && found->is_integer());
+  const bool fits =
+      found->type() == type || (type == toml::node_type::floating_point && found->is_integer());
   if (fits) return found;
   complain(where(key), fmt::format("{} {} must be {}", title_, key, wanted));
   return nullptr;
@@ -84,7 +84,8 @@ std::string TomlReader::required_text(std::string_view key, std::string_view exa
 }
 
 void TomlReader::forgive(std::initializer_list<std::string_view> keys) {
-  for (const std::string_view key : keys) asked_.emplace_back(key);
+  for (const std::string_view key : keys)
+    asked_.emplace_back(key);
 }
 
 void TomlReader::finish() {

@@ -1,0 +1,88 @@
+#include <fmt/core.h>
+
+#include "cli/commands.h"
+#include "gateway/config.h"
+
+namespace vgyro::cli {
+
+namespace {
+
+std::string id_text(const gateway::FrameMatch& match) {
+  if (!match.extended) return fmt::format("{:03X}", match.id);
+  const bool any_source = (match.mask & 0xFFU) == 0;
+  return any_source ? fmt::format("{:06X}xx", match.id >> 8U) : fmt::format("{:08X}", match.id);
+}
+
+void print_row(std::string_view role, const std::string& bus, const gateway::FrameMatch& match,
+               const std::string& message, const gateway::Quantity& quantity) {
+  const std::string signal = message + "." + quantity.name;
+  fmt::print("  {:<14}{:<8}{:<10}{:<26}{:<8}{}\n", role, bus, id_text(match), signal, quantity.unit,
+             quantity.layout);
+}
+
+void print_gyro(const gateway::GyroPlan& gyro) {
+  print_row("gyro " + gyro.name, gyro.bus, gyro.match, gyro.message, gyro.rate);
+  const auto detail = [](std::string_view what, const std::string& text) {
+    fmt::print("    {:<12}{}\n", what, text);
+  };
+  detail("accepted", fmt::format("{:g} to {:g} {}{}", gyro.rate.minimum, gyro.rate.maximum,
+                                 gyro.rate.unit, gyro.rate.scale < 0 ? ", sign flipped" : ""));
+  if (gyro.sign) detail("sign", "from a signal of its own: 1 is negative");
+  if (gyro.temperature) {
+    detail("temperature", fmt::format("{} in {}, {}", gyro.temperature->name,
+                                      gyro.temperature->unit, gyro.temperature->layout));
+  }
+  if (gyro.counter) {
+    detail("counter",
+           fmt::format("{}, runs 0 to {}", gyro.counter->name, gyro.counter->modulus - 1));
+  }
+  if (gyro.valid) detail("valid when", gyro.valid->text);
+}
+
+void print_plan(const gateway::Plan& plan) {
+  fmt::print("  {:<14}{:<8}{:<10}{:<26}{:<8}{}\n", "", "bus", "id", "signal", "unit", "bits");
+  for (const gateway::GyroPlan& gyro : plan.gyros)
+    print_gyro(gyro);
+  if (plan.reference) {
+    print_row("reference", plan.reference->bus, plan.reference->match, plan.reference->message,
+              plan.reference->rate);
+  }
+  if (plan.accelerometer) {
+    for (const gateway::Quantity& axis : plan.accelerometer->axes) {
+      print_row("accelerometer", plan.accelerometer->bus, plan.accelerometer->match,
+                plan.accelerometer->message, axis);
+    }
+  }
+  if (plan.speed) {
+    print_row("speed", plan.speed->bus, plan.speed->match, plan.speed->message, plan.speed->speed);
+  }
+  fmt::print("  {:<14}", "calibration");
+  if (plan.calibration.from_reference) {
+    fmt::print("the first {:g} s against [reference]\n", plan.calibration.rest_s);
+  } else {
+    fmt::print("the first {:g} s at rest, true rate {:g} deg/s\n", plan.calibration.rest_s,
+               plan.calibration.rate_dps);
+  }
+  fmt::print("  {:<14}{}", "corrector", gateway::to_string(plan.corrector.method));
+  if (plan.corrector.method != gateway::Method::kMean) {
+    fmt::print(", window {:g} s, drift polynomial of order {}", plan.corrector.window_s,
+               plan.corrector.order);
+  }
+  fmt::print("\n  {:<14}{:<8}VG_Rate {:03X}, VG_Bias {:03X}, VG_Model {:03X}, {}\n", "output",
+             plan.buses[plan.output.bus], plan.output.rate_id, plan.output.bias_id,
+             plan.output.model_id, plan.output.fd ? "VG_Rate as CAN FD" : "classic CAN");
+}
+
+}  // namespace
+
+int run_check(const CheckOptions& options) {
+  const auto loaded = gateway::load_config(options.config);
+  if (!loaded) return report(loaded.error());
+  for (const Error& warning : loaded->warnings)
+    warn(warning);
+  fmt::print("{}: good\n", options.config);
+  print_plan(loaded->plan);
+  return kDone;
+}
+
+}  // namespace vgyro::cli

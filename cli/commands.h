@@ -1,0 +1,48 @@
+#pragma once
+
+// The subcommands of `vgyro`, each in a file of its own. They return the exit code: 0 done, 1 bad
+// input (told on stderr). Wrong usage, 2, is main()'s business.
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "base/error.h"
+#include "gateway/plan.h"
+
+namespace vgyro::cli {
+
+inline constexpr int kDone = 0;
+inline constexpr int kBadInput = 1;
+inline constexpr int kWrongUsage = 2;
+
+struct CheckOptions {
+  std::string config;
+};
+int run_check(const CheckOptions& options);
+
+struct DecodeOptions {
+  std::vector<std::string> dbc_files;
+  std::string log;
+  bool text = false;
+};
+int run_decode(const DecodeOptions& options);
+
+struct ReplayOptions {
+  std::string config;
+  std::optional<gateway::Method> method;
+  std::string output;                ///< "-": standard output; empty: nowhere
+  std::string json;                  ///< likewise
+  std::string plot;                  ///< empty: none
+  std::vector<std::string> bus_map;  ///< "LOGNAME=CONFIGNAME"
+  std::vector<std::string> logs;
+  bool quiet = false;
+};
+int run_replay(const ReplayOptions& options);
+
+/// "error: where: what; remedy" on stderr; returns kBadInput.
+int report(const Error& error);
+int report(const std::vector<Error>& errors);
+void warn(const Error& warning);
+
+}  // namespace vgyro::cli

@@ -1,0 +1,85 @@
+// vgyro: replays, checks and decodes recordings of the gateway's CAN traffic.
+
+#include <CLI/CLI.hpp>
+
+#include "cli/commands.h"
+#include "gateway/config.h"
+
+namespace {
+
+using namespace vgyro::cli;
+
+struct Options {
+  CheckOptions check;
+  DecodeOptions decode;
+  ReplayOptions replay;
+  std::string method;
+};
+
+CLI::App* add_check(CLI::App& app, CheckOptions& options) {
+  CLI::App* command = app.add_subcommand(
+      "check", "Explain a configuration before it is trusted: which bits of which frame are used");
+  command->add_option("CONFIG", options.config, "configuration, e.g. vgyro.toml")->required();
+  return command;
+}
+
+CLI::App* add_decode(CLI::App& app, DecodeOptions& options) {
+  CLI::App* command = app.add_subcommand(
+      "decode", "Show the signals of every frame that the DBC files know, one JSON object a line");
+  command->add_option("--dbc", options.dbc_files, "DBC file; may be given several times")
+      ->required()
+      ->allow_extra_args(false);
+  command->add_flag("--text", options.text, "lines for people instead of JSON");
+  command->add_option("LOG", options.log, "candump log, .xz too; - is standard input")->required();
+  command->footer("Live monitor: candump -L can0 | vgyro decode --dbc vgyro.dbc --text -");
+  return command;
+}
+
+CLI::App* add_replay(CLI::App& app, ReplayOptions& options, std::string& method) {
+  CLI::App* command = app.add_subcommand(
+      "replay", "Run the gateway over recorded traffic, as fast as the machine can");
+  command->add_option("--config", options.config, "configuration, e.g. vgyro.toml")->required();
+  command->add_option("--method", method, "corrector instead of the configured one")
+      ->check(CLI::IsMember({"mutual", "mean"}));
+  command->add_option("-o,--output", options.output,
+                      "where the output frames go, as candump lines; default: standard output");
+  command->add_option("--json", options.json, "summary as JSON; - is standard output");
+  command->add_option("--plot", options.plot, "picture of rates and drifts: .svg, .png or .pdf");
+  command
+      ->add_option("--map", options.bus_map,
+                   "LOGNAME=CONFIGNAME: take an interface of the log for one of the configuration; "
+                   "may be given several times")
+      ->allow_extra_args(false);
+  command->add_flag("-q,--quiet", options.quiet, "no summary on stderr");
+  command->add_option("LOG", options.logs, "candump logs, .xz too; - is standard input")
+      ->required();
+  command->footer(
+      "The same input gives the same bytes out, on every run.\n"
+      "Example: vgyro replay --config vgyro.toml -o out.log --plot drift.svg drive.log.xz");
+  return command;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app{"vgyro: two gyros on CAN in, one better gyro out"};
+  app.set_version_flag("--version", "vgyro " VGYRO_VERSION);
+  app.require_subcommand(1);
+  app.footer("Exit codes: 0 done, 1 bad input (told on stderr), 2 wrong usage.");
+  Options options;
+  CLI::App* check = add_check(app, options.check);
+  CLI::App* decode = add_decode(app, options.decode);
+  CLI::App* replay = add_replay(app, options.replay, options.method);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? kDone : kWrongUsage;
+  }
+  if (check->parsed()) return run_check(options.check);
+  if (decode->parsed()) return run_decode(options.decode);
+  if (!options.method.empty()) options.replay.method = vgyro::gateway::method_from(options.method);
+  // Frames are the main result; they give way only to a summary that wants the same place.
+  const bool output_given = replay->count("--output") > 0;
+  if (!output_given && options.replay.json != "-") options.replay.output = "-";
+  return run_replay(options.replay);
+}

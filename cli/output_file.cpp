@@ -1,0 +1,77 @@
+#include "cli/output_file.h"
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <fcntl.h>
+#include <unistd.h>
+
+namespace vgyro::cli {
+
+namespace {
+constexpr int kDiscard = -1;
+}
+
+OutputFile::OutputFile(int fd, std::string name, bool owned)
+    : fd_(fd),
+      name_(std::move(name)),
+      owned_(owned),
+      buffer_(std::make_unique<char[]>(kBufferBytes)) {}
+
+OutputFile::OutputFile(OutputFile&& other) noexcept
+    : fd_(std::exchange(other.fd_, kDiscard)),
+      name_(std::move(other.name_)),
+      owned_(std::exchange(other.owned_, false)),
+      buffer_(std::move(other.buffer_)),
+      used_(std::exchange(other.used_, 0)),
+      error_(std::move(other.error_)) {}
+
+OutputFile::~OutputFile() {
+  if (buffer_ != nullptr) flush();
+  if (owned_) ::close(fd_);
+}
+
+Expected<OutputFile> OutputFile::open(const std::string& path) {
+  if (path.empty()) return OutputFile(kDiscard, "", false);
+  if (path == "-") return OutputFile(STDOUT_FILENO, "standard output", false);
+  const int fd = ::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
+  if (fd < 0) return fail(path, std::string("cannot be written: ") + std::strerror(errno));
+  return OutputFile(fd, path, true);
+}
+
+void OutputFile::flush() {
+  const char* at = buffer_.get();
+  std::size_t left = used_;
+  used_ = 0;
+  while (left > 0 && fd_ != kDiscard && !error_) {
+    const ssize_t written = ::write(fd_, at, left);
+    if (written < 0 && errno == EINTR) continue;
+    if (written < 0) {
+      error_ = Error{name_, std::string("cannot be written: ") + std::strerror(errno), {}};
+      return;
+    }
+    at += written;
+    left -= static_cast<std::size_t>(written);
+  }
+}
+
+void OutputFile::write(std::string_view text) {
+  while (!text.empty()) {
+    const std::size_t part = std::min(text.size(), kRoomMax);
+    std::memcpy(room(part), text.data(), part);
+    commit(part);
+    text.remove_prefix(part);
+  }
+}
+
+Expected<void> OutputFile::close() {
+  flush();
+  if (owned_ && ::close(std::exchange(fd_, kDiscard)) != 0 && !error_) {
+    error_ = Error{name_, std::string("cannot be written: ") + std::strerror(errno), {}};
+  }
+  owned_ = false;
+  if (error_) return tl::unexpected(*error_);
+  return {};
+}
+
+}  // namespace vgyro::cli

@@ -1,0 +1,47 @@
+#pragma once
+
+// Bytes to a file or to standard output through one buffer. The first failure is kept and told at
+// the end; later writes are dropped.
+
+#include <cstddef>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "base/error.h"
+
+namespace vgyro::cli {
+
+class OutputFile {
+ public:
+  /// "-" is standard output; an empty path discards.
+  static Expected<OutputFile> open(const std::string& path);
+  OutputFile(OutputFile&& other) noexcept;
+  OutputFile& operator=(OutputFile&&) = delete;
+  ~OutputFile();
+
+  /// Room for at least `size` bytes; commit() what was used of it. size ≤ kRoomMax.
+  static constexpr std::size_t kRoomMax = 16 * 1024;
+  char* room(std::size_t size) {
+    if (kBufferBytes - used_ < size) flush();
+    return buffer_.get() + used_;
+  }
+  void commit(std::size_t size) { used_ += size; }
+  void write(std::string_view text);
+  void flush();
+  /// Flushes and closes; the error names the file and the reason.
+  Expected<void> close();
+
+ private:
+  OutputFile(int fd, std::string name, bool owned);
+  static constexpr std::size_t kBufferBytes = 128 * 1024;
+  int fd_;
+  std::string name_;
+  bool owned_;
+  std::unique_ptr<char[]> buffer_;
+  std::size_t used_ = 0;
+  std::optional<Error> error_;
+};
+
+}  // namespace vgyro::cli

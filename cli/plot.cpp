@@ -1,0 +1,165 @@
+#include "cli/plot.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <sys/wait.h>
+
+#include <fmt/format.h>
+
+namespace vgyro::cli {
+
+namespace {
+
+constexpr double kSecondsPerHour = 3600.0;
+
+std::string ending_of(const std::string& path) {
+  const std::size_t dot = path.rfind('.');
+  return dot == std::string::npos ? std::string() : path.substr(dot + 1);
+}
+
+std::string terminal_of(const std::string& ending) {
+  if (ending == "svg") return "svg size 1200,1250 dynamic font 'DejaVu Sans,13' background 'white'";
+  if (ending == "png") return "pngcairo size 1200,1250 font 'DejaVu Sans,11'";
+  if (ending == "pdf") return "pdfcairo size 8.3in,11.7in font 'DejaVu Sans,11'";
+  return {};
+}
+
+std::string gnuplot_text(const std::string& text) {
+  std::string result = "'";
+  for (const char c : text) {
+    if (c == '\'') result += '\'';
+    if (c != '\n') result += c;
+  }
+  return result + "'";
+}
+
+}  // namespace
+
+void ReplayPlot::Mean::add(double value) {
+  if (!std::isfinite(value)) return;
+  sum += value;
+  ++count;
+}
+
+void ReplayPlot::Mean::merge(const Mean& other) {
+  sum += other.sum;
+  count += other.count;
+}
+
+std::string ReplayPlot::Mean::text(double scale) const {
+  return count == 0 ? "NaN" : fmt::format("{:.9g}", scale * sum / static_cast<double>(count));
+}
+
+void ReplayPlot::Bucket::merge(const Bucket& other) {
+  for (std::size_t i = 0; i < 2; ++i) {
+    raw[i].merge(other.raw[i]);
+    excess[i].merge(other.excess[i]);
+    bias[i].merge(other.bias[i]);
+  }
+  average.merge(other.average);
+  rate.merge(other.rate);
+}
+
+ReplayPlot::Bucket& ReplayPlot::bucket_at(TimePoint t) {
+  if (!begun_) {
+    begun_ = true;
+    begin_ = t;
+  }
+  auto index = static_cast<std::size_t>(std::max<Duration::rep>((t - begin_) / width_, 0));
+  while (index >= kBucketsMax) {
+    for (std::size_t i = 0; i < buckets_.size(); ++i) {
+      if (i % 2 == 1) {
+        buckets_[i / 2].merge(buckets_[i]);
+      } else {
+        buckets_[i / 2] = buckets_[i];
+      }
+    }
+    buckets_.resize((buckets_.size() + 1) / 2);
+    width_ *= 2;
+    index /= 2;
+  }
+  if (index >= buckets_.size()) buckets_.resize(index + 1);
+  return buckets_[index];
+}
+
+void ReplayPlot::add_rate(TimePoint t, const std::array<double, 2>& raw_dps, double virtual_dps) {
+  Bucket& bucket = bucket_at(t);
+  for (std::size_t i = 0; i < 2; ++i) {
+    bucket.raw[i].add(raw_dps[i]);
+    bucket.excess[i].add(raw_dps[i] - virtual_dps);
+  }
+  bucket.average.add(0.5 * (raw_dps[0] + raw_dps[1]));
+  bucket.rate.add(virtual_dps);
+}
+
+void ReplayPlot::add_bias(TimePoint t, const std::array<double, 2>& bias_dps) {
+  Bucket& bucket = bucket_at(t);
+  for (std::size_t i = 0; i < 2; ++i)
+    bucket.bias[i].add(bias_dps[i]);
+}
+
+Expected<void> ReplayPlot::check_path(const std::string& path) {
+  if (!terminal_of(ending_of(path)).empty()) return {};
+  return fail(path, "is no kind of picture that can be drawn",
+              "a name ending in .svg, .png or .pdf");
+}
+
+void ReplayPlot::write_data(std::FILE* to) const {
+  fmt::print(to, "$rates << EOD\n");
+  for (std::size_t i = 0; i < buckets_.size(); ++i) {
+    const Bucket& b = buckets_[i];
+    if (b.average.count == 0 && b.rate.count == 0 && b.bias[0].count == 0) continue;
+    fmt::print(to, "{:.9g} {} {} {} {} {} {} {} {}\n",
+               to_seconds(width_) * (static_cast<double>(i) + 0.5), b.raw[0].text(1.0),
+               b.raw[1].text(1.0), b.average.text(1.0), b.rate.text(1.0),
+               b.excess[0].text(kSecondsPerHour), b.excess[1].text(kSecondsPerHour),
+               b.bias[0].text(kSecondsPerHour), b.bias[1].text(kSecondsPerHour));
+  }
+  fmt::print(to, "EOD\n");
+}
+
+std::string ReplayPlot::script(const std::string& path, const PlotTexts& texts) const {
+  std::string text = fmt::format(
+      "set terminal {}\nset output {}\nset encoding utf8\n"
+      "set multiplot layout 4,1 title {} noenhanced\n"
+      "set grid lc rgb '#dddddd'\nset key outside top right horizontal noenhanced\n"
+      "set lmargin 12\nset rmargin 3\nset xrange [0:{:.9g}]\nset datafile missing 'NaN'\n"
+      "set ylabel 'rate, deg/s'\n"
+      "plot $rates u 1:2 w l lc rgb '#e0a030' t {}, '' u 1:3 w l lc rgb '#70a0d0' t {}, "
+      "'' u 1:4 w l lc rgb '#909090' t 'mean', '' u 1:5 w l lw 1.5 lc rgb '#b00020' t 'virtual "
+      "gyro'\n"
+      "set ylabel 'off the virtual gyro, deg/h'\n"
+      "plot $rates u 1:6 w l lc rgb '#e0a030' t {}, '' u 1:7 w l lc rgb '#70a0d0' t {}, "
+      "'' u 1:(0.5*($6+$7)) w l lc rgb '#606060' t 'mean', 0 w l lw 1.5 lc rgb '#b00020' t "
+      "'virtual gyro'\n",
+      terminal_of(ending_of(path)), gnuplot_text(path), gnuplot_text(texts.title),
+      to_seconds(width_) * static_cast<double>(buckets_.size()),
+      gnuplot_text("gyro " + texts.gyro_names[0]), gnuplot_text("gyro " + texts.gyro_names[1]),
+      gnuplot_text("gyro " + texts.gyro_names[0]), gnuplot_text("gyro " + texts.gyro_names[1]));
+  const std::array<const char*, 2> colours{"#e0a030", "#70a0d0"};
+  for (std::size_t i = 0; i < 2; ++i) {
+    if (i == 1) text += "set xlabel 'time since the first pair, s'\n";
+    text += fmt::format(
+        "set ylabel 'drift, deg/h'\nplot $rates u 1:{} w p pt 7 ps 0.25 lc rgb '{}' t {}, "
+        "'' u 1:{} w l lw 1.5 lc rgb '#202020' t 'drift curve'\n",
+        6 + i, colours[i], gnuplot_text("gyro " + texts.gyro_names[i] + " less the virtual gyro"),
+        8 + i);
+  }
+  return text + "unset multiplot\n";
+}
+
+Expected<void> ReplayPlot::draw(const std::string& path, const PlotTexts& texts) const {
+  if (const auto good = check_path(path); !good) return good;
+  if (buckets_.empty())
+    return fail(path, "there is nothing to draw: no pair of samples came together");
+  std::FILE* gnuplot = ::popen("gnuplot", "w");
+  if (gnuplot == nullptr) return fail(path, "cannot be drawn: gnuplot could not be started");
+  write_data(gnuplot);
+  fmt::print(gnuplot, "{}", script(path, texts));
+  const int status = ::pclose(gnuplot);
+  if (status == 0) return {};
+  return fail(path, "was not drawn: gnuplot is missing or failed", "apt-get install gnuplot-nox");
+}
+
+}  // namespace vgyro::cli

@@ -1,0 +1,62 @@
+#pragma once
+
+// The picture of a replay: raw, mean and virtual rate, and each gyro's drift curve over what was
+// measured of it. Samples go into a bounded number of buckets on the way, so a day of data draws as
+// fast as a minute. Drawn by gnuplot; the file's ending says the format: .svg, .png or .pdf.
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "base/error.h"
+#include "base/time.h"
+
+namespace vgyro::cli {
+
+struct PlotTexts {
+  std::string title;
+  std::array<std::string, 2> gyro_names;
+};
+
+class ReplayPlot {
+ public:
+  void add_rate(TimePoint t, const std::array<double, 2>& raw_dps, double virtual_dps);
+  void add_bias(TimePoint t, const std::array<double, 2>& bias_dps);
+
+  /// Error when the ending is none of the three, gnuplot is missing, or it fails.
+  Expected<void> draw(const std::string& path, const PlotTexts& texts) const;
+
+  /// For a check before the long work.
+  static Expected<void> check_path(const std::string& path);
+
+ private:
+  /// Mean of what fell into one stretch of time.
+  struct Mean {
+    double sum = 0.0;
+    std::uint64_t count = 0;
+    void add(double value);
+    void merge(const Mean& other);
+    [[nodiscard]] std::string text(double scale) const;
+  };
+  struct Bucket {
+    std::array<Mean, 2> raw;
+    Mean average;
+    Mean rate;
+    std::array<Mean, 2> excess;  ///< raw less virtual rate: what the drift should be
+    std::array<Mean, 2> bias;
+    void merge(const Bucket& other);
+  };
+  static constexpr std::size_t kBucketsMax = 2000;
+
+  Bucket& bucket_at(TimePoint t);
+  void write_data(std::FILE* to) const;
+  [[nodiscard]] std::string script(const std::string& path, const PlotTexts& texts) const;
+
+  bool begun_ = false;
+  TimePoint begin_;
+  Duration width_ = std::chrono::milliseconds(10);
+  std::vector<Bucket> buckets_;
+};
+
+}  // namespace vgyro::cli

@@ -1,0 +1,46 @@
+#include "cli/progress.h"
+
+#include <cstdio>
+#include <unistd.h>
+
+#include <fmt/core.h>
+
+namespace vgyro::cli {
+
+std::string human_count(double count) {
+  if (count >= 1e6) return fmt::format("{:.1f} M", count * 1e-6);
+  if (count >= 1e4) return fmt::format("{:.0f} k", count * 1e-3);
+  return fmt::format("{:.0f}", count);
+}
+
+Progress::Progress(std::string what)
+    : what_(std::move(what)),
+      enabled_(::isatty(STDERR_FILENO) == 1),
+      begin_(std::chrono::steady_clock::now()),
+      last_(begin_) {}
+
+void Progress::update(std::uint64_t done, std::uint64_t total, std::uint64_t frames) {
+  if (!enabled_) return;
+  const auto now = std::chrono::steady_clock::now();
+  if (now - last_ < std::chrono::milliseconds(100)) return;
+  last_ = now;
+  const double elapsed_s = std::chrono::duration<double>(now - begin_).count();
+  const std::string share = total == 0
+                                ? std::string()
+                                : fmt::format(" {:3.0f} %", 100.0 * static_cast<double>(done) /
+                                                                static_cast<double>(total));
+  fmt::print(stderr, "\r\x1b[K{}{}  {} frames, {} frames/s", what_, share,
+             human_count(static_cast<double>(frames)),
+             human_count(static_cast<double>(frames) / elapsed_s));
+  std::fflush(stderr);
+  drawn_ = true;
+}
+
+void Progress::clear() {
+  if (!drawn_) return;
+  fmt::print(stderr, "\r\x1b[K");
+  std::fflush(stderr);
+  drawn_ = false;
+}
+
+}  // namespace vgyro::cli

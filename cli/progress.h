@@ -1,0 +1,33 @@
+#pragma once
+
+// One line on a terminal that says how far a long command is. Silent where stderr is no terminal.
+
+#include <chrono>
+#include <cstdint>
+#include <string>
+
+namespace vgyro::cli {
+
+class Progress {
+ public:
+  explicit Progress(std::string what);
+  Progress(const Progress&) = delete;
+  Progress& operator=(const Progress&) = delete;
+  ~Progress() { clear(); }
+
+  /// Draws at most ten times a second. `total` 0: unknown.
+  void update(std::uint64_t done, std::uint64_t total, std::uint64_t frames);
+  void clear();
+
+ private:
+  std::string what_;
+  bool enabled_;
+  bool drawn_ = false;
+  std::chrono::steady_clock::time_point begin_;
+  std::chrono::steady_clock::time_point last_;
+};
+
+/// "1.2 M"
+std::string human_count(double count);
+
+}  // namespace vgyro::cli

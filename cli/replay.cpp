@@ -1,0 +1,297 @@
+#include <cmath>
+#include <cstdio>
+#include <limits>
+
+#include <fmt/core.h>
+#include <nlohmann/json.hpp>
+
+#include "base/nearest.h"
+#include "can/candump.h"
+#include "cli/commands.h"
+#include "cli/output_file.h"
+#include "cli/plot.h"
+#include "cli/progress.h"
+#include "cli/replay_summary.h"
+#include "gateway/config.h"
+#include "gateway/pipeline.h"
+
+namespace vgyro::cli {
+
+namespace {
+
+constexpr std::uint64_t kFramesPerProgress = 1U << 16U;
+constexpr can::BusIndex kForeignBus = 0xFF;
+
+// Frames of the pipeline → candump lines.
+class LineSink final : public gateway::FrameSink {
+ public:
+  LineSink(OutputFile& file, std::string interface)
+      : file_(file), interface_(std::move(interface)) {}
+  void put(const can::Frame& frame, TimePoint stamp) override {
+    char* room = file_.room(can::kLineBytesMax);
+    file_.commit(can::format_line(room, stamp, interface_, frame, fraction_digits));
+    ++frames;
+  }
+  unsigned fraction_digits = 6;
+  std::uint64_t frames = 0;
+
+ private:
+  OutputFile& file_;
+  std::string interface_;
+};
+
+class Totals final : public gateway::RateObserver {
+ public:
+  explicit Totals(ReplaySummary& summary, ReplayPlot* plot) : summary_(summary), plot_(plot) {}
+  void on_rate(TimePoint t, const std::array<double, 2>& raw_dps, double virtual_dps) override {
+    if (!begun_) first_ = t;
+    if (begun_ && t - last_ > kGap) {
+      summary_.add_gap({to_seconds(last_ - first_), to_seconds(t - last_)});
+    }
+    begun_ = true;
+    last_ = t;
+    if (plot_ != nullptr) plot_->add_rate(t, raw_dps, virtual_dps);
+    if (std::isnan(virtual_dps)) return;
+    summary_.rate_sum_dps += virtual_dps;
+    ++summary_.rates;
+    for (std::size_t i = 0; i < 2; ++i) {
+      if (std::isnan(raw_dps[i])) continue;
+      summary_.raw_sum_dps[i] += raw_dps[i];
+      ++summary_.raws[i];
+    }
+  }
+
+ private:
+  static constexpr Duration kGap = std::chrono::milliseconds(500);
+  static_assert(ReplaySummary::kGap_s == 0.5);
+  ReplaySummary& summary_;
+  ReplayPlot* plot_;
+  bool begun_ = false;
+  TimePoint first_;
+  TimePoint last_;
+};
+
+// Interface names of the log → indices of the plan, through the user's --map.
+class BusMap {
+ public:
+  static Expected<BusMap> make(const std::vector<std::string>& entries, const gateway::Plan& plan) {
+    BusMap map(plan);
+    for (const std::string& entry : entries) {
+      const std::size_t equals = entry.find('=');
+      const std::string to = equals == std::string::npos ? "" : entry.substr(equals + 1);
+      if (equals == 0 || to.empty()) {
+        return fail("--map " + entry, "is not LOGNAME=CONFIGNAME", "for example --map vcan0=can0");
+      }
+      if (std::find(plan.buses.begin(), plan.buses.end(), to) == plan.buses.end()) {
+        return fail("--map " + entry, "the configuration has no bus \"" + to + "\"",
+                    suggest_name(to, plan.buses));
+      }
+      map.entries_.emplace_back(entry.substr(0, equals), to);
+    }
+    return map;
+  }
+
+  can::BusIndex index(can::BusIndex log_bus, const can::InterfaceTable& interfaces) {
+    while (known_.size() <= log_bus) {
+      known_.push_back(look_up(interfaces.name(static_cast<can::BusIndex>(known_.size()))));
+    }
+    return known_[log_bus];
+  }
+
+  void new_log() { known_.clear(); }
+
+ private:
+  explicit BusMap(const gateway::Plan& plan) : plan_(&plan) {}
+  [[nodiscard]] can::BusIndex look_up(const std::string& name) const {
+    const auto mapped = std::find_if(entries_.begin(), entries_.end(),
+                                     [&](const auto& entry) { return entry.first == name; });
+    const std::string& wanted = mapped == entries_.end() ? name : mapped->second;
+    const auto found = std::find(plan_->buses.begin(), plan_->buses.end(), wanted);
+    return found == plan_->buses.end() ? kForeignBus
+                                       : static_cast<can::BusIndex>(found - plan_->buses.begin());
+  }
+  const gateway::Plan* plan_;
+  std::vector<std::pair<std::string, std::string>> entries_;
+  std::vector<can::BusIndex> known_;
+};
+
+class Replay {
+ public:
+  Replay(const ReplayOptions& options, const gateway::Plan& plan, OutputFile& output, BusMap buses)
+      : options_(options),
+        plan_(plan),
+        output_(output),
+        buses_(std::move(buses)),
+        pipeline_(plan),
+        sink_(output, plan.buses[plan.output.bus]),
+        totals_(summary_, options.plot.empty() ? nullptr : &plot_) {
+    pipeline_.observe(&totals_);
+  }
+
+  Expected<void> run_log(const std::string& path) {
+    auto source = can::open_log(path);
+    if (!source) return tl::unexpected(source.error());
+    can::LogSource* bytes = source->get();
+    if (path == "-") bytes->before_wait([this] { output_.flush(); });
+    can::LogReader reader(std::move(*source));
+    run_records(path, reader, *bytes);
+    summary_.logs.push_back({path, reader.counts()});
+    summary_.interfaces = reader.interfaces().names();
+    if (reader.error()) return tl::unexpected(*reader.error());
+    return {};
+  }
+
+  ReplaySummary& finish() {
+    summary_.status = pipeline_.status();
+    summary_.frames_out = sink_.frames;
+    return summary_;
+  }
+
+  const ReplayPlot& plot() const { return plot_; }
+
+ private:
+  void run_records(const std::string& path, can::LogReader& reader, const can::LogSource& bytes) {
+    Progress progress("replay " + path);
+    buses_.new_log();
+    can::LogRecord record;
+    std::uint64_t until_progress = kFramesPerProgress;
+    std::uint64_t biases = 0;
+    while (reader.next(record)) {
+      if (record.is_xl) continue;
+      if (first_) summary_.first_s = to_seconds(record.stamp.time_since_epoch());
+      first_ = false;
+      last_ = record.stamp;
+      summary_.ids.add(record.bus, record.frame);
+      sink_.fraction_digits = record.fraction_digits;
+      pipeline_.receive(buses_.index(record.bus, reader.interfaces()), record.frame, record.stamp,
+                        sink_);
+      if (--until_progress == 0) {
+        until_progress = kFramesPerProgress;
+        progress.update(bytes.bytes_read(), bytes.bytes_total(), reader.counts().frames);
+      }
+      if (!options_.plot.empty()) follow_drift(record.stamp, biases);
+    }
+    summary_.last_s = to_seconds(last_.time_since_epoch());
+  }
+
+  // Looks at the drift whenever the pipeline has published it.
+  void follow_drift(TimePoint stamp, std::uint64_t& biases) {
+    if (sink_.frames == frames_seen_) return;
+    frames_seen_ = sink_.frames;
+    const gateway::Status& status = pipeline_.status();
+    if (status.biases_out == biases) return;
+    biases = status.biases_out;
+    plot_.add_bias(stamp, {status.gyros[0].bias_dps, status.gyros[1].bias_dps});
+  }
+
+  const ReplayOptions& options_;
+  const gateway::Plan& plan_;
+  OutputFile& output_;
+  BusMap buses_;
+  gateway::Pipeline pipeline_;
+  LineSink sink_;
+  ReplaySummary summary_;
+  ReplayPlot plot_;
+  Totals totals_;
+  bool first_ = true;
+  TimePoint last_;
+  std::uint64_t frames_seen_ = 0;
+};
+
+// Why nothing came out, in words that lead to the remedy.
+std::optional<Error> explain_silence(const ReplaySummary& summary, const gateway::Plan& plan,
+                                     const std::string& logs) {
+  std::uint64_t frames = 0;
+  for (const LogSummary& log : summary.logs)
+    frames += log.counts.frames + log.counts.xl_frames;
+  if (frames == 0) {
+    return Error{logs, "holds no CAN frame",
+                 "a log as `candump -L` prints and `candump -l` writes it is needed"};
+  }
+  for (std::size_t i = 0; i < 2; ++i) {
+    if (summary.status.gyros[i].frames > 0) continue;
+    std::string names;
+    for (const std::string& name : summary.interfaces)
+      names += (names.empty() ? "" : ", ") + name;
+    return Error{
+        logs,
+        fmt::format("no frame of gyro {} ({} {:X} on {})", plan.gyros[i].name,
+                    plan.gyros[i].message, plan.gyros[i].match.id, plan.gyros[i].bus),
+        fmt::format("the log's interfaces are: {}; --map LOGNAME={} takes one of them for {}",
+                    names, plan.gyros[i].bus, plan.gyros[i].bus)};
+  }
+  return std::nullopt;
+}
+
+void warn_of_doubts(const ReplaySummary& summary, const gateway::Plan& plan) {
+  if (summary.status.moved_in_calibration) {
+    warn({"calibration",
+          fmt::format("both gyros moved together during the first {:g} s, which should be rest: "
+                      "what was learnt holds part of that motion, and VG_Quality says so",
+                      plan.calibration.rest_s),
+          "record at rest, shorten rest_s, or calibrate with source = \"reference\""});
+  }
+  const bool never = summary.status.pairs > 0 && summary.status.rates_out_valid == 0;
+  if (never) {
+    warn({"calibration",
+          fmt::format("not complete: {:.1f} of {:g} s; no valid rate was sent",
+                      summary.status.calibrated_s, plan.calibration.rest_s),
+          "a longer log, or a shorter rest_s"});
+  }
+}
+
+int write_results(const ReplayOptions& options, const gateway::Plan& plan,
+                  const ReplaySummary& summary, const ReplayPlot& plot) {
+  if (!options.json.empty()) {
+    auto json = OutputFile::open(options.json);
+    if (!json) return report(json.error());
+    json->write(to_json(summary, plan).dump(2) + "\n");
+    if (const auto closed = json->close(); !closed) return report(closed.error());
+  }
+  if (!options.quiet) fmt::print(stderr, "{}", to_text(summary, plan));
+  if (!options.plot.empty()) {
+    const PlotTexts texts{
+        fmt::format("{}: {} over {:g}-s windows", options.logs.front(),
+                    gateway::to_string(plan.corrector.method), plan.corrector.window_s),
+        {plan.gyros[0].name, plan.gyros[1].name}};
+    if (const auto drawn = plot.draw(options.plot, texts); !drawn) return report(drawn.error());
+  }
+  return kDone;
+}
+
+}  // namespace
+
+int run_replay(const ReplayOptions& options) {
+  const auto loaded = gateway::load_config(options.config, {options.method});
+  if (!loaded) return report(loaded.error());
+  const gateway::Plan& plan = loaded->plan;
+  if (!options.quiet) {
+    for (const Error& warning : loaded->warnings)
+      warn(warning);
+  }
+  if (!options.plot.empty()) {
+    if (const auto good = ReplayPlot::check_path(options.plot); !good) return report(good.error());
+  }
+  auto buses = BusMap::make(options.bus_map, plan);
+  if (!buses) return report(buses.error());
+  auto output = OutputFile::open(options.output);
+  if (!output) return report(output.error());
+
+  Replay replay(options, plan, *output, std::move(*buses));
+  std::optional<Error> trouble;
+  for (const std::string& log : options.logs) {
+    if (const auto ran = replay.run_log(log); !ran) {
+      trouble = ran.error();
+      break;
+    }
+  }
+  const ReplaySummary& summary = replay.finish();
+  if (const auto closed = output->close(); !closed) return report(closed.error());
+  if (!trouble) trouble = explain_silence(summary, plan, options.logs.front());
+  const int written = write_results(options, plan, summary, replay.plot());
+  warn_of_doubts(summary, plan);
+  if (trouble) return report(*trouble);
+  return written;
+}
+
+}  // namespace vgyro::cli

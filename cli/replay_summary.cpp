@@ -1,0 +1,238 @@
+#include "cli/replay_summary.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "gateway/config.h"
+
+namespace vgyro::cli {
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr double kSecondsPerHour = 3600.0;
+
+Json number(double value) {
+  return std::isfinite(value) ? Json(value) : Json(nullptr);
+}
+
+double mean_of(double sum, std::uint64_t count) {
+  return count == 0 ? std::nan("") : sum / static_cast<double>(count);
+}
+
+Json log_json(const LogSummary& log) {
+  Json malformed = Json::array();
+  for (const can::MalformedLine& bad : log.counts.first_malformed) {
+    malformed.push_back({{"line", bad.line}, {"why", bad.why}});
+  }
+  return {{"lines", log.counts.lines},
+          {"frames", log.counts.frames},
+          {"xl_frames", log.counts.xl_frames},
+          {"other_lines", log.counts.other_lines},
+          {"malformed_lines", log.counts.malformed_lines},
+          {"cut_off_lines", log.counts.cut_off_lines},
+          {"first_malformed", malformed}};
+}
+
+Json rejected_json(const gateway::GyroStatus& gyro) {
+  Json rejected = Json::object();
+  for (std::size_t i = 0; i < gateway::kRejectCount; ++i) {
+    rejected[std::string(to_string(static_cast<gateway::Reject>(i)))] = gyro.rejected[i];
+  }
+  return rejected;
+}
+
+std::uint64_t rejected_total(const gateway::GyroStatus& gyro) {
+  std::uint64_t total = 0;
+  for (const std::uint64_t count : gyro.rejected)
+    total += count;
+  return total;
+}
+
+Json gyro_json(const ReplaySummary& summary, const gateway::Plan& plan, std::size_t index) {
+  const gateway::GyroStatus& gyro = summary.status.gyros[index];
+  return {{"name", plan.gyros[index].name},
+          {"frames", gyro.frames},
+          {"samples", gyro.samples},
+          {"rejected", rejected_json(gyro)},
+          {"missing_by_counter", gyro.missing},
+          {"unpaired", gyro.unpaired},
+          {"time_outs", gyro.time_outs},
+          {"mean_rate_dps", number(mean_of(summary.raw_sum_dps[index], summary.raws[index]))},
+          {"bias_dps", number(gyro.bias_dps)},
+          {"temperature_c", number(gyro.temperature_c)}};
+}
+
+const gateway::GyroPlan* gyro_of(const gateway::Plan& plan, const std::string& interface,
+                                 const IdCounts::Row& row) {
+  for (const gateway::GyroPlan& gyro : plan.gyros) {
+    const bool same_id = ((gyro.match.id ^ row.id) & gyro.match.mask) == 0;
+    if (gyro.bus == interface && gyro.match.extended == row.extended && same_id) return &gyro;
+  }
+  return nullptr;
+}
+
+}  // namespace
+
+void IdCounts::add_extended(can::BusIndex bus, const can::Frame& frame) {
+  if (frame.has(can::kError)) {
+    ++error_frames_;
+    return;
+  }
+  const std::uint64_t key = static_cast<std::uint64_t>(bus) << 32U | frame.id;
+  const auto known = extended_.find(key);
+  if (known != extended_.end()) {
+    ++known->second;
+  } else if (extended_.size() < kExtendedMax) {
+    extended_.emplace(key, 1);
+  } else {
+    ++beyond_limit_;
+  }
+}
+
+std::vector<IdCounts::Row> IdCounts::rows() const {
+  std::vector<Row> rows;
+  for (std::size_t bus = 0; bus < standard_.size(); ++bus) {
+    for (std::uint32_t id = 0; id <= can::kStandardIdMax; ++id) {
+      const std::uint64_t frames = standard_[bus][id];
+      if (frames > 0) rows.push_back({static_cast<can::BusIndex>(bus), id, false, frames});
+    }
+  }
+  for (const auto& [key, frames] : extended_) {
+    rows.push_back(
+        {static_cast<can::BusIndex>(key >> 32U), static_cast<std::uint32_t>(key), true, frames});
+  }
+  std::sort(rows.begin(), rows.end(), [](const Row& a, const Row& b) {
+    return std::tuple(a.bus, a.extended, a.id) < std::tuple(b.bus, b.extended, b.id);
+  });
+  return rows;
+}
+
+void ReplaySummary::add_gap(const Gap& gap) {
+  ++gaps;
+  longest_gaps.push_back(gap);
+  std::stable_sort(longest_gaps.begin(), longest_gaps.end(),
+                   [](const Gap& a, const Gap& b) { return a.length_s > b.length_s; });
+  if (longest_gaps.size() > kGapsShown) longest_gaps.resize(kGapsShown);
+}
+
+Json to_json(const ReplaySummary& summary, const gateway::Plan& plan) {
+  const gateway::Status& status = summary.status;
+  Json logs = Json::array();
+  for (const LogSummary& log : summary.logs)
+    logs.push_back(log_json(log));
+  Json ids = Json::array();
+  for (const IdCounts::Row& row : summary.ids.rows()) {
+    const std::string& interface = summary.interfaces[row.bus];
+    const gateway::GyroPlan* gyro = gyro_of(plan, interface, row);
+    ids.push_back({{"bus", interface},
+                   {"id", row.id},
+                   {"extended", row.extended},
+                   {"frames", row.frames},
+                   {"gyro", gyro == nullptr ? Json(nullptr) : Json(gyro->name)}});
+  }
+  Json gaps = Json::array();
+  for (const Gap& gap : summary.longest_gaps) {
+    gaps.push_back({{"from_s", gap.from_s}, {"length_s", gap.length_s}});
+  }
+  return {
+      {"format", 1},
+      {"method", gateway::to_string(plan.corrector.method)},
+      {"logs", logs},
+      {"first_s", summary.first_s},
+      {"last_s", summary.last_s},
+      {"frames_by_id", ids},
+      {"error_frames", summary.ids.error_frames()},
+      {"gyros", {gyro_json(summary, plan, 0), gyro_json(summary, plan, 1)}},
+      {"reference", {{"frames", status.reference_frames}, {"rejected", status.reference_rejected}}},
+      {"pairs", status.pairs},
+      {"clock_steps", status.clock_steps},
+      {"gaps",
+       {{"longer_than_s", ReplaySummary::kGap_s}, {"count", summary.gaps}, {"longest", gaps}}},
+      {"windows", {{"completed", status.windows}, {"skipped", status.windows_skipped}}},
+      {"calibration",
+       {{"covered_s", status.calibrated_s}, {"platform_moved", status.moved_in_calibration}}},
+      {"out",
+       {{"frames", summary.frames_out},
+        {"rates", status.rates_out},
+        {"rates_valid", status.rates_out_valid},
+        {"rates_out_of_range", status.rates_out_of_range},
+        {"biases", status.biases_out},
+        {"mean_rate_dps", number(mean_of(summary.rate_sum_dps, summary.rates))}}},
+      {"final_state", to_string(status.state)}};
+}
+
+std::string to_text(const ReplaySummary& summary, const gateway::Plan& plan) {
+  const gateway::Status& status = summary.status;
+  fmt::memory_buffer text;
+  auto to = std::back_inserter(text);
+  for (const LogSummary& log : summary.logs) {
+    fmt::format_to(to, "{}: {} frames", log.path, log.counts.frames);
+    if (log.counts.xl_frames > 0)
+      fmt::format_to(to, ", {} CAN XL frames passed over", log.counts.xl_frames);
+    if (log.counts.malformed_lines > 0)
+      fmt::format_to(to, ", {} lines not understood", log.counts.malformed_lines);
+    if (log.counts.cut_off_lines > 0) {
+      fmt::format_to(to, "; the log ends inside line {}, which was not used", log.counts.lines + 1);
+    }
+    fmt::format_to(to, "\n");
+    for (const can::MalformedLine& bad : log.counts.first_malformed) {
+      fmt::format_to(to, "  line {}: {}\n", bad.line, bad.why);
+    }
+  }
+  for (std::size_t i = 0; i < 2; ++i) {
+    const gateway::GyroStatus& gyro = status.gyros[i];
+    fmt::format_to(to, "gyro {:<8} {} samples", plan.gyros[i].name, gyro.samples);
+    if (summary.raws[i] > 0) {
+      fmt::format_to(to, ", raw mean {:+.6f} deg/s",
+                     summary.raw_sum_dps[i] / static_cast<double>(summary.raws[i]));
+    }
+    if (std::isfinite(gyro.bias_dps)) {
+      fmt::format_to(to, ", drift now {:+.6f} deg/s = {:+.3f} deg/h", gyro.bias_dps,
+                     gyro.bias_dps * kSecondsPerHour);
+    }
+    if (gyro.missing > 0) fmt::format_to(to, ", {} missing by its counter", gyro.missing);
+    if (gyro.time_outs > 0) fmt::format_to(to, ", silent {} times", gyro.time_outs);
+    if (rejected_total(gyro) > 0) {
+      fmt::format_to(to, "\n  not used:");
+      for (std::size_t k = 0; k < gateway::kRejectCount; ++k) {
+        if (gyro.rejected[k] == 0) continue;
+        fmt::format_to(to, " {} {}", gyro.rejected[k], to_string(static_cast<gateway::Reject>(k)));
+      }
+    }
+    fmt::format_to(to, "\n");
+  }
+  if (status.reference_frames > 0) {
+    fmt::format_to(to, "reference     {} frames, {} not used\n", status.reference_frames,
+                   status.reference_rejected);
+  }
+  fmt::format_to(to, "virtual gyro  {} pairs, {} valid rates", status.pairs,
+                 status.rates_out_valid);
+  if (summary.rates > 0) {
+    fmt::format_to(to, ", mean {:+.6f} deg/s",
+                   summary.rate_sum_dps / static_cast<double>(summary.rates));
+  }
+  if (status.rates_out_of_range > 0) {
+    fmt::format_to(to, ", {} beyond what VG_Rate can carry (sent as invalid)",
+                   status.rates_out_of_range);
+  }
+  fmt::format_to(to, "\nmethod        {}", gateway::to_string(plan.corrector.method));
+  if (status.windows + status.windows_skipped > 0) {
+    fmt::format_to(to, ", {} windows, {} skipped for want of pairs", status.windows,
+                   status.windows_skipped);
+  }
+  if (status.clock_steps > 0)
+    fmt::format_to(to, "; the clock was set back {} times", status.clock_steps);
+  if (summary.gaps > 0) {
+    fmt::format_to(to, "; {} gaps, the longest {:.2f} s", summary.gaps,
+                   summary.longest_gaps.front().length_s);
+  }
+  fmt::format_to(to, "\nended in state {}\n", to_string(status.state));
+  return fmt::to_string(text);
+}
+
+}  // namespace vgyro::cli

@@ -1,0 +1,85 @@
+#pragma once
+
+// What a replay saw and did, as JSON for programs and as a few lines for people. Holds nothing that
+// differs from run to run: no wall-clock time, no paths of temporary files.
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <unordered_map>
+#include <vector>
+
+#include <nlohmann/json_fwd.hpp>
+
+#include "can/candump.h"
+#include "gateway/plan.h"
+#include "gateway/status.h"
+
+namespace vgyro::cli {
+
+/// Frames by interface and identifier. Bounded: identifiers beyond the limit are counted together.
+class IdCounts {
+ public:
+  void add(can::BusIndex bus, const can::Frame& frame) {
+    if (!frame.has(can::kExtended) && !frame.has(can::kError)) {
+      if (bus >= standard_.size()) standard_.resize(bus + 1U);
+      ++standard_[bus][frame.id & can::kStandardIdMax];
+    } else {
+      add_extended(bus, frame);
+    }
+  }
+
+  struct Row {
+    can::BusIndex bus = 0;
+    std::uint32_t id = 0;
+    bool extended = false;
+    std::uint64_t frames = 0;
+  };
+  /// By interface, then identifier.
+  [[nodiscard]] std::vector<Row> rows() const;
+  [[nodiscard]] std::uint64_t error_frames() const { return error_frames_; }
+  [[nodiscard]] std::uint64_t beyond_limit() const { return beyond_limit_; }
+
+ private:
+  static constexpr std::size_t kExtendedMax = 4096;
+  void add_extended(can::BusIndex bus, const can::Frame& frame);
+  std::vector<std::array<std::uint64_t, can::kStandardIdMax + 1>> standard_;
+  std::unordered_map<std::uint64_t, std::uint64_t> extended_;
+  std::uint64_t error_frames_ = 0;
+  std::uint64_t beyond_limit_ = 0;
+};
+
+struct LogSummary {
+  std::string path;
+  can::LogCounts counts;
+};
+
+struct Gap {
+  double from_s = 0.0;  ///< since the first pair
+  double length_s = 0.0;
+};
+
+struct ReplaySummary {
+  std::vector<LogSummary> logs;
+  std::vector<std::string> interfaces;
+  IdCounts ids;
+  gateway::Status status;
+  std::uint64_t frames_out = 0;
+  double first_s = 0.0;  ///< stamps of the first and the last frame
+  double last_s = 0.0;
+  double rate_sum_dps = 0.0;  ///< over the valid virtual rates
+  std::uint64_t rates = 0;
+  std::array<double, 2> raw_sum_dps{};  ///< over the same instants, where the gyro took part
+  std::array<std::uint64_t, 2> raws{};
+  std::uint64_t gaps = 0;         ///< between successive virtual rates, longer than kGap_s
+  std::vector<Gap> longest_gaps;  ///< at most kGapsShown, longest first
+  static constexpr double kGap_s = 0.5;
+  static constexpr std::size_t kGapsShown = 5;
+
+  void add_gap(const Gap& gap);
+};
+
+nlohmann::ordered_json to_json(const ReplaySummary& summary, const gateway::Plan& plan);
+std::string to_text(const ReplaySummary& summary, const gateway::Plan& plan);
+
+}  // namespace vgyro::cli
