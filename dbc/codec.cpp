@@ -10,6 +10,14 @@
 
 namespace vgyro::dbc {
 
+namespace {
+
+double power_of_two(int exponent) {
+  return std::bit_cast<double>(static_cast<std::uint64_t>(1023 + exponent) << 52U);
+}
+
+}  // namespace
+
 Expected<SignalCodec> SignalCodec::make(const Signal& signal, std::size_t message_bytes,
                                         const std::string& where) {
   if (signal.length_bits == 0 || signal.length_bits > kSignalBitsMax) {
@@ -101,7 +109,7 @@ std::uint64_t SignalCodec::nearest_raw(double value) const {
   const std::uint64_t raw_max = ~std::uint64_t{0} >> shift_down_ >> (is_signed ? 1U : 0U);
   const double rounded = std::round(value);
   if (!(rounded > number_min())) return is_signed ? ~raw_max : 0;
-  if (rounded >= std::ldexp(1.0, value_bits)) return raw_max;
+  if (rounded >= power_of_two(value_bits)) return raw_max;
   return is_signed ? static_cast<std::uint64_t>(static_cast<std::int64_t>(rounded))
                    : static_cast<std::uint64_t>(rounded);
 }
@@ -109,13 +117,13 @@ std::uint64_t SignalCodec::nearest_raw(double value) const {
 double SignalCodec::number_min() const {
   if (type_ == ValueType::kFloat32) return std::numeric_limits<float>::lowest();
   if (type_ == ValueType::kFloat64) return std::numeric_limits<double>::lowest();
-  return type_ == ValueType::kSigned ? -std::ldexp(1.0, 63 - shift_down_) : 0.0;
+  return type_ == ValueType::kSigned ? -power_of_two(63 - shift_down_) : 0.0;
 }
 
 double SignalCodec::number_max() const {
   if (type_ == ValueType::kFloat32) return std::numeric_limits<float>::max();
   if (type_ == ValueType::kFloat64) return std::numeric_limits<double>::max();
-  return std::ldexp(1.0, 64 - shift_down_ - (type_ == ValueType::kSigned ? 1 : 0)) - 1.0;
+  return power_of_two(64 - shift_down_ - (type_ == ValueType::kSigned ? 1 : 0)) - 1.0;
 }
 
 double SignalCodec::representable_min() const {
