@@ -16,7 +16,7 @@ namespace {
 using Bytes = std::vector<std::uint8_t>;
 
 Database loaded(const std::string& name) {
-  const auto database = load(std::string{VGYRO_DBC_DIR} + "/" + name);
+  const auto database = load(fmt::format("{}/{}", VGYRO_DBC_DIR, name));
   EXPECT_TRUE(database) << name;
   if (!database) return {};
   for (const Diagnostic& odd : database->diagnostics) {
@@ -42,9 +42,9 @@ double value_of(const Database& database, std::uint32_t id, bool extended, const
 TEST(Profiles, ReadTheGoldenJ1939Frame) {
   const Database ari = loaded("profiles/j1939_ari.dbc");
   const Bytes golden = {0x00, 0x7D, 0x00, 0x7D, 0x00, 0x7D, 0x00, 0x05};
-  for (const std::string axis : {"Pitch", "Roll", "Yaw"}) {
-    EXPECT_EQ(value_of(ari, 0x0CF02AE2, true, axis + "Rate", golden), 0.0);
-    EXPECT_EQ(value_of(ari, 0x0CF02AE2, true, axis + "RateMerit", golden), 0.0);
+  for (const char* const axis : {"Pitch", "Roll", "Yaw"}) {
+    EXPECT_EQ(value_of(ari, 0x0CF02AE2, true, fmt::format("{}Rate", axis), golden), 0.0);
+    EXPECT_EQ(value_of(ari, 0x0CF02AE2, true, fmt::format("{}RateMerit", axis), golden), 0.0);
   }
   const Signal& yaw = *ari.messages[0].find_signal("YawRate");
   EXPECT_GT(0xFE00 / 128.0 - 250, yaw.maximum) << "an error value is outside of the range";
