@@ -1,0 +1,382 @@
+"""What the harness plays, and what must come of it. A case prepares its folder (config, DBC, log to
+play), says what the guest has to do, and judges the result."""
+
+import dataclasses
+import json
+import lzma
+import os
+import re
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import verdicts
+from verdicts import require
+
+SOURCE = Path(os.environ.get("VGYRO_SOURCE", Path(__file__).resolve().parents[2]))
+BIN = Path(os.environ.get("VGYRO_BIN", SOURCE / "build/release/bin"))
+sys.path.insert(0, str(SOURCE / "tests/twin"))
+import make_twin  # noqa: E402
+
+RSS_MOST_KB = 12 * 1024
+REST_S, RUN_S, RAMP_S = 3.0, 6.0, make_twin.RAMP_S
+TURN_DPS = 50.0
+
+CONFIG = """\
+[[gyro]]
+name = "quiet"
+bus = "{bus_a}"
+dbc = "twin.dbc"
+message = "GYRO_A"
+rate = "Rate"
+temperature = "Temperature"
+counter = "Counter"
+
+[[gyro]]
+name = "noisy"
+bus = "{bus_b}"
+dbc = "twin.dbc"
+message = "GYRO_B"
+rate = "Rate"
+temperature = "Temperature"
+counter = "Counter"
+
+[calibration]
+rest_s = {rest_s}
+rate_dps = {rate_dps}
+
+[corrector]
+method = "mutual"
+window_s = 2.0
+order = 0
+
+[output]
+bus = "{bus_out}"
+fd = {fd}
+"""
+
+
+@dataclasses.dataclass
+class Twin:
+    """A short cut of the paper's experiment: at rest, then turning at a constant rate."""
+
+    bus_a: str = "can0"
+    bus_b: str = "can0"
+    bus_out: str = "can0"
+    fd: bool = False
+    run_s: float = RUN_S
+    silent_s: tuple = ()  # from, to: gyro B sends nothing
+
+    def prepare(self, folder):
+        dbc = (SOURCE / "examples/twin.dbc").read_text(encoding="utf-8")
+        if self.fd:
+            dbc = dbc.replace("GYRO_A: 8", "GYRO_A: 12")
+        (folder / "twin.dbc").write_text(dbc, encoding="utf-8")
+        (folder / "vgyro.toml").write_text(CONFIG.format(
+            bus_a=self.bus_a, bus_b=self.bus_b, bus_out=self.bus_out, fd=str(self.fd).lower(),
+            rest_s=REST_S, rate_dps=make_twin.EARTH_DPS), encoding="utf-8")
+        options = make_twin.Options(scenario="turn", rest_s=REST_S, run_s=self.run_s, turn_dps=TURN_DPS)
+        twin = make_twin.simulate(options)
+        lines = []
+        for stream, bus, fd in zip(twin.streams, (self.bus_a, self.bus_b), (self.fd, False)):
+            head, tail = ("##1", "00000000") if fd else ("#", "")
+            for us, payload in zip(stream.stamps_us.tolist(), stream.payloads):
+                seconds = us * 1e-6 - options.start_s
+                if stream.can_id == 0x102 and self.silent_s and self.silent_s[0] <= seconds < self.silent_s[1]:
+                    continue
+                lines.append((us, f"({us // 1_000_000}.{us % 1_000_000:06}) {bus} {stream.can_id:03X}"
+                                  f"{head}{payload.tobytes().hex().upper()}{tail}\n"))
+        (folder / "played.log").write_text("".join(text for _, text in sorted(lines)), encoding="ascii")
+
+    def links(self):
+        mtu = 72 if self.fd else 16
+        return [{"name": name, "mtu": mtu} for name in sorted({self.bus_a, self.bus_b, self.bus_out})]
+
+
+@dataclasses.dataclass
+class Run:
+    """A case after the guest has run it: files of its folder, read and split."""
+
+    folder: Path
+    result: dict
+    inputs: list
+    outputs: list
+    said: str  # by the daemon, to people
+    ids: tuple = (0x610, 0x611, 0x612)
+
+    def of(self, can_id):
+        return [line for line in self.outputs if int(line.name, 16) == can_id]
+
+    def replay(self):
+        """What `vgyro replay` makes of the captured input frames."""
+        log, out = self.folder / "inputs.log", self.folder / "replayed.log"
+        log.write_text("".join(line.text for line in self.inputs), encoding="ascii")
+        done = subprocess.run([str(BIN / "vgyro"), "replay", "--config", str(self.folder / "vgyro.toml"), "-o",
+                               str(out), "--json", str(self.folder / "replay.json"), str(log)],
+                              capture_output=True, text=True, check=False)
+        require(done.returncode == 0, f"replay failed: {done.stderr.strip()}")
+        return verdicts.read_log(out)
+
+
+def read_run(folder, result, ids=(0x610, 0x611, 0x612)):
+    require("failure" not in result, result.get("failure"))
+    said = (folder / "vgyrod.err").read_text(encoding="utf-8", errors="replace")
+    require(result["ready"], f"not READY within the time; it said: {said.strip()}")
+    config = tomllib.loads((folder / "vgyro.toml").read_text(encoding="utf-8"))
+    output_bus = config["output"]["bus"]
+    inputs, outputs = [], []
+    # candump reads one socket after the other: with a backlog, its order is not that of the buses.
+    for line in sorted(verdicts.read_log(folder / "capture.log"), key=lambda line: line.us):
+        own = line.bus == output_bus and len(line.name) == 3 and int(line.name, 16) in ids
+        (outputs if own else inputs).append(line)
+    return Run(folder, result, inputs, outputs, said, ids)
+
+
+def check_service(run):
+    """READY, STATUS, STOPPING, exit code, memory."""
+    texts = [text for _, text in run.result["notices"]]
+    require(texts[0].startswith("READY=1"), f"first notice: {texts[0]!r}")
+    require(texts[-1].startswith("STOPPING=1"), f"last notice: {texts[-1]!r}")
+    require(run.result["exit"] == 0, f"exit {run.result['exit']!r}; it said: {run.said.strip()}")
+    require("stopped: " in run.said, f"no summary; it said: {run.said.strip()}")
+    resident = run.result["resources"]["rss_most_kb"]
+    require(resident <= RSS_MOST_KB, f"{resident} kB resident, more than {RSS_MOST_KB}")
+
+
+def check_played(run):
+    """The capture holds every frame that was played, in order: else nothing can be compared."""
+    require(run.result.get("player") == 0, f"canplayer: exit {run.result.get('player')}")
+    played = verdicts.read_log(run.folder / "played.log")
+    for bus in {line.bus for line in played}:
+        sent = [line.content for line in played if line.bus == bus]
+        seen = [line.content for line in run.inputs if line.bus == bus]
+        require(sent == seen, f"{bus}: {len(sent)} frames played, {len(seen)} captured, or changed on the way")
+
+
+def check_against_replay(run):
+    rate_id = run.ids[0]
+    replayed = run.replay()
+    replayed_rates = [line for line in replayed if int(line.name, 16) == rate_id]
+    require(len(replayed_rates) > 0, "the replay sends no rates")
+    verdicts.check_same_rates(run.of(rate_id), replayed_rates)
+    verdicts.check_same_sequence(run.outputs, replayed, rate_id)
+    for can_id in run.ids:
+        verdicts.check_protection(run.of(can_id), can_id)
+    return len(replayed_rates)
+
+
+def check_truth(run, oracle):
+    """The decoded rate against the known truth, where that is constant."""
+    t, rate, state = verdicts.rates_of(run.of(0x610), oracle)
+    since = t - run.inputs[0].us * 1e-6
+    resting = (since > 1.0) & (since < REST_S - 0.2)
+    turning = (since > REST_S + RAMP_S + 0.3) & (since < REST_S + RAMP_S + RUN_S - 0.3)
+    require(np.isnan(rate[resting]).all() and set(state[resting]) == {1}, "valid rates while calibrating")
+    require(np.isfinite(rate[turning]).all() and set(state[turning]) == {2}, "not running while turning")
+    error = rate[turning] - (TURN_DPS + make_twin.EARTH_DPS)
+    # Noise of the mean of both gyros at 500 Hz is 3.5e-3 deg/s; the biases' mean, uncorrected, 1.3e-2.
+    require(abs(error.mean()) < 1e-3, f"mean error {error.mean():.5f} deg/s")
+    require(2.5e-3 < error.std() < 5e-3, f"noise {error.std():.5f} deg/s")
+    return f"mean error {error.mean() * 3600:+.1f} deg/h"
+
+
+class TwinCase:
+    def __init__(self, name, says, twin, dbc="dbc/vgyro.dbc", check_more=None):
+        self.name, self.says, self.twin, self.dbc = name, says, twin, dbc
+        self.check_more = check_more or (lambda run, oracle: check_truth(run, oracle))
+
+    def prepare(self, folder):
+        self.twin.prepare(folder)
+        return {"links": self.twin.links(), "play": str(folder / "played.log"),
+                "command": [str(BIN / "vgyrod"), "--config", str(folder / "vgyro.toml")]}
+
+    def judge(self, folder, result):
+        run = read_run(folder, result)
+        check_service(run)
+        check_played(run)
+        rates = check_against_replay(run)
+        require("running" in " ".join(text for _, text in result["notices"]), "STATUS never said running")
+        more = self.check_more(run, verdicts.Oracle(SOURCE / self.dbc))
+        return f"{rates} rates as in the replay, {more}, {describe(run)}"
+
+
+def describe(run):
+    used = run.result["resources"]
+    return f"{used['rss_most_kb'] / 1024:.1f} MB, {used['cpu_s']:.2f} s CPU"
+
+
+def check_silent(run, oracle):
+    """Degraded while gyro B is silent, running again afterwards, valid throughout."""
+    _, rate, state = verdicts.rates_of(run.of(0x610), oracle)
+    order = [int(s) for i, s in enumerate(state) if i == 0 or s != state[i - 1]]
+    require(order == [1, 2, 3, 2], f"states {order}")
+    require(np.isfinite(rate[state > 1]).all(), "invalid rates after the calibration")
+    require("degraded" in run.said, "the silence was not logged")
+    return f"{int((state == 3).sum())} of them from one gyro alone"
+
+
+def check_fd(run, oracle):
+    require(all(line.fd and len(line.data) == 32 for line in run.of(0x610)), "VG_Rate is not FD")
+    require(any(line.fd for line in run.inputs), "no FD input was played")
+    return check_truth(run, oracle)
+
+
+class SlowBusCase:
+    """The output bus takes less than the gateway sends: tbf says ENOBUFS while poll says writable."""
+
+    name = "slow_bus"
+    says = "output bus behind a token bucket: survives, sends in time or not at all"
+    patience_us = 20_000
+
+    def __init__(self):
+        self.twin = Twin(bus_out="can1", run_s=2.0)
+
+    def prepare(self, folder):
+        self.twin.prepare(folder)
+        qdisc = "tc qdisc add dev can1 root tbf rate 24kbit burst 200 limit 400".split()
+        return {"links": self.twin.links(), "after_links": [qdisc], "play": str(folder / "played.log"),
+                "command": [str(BIN / "vgyrod"), "--config", str(folder / "vgyro.toml")]}
+
+    def judge(self, folder, result):
+        run = read_run(folder, result)
+        check_service(run)
+        check_played(run)
+        counts = {name: int(count) for count, name in re.findall(r"(\d+) (frames out|stale|overflowed|retries)", run.said)}
+        require(counts["frames out"] == len(run.outputs), f"says {counts}, captured {len(run.outputs)}")
+        require(counts["stale"] > 500 and counts["retries"] > 100, f"the bus was not slow: {counts}")
+        require("did not take them in time" in run.said, "the loss was not logged")
+        live = [verdicts.without_protection(line) for line in run.of(0x610)]
+        whole = [verdicts.without_protection(line) for line in run.replay() if line.name == "610"]
+        require(len(live) > 200, f"only {len(live)} rates got through")
+        require(verdicts.is_subsequence(live, whole), "rates out of order, or not those of the replay")
+        self.check_lateness(run)
+        return f"{len(live)} of {len(whole)} rates sent, {counts['stale']} dropped as stale, {describe(run)}"
+
+    def check_lateness(self, run):
+        replayed = verdicts.read_log(run.folder / "replayed.log")
+        cause = {line.data: line.us for line in replayed if line.name == "610"}
+        late = [line.us - cause[line.data] for line in run.of(0x610) if line.data in cause]
+        require(len(late) > 200, "too few rates to judge")
+        # The guest has one processor for canplayer, candump and the gateway: 30 ms of grace.
+        late_most = np.percentile(late, 95)
+        require(late_most < self.patience_us + 30_000, f"5 % of the rates went out {late_most / 1000:.1f} ms late")
+
+
+class IdleCase:
+    """No gyro is there: heartbeat, status, and a clean end."""
+
+    name = "idle"
+    says = "no gyro there: heartbeat ten times a second, SIGINT ends it"
+
+    def prepare(self, folder):
+        twin = Twin()
+        twin.prepare(folder)
+        return {"links": twin.links(), "idle_s": 2.2, "signal": "SIGINT",
+                "command": [str(BIN / "vgyrod"), "--config", str(folder / "vgyro.toml")]}
+
+    def judge(self, folder, result):
+        run = read_run(folder, result)
+        check_service(run)
+        biases = run.of(0x611)
+        require(not run.of(0x610), "a rate without gyros")
+        require(15 <= len(biases) <= 32, f"{len(biases)} heartbeats in 2.7 s")
+        for can_id in run.ids:
+            verdicts.check_protection(run.of(can_id), can_id)
+        statuses = [text for _, text in result["notices"] if text.startswith("STATUS=")]
+        require(1 <= len(statuses) <= 4, f"{len(statuses)} STATUS notices in 2.7 s")
+        require(all("waiting" in text for text in statuses), f"{statuses}")
+        return f"{len(biases)} heartbeats, {describe(run)}"
+
+
+class CommandCase:
+    """A program that judges by itself."""
+
+    def __init__(self, name, says, command, exit_code, expected):
+        self.name, self.says, self.command = name, says, command
+        self.exit_code, self.expected = exit_code, expected
+
+    def prepare(self, folder):
+        Twin(bus_a="nosuch0").prepare(folder)
+        return {"command": [part.format(folder=folder) for part in self.command]}
+
+    def judge(self, folder, result):
+        require("failure" not in result, result.get("failure"))
+        output = (folder / "output.txt").read_text(encoding="utf-8", errors="replace")
+        found = re.search(self.expected, output)
+        require(result["exit"] == self.exit_code and found, f"exit {result['exit']}:\n{output}")
+        return found.group(0)
+
+
+class CarCase:
+    """Recorded traffic of a car: one gyro among many identifiers, the other and the reference on a bus
+    of their own. At real time."""
+
+    name = "car"
+    says = "real car traffic around the gyros, at real time"
+
+    def __init__(self, recordings):
+        self.source = recordings / "car_rav4"
+        self.ids = (0x610, 0x611, 0x612)
+
+    def prepare(self, folder):
+        for path in self.source.glob("*.dbc"):
+            (folder / path.name).write_bytes(path.read_bytes())
+        log = lzma.decompress((self.source / "measured.log.xz").read_bytes()).decode("ascii")
+        (folder / "played.log").write_text(log, encoding="ascii")
+        used = {int(text, 16) for text in re.findall(r" ([0-9A-F]{3})#", log)}
+        free = (i for i in range(0x620, 0x800) if i not in used)
+        self.ids = tuple(next(free) if i in used else i for i in self.ids)
+        (folder / "vgyro.toml").write_text(self.rewritten_config(), encoding="utf-8")
+        buses = sorted(set(re.findall(r"\) +(\S+) ", log)))
+        return {"links": [{"name": bus} for bus in buses], "play": str(folder / "played.log"),
+                "command": [str(BIN / "vgyrod"), "--config", str(folder / "vgyro.toml")]}
+
+    def rewritten_config(self):
+        """As recorded, but on identifiers that the car itself does not use."""
+        text = (self.source / "vgyro.toml").read_text(encoding="utf-8")
+        text = text.replace('method = "optimal"', 'method = "mutual"')
+        return text.replace("[output]", f"[output]\nrate_id = {self.ids[0]}\nbias_id = {self.ids[1]}\nmodel_id = {self.ids[2]}", 1)
+
+    def judge(self, folder, result):
+        run = read_run(folder, result, self.ids)
+        check_service(run)
+        check_played(run)
+        rates = check_against_replay(run)
+        require("(0 lost by the kernel)" in run.said, run.said)
+        return f"{rates} rates as in the replay among {len(run.inputs)} frames, {describe(run)}"
+
+
+def all_cases(recordings):
+    vgyrod = str(BIN / "vgyrod")
+    cases = [
+        TwinCase("twin", "rate-table twin on one bus", Twin()),
+        TwinCase("two_buses", "a bus for each gyro, a third for the output",
+                 Twin(bus_b="can1", bus_out="can2")),
+        TwinCase("silent_gyro", "one gyro silent for two seconds, then back",
+                 Twin(bus_b="can1", silent_s=(REST_S + RAMP_S + 1.0, REST_S + RAMP_S + 3.0)),
+                 check_more=check_silent),
+        TwinCase("fd", "CAN FD in and out", Twin(fd=True), dbc="dbc/vgyro_fd.dbc", check_more=check_fd),
+        SlowBusCase(),
+        IdleCase(),
+        CommandCase("missing_interface", "an interface that is not there: exit 1 and what to do",
+                    [vgyrod, "--config", "{folder}/vgyro.toml"], 1,
+                    r"nosuch0: no such interface; .*ip link add nosuch0 type vcan"),
+        CommandCase("socket", "the socket layer on a real kernel", [str(BIN / "vcan_socket_probe")], 0,
+                    r"\d+ tests from 1 test suite ran"),
+    ]
+    if recordings is not None and (recordings / "car_rav4").is_dir():
+        cases.append(CarCase(recordings))
+    return cases
+
+
+def judge(case, folder):
+    """(passed, text)"""
+    path = folder / "result.json"
+    if not path.exists():
+        return False, "did not run"
+    try:
+        return True, case.judge(folder, json.loads(path.read_text(encoding="utf-8")))
+    except verdicts.Failure as failure:
+        return False, str(failure)

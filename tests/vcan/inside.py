@@ -1,0 +1,171 @@
+#!/usr/bin/python3
+"""The part of the vcan harness that runs where the CAN interfaces are: in a network namespace of its
+own, or in a User Mode Linux guest. Takes its orders from plan.json in the folder named first, writes
+what it saw beside it, and keeps captures meanwhile in the folder named second. Starting programs is
+slow in the guest, so this starts few and imports little."""
+
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+
+READY_WITHIN_S = 30.0
+STOP_WITHIN_S = 20.0
+
+
+class Daemon:
+    """The gateway under test and what it tells its service manager."""
+
+    def __init__(self, command, folder):
+        self.notices = []  # (seconds since the start, text)
+        # An abstract name leaves nothing behind in the file system.
+        self.address = f"@vgyro-test-{os.getpid()}"
+        self.listener = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+        self.listener.bind(self.address.replace("@", "\0"))
+        self.begin = time.monotonic()
+        with open(os.path.join(folder, "vgyrod.err"), "wb") as stderr:
+            environment = dict(os.environ, NOTIFY_SOCKET=self.address)
+            self.process = subprocess.Popen(command, stderr=stderr, env=environment)
+
+    def listen(self, seconds, until=None):
+        """Collects notices for some time, or until one of them starts with `until`."""
+        end = time.monotonic() + seconds
+        while (left := end - time.monotonic()) > 0:
+            self.listener.settimeout(min(left, 0.1))
+            try:
+                text = self.listener.recv(4096).decode()
+            except TimeoutError:
+                if self.process.poll() is not None:
+                    return False
+                continue
+            self.notices.append((time.monotonic() - self.begin, text))
+            if until is not None and text.startswith(until):
+                return True
+        return until is None
+
+    def resources(self):
+        """Resident kilobytes (now and at most), and the processor time it took, in seconds."""
+        with open(f"/proc/{self.process.pid}/status", encoding="ascii") as file:
+            fields = dict(line.split(":", 1) for line in file)
+        with open(f"/proc/{self.process.pid}/stat", encoding="ascii") as file:
+            user, system = file.read().rsplit(")", 1)[1].split()[11:13]
+        tick = os.sysconf("SC_CLK_TCK")
+        return {
+            "rss_kb": int(fields["VmRSS"].split()[0]),
+            "rss_most_kb": int(fields["VmHWM"].split()[0]),
+            "cpu_s": (int(user) + int(system)) / tick,
+        }
+
+    def stop(self, number):
+        if self.process.poll() is None:
+            self.process.send_signal(number)
+        try:
+            code = self.process.wait(STOP_WITHIN_S)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            code = "still running after its signal"
+        self.listen(0.05)
+        self.listener.close()
+        return code
+
+
+def stop_quietly(process):
+    process.send_signal(signal.SIGTERM)
+    try:
+        process.wait(STOP_WITHIN_S)
+    except subprocess.TimeoutExpired:
+        process.kill()
+
+
+def wait_until_still(path):
+    """candump may lag behind the buses; it has caught up when its file does not grow any more."""
+    size, still = -1, 0
+    for _ in range(200):
+        time.sleep(0.1)
+        before, size = size, os.path.getsize(path)
+        still = still + 1 if size == before else 0
+        if still == 4:
+            return
+
+
+def make_links(case, verb):
+    lines = []
+    for link in case["links"]:
+        if verb == "add":
+            lines += [f"link add {link['name']} mtu {link.get('mtu', 16)} type vcan", f"link set {link['name']} up"]
+        else:
+            lines.append(f"link del {link['name']}")
+    subprocess.run(["ip", "-batch", "-"], input="\n".join(lines).encode(), check=verb == "add")
+    if verb == "add":
+        for command in case.get("after_links", []):
+            subprocess.run(command, check=True)
+
+
+def play(case, daemon, folder):
+    """Recorded traffic onto the buses, in its own time."""
+    with open(os.path.join(folder, "canplayer.err"), "wb") as stderr:
+        player = subprocess.Popen(["canplayer", "-I", case["play"]], stderr=stderr)
+    while player.poll() is None:
+        daemon.listen(0.2)
+    return player.returncode
+
+
+def run_case(case, folder, memory):
+    result = {"name": case["name"]}
+    make_links(case, "add")
+    # A memory file system keeps the capture from waiting for a disk.
+    capture_path = os.path.join(memory, "capture.tmp")
+    try:
+        with open(capture_path, "wb") as capture, open(os.path.join(folder, "candump.err"), "wb") as errors:
+            names = [link["name"] for link in case["links"]]
+            dump = subprocess.Popen(["candump", "-L", "-D", "-r", "8000000", *names], stdout=capture, stderr=errors)
+            time.sleep(0.5)
+            daemon = Daemon(case["command"], folder)
+            result["ready"] = daemon.listen(READY_WITHIN_S, "READY=1")
+            if result["ready"]:
+                daemon.listen(case.get("idle_s", 0.2))
+                if "play" in case:
+                    result["player"] = play(case, daemon, folder)
+                daemon.listen(case.get("settle_s", 0.5))
+                if daemon.process.poll() is None:
+                    result["resources"] = daemon.resources()
+            result["exit"] = daemon.stop(getattr(signal, case.get("signal", "SIGTERM")))
+            result["notices"] = daemon.notices
+            wait_until_still(capture_path)
+            stop_quietly(dump)
+        with open(capture_path, "rb") as capture, open(os.path.join(folder, "capture.log"), "wb") as out:
+            out.write(capture.read())
+    finally:
+        if os.path.exists(capture_path):
+            os.unlink(capture_path)
+        make_links(case, "del")
+    return result
+
+
+def run_command(case, folder, _memory):
+    """A program that tests something by itself."""
+    with open(os.path.join(folder, "output.txt"), "wb") as out:
+        done = subprocess.run(case["command"], stdout=out, stderr=subprocess.STDOUT, check=False)
+    return {"name": case["name"], "exit": done.returncode}
+
+
+def main():
+    folder, memory = sys.argv[1:]
+    with open(os.path.join(folder, "plan.json"), encoding="utf-8") as file:
+        plan = json.load(file)
+    for case in plan["cases"]:
+        case_folder = os.path.join(folder, case["name"])
+        try:
+            result = (run_case if "links" in case else run_command)(case, case_folder, memory)
+        except (OSError, subprocess.SubprocessError) as error:
+            result = {"name": case["name"], "failure": str(error)}
+        with open(os.path.join(case_folder, "result.json"), "w", encoding="utf-8") as file:
+            json.dump(result, file)
+        print(f"vcan: {case['name']} ran", file=sys.stderr, flush=True)
+
+
+if __name__ == "__main__":
+    main()

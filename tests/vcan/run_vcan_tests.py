@@ -1,0 +1,95 @@
+#!/usr/bin/python3
+"""Runs the real vgyrod on a real vcan, and holds what it sent against `vgyro replay` of what it
+received. Natively where the host's kernel has vcan, else inside User Mode Linux. Never skips: exits
+with 1 when a case fails or nothing could run."""
+
+import argparse
+import json
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+import cases  # noqa: E402
+import ground  # noqa: E402
+import verdicts  # noqa: E402
+
+# Booting, and what a busy host may add to each case.
+SECONDS_MOST = 600
+
+
+def parse_arguments():
+    p = argparse.ArgumentParser(description=__doc__)
+    p.add_argument("--on", choices=["auto", "native", "uml"], default="auto", help="default: native if possible")
+    p.add_argument("--keep", metavar="DIR", help="keep captures and logs in this folder")
+    p.add_argument("case", nargs="*", help="names of cases; default: all")
+    return p.parse_args()
+
+
+def chosen_cases(names):
+    recordings = os.environ.get("VGYRO_RECORDINGS")
+    everything = cases.all_cases(Path(recordings) if recordings else None)
+    unknown = set(names) - {case.name for case in everything}
+    if unknown:
+        sys.exit(f"vcan: no case {', '.join(sorted(unknown))}; one of: {', '.join(c.name for c in everything)}")
+    return [case for case in everything if not names or case.name in names]
+
+
+def check_programs():
+    for program in ("ip", "tc", "candump", "canplayer"):
+        if shutil.which(program, path=os.environ["PATH"] + ":/usr/sbin:/sbin") is None:
+            sys.exit(f"vcan: nothing could run: no `{program}` (`apt install iproute2 can-utils`)")
+    for program in ("vgyrod", "vgyro", "vcan_socket_probe"):
+        if not (cases.BIN / program).exists():
+            sys.exit(f"vcan: nothing could run: {cases.BIN / program} is not built")
+
+
+def run(folder, selected, where):
+    plan = []
+    for case in selected:
+        case_folder = folder / case.name
+        case_folder.mkdir(parents=True)
+        plan.append({"name": case.name, **case.prepare(case_folder)})
+    (folder / "plan.json").write_text(json.dumps({"cases": plan}), encoding="utf-8")
+    begin = time.monotonic()
+    try:
+        code = where.run(folder, SECONDS_MOST)
+    except subprocess.TimeoutExpired:
+        code = f"still running after {SECONDS_MOST} s"
+    if code != 0:
+        guest = folder / "guest.txt"
+        print(f"vcan: the guest failed ({code})\n{guest.read_text() if guest.exists() else ''}")
+    print(f"vcan: ran for {time.monotonic() - begin:.0f} s {where.name}")
+
+    failed = 0
+    for case in selected:
+        passed, text = cases.judge(case, folder / case.name)
+        failed += not passed
+        print(f"  {'pass' if passed else 'FAIL'}  {case.name}: {case.says}\n        {text}")
+    return failed
+
+
+def main():
+    arguments = parse_arguments()
+    check_programs()
+    verdicts.check_own_vectors()
+    selected = chosen_cases(arguments.case)
+    where = ground.choose(arguments.on)
+    if "car" not in {case.name for case in selected} and not arguments.case:
+        print("vcan: no recordings of real cars (VGYRO_RECORDINGS is not set to a folder with car_rav4)")
+    with tempfile.TemporaryDirectory(prefix="vgyro-vcan-") as scratch:
+        folder = Path(arguments.keep or scratch).resolve()
+        failed = run(folder, selected, where)
+    if failed:
+        print(f"vcan: {failed} of {len(selected)} cases FAILED {where.name}")
+        return 1
+    print(f"vcan: {len(selected)} cases passed {where.name}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
