@@ -475,12 +475,14 @@ bool LogReader::next(LogRecord& record) {
 
 namespace {
 
-char* put_decimal(char* out, std::uint64_t value, unsigned digits) {
+// The lowest `digits` decimal digits of `value`, which has no more.
+template <unsigned digits>
+char* put_decimal(char* out, std::uint32_t value) {
   for (unsigned i = digits; i >= 2; i -= 2) {
     std::memcpy(out + i - 2, &kDecimalPairs[2 * (value % 100)], 2);
     value /= 100;
   }
-  if (digits % 2 != 0) out[0] = static_cast<char>('0' + value % 10);
+  if constexpr (digits % 2 != 0) out[0] = static_cast<char>('0' + value % 10);
   return out + digits;
 }
 
@@ -490,6 +492,20 @@ char* put_hex(char* out, std::uint32_t value, unsigned digits) {
   return out + digits;
 }
 
+#if defined(__SSE2__)
+char* put_bytes8(char* out, const std::uint8_t* data) {
+  const __m128i bytes = _mm_loadl_epi64(reinterpret_cast<const __m128i*>(data));
+  const __m128i low_nibble = _mm_set1_epi8(0x0F);
+  const __m128i nibbles = _mm_unpacklo_epi8(_mm_and_si128(_mm_srli_epi16(bytes, 4), low_nibble),
+                                            _mm_and_si128(bytes, low_nibble));
+  const __m128i is_letter = _mm_cmpgt_epi8(nibbles, _mm_set1_epi8(9));
+  const __m128i to_letter = _mm_and_si128(is_letter, _mm_set1_epi8('A' - '0' - 10));
+  const __m128i text = _mm_add_epi8(_mm_add_epi8(nibbles, _mm_set1_epi8('0')), to_letter);
+  _mm_storeu_si128(reinterpret_cast<__m128i*>(out), text);
+  return out + 16;
+}
+#endif
+
 char* put_bytes(char* out, const std::uint8_t* data, std::size_t count) {
   for (std::size_t i = 0; i < count; ++i) {
     std::memcpy(out, &kHexPairs[2 * static_cast<std::size_t>(data[i])], 2);
@@ -498,21 +514,36 @@ char* put_bytes(char* out, const std::uint8_t* data, std::size_t count) {
   return out;
 }
 
-char* put_prefix(char* out, TimePoint stamp, std::string_view interface, unsigned fraction_digits) {
-  const auto ns = static_cast<std::uint64_t>(std::max<std::int64_t>(to_ns(stamp), 0));
-  const std::uint64_t seconds = ns / 1'000'000'000;
-  const std::uint64_t rest = ns % 1'000'000'000;
+constexpr std::int64_t kSecond_ns = 1'000'000'000;
+constexpr std::size_t kSecondsTextBytes = 12;  // "(SSSSSSSSSS."
+
+// `second_ns` is the start of a second, not negative.
+void put_seconds(char* out, std::int64_t second_ns) {
+  const auto seconds = static_cast<std::uint64_t>(second_ns / kSecond_ns);
+  const auto high_digits = static_cast<std::uint32_t>(seconds / 100'000'000);
   *out++ = '(';
-  out = put_decimal(out, seconds, 10);
-  *out++ = '.';
-  out = fraction_digits == 9 ? put_decimal(out, rest, 9) : put_decimal(out, rest / 1000, 6);
+  out = put_decimal<2>(out, high_digits);
+  out = put_decimal<8>(out, static_cast<std::uint32_t>(seconds - high_digits * 100'000'000ULL));
+  *out = '.';
+}
+
+char* put_fraction(char* out, std::uint32_t ns, std::string_view interface, unsigned digits) {
+  out = digits == 9 ? put_decimal<9>(out, ns) : put_decimal<6>(out, ns / 1000);
   *out++ = ')';
   *out++ = ' ';
   const std::size_t length = std::min(interface.size(), kInterfaceNameMax);
-  std::memcpy(out, interface.data(), length);
+  for (std::size_t i = 0; i < length; ++i)
+    out[i] = interface[i];
   out += length;
   *out++ = ' ';
   return out;
+}
+
+char* put_prefix(char* out, TimePoint stamp, std::string_view interface, unsigned fraction_digits) {
+  const std::int64_t ns = std::max<std::int64_t>(to_ns(stamp), 0);
+  put_seconds(out, ns - ns % kSecond_ns);
+  return put_fraction(out + kSecondsTextBytes, static_cast<std::uint32_t>(ns % kSecond_ns),
+                      interface, fraction_digits);
 }
 
 char* put_direction(char* out, Direction direction) {
@@ -540,6 +571,13 @@ char* put_frame(char* out, const Frame& frame) {
     return put_bytes(out, frame.data.data(), std::min<std::size_t>(frame.length, kFdBytesMax));
   }
   const std::size_t length = std::min<std::size_t>(frame.length, kClassicBytesMax);
+  if (length == kClassicBytesMax && (frame.flags & kRemote) == 0 && frame.raw_dlc == 0) {
+#if defined(__SSE2__)
+    return put_bytes8(out, frame.data.data());
+#else
+    return put_bytes(out, frame.data.data(), kClassicBytesMax);
+#endif
+  }
   if (frame.has(kRemote)) {
     *out++ = 'R';
     if (length > 0) *out++ = static_cast<char>('0' + length);
@@ -560,6 +598,21 @@ std::size_t format_line(char* out, TimePoint stamp, std::string_view interface, 
   char* at = put_prefix(out, stamp, interface, fraction_digits);
   at = put_frame(at, frame);
   at = put_direction(at, direction);
+  return static_cast<std::size_t>(at - out);
+}
+
+std::size_t LineFormatter::format(char* out, TimePoint stamp, const Frame& frame,
+                                  unsigned fraction_digits) {
+  const std::int64_t ns = std::max<std::int64_t>(to_ns(stamp), 0);
+  if (second_ns_ < 0 || ns < second_ns_ || ns - second_ns_ >= kSecond_ns) {
+    second_ns_ = ns - ns % kSecond_ns;
+    put_seconds(prefix_.data(), second_ns_);
+  }
+  std::memcpy(out, prefix_.data(), kSecondsTextBytes);
+  char* at = put_fraction(out + kSecondsTextBytes, static_cast<std::uint32_t>(ns - second_ns_),
+                          interface_, fraction_digits);
+  at = put_frame(at, frame);
+  *at++ = '\n';
   return static_cast<std::size_t>(at - out);
 }
 

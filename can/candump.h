@@ -136,6 +136,19 @@ inline constexpr std::size_t kLineBytesMax = 192;
 std::size_t format_line(char* out, TimePoint stamp, std::string_view interface, const Frame& frame,
                         unsigned fraction_digits, Direction direction = Direction::kUnknown);
 
+/// Many lines for one interface: remembers the text that stays the same from line to line.
+class LineFormatter {
+ public:
+  explicit LineFormatter(std::string interface) : interface_(std::move(interface)) {}
+  /// As format_line().
+  std::size_t format(char* out, TimePoint stamp, const Frame& frame, unsigned fraction_digits);
+
+ private:
+  std::string interface_;
+  std::int64_t second_ns_ = -1;    ///< start of the second that prefix_ shows
+  std::array<char, 16> prefix_{};  ///< "(SSSSSSSSSS."
+};
+
 std::string format_xl_line(TimePoint stamp, std::string_view interface, const XlFrame& frame,
                            unsigned fraction_digits, Direction direction = Direction::kUnknown);
 

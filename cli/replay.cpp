@@ -25,11 +25,10 @@ constexpr can::BusIndex kForeignBus = 0xFF;
 // Frames of the pipeline → candump lines.
 class LineSink final : public gateway::FrameSink {
  public:
-  LineSink(OutputFile& file, std::string interface)
-      : file_(file), interface_(std::move(interface)) {}
+  LineSink(OutputFile& file, std::string interface) : file_(file), lines_(std::move(interface)) {}
   void put(const can::Frame& frame, TimePoint stamp) override {
     char* room = file_.room(can::kLineBytesMax);
-    file_.commit(can::format_line(room, stamp, interface_, frame, fraction_digits));
+    file_.commit(lines_.format(room, stamp, frame, fraction_digits));
     ++frames;
   }
   unsigned fraction_digits = 6;
@@ -37,7 +36,7 @@ class LineSink final : public gateway::FrameSink {
 
  private:
   OutputFile& file_;
-  std::string interface_;
+  can::LineFormatter lines_;
 };
 
 class Totals final : public gateway::RateObserver {

@@ -1,6 +1,7 @@
 #include "gateway/gyro_input.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
 
@@ -36,29 +37,42 @@ bool holds(const Condition& condition, double value) {
   return false;
 }
 
+// Precondition: the signal is there and fits.
+std::optional<Reject> convert(const Quantity& quantity, std::span<const std::uint8_t> payload,
+                              double& value) {
+  const double raw = quantity.codec.decode(payload).value;
+  value = raw * quantity.scale + quantity.shift;
+  if (raw >= quantity.minimum && raw <= quantity.maximum) return std::nullopt;
+  return std::isfinite(raw) ? Reject::kOutOfRange : Reject::kNotFinite;
+}
+
 }  // namespace
 
 std::optional<Reject> decode_quantity(const Quantity& quantity, const can::Frame& frame,
                                       double& value) {
   if (!frame.is_data()) return Reject::kNotData;
-  if (!quantity.presence.holds(frame.payload())) return Reject::kOtherPage;
+  if (!quantity.presence.always() && !quantity.presence.holds(frame.payload())) {
+    return Reject::kOtherPage;
+  }
   if (!quantity.codec.fits(frame.length)) return Reject::kTruncated;
-  const double raw = quantity.codec.decode(frame.payload()).value;
-  if (!std::isfinite(raw)) return Reject::kNotFinite;
-  if (raw < quantity.minimum || raw > quantity.maximum) return Reject::kOutOfRange;
-  value = raw * quantity.scale + quantity.shift;
-  return std::nullopt;
+  return convert(quantity, frame.payload(), value);
 }
 
-GyroInput::GyroInput(const GyroPlan& plan)
-    : plan_(plan),
-      bytes_needed_(bytes_of(plan)),
-      temperature_c_(std::numeric_limits<double>::quiet_NaN()) {}
+GyroInput::GyroInput(const GyroPlan& plan) : plan_(plan), bytes_needed_(bytes_of(plan)) {}
+
+double GyroInput::temperature_c() const {
+  double temperature_c = 0.0;
+  const bool known = plan_.temperature && newest_.length > 0 &&
+                     !decode_quantity(*plan_.temperature, newest_, temperature_c);
+  return known ? temperature_c : std::numeric_limits<double>::quiet_NaN();
+}
 
 bool GyroInput::count(std::span<const std::uint8_t> payload, std::uint32_t& missing) {
-  const auto raw = static_cast<std::uint64_t>(plan_.counter->codec.decode(payload).raw);
-  const auto now = static_cast<std::uint32_t>(raw % plan_.counter->modulus);
-  const std::uint32_t step = (now + plan_.counter->modulus - counter_) % plan_.counter->modulus;
+  const std::uint32_t modulus = plan_.counter->modulus;
+  auto now = static_cast<std::uint32_t>(plan_.counter->codec.decode(payload).raw) &
+             (std::bit_ceil(modulus) - 1);
+  if (now >= modulus) now -= modulus;
+  const std::uint32_t step = now >= counter_ ? now - counter_ : now + modulus - counter_;
   const bool known = counter_known_;
   counter_ = now;
   counter_known_ = true;
@@ -74,7 +88,7 @@ GyroInput::Result GyroInput::decode(const can::Frame& frame) {
     return result;
   }
   const auto payload = frame.payload();
-  if (!plan_.rate.presence.holds(payload)) {
+  if (!plan_.rate.presence.always() && !plan_.rate.presence.holds(payload)) {
     result.reject = Reject::kOtherPage;
     return result;
   }
@@ -90,13 +104,10 @@ GyroInput::Result GyroInput::decode(const can::Frame& frame) {
     result.reject = Reject::kFlaggedInvalid;
     return result;
   }
-  result.reject = decode_quantity(plan_.rate, frame, result.rate_dps);
+  result.reject = convert(plan_.rate, payload, result.rate_dps);
   if (result.reject) return result;
   if (plan_.sign && plan_.sign->decode(payload).raw != 0) result.rate_dps = -result.rate_dps;
-  if (plan_.temperature) {
-    double temperature_c = 0.0;
-    if (!decode_quantity(*plan_.temperature, frame, temperature_c)) temperature_c_ = temperature_c;
-  }
+  if (plan_.temperature) newest_ = frame;
   return result;
 }
 

@@ -27,7 +27,8 @@ class GyroInput {
   /// After a silence the counter says nothing about how many frames are missing.
   void forget_counter() { counter_known_ = false; }
 
-  [[nodiscard]] double temperature_c() const { return temperature_c_; }
+  /// Of the newest frame that was used; NaN when there is none. Decoded when asked for.
+  [[nodiscard]] double temperature_c() const;
 
  private:
   /// False when the counter stands still.
@@ -35,7 +36,7 @@ class GyroInput {
 
   const GyroPlan& plan_;
   std::size_t bytes_needed_;
-  double temperature_c_;
+  can::Frame newest_;  ///< that carried the temperature; length 0 before the first
   std::uint32_t counter_ = 0;
   bool counter_known_ = false;
 };
