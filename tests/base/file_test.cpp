@@ -1,0 +1,75 @@
+#include "base/file.h"
+
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <unistd.h>
+
+#include <gtest/gtest.h>
+
+namespace vgyro {
+namespace {
+
+class ReadFile : public ::testing::Test {
+ protected:
+  ReadFile() {
+    std::string pattern = ::testing::TempDir() + "vgyro_file_XXXXXX";
+    folder_ = ::mkdtemp(pattern.data());
+  }
+  ~ReadFile() override { std::filesystem::remove_all(folder_); }
+
+  std::string file_with(const std::string& bytes) {
+    const std::string path = folder_ + "/file";
+    std::ofstream(path, std::ios::binary) << bytes;
+    return path;
+  }
+
+  std::string folder_;
+};
+
+// DBC files come with any bytes: nothing is translated, dropped or taken for an end.
+TEST_F(ReadFile, ReturnsTheBytesAsTheyAre) {
+  std::string bytes;
+  for (int i = 0; i < 100'000; ++i)
+    bytes += static_cast<char>(i * 7 % 256);
+  bytes += "\r\n\x1A last line without an end";
+  EXPECT_EQ(read_file(file_with(bytes)).value(), bytes);
+}
+
+// An empty file is a file with nothing in it, not an error.
+TEST_F(ReadFile, ReadsAnEmptyFile) {
+  EXPECT_EQ(read_file(file_with("")).value(), "");
+}
+
+// Who mistyped a path must see the path and why.
+TEST_F(ReadFile, NamesTheFileThatIsMissing) {
+  const std::string path = folder_ + "/missing.toml";
+  const auto missing = read_file(path);
+  ASSERT_FALSE(missing);
+  EXPECT_EQ(missing.error().message(), path + ": cannot be read: No such file or directory");
+}
+
+// Opening a directory succeeds on Linux; its "bytes" would be a confusing error later.
+TEST_F(ReadFile, RefusesADirectory) {
+  const auto directory = read_file(folder_);
+  ASSERT_FALSE(directory);
+  EXPECT_EQ(directory.error().message(), folder_ + ": is a directory, not a file");
+}
+
+// A recording given by mistake in place of a config must not fill the memory.
+TEST_F(ReadFile, RefusesMoreThan64MiBAndTakesExactlyThat) {
+  constexpr std::uintmax_t kLimit = 64U << 20U;
+  const std::string path = file_with("");
+  std::filesystem::resize_file(path, kLimit + 1);
+  const auto large = read_file(path);
+  ASSERT_FALSE(large);
+  EXPECT_EQ(large.error().message(), path + ": is larger than 64 MiB");
+  std::filesystem::resize_file(path, kLimit);
+  const auto just = read_file(path);
+  ASSERT_TRUE(just) << just.error().message();
+  EXPECT_EQ(just->size(), kLimit);
+}
+
+}  // namespace
+}  // namespace vgyro
