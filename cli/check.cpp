@@ -60,8 +60,9 @@ void print_plan(const gateway::Plan& plan) {
   if (plan.calibration.from_reference) {
     fmt::print("the first {:g} s against [reference]\n", plan.calibration.rest_s);
   } else {
-    fmt::print("the first {:g} s at rest, true rate {:g} deg/s\n", plan.calibration.rest_s,
-               plan.calibration.rate_dps);
+    const bool waits = plan.calibration.when_moving == fusion::WhenMoving::kWait;
+    fmt::print("the first {:g} s{}, true rate {:g} deg/s\n", plan.calibration.rest_s,
+               waits ? " of rest" : ", taken for rest whatever moves", plan.calibration.rate_dps);
   }
   fmt::print("  {:<14}{}", "corrector", gateway::to_string(plan.corrector.method));
   if (plan.corrector.method != gateway::Method::kMean) {

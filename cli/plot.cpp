@@ -12,6 +12,7 @@ namespace vgyro::cli {
 namespace {
 
 constexpr double kSecondsPerHour = 3600.0;
+constexpr std::array<const char*, 2> kColours{"#e0a030", "#70a0d0"};
 
 std::string ending_of(const std::string& path) {
   const std::size_t dot = path.rfind('.');
@@ -119,34 +120,58 @@ void ReplayPlot::write_data(std::FILE* to) const {
   fmt::print(to, "EOD\n");
 }
 
-std::string ReplayPlot::script(const std::string& path, const PlotTexts& texts) const {
+bool ReplayPlot::has_rates() const {
+  return std::any_of(buckets_.begin(), buckets_.end(),
+                     [](const Bucket& bucket) { return bucket.rate.count > 0; });
+}
+
+bool ReplayPlot::has_biases() const {
+  return std::any_of(buckets_.begin(), buckets_.end(),
+                     [](const Bucket& bucket) { return bucket.bias[0].count > 0; });
+}
+
+std::string ReplayPlot::drift_script(const PlotTexts& texts) const {
+  const std::array<std::string, 2> names{gnuplot_text("gyro " + texts.gyro_names[0]),
+                                         gnuplot_text("gyro " + texts.gyro_names[1])};
   std::string text = fmt::format(
-      "set terminal {}\nset output {}\nset encoding utf8\n"
-      "set multiplot layout 4,1 title {} noenhanced\n"
-      "set grid lc rgb '#dddddd'\nset key outside top right horizontal noenhanced\n"
-      "set lmargin 12\nset rmargin 3\nset xrange [0:{:.9g}]\nset datafile missing 'NaN'\n"
-      "set ylabel 'rate, deg/s'\n"
-      "plot $rates u 1:2 w l lc rgb '#e0a030' t {}, '' u 1:3 w l lc rgb '#70a0d0' t {}, "
-      "'' u 1:4 w l lc rgb '#909090' t 'mean', '' u 1:5 w l lw 1.5 lc rgb '#b00020' t 'virtual "
-      "gyro'\n"
       "set ylabel 'off the virtual gyro, deg/h'\n"
-      "plot $rates u 1:6 w l lc rgb '#e0a030' t {}, '' u 1:7 w l lc rgb '#70a0d0' t {}, "
-      "'' u 1:(0.5*($6+$7)) w l lc rgb '#606060' t 'mean', 0 w l lw 1.5 lc rgb '#b00020' t "
-      "'virtual gyro'\n",
-      terminal_of(ending_of(path)), gnuplot_text(path), gnuplot_text(texts.title),
-      to_seconds(width_) * static_cast<double>(buckets_.size()),
-      gnuplot_text("gyro " + texts.gyro_names[0]), gnuplot_text("gyro " + texts.gyro_names[1]),
-      gnuplot_text("gyro " + texts.gyro_names[0]), gnuplot_text("gyro " + texts.gyro_names[1]));
-  const std::array<const char*, 2> colours{"#e0a030", "#70a0d0"};
+      "plot $rates u 1:6 w l lc rgb '{}' t {}, '' u 1:7 w l lc rgb '{}' t {}, "
+      "'' u 1:(0.5*($6+$7)) w l lc rgb '#606060' t 'mean', "
+      "0 w l lw 1.5 lc rgb '#b00020' t 'virtual gyro'\n",
+      kColours[0], names[0], kColours[1], names[1]);
+  if (!has_biases()) return text;
   for (std::size_t i = 0; i < 2; ++i) {
     if (i == 1) text += "set xlabel 'time since the first pair, s'\n";
     text += fmt::format(
         "set ylabel 'drift, deg/h'\nplot $rates u 1:{} w p pt 7 ps 0.25 lc rgb '{}' t {}, "
         "'' u 1:{} w l lw 1.5 lc rgb '#202020' t 'drift curve'\n",
-        6 + i, colours[i], gnuplot_text("gyro " + texts.gyro_names[i] + " less the virtual gyro"),
+        6 + i, kColours[i], gnuplot_text("gyro " + texts.gyro_names[i] + " less the virtual gyro"),
         8 + i);
   }
-  return text + "unset multiplot\n";
+  return text;
+}
+
+std::string ReplayPlot::script(const std::string& path, const PlotTexts& texts) const {
+  const bool rates = has_rates();
+  const int panels = !rates ? 1 : has_biases() ? 4 : 2;
+  std::string text = fmt::format(
+      "set terminal {}\nset output {}\nset encoding utf8\n"
+      "set multiplot layout {},1 title {} noenhanced\n"
+      "set grid lc rgb '#dddddd'\nset key outside top right horizontal noenhanced\n"
+      "set lmargin 12\nset rmargin 3\nset xrange [0:{:.9g}]\nset datafile missing 'NaN'\n"
+      "set ylabel 'rate, deg/s'\n{}"
+      "plot $rates u 1:2 w l lc rgb '{}' t {}, '' u 1:3 w l lc rgb '{}' t {}, "
+      "'' u 1:4 w l lc rgb '#909090' t 'mean'",
+      terminal_of(ending_of(path)), gnuplot_text(path), panels,
+      gnuplot_text(texts.title + (rates ? "" : " (no valid virtual rate)")),
+      to_seconds(width_) * static_cast<double>(buckets_.size()),
+      rates ? "" : "set xlabel 'time since the first pair, s'\n", kColours[0],
+      gnuplot_text("gyro " + texts.gyro_names[0]), kColours[1],
+      gnuplot_text("gyro " + texts.gyro_names[1]));
+  if (rates) {
+    text += ", '' u 1:5 w l lw 1.5 lc rgb '#b00020' t 'virtual gyro'\n" + drift_script(texts);
+  }
+  return text + "\nunset multiplot\n";
 }
 
 Expected<void> ReplayPlot::draw(const std::string& path, const PlotTexts& texts) const {

@@ -51,7 +51,10 @@ class ReplayPlot {
 
   Bucket& bucket_at(TimePoint t);
   void write_data(std::FILE* to) const;
+  [[nodiscard]] bool has_rates() const;
   [[nodiscard]] std::string script(const std::string& path, const PlotTexts& texts) const;
+  [[nodiscard]] bool has_biases() const;
+  [[nodiscard]] std::string drift_script(const PlotTexts& texts) const;
 
   bool begun_ = false;
   TimePoint begin_;

@@ -223,18 +223,27 @@ std::optional<Error> explain_silence(const ReplaySummary& summary, const gateway
 }
 
 void warn_of_doubts(const ReplaySummary& summary, const gateway::Plan& plan) {
-  if (summary.status.moved_in_calibration) {
+  const gateway::Status& status = summary.status;
+  if (status.moved_in_calibration) {
     warn({"calibration",
-          fmt::format("both gyros moved together during the first {:g} s, which should be rest: "
-                      "what was learnt holds part of that motion, and VG_Quality says so",
+          fmt::format("the platform moved during the {:g} s that should be rest: the drifts hold "
+                      "part of that motion, and VG_Quality says so",
                       plan.calibration.rest_s),
-          "record at rest, shorten rest_s, or calibrate with source = \"reference\""});
+          "when_moving = \"wait\" waits for rest"});
   }
-  const bool never = summary.status.pairs > 0 && summary.status.rates_out_valid == 0;
-  if (never) {
+  if (status.pairs == 0 || status.rates_out_valid > 0) return;
+  if (status.calibration_restarts > 0) {
+    warn(
+        {"calibration",
+         fmt::format("never complete: the platform moved again and again ({} times), and no {:g} s "
+                     "of rest were found; no valid rate was sent",
+                     status.calibration_restarts, plan.calibration.rest_s),
+         "a shorter rest_s, source = \"reference\", or when_moving = \"accept\", which learns "
+         "part of the motion as drift"});
+  } else {
     warn({"calibration",
-          fmt::format("not complete: {:.1f} of {:g} s; no valid rate was sent",
-                      summary.status.calibrated_s, plan.calibration.rest_s),
+          fmt::format("not complete: {:.1f} of {:g} s; no valid rate was sent", status.calibrated_s,
+                      plan.calibration.rest_s),
           "a longer log, or a shorter rest_s"});
   }
 }

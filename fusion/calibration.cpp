@@ -1,46 +1,94 @@
 #include "fusion/calibration.h"
 
+#include <algorithm>
+#include <cmath>
+
 namespace vgyro::fusion {
 
 namespace {
-// Sum and difference of two independent noises have equal variance; noises correlated by 0.6 give a
-// ratio of 4. Beyond that it is motion.
-constexpr double kMotionVarianceRatio = 4.0;
+// The level follows slow drift of the gyros themselves within a few blocks.
+constexpr double kLevelGain = 0.3;
 }  // namespace
 
-bool Calibration::platform_moved() const {
-  return common_variance > kMotionVarianceRatio * difference_variance;
+Calibrator::Calibrator(int order, double rest_s, WhenMoving when_moving)
+    : order_(order),
+      rest_s_(rest_s),
+      when_moving_(when_moving),
+      sums_(empty_sums(0.0)),
+      calm_(sums_) {}
+
+Calibrator::Sums Calibrator::empty_sums(double from_s) const {
+  return {LeastSquares(order_, from_s, rest_s_), LeastSquares(0, from_s, rest_s_),
+          LeastSquares(order_, from_s, rest_s_)};
 }
 
-Calibrator::Calibrator(int order, double rest_s)
-    : order_(order), rest_s_(rest_s), sum_(order, 0.0, rest_s), difference_(order, 0.0, rest_s) {}
+void Calibrator::begin(double t_s) {
+  started_ = true;
+  level_known_ = false;
+  from_s_ = t_s;
+  calm_until_s_ = t_s;
+  covered_s_ = 0.0;
+  sums_ = empty_sums(t_s);
+  calm_ = sums_;
+  block_ = Block{.from_s = t_s};
+}
+
+bool Calibrator::close_block() {
+  const auto count = static_cast<double>(block_.count);
+  if (block_.count == 0) return true;
+  const double common = block_.common / count;
+  const double mean = block_.difference / count;
+  const double variance = std::max(block_.difference_squares / count - mean * mean, 0.0);
+  const double allowed = kStill_dps + kNoiseFactor * std::sqrt(variance / count);
+  const bool still = !level_known_ || std::abs(common - level_dps_) <= allowed;
+  level_dps_ = level_known_ ? level_dps_ + kLevelGain * (common - level_dps_) : common;
+  level_known_ = true;
+  return still;
+}
+
+bool Calibrator::finish(const Sums& sums, double t_s) {
+  const auto sum = moved_ ? sums.level.fit() : sums.sum.fit();
+  const auto difference = sums.difference.fit();
+  if (!sum || !difference) return false;
+  result_ = {.end_s = t_s,
+             .sum = sum->polynomial,
+             .difference = difference->polynomial,
+             .in_motion = moved_};
+  return true;
+}
 
 bool Calibrator::add(double t_s, const std::array<double, 2>& rate_dps, double true_rate_dps) {
-  if (!started_) {
-    started_ = true;
-    from_s_ = t_s;
-    sum_ = LeastSquares(order_, t_s, rest_s_);
-    difference_ = LeastSquares(order_, t_s, rest_s_);
+  if (!started_) begin(t_s);
+  const bool complete = t_s - from_s_ >= rest_s_;
+  if (complete || t_s - block_.from_s >= kBlock_s) {
+    const bool still = close_block();
+    moved_ = moved_ || (!still && when_moving_ == WhenMoving::kAccept);
+    if (!still && when_moving_ == WhenMoving::kWait) {
+      const bool enough = calm_until_s_ - from_s_ >= kEnoughShare * rest_s_;
+      if (enough && finish(calm_, t_s)) return false;
+      ++restarts_;
+      begin(t_s);
+    } else if (complete) {
+      covered_s_ = rest_s_;
+      if (finish(sums_, from_s_ + rest_s_)) return false;
+      ++restarts_;
+      begin(t_s);
+    } else {
+      calm_ = sums_;
+      calm_until_s_ = t_s;
+      block_ = Block{.from_s = t_s};
+    }
   }
   covered_s_ = t_s - from_s_;
-  if (covered_s_ >= rest_s_) {
-    covered_s_ = rest_s_;
-    const auto sum = sum_.fit();
-    const auto difference = difference_.fit();
-    if (sum && difference) {
-      result_ = {.end_s = from_s_ + rest_s_,
-                 .sum = sum->polynomial,
-                 .difference = difference->polynomial,
-                 .common_variance = sum->residual_variance,
-                 .difference_variance = difference->residual_variance};
-      return false;
-    }
-    // A stream with holes: what was gathered cannot carry the fit. Begin again with this pair.
-    started_ = false;
-    return add(t_s, rate_dps, true_rate_dps);
-  }
-  sum_.add(t_s, rate_dps[0] + rate_dps[1] - 2.0 * true_rate_dps);
-  difference_.add(t_s, rate_dps[0] - rate_dps[1]);
+  const double common = 0.5 * (rate_dps[0] + rate_dps[1]) - true_rate_dps;
+  const double difference = 0.5 * (rate_dps[0] - rate_dps[1]);
+  sums_.sum.add(t_s, 2.0 * common);
+  if (when_moving_ == WhenMoving::kAccept) sums_.level.add(t_s, 2.0 * common);
+  sums_.difference.add(t_s, 2.0 * difference);
+  ++block_.count;
+  block_.common += common;
+  block_.difference += difference;
+  block_.difference_squares += difference * difference;
   return true;
 }
 

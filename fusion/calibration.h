@@ -1,8 +1,9 @@
 #pragma once
 
-// Initial calibration: with the true rate Ω known, y_k − Ω over the first rest_s seconds gives each
-// gyro's drift polynomial P_k⁰ by least squares. Fitted as sum and difference of the two gyros,
-// because the sum shows whether the platform really stood still.
+// Initial calibration: with the true rate Ω known, y_k − Ω over rest_s seconds gives each gyro's
+// drift polynomial P_k⁰ by least squares. Fitted as sum and difference of the two gyros, because
+// the sum shows whether the platform really stands still: second by second, a step of the common
+// rate that noise cannot explain is motion, and what was gathered so far is thrown away.
 
 #include <array>
 #include <cstdint>
@@ -13,42 +14,83 @@
 namespace vgyro::fusion {
 
 struct Calibration {
-  double end_s = 0.0;                ///< the first window starts here
-  Polynomial sum;                    ///< P₁⁰ + P₂⁰, deg/s
-  Polynomial difference;             ///< P₁⁰ − P₂⁰, deg/s
-  double common_variance = 0.0;      ///< of y₁ + y₂ − 2Ω about its polynomial, (deg/s)²
-  double difference_variance = 0.0;  ///< of y₁ − y₂ about its polynomial, (deg/s)²
+  double end_s = 0.0;      ///< the first window starts here
+  Polynomial sum;          ///< P₁⁰ + P₂⁰, deg/s
+  Polynomial difference;   ///< P₁⁰ − P₂⁰, deg/s
+  bool in_motion = false;  ///< the platform moved, and that was accepted
 
   [[nodiscard]] double bias_dps(std::size_t gyro, double t_s) const {
     return 0.5 * (sum.at(t_s) + (gyro == 0 ? difference.at(t_s) : -difference.at(t_s)));
   }
-  /// Both gyros moved together far beyond their noises: the platform turned while it should have
-  /// rested, and what was learnt holds part of that motion.
-  [[nodiscard]] bool platform_moved() const;
+};
+
+/// What to do when the platform moves while it should rest.
+enum class WhenMoving : std::uint8_t {
+  kWait,    ///< begin again: the calibration is the first rest_s seconds of rest
+  kAccept,  ///< go on, say so in Calibration::in_motion, and learn no slope from the motion
+  kKnown    ///< the true rate comes from a reference: motion does not matter
 };
 
 class Calibrator {
  public:
-  /// order 0…kOrderMax, rest_s > 0.
-  Calibrator(int order, double rest_s);
+  /// A common rate that moves less than this from second to second never counts as motion: no
+  /// vehicle turns so slowly for long, and a platform that only sways must be able to calibrate.
+  static constexpr double kStill_dps = 0.05;
+  /// On top, this many standard errors of a block's mean, from the noise of the difference.
+  static constexpr double kNoiseFactor = 10.0;
+  static constexpr double kBlock_s = 1.0;
+  /// Motion that begins after this share of rest_s ends the calibration instead of spoiling it.
+  static constexpr double kEnoughShare = 0.9;
 
-  /// The next pair and the true rate at its time; t_s grows. Returns false when this pair lies
-  /// behind the calibration's end and was not used: then result() is there.
+  /// order 0…kOrderMax, rest_s > 0.
+  Calibrator(int order, double rest_s, WhenMoving when_moving = WhenMoving::kWait);
+
+  /// The next pair and the true rate at its time; t_s grows. Returns false when the calibration is
+  /// complete and this pair was not used for it: then result() is there.
   bool add(double t_s, const std::array<double, 2>& rate_dps, double true_rate_dps);
 
-  /// Seconds covered so far.
+  /// Seconds gathered so far.
   [[nodiscard]] double covered_s() const { return covered_s_; }
+  /// Times that motion, or holes in the stream, made it begin again.
+  [[nodiscard]] std::uint64_t restarts() const { return restarts_; }
   /// Precondition: add() has returned false.
   [[nodiscard]] const Calibration& result() const { return result_; }
 
  private:
+  struct Sums {
+    LeastSquares sum;
+    LeastSquares level;  ///< the sum as a constant
+    LeastSquares difference;
+  };
+  /// One second of pairs.
+  struct Block {
+    double from_s = 0.0;
+    std::uint64_t count = 0;
+    double common = 0.0;              ///< Σ ½(y₁ + y₂) − Ω
+    double difference = 0.0;          ///< Σ ½(y₁ − y₂)
+    double difference_squares = 0.0;  ///< Σ of its squares
+  };
+
+  void begin(double t_s);
+  [[nodiscard]] Sums empty_sums(double from_s) const;
+  /// Judges the block that ends; false when it holds motion.
+  bool close_block();
+  bool finish(const Sums& sums, double t_s);
+
   int order_;
   double rest_s_;
+  WhenMoving when_moving_;
   bool started_ = false;
+  bool moved_ = false;
   double from_s_ = 0.0;
   double covered_s_ = 0.0;
-  LeastSquares sum_;
-  LeastSquares difference_;
+  std::uint64_t restarts_ = 0;
+  Sums sums_;
+  Sums calm_;  ///< up to the last block that was judged still
+  double calm_until_s_ = 0.0;
+  Block block_;
+  double level_dps_ = 0.0;  ///< common rate of the last blocks, smoothed
+  bool level_known_ = false;
   Calibration result_;
 };
 

@@ -269,6 +269,18 @@ double number_within(TomlReader& reader, std::string_view key, double fallback, 
   return fallback;
 }
 
+void read_when_moving(TomlReader& reader, CalibrationPlan& plan) {
+  const std::string word = reader.text("when_moving").value_or("wait");
+  if (plan.from_reference) {
+    plan.when_moving = fusion::WhenMoving::kKnown;
+  } else if (word == "accept") {
+    plan.when_moving = fusion::WhenMoving::kAccept;
+  }
+  if (word == "wait" || word == "accept") return;
+  reader.complain(reader.where("when_moving"), fmt::format("when_moving is \"{}\"", word),
+                  suggest_name(word, {"wait", "accept"}));
+}
+
 void read_calibration(TomlReader& root, Context& context) {
   CalibrationPlan& plan = context.resolved.plan.calibration;
   const toml::table* table = root.table("calibration");
@@ -297,6 +309,7 @@ void read_calibration(TomlReader& root, Context& context) {
     reader.complain(reader.where("source"), fmt::format("source is \"{}\"", source),
                     suggest_name(source, {"rest", "reference"}));
   }
+  read_when_moving(reader, plan);
   if (plan.from_reference && !root.has("reference")) {
     reader.complain(reader.where("source"), "source = \"reference\" needs a [reference] table");
   }

@@ -108,7 +108,7 @@ Pipeline::Impl::Impl(const Plan& the_plan)
     : plan(the_plan),
       router(plan),
       inputs{GyroInput(plan.gyros[0]), GyroInput(plan.gyros[1])},
-      calibrator(plan.corrector.order, plan.calibration.rest_s),
+      calibrator(plan.corrector.order, plan.calibration.rest_s, plan.calibration.when_moving),
       corrector(make_corrector(plan.corrector)),
       encoder(plan.output) {
   calibrated = !corrector->needs_calibration();
@@ -267,11 +267,11 @@ void Pipeline::Impl::calibrate(const fusion::AlignedPair& pair) {
 void Pipeline::Impl::calibrate_with(const fusion::AlignedPair& pair, double true_rate_dps) {
   const bool used = calibrator.add(seconds(pair.t), pair.rate_dps, true_rate_dps);
   status.calibrated_s = calibrator.covered_s();
+  status.calibration_restarts = calibrator.restarts();
   if (used) return;
   corrector->start(calibrator.result());
   calibrated = true;
-  status.moved_in_calibration =
-      !plan.calibration.from_reference && calibrator.result().platform_moved();
+  status.moved_in_calibration = calibrator.result().in_motion;
 }
 
 // --- states --------------------------------------------------------------------------------------

@@ -12,6 +12,7 @@
 #include "can/frame.h"
 #include "dbc/codec.h"
 #include "dbc/multiplex.h"
+#include "fusion/calibration.h"
 
 namespace vgyro::gateway {
 
@@ -99,6 +100,7 @@ struct CalibrationPlan {
   double rest_s = 60.0;
   double rate_dps = 0.0;        ///< true rate along the axis while calibrating at rest
   bool from_reference = false;  ///< calibrate against [reference] instead
+  fusion::WhenMoving when_moving = fusion::WhenMoving::kWait;
 };
 
 struct CorrectorPlan {

@@ -61,11 +61,12 @@ struct Status {
   std::uint64_t rates_out_valid = 0;
   std::uint64_t rates_out_of_range = 0;  ///< virtual rate beyond what VG_Rate can carry
   std::uint64_t biases_out = 0;
-  std::uint64_t windows = 0;          ///< corrector windows completed
-  std::uint64_t windows_skipped = 0;  ///< too few pairs in the window: drift held
-  double rate_dps = 0.0;              ///< last virtual rate; NaN when invalid
-  double calibrated_s = 0.0;          ///< calibration progress
-  bool moved_in_calibration = false;  ///< both gyros turned together while at "rest"
+  std::uint64_t windows = 0;               ///< corrector windows completed
+  std::uint64_t windows_skipped = 0;       ///< too few pairs in the window: drift held
+  double rate_dps = 0.0;                   ///< last virtual rate; NaN when invalid
+  double calibrated_s = 0.0;               ///< calibration progress
+  std::uint64_t calibration_restarts = 0;  ///< the platform moved, or the stream had holes
+  bool moved_in_calibration = false;       ///< and that was accepted
 };
 
 }  // namespace vgyro::gateway
