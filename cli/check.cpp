@@ -77,7 +77,7 @@ void print_plan(const gateway::Plan& plan) {
 }  // namespace
 
 int run_check(const CheckOptions& options) {
-  const auto loaded = gateway::load_config(options.config);
+  const auto loaded = gateway::load_config(options.config, {options.method});
   if (!loaded) return report(loaded.error());
   for (const Error& warning : loaded->warnings)
     warn(warning);

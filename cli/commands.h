@@ -18,6 +18,7 @@ inline constexpr int kWrongUsage = 2;
 
 struct CheckOptions {
   std::string config;
+  std::optional<gateway::Method> method;
 };
 int run_check(const CheckOptions& options);
 

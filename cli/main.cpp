@@ -16,10 +16,16 @@ struct Options {
   std::string method;
 };
 
-CLI::App* add_check(CLI::App& app, CheckOptions& options) {
+void add_method(CLI::App& command, std::string& method) {
+  command.add_option("--method", method, "corrector instead of the configured one")
+      ->check(CLI::IsMember({"mutual", "mean"}));
+}
+
+CLI::App* add_check(CLI::App& app, CheckOptions& options, std::string& method) {
   CLI::App* command = app.add_subcommand(
       "check", "Explain a configuration before it is trusted: which bits of which frame are used");
   command->add_option("CONFIG", options.config, "configuration, e.g. vgyro.toml")->required();
+  add_method(*command, method);
   return command;
 }
 
@@ -39,8 +45,7 @@ CLI::App* add_replay(CLI::App& app, ReplayOptions& options, std::string& method)
   CLI::App* command = app.add_subcommand(
       "replay", "Run the gateway over recorded traffic, as fast as the machine can");
   command->add_option("--config", options.config, "configuration, e.g. vgyro.toml")->required();
-  command->add_option("--method", method, "corrector instead of the configured one")
-      ->check(CLI::IsMember({"mutual", "mean"}));
+  add_method(*command, method);
   command->add_option("-o,--output", options.output,
                       "where the output frames go, as candump lines; default: standard output");
   command->add_option("--json", options.json, "summary as JSON; - is standard output");
@@ -67,7 +72,7 @@ int main(int argc, char** argv) {
   app.require_subcommand(1);
   app.footer("Exit codes: 0 done, 1 bad input (told on stderr), 2 wrong usage.");
   Options options;
-  CLI::App* check = add_check(app, options.check);
+  CLI::App* check = add_check(app, options.check, options.method);
   CLI::App* decode = add_decode(app, options.decode);
   CLI::App* replay = add_replay(app, options.replay, options.method);
   try {
@@ -75,9 +80,11 @@ int main(int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? kDone : kWrongUsage;
   }
+  const auto method = vgyro::gateway::method_from(options.method);
+  options.check.method = method;
+  options.replay.method = method;
   if (check->parsed()) return run_check(options.check);
   if (decode->parsed()) return run_decode(options.decode);
-  if (!options.method.empty()) options.replay.method = vgyro::gateway::method_from(options.method);
   // Frames are the main result; they give way only to a summary that wants the same place.
   const bool output_given = replay->count("--output") > 0;
   if (!output_given && options.replay.json != "-") options.replay.output = "-";

@@ -168,6 +168,27 @@ Json to_json(const ReplaySummary& summary, const gateway::Plan& plan) {
       {"final_state", to_string(status.state)}};
 }
 
+namespace {
+
+// What the plain mean of the two would have done over the same instants.
+void put_plain_mean(fmt::memory_buffer& text, const ReplaySummary& summary) {
+  if (summary.rates == 0 || summary.raws[0] != summary.rates || summary.raws[1] != summary.rates) {
+    return;
+  }
+  const auto count = static_cast<double>(summary.rates);
+  const double mean_dps = 0.5 * (summary.raw_sum_dps[0] + summary.raw_sum_dps[1]) / count;
+  const double excess_dps = mean_dps - summary.rate_sum_dps / count;
+  const double valid_s = (summary.last_s - summary.first_s) * count /
+                         static_cast<double>(std::max<std::uint64_t>(summary.status.pairs, 1));
+  fmt::format_to(
+      std::back_inserter(text),
+      "\nplain mean    {:+.6f} deg/s, {:+.3f} deg/h off the virtual gyro: {:+.4f} deg of "
+      "heading over {:.0f} s",
+      mean_dps, excess_dps * kSecondsPerHour, excess_dps * valid_s, valid_s);
+}
+
+}  // namespace
+
 std::string to_text(const ReplaySummary& summary, const gateway::Plan& plan) {
   const gateway::Status& status = summary.status;
   fmt::memory_buffer text;
@@ -222,6 +243,7 @@ std::string to_text(const ReplaySummary& summary, const gateway::Plan& plan) {
     fmt::format_to(to, ", {} beyond what VG_Rate can carry (sent as invalid)",
                    status.rates_out_of_range);
   }
+  put_plain_mean(text, summary);
   fmt::format_to(to, "\nmethod        {}", gateway::to_string(plan.corrector.method));
   if (status.windows + status.windows_skipped > 0) {
     fmt::format_to(to, ", {} windows, {} skipped for want of pairs", status.windows,
