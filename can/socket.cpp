@@ -4,7 +4,6 @@
 #include <array>
 #include <cerrno>
 #include <cstring>
-#include <ctime>
 #include <fcntl.h>
 #include <linux/can.h>
 #include <linux/can/raw.h>
@@ -115,12 +114,6 @@ bool bind_to(int fd, int interface_index) {
 
 TimePoint from_timespec(const timespec& t) {
   return time_from_ns(static_cast<std::int64_t>(t.tv_sec) * 1'000'000'000 + t.tv_nsec);
-}
-
-TimePoint host_clock() {
-  timespec now{};
-  ::clock_gettime(CLOCK_REALTIME, &now);
-  return from_timespec(now);
 }
 
 void from_kernel(const canfd_frame& raw, std::size_t bytes, Frame& frame) {
@@ -287,8 +280,6 @@ void Socket::read_control(std::size_t index, Received& out) {
       kernel_drops_ = total;
     }
   }
-  // The kernel starts stamping a moment after it is asked to.
-  if (out.stamp == TimePoint{}) out.stamp = host_clock();
 }
 
 SendResult Socket::send(const Frame& frame) {

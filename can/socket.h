@@ -31,7 +31,7 @@ struct SocketOptions {
 
 struct Received {
   Frame frame;
-  TimePoint stamp;     ///< kernel's software stamp, host clock
+  TimePoint stamp;     ///< kernel's software stamp, host clock; 0 in its first moments
   TimePoint hardware;  ///< controller's own clock, whatever its epoch; 0 where it has none
 };
 

@@ -22,7 +22,8 @@ Arrival Bus::peek() {
   if (next_ == batch_.frames.size() && !refill()) return {};
   const can::Received& received = batch_.frames[next_];
   if (stamped_ == next_) {  // each stamp goes through the clock once
-    next_stamp_ = clock_.host_time(received.stamp, received.hardware);
+    const TimePoint software = received.stamp == TimePoint{} ? now_ : received.stamp;
+    next_stamp_ = clock_.host_time(software, received.hardware);
     ++stamped_;
   }
   return {&received.frame, next_stamp_};

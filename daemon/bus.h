@@ -31,7 +31,10 @@ class Bus final : public can::Sender {
   Expected<void> open();
 
   /// Poll reported something: read again when peek() runs dry, but not without end.
-  void begin_reading() { reads_left_ = kReadsPerCycle; }
+  void begin_reading(TimePoint now) {
+    reads_left_ = kReadsPerCycle;
+    now_ = now;
+  }
 
   /// The oldest frame not yet taken; its frame is null when there is none for now.
   Arrival peek();
@@ -72,6 +75,7 @@ class Bus final : public can::Sender {
   std::size_t next_ = 0;
   TimePoint next_stamp_;
   std::size_t stamped_ = 0;  ///< frames of the batch whose stamp has been worked out
+  TimePoint now_;            ///< stands in where the kernel gave no stamp
   int reads_left_ = 0;
   bool more_ = false;
   bool down_ = false;

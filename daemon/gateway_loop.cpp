@@ -45,7 +45,10 @@ std::vector<can::Filter> filters_of(const gateway::Plan& plan, std::size_t bus) 
 }  // namespace
 
 GatewayLoop::GatewayLoop(const gateway::Plan& plan, Log& log)
-    : plan_(plan), log_(log), reporter_(plan, log), pipeline_(plan) {
+    : plan_(plan),
+      log_(log),
+      reporter_({plan.gyros[0].name, plan.gyros[1].name}, plan.calibration.rest_s, log),
+      pipeline_(plan) {
   buses_.reserve(plan.buses.size());
   for (std::size_t i = 0; i < plan.buses.size(); ++i) {
     buses_.emplace_back(plan.buses[i], filters_of(plan, i), log);
@@ -112,7 +115,7 @@ Expected<void> GatewayLoop::start_events() {
 
 Expected<void> GatewayLoop::run() {
   std::array<epoll_event, 16> ready{};
-  if (!serve_events(false)) return fail("sd-event", "cannot start");
+  if (const Expected<void> armed = serve_events(false); !armed) return armed;
   sd_notify(0, "READY=1\nSTATUS=waiting for both gyros");
   for (const Bus& bus : buses_) {
     log_.info("{}: bound{}", bus.name(), bus.socket().fd_frames() ? ", CAN FD" : "");
@@ -122,7 +125,9 @@ Expected<void> GatewayLoop::run() {
     const int count =
         ::epoll_wait(epoll_fd_, ready.data(), static_cast<int>(ready.size()), timeout_ms());
     if (count < 0 && errno != EINTR) return fail("epoll", reason(errno));
-    cycle({ready.data(), static_cast<std::size_t>(std::max(count, 0))});
+    const std::span<const epoll_event> events{ready.data(),
+                                              static_cast<std::size_t>(std::max(count, 0))};
+    if (const Expected<void> done = cycle(events); !done) return done;
   }
   sd_notify(0, "STOPPING=1\nSTATUS=stopping");
   reporter_.summarize(pipeline_.status(), traffic());
@@ -130,17 +135,17 @@ Expected<void> GatewayLoop::run() {
 }
 
 // sd-event inside another loop: armed once, and again only after it had something to do.
-bool GatewayLoop::serve_events(bool armed) {
+Expected<void> GatewayLoop::serve_events(bool armed) {
   int result = armed ? sd_event_wait(events_.get(), 0) : 0;
   for (;;) {
     if (result > 0) result = sd_event_dispatch(events_.get());
-    if (result < 0) return false;
-    result = sd_event_prepare(events_.get());
-    if (result == 0) return true;
+    if (result >= 0) result = sd_event_prepare(events_.get());
+    if (result == 0) return {};
+    if (result < 0) return fail("sd-event", reason(-result));
   }
 }
 
-void GatewayLoop::cycle(std::span<const epoll_event> ready) {
+Expected<void> GatewayLoop::cycle(std::span<const epoll_event> ready) {
   now_ = host_clock();
   bool events_ready = false;
   for (const epoll_event& event : ready) {
@@ -149,19 +154,19 @@ void GatewayLoop::cycle(std::span<const epoll_event> ready) {
       continue;
     }
     if ((event.events & EPOLLOUT) != 0) queue_.on_writable();
-    if ((event.events & ~std::uint32_t{EPOLLOUT}) != 0) buses_[event.data.u32].begin_reading();
+    if ((event.events & ~std::uint32_t{EPOLLOUT}) != 0) buses_[event.data.u32].begin_reading(now_);
   }
   hand_on_arrivals();
   if (now_ >= pipeline_.next_deadline()) {
     // Frames that came before now_ but after poll had looked count before the time-out does.
     for (Bus& bus : buses_)
-      bus.begin_reading();
+      bus.begin_reading(now_);
     hand_on_arrivals();
     if (all_drained()) pipeline_.advance(now_, *this);
   }
   flush();
   if (std::exchange(has_spoken_, false)) reporter_.check_state(pipeline_.status());
-  if (events_ready && !serve_events(true)) stopping_ = true;
+  return events_ready ? serve_events(true) : Expected<void>{};
 }
 
 void GatewayLoop::hand_on_arrivals() {

@@ -43,8 +43,8 @@ class GatewayLoop final : private gateway::FrameSink {
   Expected<void> start_events();
   Expected<void> check_output() const;
   bool poll_bus(std::size_t index);
-  bool serve_events(bool armed);
-  void cycle(std::span<const epoll_event> ready);
+  Expected<void> serve_events(bool armed);
+  Expected<void> cycle(std::span<const epoll_event> ready);
   void hand_on_arrivals();
   Bus* earliest(Arrival& arrival);
   void flush();

@@ -16,7 +16,8 @@ std::string bias_text(double bias_dps) {
 
 }  // namespace
 
-Reporter::Reporter(const gateway::Plan& plan, Log& log) : plan_(plan), log_(log) {}
+Reporter::Reporter(std::array<std::string, 2> gyro_names, double rest_s, Log& log)
+    : names_(std::move(gyro_names)), rest_s_(rest_s), log_(log) {}
 
 void Reporter::state_changed(const gateway::Status& status) {
   const gateway::State before = std::exchange(state_, status.state);
@@ -26,8 +27,8 @@ void Reporter::state_changed(const gateway::Status& status) {
   }
   --state_lines_left_;
   std::string silent;
-  for (std::size_t k = 0; k < plan_.gyros.size(); ++k) {
-    if (!status.gyros[k].heard) silent += fmt::format(", gyro {} is silent", plan_.gyros[k].name);
+  for (std::size_t k = 0; k < status.gyros.size(); ++k) {
+    if (!status.gyros[k].heard) silent += fmt::format(", gyro {} is silent", names_[k]);
   }
   log_.notice("{} (was {}){}", to_string(status.state), to_string(before), silent);
 }
@@ -42,14 +43,14 @@ std::string Reporter::second_passed(const gateway::Status& status, const Traffic
     state_lines_left_ = kStateLinesMost;
   }
   for (std::size_t k = 0; k < gyros_.size(); ++k) {
-    tell_gyro(plan_.gyros[k], status.gyros[k], gyros_[k]);
+    tell_gyro(names_[k], status.gyros[k], gyros_[k]);
   }
   tell_pipeline(status);
   tell_traffic(traffic);
 
   std::string doing{to_string(status.state)};
   if (status.state == gateway::State::kCalibrating) {
-    doing += fmt::format(" ({:.1f} of {:g} s)", status.calibrated_s, plan_.calibration.rest_s);
+    doing += fmt::format(" ({:.1f} of {:g} s)", status.calibrated_s, rest_s_);
   } else if (std::isfinite(status.rate_dps)) {
     doing += fmt::format(", {:.5f} deg/s", status.rate_dps);
   }
@@ -67,19 +68,18 @@ std::uint64_t Reporter::news(Told& told, std::uint64_t count) const {
   return count - std::exchange(told.count, count);
 }
 
-void Reporter::tell_gyro(const gateway::GyroPlan& plan, const gateway::GyroStatus& gyro,
-                         GyroTold& told) {
+void Reporter::tell_gyro(const std::string& name, const gateway::GyroStatus& gyro, GyroTold& told) {
   for (std::size_t cause = 0; cause < gateway::kRejectCount; ++cause) {
     if (const std::uint64_t n = news(told.rejected[cause], gyro.rejected[cause]); n > 0) {
-      log_.warning("gyro {}: {} frames not used: {}", plan.name, n,
+      log_.warning("gyro {}: {} frames not used: {}", name, n,
                    to_string(static_cast<gateway::Reject>(cause)));
     }
   }
   if (const std::uint64_t n = news(told.missing, gyro.missing); n > 0) {
-    log_.warning("gyro {}: {} frames missing by its counter", plan.name, n);
+    log_.warning("gyro {}: {} frames missing by its counter", name, n);
   }
   if (const std::uint64_t n = news(told.unpaired, gyro.unpaired); n > 0) {
-    log_.warning("gyro {}: {} samples found no partner: the other gyro had a gap", plan.name, n);
+    log_.info("gyro {}: {} samples found no partner: the other gyro had a gap", name, n);
   }
 }
 
@@ -96,8 +96,11 @@ void Reporter::tell_pipeline(const gateway::Status& status) {
   if (const std::uint64_t n = news(windows_skipped_, status.windows_skipped); n > 0) {
     log_.warning("{} windows had too few pairs: drifts held", n);
   }
+  if (const std::uint64_t n = news(restarts_, status.calibration_restarts); n > 0) {
+    log_.warning("calibration began anew {} times: the platform moved, or frames were missing", n);
+  }
   if (status.moved_in_calibration && !std::exchange(told_of_motion_, true)) {
-    log_.warning("both gyros turned together while calibrating at rest");
+    log_.warning("calibrated although the platform moved");
   }
 }
 
@@ -117,8 +120,8 @@ void Reporter::tell_traffic(const Traffic& traffic) {
 }
 
 std::string Reporter::biases(const gateway::Status& status) const {
-  return fmt::format("{} {}, {} {}", plan_.gyros[0].name, bias_text(status.gyros[0].bias_dps),
-                     plan_.gyros[1].name, bias_text(status.gyros[1].bias_dps));
+  return fmt::format("{} {}, {} {}", names_[0], bias_text(status.gyros[0].bias_dps), names_[1],
+                     bias_text(status.gyros[1].bias_dps));
 }
 
 void Reporter::summarize(const gateway::Status& status, const Traffic& traffic) {

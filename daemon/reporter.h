@@ -7,11 +7,9 @@
 #include <array>
 #include <cstdint>
 #include <string>
-#include <vector>
 
 #include "can/transmit.h"
 #include "daemon/log.h"
-#include "gateway/plan.h"
 #include "gateway/status.h"
 
 namespace vgyro::daemon {
@@ -25,7 +23,7 @@ struct Traffic {
 
 class Reporter {
  public:
-  Reporter(const gateway::Plan& plan, Log& log);
+  Reporter(std::array<std::string, 2> gyro_names, double rest_s, Log& log);
 
   /// Logs a change of state. Cheap when there is none.
   void check_state(const gateway::Status& status) {
@@ -53,19 +51,20 @@ class Reporter {
 
   void state_changed(const gateway::Status& status);
   std::uint64_t news(Told& told, std::uint64_t count) const;
-  void tell_gyro(const gateway::GyroPlan& plan, const gateway::GyroStatus& gyro, GyroTold& told);
+  void tell_gyro(const std::string& name, const gateway::GyroStatus& gyro, GyroTold& told);
   void tell_pipeline(const gateway::Status& status);
   void tell_traffic(const Traffic& traffic);
   [[nodiscard]] std::string biases(const gateway::Status& status) const;
 
-  const gateway::Plan& plan_;
+  std::array<std::string, 2> names_;
+  double rest_s_;
   Log& log_;
   gateway::State state_ = gateway::State::kWaiting;
   int state_lines_left_ = kStateLinesMost;
   std::uint64_t state_lines_held_ = 0;
   std::uint64_t second_ = 0;
   std::array<GyroTold, 2> gyros_;
-  Told clock_steps_, rates_out_of_range_, reference_rejected_, windows_skipped_;
+  Told clock_steps_, rates_out_of_range_, reference_rejected_, windows_skipped_, restarts_;
   Told lost_by_kernel_, stale_, overflow_, failed_;
   bool told_of_motion_ = false;
   std::uint64_t last_received_ = 0;

@@ -104,13 +104,24 @@ def make_links(case, verb):
             subprocess.run(command, check=True)
 
 
-def play(case, daemon, folder):
+def play(log, daemon, folder):
     """Recorded traffic onto the buses, in its own time."""
-    with open(os.path.join(folder, "canplayer.err"), "wb") as stderr:
-        player = subprocess.Popen(["canplayer", "-I", case["play"]], stderr=stderr)
+    with open(os.path.join(folder, "canplayer.err"), "ab") as stderr:
+        player = subprocess.Popen(["canplayer", "-I", log], stderr=stderr)
     while player.poll() is None:
         daemon.listen(0.2)
-    return player.returncode
+    if player.returncode != 0:
+        raise OSError(f"canplayer {log}: exit {player.returncode}")
+
+
+def take_steps(steps, daemon, folder):
+    for verb, what in steps:
+        if verb == "play":
+            play(what, daemon, folder)
+        elif verb == "wait":
+            daemon.listen(what)
+        else:
+            subprocess.run(what, check=True)
 
 
 def run_case(case, folder, memory):
@@ -120,16 +131,12 @@ def run_case(case, folder, memory):
     capture_path = os.path.join(memory, "capture.tmp")
     try:
         with open(capture_path, "wb") as capture, open(os.path.join(folder, "candump.err"), "wb") as errors:
-            names = [link["name"] for link in case["links"]]
-            dump = subprocess.Popen(["candump", "-L", "-D", "-r", "8000000", *names], stdout=capture, stderr=errors)
+            dump = subprocess.Popen(["candump", "-L", "-D", "-r", "8000000", "any"], stdout=capture, stderr=errors)
             time.sleep(0.5)
             daemon = Daemon(case["command"], folder)
             result["ready"] = daemon.listen(READY_WITHIN_S, "READY=1")
             if result["ready"]:
-                daemon.listen(case.get("idle_s", 0.2))
-                if "play" in case:
-                    result["player"] = play(case, daemon, folder)
-                daemon.listen(case.get("settle_s", 0.5))
+                take_steps([["wait", 0.2], *case["steps"], ["wait", 0.5]], daemon, folder)
                 if daemon.process.poll() is None:
                     result["resources"] = daemon.resources()
             result["exit"] = daemon.stop(getattr(signal, case.get("signal", "SIGTERM")))

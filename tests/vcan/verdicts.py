@@ -76,17 +76,20 @@ def check_own_vectors():
             "the harness' own E2E check is wrong")
 
 
+def check_crc(line, can_id):
+    data = line.data
+    if line.fd:
+        right = int.from_bytes(data[:2], "little") == profile_5_crc(can_id, data)
+    else:
+        right = data[0] == profile_11c_crc(can_id, data) and data[1] >> 4 == can_id >> 8
+    require(right, f"wrong E2E checksum: {line.text}")
+
+
 def check_protection(lines, can_id):
     """Every frame's CRC, and that the counter runs without a gap from 0."""
     for position, line in enumerate(lines):
-        data = line.data
-        if line.fd:
-            right = int.from_bytes(data[:2], "little") == profile_5_crc(can_id, data)
-            counter, expected = data[2], position % 256
-        else:
-            right = data[0] == profile_11c_crc(can_id, data) and data[1] >> 4 == can_id >> 8
-            counter, expected = data[1] & 0x0F, position % 15
-        require(right, f"wrong E2E checksum: {line.text}")
+        check_crc(line, can_id)
+        counter, expected = (line.data[2], position % 256) if line.fd else (line.data[1] & 0x0F, position % 15)
         require(counter == expected, f"E2E counter {counter}, not {expected}: {line.text}")
 
 

@@ -1,0 +1,128 @@
+#include "daemon/reporter.h"
+
+#include <cmath>
+#include <string>
+
+#include <gtest/gtest.h>
+
+namespace vgyro::daemon {
+namespace {
+
+using gateway::Reject;
+using gateway::State;
+
+std::uint64_t& rejected(gateway::Status& status, std::size_t gyro, Reject cause) {
+  return status.gyros[gyro].rejected[static_cast<std::size_t>(cause)];
+}
+
+std::size_t count_of(const std::string& what, const std::string& text) {
+  std::size_t count = 0;
+  for (auto at = text.find(what); at != std::string::npos; at = text.find(what, at + 1))
+    ++count;
+  return count;
+}
+
+class ReporterTest : public testing::Test {
+ protected:
+  ReporterTest() {
+    for (gateway::GyroStatus& gyro : status.gyros) {
+      gyro.heard = true;
+      gyro.bias_dps = std::nan("");
+    }
+    status.rate_dps = std::nan("");
+  }
+
+  template <class Action>
+  static std::string said_during(const Action& action) {
+    testing::internal::CaptureStderr();
+    action();
+    return testing::internal::GetCapturedStderr();
+  }
+
+  std::string second() {
+    return said_during([&] { last_line = reporter.second_passed(status, traffic); });
+  }
+
+  gateway::Status status;
+  Traffic traffic;
+  Log log;
+  Reporter reporter{{"left", "right"}, 60.0, log};
+  std::string last_line;
+};
+
+TEST_F(ReporterTest, TellsEachChangeOfStateOnceAndWhoIsSilent) {
+  status.state = State::kDegraded;
+  status.gyros[1].heard = false;
+  const std::string said = said_during([&] {
+    reporter.check_state(status);
+    reporter.check_state(status);
+  });
+  EXPECT_EQ(count_of("degraded (was waiting), gyro right is silent", said), 1U) << said;
+  EXPECT_EQ(count_of("left", said), 0U) << said;
+}
+
+TEST_F(ReporterTest, HoldsAFlickeringStateBackAndSaysSo) {
+  const std::string said = said_during([&] {
+    for (int i = 0; i < 100; ++i) {
+      status.state = i % 2 == 0 ? State::kRunning : State::kDegraded;
+      reporter.check_state(status);
+    }
+  });
+  EXPECT_EQ(count_of("\n", said), 10U) << said;
+  std::string later;
+  for (int i = 0; i < 60; ++i)
+    later += second();
+  EXPECT_EQ(count_of("90 more changes of state", later), 1U) << later;
+}
+
+TEST_F(ReporterTest, TellsTheFirstOfEachCauseAtOnceAndTheRestOnceAMinute) {
+  rejected(status, 0, Reject::kOutOfRange) = 1;
+  EXPECT_EQ(count_of("gyro left: 1 frames not used", second()), 1U);
+  rejected(status, 1, Reject::kOutOfRange) = 1;
+  EXPECT_EQ(count_of("gyro right: 1 frames not used", second()), 1U) << "another gyro is news";
+  std::string said;
+  for (int i = 0; i < 58; ++i) {
+    ++rejected(status, 0, Reject::kOutOfRange);
+    said += second();
+  }
+  EXPECT_EQ(said, "");
+  EXPECT_EQ(count_of("gyro left: 58 frames not used", second()), 1U);
+}
+
+TEST_F(ReporterTest, SaysNothingWhenNothingIsWrong) {
+  for (int i = 0; i < 200; ++i)
+    EXPECT_EQ(second(), "");
+}
+
+TEST_F(ReporterTest, TellsFramesThatWereLostOrDropped) {
+  traffic.lost_by_kernel = 7;
+  traffic.transmitted.dropped_stale = 8;
+  const std::string said = second();
+  EXPECT_EQ(count_of("7 received frames lost", said), 1U) << said;
+  EXPECT_EQ(count_of("8 frames dropped: the bus did not take them in time", said), 1U) << said;
+}
+
+TEST_F(ReporterTest, PutsStateRateBiasesAndTrafficInTheStatusLine) {
+  traffic.received = 1000;
+  second();
+  status.state = State::kRunning;
+  status.rate_dps = 50.00321;
+  status.gyros[0].bias_dps = 0.0330;
+  status.gyros[1].bias_dps = -0.0074;
+  traffic.received = 2000;
+  traffic.transmitted.sent = 520;
+  second();
+  EXPECT_EQ(last_line,
+            "running, 50.00321 deg/s; bias left 118.80, right -26.64 deg/h; 1000 frames/s in, "
+            "520 out");
+}
+
+TEST_F(ReporterTest, ShowsTheProgressOfCalibration) {
+  status.state = State::kCalibrating;
+  status.calibrated_s = 12.34;
+  second();
+  EXPECT_EQ(last_line.rfind("calibrating (12.3 of 60 s); bias left unknown", 0), 0U) << last_line;
+}
+
+}  // namespace
+}  // namespace vgyro::daemon
