@@ -286,9 +286,13 @@ const char* parse_frame_text(Cursor& at, LogRecord& record, XlFrame& xl) {
 }
 
 const char* parse_direction(Cursor& at, LogRecord& record) {
+  const bool apart = at.peek() == ' ' || at.peek() == '\t';
   at.skip_blanks();
-  if (at.skip('R')) record.direction = Direction::kReceived;
-  if (at.skip('T')) record.direction = Direction::kTransmitted;
+  if (apart && at.skip('R')) {
+    record.direction = Direction::kReceived;
+  } else if (apart && at.skip('T')) {
+    record.direction = Direction::kTransmitted;
+  }
   at.skip_blanks();
   return at.at_end() ? nullptr : "something stands behind the frame";
 }
@@ -338,7 +342,7 @@ const LogReader::KnownInterface* LogReader::known_interface(std::uint64_t word) 
 void LogReader::remember_interface(BusIndex bus) {
   const std::string& name = interfaces_.name(bus);
   // Only the first few names of up to seven characters take the quick way.
-  if (bus != known_count_ || known_count_ == known_.size() || name.size() > 7) return;
+  if (known_count_ == known_.size() || name.size() > 7) return;
   KnownInterface& known = known_[known_count_++];
   char text[8] = {};
   std::memcpy(text, name.data(), name.size());

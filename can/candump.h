@@ -118,7 +118,7 @@ class LogReader {
   std::unique_ptr<LogSource> source_;
   const char* at_ = nullptr;
   const char* end_ = nullptr;
-  std::uint64_t seconds_text_[2] = {0, 0};
+  std::uint64_t seconds_text_[2] = {0x3030303030303030U, 0x3030303030303030U};  ///< "0000000000"
   std::int64_t seconds_ns_ = 0;
   std::array<KnownInterface, 4> known_{};
   std::size_t known_count_ = 0;
@@ -129,7 +129,7 @@ class LogReader {
 };
 
 /// Longest text of a line that format_line writes, newline included.
-inline constexpr std::size_t kLineBytesMax = 192;
+inline constexpr std::size_t kLineBytesMax = 200;
 
 /// Writes one line with its newline to `out`, which has room for kLineBytesMax; returns its length.
 /// `fraction_digits` is 6 or 9; 6 truncates.
