@@ -1,0 +1,297 @@
+// What one line of a log means, form by form.
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include "can/candump.h"
+#include "tests/can/log_text.h"
+
+namespace vgyro::can {
+namespace {
+
+struct ParsedLine {
+  LineKind kind = LineKind::kOther;
+  std::string why;
+  LogRecord record;
+  XlFrame xl;
+  std::string interface;
+};
+
+ParsedLine parse(std::string_view line) {
+  ParsedLine parsed;
+  InterfaceTable interfaces;
+  const LineResult result = parse_line(line, interfaces, parsed.record, parsed.xl);
+  parsed.kind = result.kind;
+  parsed.why = result.why;
+  if (!interfaces.names().empty()) parsed.interface = interfaces.name(parsed.record.bus);
+  return parsed;
+}
+
+/// The frame of "ID#..." alone; the line must be in order.
+Frame frame_in(const std::string& text) {
+  const ParsedLine parsed = parse("(1700000000.123456) can0 " + text);
+  EXPECT_EQ(parsed.kind, LineKind::kFrame) << text << ": " << parsed.why;
+  return parsed.record.frame;
+}
+
+Frame expected_frame(std::uint32_t id, unsigned flags, std::vector<std::uint8_t> bytes = {}) {
+  Frame frame;
+  frame.id = id;
+  frame.flags = static_cast<std::uint8_t>(flags);
+  frame.length = static_cast<std::uint8_t>(bytes.size());
+  std::copy(bytes.begin(), bytes.end(), frame.data.begin());
+  return frame;
+}
+
+Frame remote_frame(std::uint32_t id, unsigned flags, std::uint8_t length, std::uint8_t raw_dlc) {
+  Frame frame = expected_frame(id, flags | kRemote);
+  frame.length = length;
+  frame.raw_dlc = raw_dlc;
+  return frame;
+}
+
+std::string why_malformed(const std::string& line) {
+  const ParsedLine parsed = parse(line);
+  EXPECT_EQ(parsed.kind, LineKind::kMalformed) << line;
+  EXPECT_EQ(parsed.interface, "") << line << " must not use up a place among the interfaces";
+  return parsed.why;
+}
+
+std::string why_malformed_frame(const std::string& text) {
+  return why_malformed("(1700000000.123456) can0 " + text);
+}
+
+// The number of digits tells standard from extended, not the number's size.
+TEST(CandumpForm, ReadsStandardAndExtendedFrames) {
+  EXPECT_EQ(frame_in("123#DEADBEEF"), expected_frame(0x123, 0, {0xDE, 0xAD, 0xBE, 0xEF}));
+  EXPECT_EQ(frame_in("000#"), expected_frame(0, 0));
+  EXPECT_EQ(frame_in("7FF#0102030405060708"), expected_frame(0x7FF, 0, {1, 2, 3, 4, 5, 6, 7, 8}));
+  EXPECT_EQ(frame_in("00000123#11"), expected_frame(0x123, kExtended, {0x11}));
+  EXPECT_EQ(frame_in("1FFFFFFF#"), expected_frame(0x1FFFFFFF, kExtended));
+}
+
+// can-utils' players read small letters and dots between bytes, so logs contain them.
+TEST(CandumpForm, ReadsSmallLettersAndDotsBetweenBytes) {
+  EXPECT_EQ(frame_in("12a#deadbeef"), expected_frame(0x12A, 0, {0xDE, 0xAD, 0xBE, 0xEF}));
+  EXPECT_EQ(frame_in("12A#DE.AD.BEEF"), expected_frame(0x12A, 0, {0xDE, 0xAD, 0xBE, 0xEF}));
+  EXPECT_EQ(frame_in("12A##1de.ad"), expected_frame(0x12A, kFd | kBitRateSwitch, {0xDE, 0xAD}));
+}
+
+// Error frames have the error bit in eight digits; their identifier holds the error class.
+TEST(CandumpForm, ReadsErrorFrames) {
+  EXPECT_EQ(frame_in("20000080#0000000000000000"),
+            expected_frame(0x80, kError, {0, 0, 0, 0, 0, 0, 0, 0}));
+  EXPECT_EQ(frame_in("20000004#0004000000000000"),
+            expected_frame(0x4, kError, {0, 4, 0, 0, 0, 0, 0, 0}));
+}
+
+// Remote frames say how much they ask for, where the log's writer knew it.
+TEST(CandumpForm, ReadsRemoteFrames) {
+  EXPECT_EQ(frame_in("123#R"), remote_frame(0x123, 0, 0, 0));
+  EXPECT_EQ(frame_in("123#r"), remote_frame(0x123, 0, 0, 0));
+  EXPECT_EQ(frame_in("123#R0"), remote_frame(0x123, 0, 0, 0));
+  EXPECT_EQ(frame_in("123#R5"), remote_frame(0x123, 0, 5, 0));
+  EXPECT_EQ(frame_in("00000123#R8"), remote_frame(0x123, kExtended, 8, 0));
+  EXPECT_EQ(frame_in("123#R8_9"), remote_frame(0x123, 0, 8, 9));
+  EXPECT_EQ(frame_in("123#R8_F"), remote_frame(0x123, 0, 8, 15));
+}
+
+// A classic frame may claim 9 to 15 in its DLC and still carries 8 bytes.
+TEST(CandumpForm, ReadsRawDlcAboveEight) {
+  for (unsigned dlc = 9; dlc <= 15; ++dlc) {
+    Frame frame = expected_frame(0x123, 0, {0x11, 0x22, 0x33, 0x44, 0x55, 0x66, 0x77, 0x88});
+    frame.raw_dlc = static_cast<std::uint8_t>(dlc);
+    EXPECT_EQ(frame_in(fmt::format("123#1122334455667788_{:X}", dlc)), frame);
+    EXPECT_EQ(frame_in(fmt::format("123#1122334455667788_{:x}", dlc)), frame);
+  }
+}
+
+// Nibble 1 is the bit-rate switch and 2 the error state; 4 says FD once more, or not in old logs.
+TEST(CandumpForm, ReadsFdFlagsWithAndWithoutTheFdfBit) {
+  for (unsigned nibble = 0; nibble < 16; ++nibble) {
+    unsigned flags = kFd;
+    if ((nibble & 1U) != 0) flags |= kBitRateSwitch;
+    if ((nibble & 2U) != 0) flags |= kErrorStateIndicator;
+    EXPECT_EQ(frame_in(fmt::format("123##{:X}AABB", nibble)),
+              expected_frame(0x123, flags, {0xAA, 0xBB}));
+  }
+  EXPECT_EQ(frame_in("12345678##5"), expected_frame(0x12345678, kExtended | kFd | kBitRateSwitch));
+}
+
+// An FD frame holds up to 64 bytes; every length up to there is taken, none is padded.
+TEST(CandumpForm, ReadsFdPayloadsOfEveryLength) {
+  std::string text = "123##0";
+  std::vector<std::uint8_t> bytes;
+  for (unsigned i = 0; i <= kFdBytesMax; ++i) {
+    EXPECT_EQ(frame_in(text), expected_frame(0x123, kFd, bytes)) << i;
+    bytes.push_back(static_cast<std::uint8_t>(0xC0 + i));
+    text += fmt::format("{:02X}", bytes.back());
+  }
+  EXPECT_EQ(why_malformed_frame(text), "payload: more bytes than the frame can hold");
+}
+
+// XL frames are none of the product's business, but a log with them loses no line.
+TEST(CandumpForm, ReadsXlFrames) {
+  const ParsedLine parsed = parse("(1700000000.123456) can0 45123#81:00:12345678#11223344AA");
+  EXPECT_EQ(parsed.kind, LineKind::kXl) << parsed.why;
+  EXPECT_TRUE(parsed.record.is_xl);
+  XlFrame xl;
+  xl.vcid = 0x45;
+  xl.priority = 0x123;
+  xl.flags = 0x81;
+  xl.acceptance = 0x12345678;
+  xl.length = 5;
+  xl.data = {0x11, 0x22, 0x33, 0x44, 0xAA};
+  EXPECT_EQ(parsed.xl, xl);
+  EXPECT_EQ(parsed.record.frame, Frame{});
+  EXPECT_EQ(parse("(1.0) can0 007FF#FF:EE:FFFFFFFF#").xl.sdt, 0xEE);
+}
+
+// 2048 bytes are an XL frame, 2049 are none.
+TEST(CandumpForm, ReadsTheLongestXlFrameAndNothingLonger) {
+  std::string text = "00123#80:00:00000000#";
+  for (std::size_t i = 0; i < kXlBytesMax; ++i)
+    text += "5A";
+  const ParsedLine parsed = parse("(1.0) can0 " + text);
+  EXPECT_EQ(parsed.kind, LineKind::kXl) << parsed.why;
+  EXPECT_EQ(parsed.xl.length, kXlBytesMax);
+  EXPECT_EQ(parsed.xl.data.back(), 0x5A);
+  EXPECT_EQ(why_malformed_frame(text + "5A"), "payload: more bytes than the frame can hold");
+}
+
+// Microseconds and nanoseconds both come out exact; the writer can then write what it read.
+TEST(CandumpForm, ReadsStampsOfSixAndNineDigits) {
+  const ParsedLine micro = parse("(1700000000.123456) can0 123#");
+  EXPECT_EQ(to_ns(micro.record.stamp), 1'700'000'000'123'456'000);
+  EXPECT_EQ(micro.record.fraction_digits, 6);
+  const ParsedLine nano = parse("(1700000000.123456789) can0 123#");
+  EXPECT_EQ(to_ns(nano.record.stamp), 1'700'000'000'123'456'789);
+  EXPECT_EQ(nano.record.fraction_digits, 9);
+}
+
+// Logs may begin at zero, and hand-made ones spare digits.
+TEST(CandumpForm, ReadsStampsFromZeroAndOfAnyWidth) {
+  EXPECT_EQ(to_ns(parse("(0.000000) can0 123#").record.stamp), 0);
+  EXPECT_EQ(to_ns(parse("(0000000000.000001) can0 123#").record.stamp), 1'000);
+  EXPECT_EQ(to_ns(parse("(12.5) can0 123#").record.stamp), 12'500'000'000);
+  EXPECT_EQ(to_ns(parse("(9.0000001) can0 123#").record.stamp), 9'000'000'100);
+  EXPECT_EQ(to_ns(parse("(9000000000.999999999) can0 123#").record.stamp),
+            9'000'000'000'999'999'999);
+}
+
+// candump -L of newer can-utils ends lines with R or T, and pads interface names of several buses.
+TEST(CandumpForm, ReadsDirectionsAndPadding) {
+  EXPECT_EQ(parse("(1.000000) can0 123#11").record.direction, Direction::kUnknown);
+  EXPECT_EQ(parse("(1.000000) can0 123#11 R").record.direction, Direction::kReceived);
+  EXPECT_EQ(parse("(1.000000) can0 123#11 T").record.direction, Direction::kTransmitted);
+  EXPECT_EQ(parse("(1.000000) can0 123#R T").record.direction, Direction::kTransmitted);
+  EXPECT_EQ(parse("(1.000000) can0 123#R R").record.direction, Direction::kReceived);
+  EXPECT_EQ(parse("(1.000000) can0 123##1 R").record.direction, Direction::kReceived);
+  const ParsedLine padded = parse("(1.000000)  \t vcan0    123#11   T  ");
+  EXPECT_EQ(padded.kind, LineKind::kFrame) << padded.why;
+  EXPECT_EQ(padded.interface, "vcan0");
+  EXPECT_EQ(padded.record.direction, Direction::kTransmitted);
+}
+
+// Files that went through Windows end in CRLF.
+TEST(CandumpForm, ReadsLinesThatEndInCarriageReturn) {
+  const ParsedLine parsed = parse("(1.000000) can0 123#11\r");
+  EXPECT_EQ(parsed.kind, LineKind::kFrame) << parsed.why;
+  EXPECT_EQ(parsed.record.frame, expected_frame(0x123, 0, {0x11}));
+  EXPECT_EQ(parse("(1.000000) can0 123#11 T\r").record.direction, Direction::kTransmitted);
+  EXPECT_EQ(parse("\r").kind, LineKind::kOther);
+}
+
+// What does not begin with "(" is no frame, and players pass over it without a word.
+TEST(CandumpForm, TakesLinesWithoutAParenthesisForRemarks) {
+  for (const char* line :
+       {"", "DROPCOUNT: dropped 3 CAN frames on 'can0' socket (total drops 3)", "# a remark",
+        "can0  123   [8]  11 22 33 44 55 66 77 88", " (1.0)", "date Wed Jan 1 00:00:00 2020"}) {
+    EXPECT_EQ(parse(line).kind, LineKind::kOther) << line;
+  }
+}
+
+TEST(CandumpForm, TellsWhatIsWrongWithAStamp) {
+  EXPECT_EQ(why_malformed("("), "stamp: the seconds are no number");
+  EXPECT_EQ(why_malformed("(-1.000000) can0 123#"), "stamp: the seconds are no number");
+  EXPECT_EQ(why_malformed("(nan) can0 123#"), "stamp: the seconds are no number");
+  EXPECT_EQ(why_malformed("(12345678901.0) can0 123#"), "stamp: the seconds are no number");
+  EXPECT_EQ(why_malformed("(9000000001.0) can0 123#"), "stamp: beyond the year 2255");
+  EXPECT_EQ(why_malformed("(17) can0 123#"), "stamp: no decimal point");
+  EXPECT_EQ(why_malformed("(1,5) can0 123#"), "stamp: no decimal point");
+  EXPECT_EQ(why_malformed("(1.) can0 123#"), "stamp: the fraction needs 1 to 9 digits");
+  EXPECT_EQ(why_malformed("(1.0123456789) can0 123#"), "stamp: the fraction needs 1 to 9 digits");
+  EXPECT_EQ(why_malformed("(1.5 can0 123#"), "stamp: no closing parenthesis");
+  EXPECT_EQ(why_malformed("(1.5e3) can0 123#"), "stamp: no closing parenthesis");
+}
+
+TEST(CandumpForm, TellsWhatIsWrongWithAnInterface) {
+  EXPECT_EQ(why_malformed("(1.5)"), "no interface name");
+  EXPECT_EQ(why_malformed("(1.5) "), "no interface name");
+  EXPECT_EQ(why_malformed("(1.5) 123#11"), "no interface name");
+  EXPECT_EQ(why_malformed("(1.5) " + std::string(32, 'c') + " 123#11"), "no interface name");
+  EXPECT_EQ(parse("(1.5) " + std::string(31, 'c') + " 123#11").interface, std::string(31, 'c'));
+}
+
+TEST(CandumpForm, TellsWhatIsWrongWithAnIdentifier) {
+  EXPECT_EQ(why_malformed("(1.5) can0"), "no \"#\" behind the identifier");
+  EXPECT_EQ(why_malformed_frame("123"), "no \"#\" behind the identifier");
+  EXPECT_EQ(why_malformed_frame("12G#11"), "no \"#\" behind the identifier");
+  EXPECT_EQ(why_malformed_frame("#11"), "identifier: neither 3 nor 8 hex digits");
+  EXPECT_EQ(why_malformed_frame("12#11"), "identifier: neither 3 nor 8 hex digits");
+  EXPECT_EQ(why_malformed_frame("1234#11"), "identifier: neither 3 nor 8 hex digits");
+  EXPECT_EQ(why_malformed_frame("012345678#11"), "identifier: neither 3 nor 8 hex digits");
+  EXPECT_EQ(why_malformed_frame("800#11"), "identifier: above 7FF needs 8 digits");
+  EXPECT_EQ(why_malformed_frame("FFF#11"), "identifier: above 7FF needs 8 digits");
+  EXPECT_EQ(why_malformed_frame("40000000#11"), "identifier: above 1FFFFFFF");
+  EXPECT_EQ(why_malformed_frame("80000123#11"), "identifier: above 1FFFFFFF");
+}
+
+TEST(CandumpForm, TellsWhatIsWrongWithAPayload) {
+  EXPECT_EQ(why_malformed_frame("123#112"), "payload: an odd number of hex digits");
+  EXPECT_EQ(why_malformed_frame("123#1.1"), "payload: an odd number of hex digits");
+  EXPECT_EQ(why_malformed_frame("123##1112"), "payload: an odd number of hex digits");
+  EXPECT_EQ(why_malformed_frame("123#112233445566778899"),
+            "payload: more bytes than the frame can hold");
+  EXPECT_EQ(why_malformed_frame("123##"), "FD frame: no flags behind \"##\"");
+  EXPECT_EQ(why_malformed_frame("123##G"), "FD frame: no flags behind \"##\"");
+  EXPECT_EQ(why_malformed_frame("123#R9"), "remote frame: length above 8");
+  EXPECT_EQ(why_malformed_frame("123#1122334455667788_"), "raw DLC: \"_\" needs 9 to F behind it");
+  EXPECT_EQ(why_malformed_frame("123#1122334455667788_8"), "raw DLC: \"_\" needs 9 to F behind it");
+  EXPECT_EQ(why_malformed_frame("123#11223344556677_9"), "raw DLC: only with 8 bytes");
+  EXPECT_EQ(why_malformed_frame("123#R7_9"), "raw DLC: only with 8 bytes");
+}
+
+TEST(CandumpForm, TellsWhatIsWrongWithAnXlFrame) {
+  const std::string form = "XL frame: not VVPPP#FF:SS:AAAAAAAA#";
+  EXPECT_EQ(why_malformed_frame("45123#"), form);
+  EXPECT_EQ(why_malformed_frame("45123#1122"), form);
+  EXPECT_EQ(why_malformed_frame("45123#8:00:12345678#"), form);
+  EXPECT_EQ(why_malformed_frame("45123#81:0:12345678#"), form);
+  EXPECT_EQ(why_malformed_frame("45123#81:00:1234567#"), form);
+  EXPECT_EQ(why_malformed_frame("45123#81:00:12345678"), form);
+  EXPECT_EQ(why_malformed_frame("45800#81:00:12345678#"), "XL frame: priority above 7FF");
+  EXPECT_EQ(why_malformed_frame("45123#81:00:12345678#1"), "payload: an odd number of hex digits");
+}
+
+// Letters that stick to the payload, or stand there twice, are damage and no direction.
+TEST(CandumpForm, TellsThatSomethingStandsBehindTheFrame) {
+  for (const char* text : {"123#11G", "123#11 X", "123#11 R T", "123#11 RT", "123#11R", "123#T",
+                           "123##1R", "123#R T5", "123#R5T", "123#1122334455667788_9A", "123#R55",
+                           "123#11 22", "123#11\r", "123#11-22", "45123#81:00:12345678#11T"}) {
+    const std::string line =
+        std::string(text) + (std::string_view(text).back() == '\r' ? "\r" : "");
+    EXPECT_EQ(why_malformed_frame(line), "something stands behind the frame") << text;
+  }
+}
+
+// NUL bytes come from disks that lost power; they end no string here.
+TEST(CandumpForm, TakesNulBytesForDamage) {
+  EXPECT_EQ(why_malformed(std::string("(1.5) can0 123#11\0\0", 19)),
+            "something stands behind the frame");
+  EXPECT_EQ(why_malformed(std::string("(\0\0\0", 4)), "stamp: the seconds are no number");
+  EXPECT_EQ(parse(std::string(20, '\0')).kind, LineKind::kOther);
+}
+
+}  // namespace
+}  // namespace vgyro::can

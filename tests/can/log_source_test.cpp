@@ -1,0 +1,197 @@
+#include "can/log_source.h"
+
+#include <filesystem>
+#include <fstream>
+#include <lzma.h>
+#include <unistd.h>
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include "tests/can/log_text.h"
+
+namespace vgyro::can {
+namespace {
+
+/// Payloads that pack badly, so that the packed file has many parts to damage.
+std::string log_text(unsigned lines) {
+  std::mt19937_64 random(20'240'604);
+  std::string text;
+  for (unsigned i = 0; i < lines; ++i) {
+    text +=
+        fmt::format("(1700000000.{:06}) can0 {:03X}#{:016X}\n", i, i & kStandardIdMax, random());
+  }
+  return text;
+}
+
+std::string packed(const std::string& text) {
+  std::string out(lzma_stream_buffer_bound(text.size()), '\0');
+  std::size_t size = 0;
+  const lzma_ret result = lzma_easy_buffer_encode(
+      1, LZMA_CHECK_CRC64, nullptr, reinterpret_cast<const std::uint8_t*>(text.data()), text.size(),
+      reinterpret_cast<std::uint8_t*>(out.data()), &size, out.size());
+  EXPECT_EQ(result, LZMA_OK);
+  out.resize(size);
+  return out;
+}
+
+class OpenLog : public ::testing::Test {
+ protected:
+  OpenLog() {
+    std::string pattern = ::testing::TempDir() + "vgyro_log_XXXXXX";
+    folder_ = ::mkdtemp(pattern.data());
+  }
+  ~OpenLog() override { std::filesystem::remove_all(folder_); }
+
+  std::string file_with(const std::string& name, const std::string& bytes) {
+    std::string path = folder_ + "/" + name;
+    std::ofstream(path, std::ios::binary) << bytes;
+    return path;
+  }
+
+  static ReadLog read(const std::string& path) {
+    auto source = open_log(path);
+    EXPECT_TRUE(source) << source.error().message();
+    return source ? read_all(std::move(*source)) : ReadLog{};
+  }
+
+  /// The records of `log` are the first of `whole`.
+  static void expect_beginning(const ReadLog& log, const ReadLog& whole, std::size_t at_least) {
+    EXPECT_GE(log.records.size(), at_least);
+    ASSERT_LE(log.records.size(), whole.records.size());
+    for (std::size_t i = 0; i < log.records.size(); ++i)
+      ASSERT_EQ(log.records[i], whole.records[i]) << i;
+  }
+
+  std::string folder_;
+};
+
+// A file larger than the buffer arrives whole, and tells how far reading has come.
+TEST_F(OpenLog, ReadsAFileToItsEnd) {
+  const std::string text = log_text(20'000);
+  ASSERT_GT(text.size(), 3 * LogSource::kBufferBytes);
+  const ReadLog log = read(file_with("a.log", text));
+  EXPECT_EQ(log.records, read_by_parse_line(text).records);
+  EXPECT_EQ(log.error, "");
+  auto source = open_log(folder_ + "/a.log");
+  ASSERT_TRUE(source);
+  EXPECT_EQ((*source)->bytes_total(), text.size());
+  EXPECT_EQ((*source)->bytes_read(), 0U);
+  while (!(*source)->next()->end) {
+  }
+  EXPECT_EQ((*source)->bytes_read(), text.size());
+}
+
+// Blocks hold whole lines only, and together they are the file.
+TEST_F(OpenLog, HandsOutWholeLines) {
+  const std::string text = log_text(20'000) + "the end is cut";
+  for (const std::size_t chunk : {999U, 65'536U, 1'000'000U}) {
+    const auto source = log_from_text(text, chunk);
+    std::string together;
+    bool end = false;
+    bool cut_off = false;
+    while (!end) {
+      const auto block = source->next();
+      ASSERT_TRUE(block);
+      end = block->end;
+      cut_off = block->cut_off;
+      if (!block->text.empty()) {
+        EXPECT_EQ(block->text.back(), '\n');
+      }
+      together += block->text;
+    }
+    EXPECT_TRUE(cut_off);
+    EXPECT_EQ(together + "the end is cut", text);
+  }
+}
+
+TEST_F(OpenLog, NamesTheFileThatItCannotOpen) {
+  const auto missing = open_log(folder_ + "/missing.log");
+  ASSERT_FALSE(missing);
+  EXPECT_EQ(missing.error().message(),
+            folder_ + "/missing.log: cannot be opened: No such file or directory");
+  const auto directory = open_log(folder_);
+  ASSERT_FALSE(directory);
+  EXPECT_EQ(directory.error().message(), folder_ + ": is a directory, not a log");
+}
+
+// A driver that prints for people must flush before it may have to wait for the next frame.
+TEST_F(OpenLog, CallsBeforeEveryWait) {
+  const auto source = log_from_text("(1.0) can0 123#\n(2.0) can0 123#\n", 16);
+  int waits = 0;
+  source->before_wait([&waits] { ++waits; });
+  LogReader reader(log_from_text(""));
+  EXPECT_EQ(source->next()->text, "(1.0) can0 123#\n");
+  EXPECT_EQ(waits, 1);
+  EXPECT_EQ(source->next()->text, "(2.0) can0 123#\n");
+  EXPECT_TRUE(source->next()->end);
+  EXPECT_EQ(waits, 3);
+}
+
+// Recordings are kept packed; unpacking on the way changes nothing.
+TEST_F(OpenLog, UnpacksXz) {
+  const std::string text = log_text(20'000);
+  const std::string xz = packed(text);
+  const ReadLog log = read(file_with("a.log.xz", xz));
+  EXPECT_EQ(log.records, read_by_parse_line(text).records);
+  EXPECT_EQ(log.error, "");
+  const auto source = open_log(folder_ + "/a.log.xz");
+  ASSERT_TRUE(source);
+  EXPECT_EQ((*source)->bytes_total(), xz.size()) << "progress is counted in packed bytes";
+}
+
+// `cat a.xz b.xz` is a valid xz file; so is one with an empty stream in it.
+TEST_F(OpenLog, UnpacksXzStreamsOneBehindTheOther) {
+  const std::string a = log_text(100);
+  const std::string b = log_text(50);
+  const ReadLog log = read(file_with("ab.log.xz", packed(a) + packed("") + packed(b)));
+  EXPECT_EQ(log.records, read_by_parse_line(a + b).records);
+  EXPECT_EQ(log.error, "");
+}
+
+// A download that broke off: what came is used, and the user is told that it is not all.
+TEST_F(OpenLog, DeliversWhatATruncatedXzHolds) {
+  const std::string text = log_text(20'000);
+  const std::string xz = packed(text);
+  const ReadLog whole = read_by_parse_line(text);
+  for (const double share : {0.9, 0.5, 0.999}) {
+    SCOPED_TRACE(share);
+    const auto size = static_cast<std::size_t>(share * static_cast<double>(xz.size()));
+    const std::string path = file_with("cut.log.xz", xz.substr(0, size));
+    const ReadLog log = read(path);
+    EXPECT_EQ(log.error, path + ": ends in the middle of its packed data");
+    // The packer works in blocks of 64 KiB and less; what lies before the last one is all there.
+    expect_beginning(log, whole, static_cast<std::size_t>(20'000 * (share - 0.15)));
+  }
+}
+
+// A flipped bit on a disk: what lies before it is used; behind it nothing can be trusted.
+TEST_F(OpenLog, DeliversWhatIsBeforeTheDamageOfAnXz) {
+  const std::string text = log_text(20'000);
+  const ReadLog whole = read_by_parse_line(text);
+  for (const double share : {0.3, 0.6, 0.9}) {
+    SCOPED_TRACE(share);
+    std::string xz = packed(text);
+    const auto at = static_cast<std::size_t>(share * static_cast<double>(xz.size()));
+    for (std::size_t i = at; i < at + 64; ++i)
+      xz[i] = static_cast<char>(xz[i] ^ 0x55);
+    const std::string path = file_with("damaged.log.xz", xz);
+    const ReadLog log = read(path);
+    EXPECT_EQ(log.error.rfind(path + ": is damaged (liblzma error ", 0), 0U) << log.error;
+    const auto sure = static_cast<std::size_t>(20'000 * (share - 0.15));
+    ASSERT_GE(log.records.size(), sure);
+    for (std::size_t i = 0; i < sure; ++i)
+      ASSERT_EQ(log.records[i], whole.records[i]) << i;
+  }
+}
+
+// A plain log under a packed name, or nothing at all, is told apart from damage.
+TEST_F(OpenLog, TellsAFileThatIsNoXz) {
+  const std::string plain = file_with("plain.log.xz", log_text(10));
+  EXPECT_EQ(read(plain).error, plain + ": is not an .xz file");
+  const std::string empty = file_with("empty.log.xz", "");
+  EXPECT_EQ(read(empty).error, empty + ": ends in the middle of its packed data");
+}
+
+}  // namespace
+}  // namespace vgyro::can
