@@ -1,5 +1,8 @@
 #include "base/error.h"
 
+#include <cerrno>
+#include <system_error>
+
 #include <fmt/core.h>
 
 namespace vgyro {
@@ -8,6 +11,10 @@ std::string Error::message() const {
   std::string text = where.empty() ? what : fmt::format("{}: {}", where, what);
   if (!remedy.empty()) text += "; " + remedy;
   return text;
+}
+
+std::string system_reason() {
+  return std::system_category().message(errno);
 }
 
 std::string at_line(const std::string& file, unsigned line) {

@@ -25,6 +25,9 @@ inline tl::unexpected<Error> fail(std::string where, std::string what, std::stri
   return tl::unexpected<Error>(Error{std::move(where), std::move(what), std::move(remedy)});
 }
 
+/// What the last failed system call says of itself.
+std::string system_reason();
+
 /// "file:line"
 std::string at_line(const std::string& file, unsigned line);
 

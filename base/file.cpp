@@ -1,7 +1,5 @@
 #include "base/file.h"
 
-#include <cerrno>
-#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <sstream>
@@ -16,7 +14,7 @@ Expected<std::string> read_file(const std::string& path) {
   std::error_code code;
   if (std::filesystem::is_directory(path, code)) return fail(path, "is a directory, not a file");
   std::ifstream file(path, std::ios::binary);
-  if (!file) return fail(path, std::string("cannot be read: ") + std::strerror(errno));
+  if (!file) return fail(path, "cannot be read: " + system_reason());
   const std::uintmax_t bytes = std::filesystem::file_size(path, code);
   if (!code && bytes > kFileBytesMax) return fail(path, "is larger than 64 MiB");
   std::ostringstream text;

@@ -74,7 +74,7 @@ class FileSource : public LogSource {
     do {
       got = ::read(fd_, to, size);
     } while (got < 0 && errno == EINTR);
-    if (got < 0) return fail(name_, std::string("cannot be read: ") + std::strerror(errno));
+    if (got < 0) return fail(name_, "cannot be read: " + system_reason());
     read_ += static_cast<std::uint64_t>(got);
     return static_cast<std::size_t>(got);
   }
@@ -106,7 +106,7 @@ class XzSource : public LogSource {
     stream_.avail_out = size;
     while (stream_.avail_out == size && !done_ && damage_ == LZMA_OK) {
       if (stream_.avail_in == 0 && !packed_end_) {
-        const auto got = packed_->read(input_.get(), kInputBytes);
+        auto got = packed_->read(input_.get(), kInputBytes);
         if (!got) return got;
         stream_.next_in = reinterpret_cast<const std::uint8_t*>(input_.get());
         stream_.avail_in = *got;
@@ -131,7 +131,7 @@ class XzSource : public LogSource {
     return fail(name_, fmt::format("is damaged (liblzma error {})", static_cast<int>(damage_)));
   }
 
-  static constexpr std::size_t kInputBytes = 64 * 1024;
+  static constexpr std::size_t kInputBytes = 65'536;
   static constexpr std::uint64_t kMemoryBytesMax = 256U << 20U;
   std::unique_ptr<FileSource> packed_;
   std::string name_;
@@ -168,7 +168,7 @@ Expected<std::unique_ptr<LogSource>> open_log(const std::string& path) {
     return std::make_unique<FileSource>(STDIN_FILENO, "standard input", 0, false);
   }
   const int fd = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
-  if (fd < 0) return fail(path, std::string("cannot be opened: ") + std::strerror(errno));
+  if (fd < 0) return fail(path, "cannot be opened: " + system_reason());
   struct stat info {};
   const bool known = ::fstat(fd, &info) == 0;
   if (known && S_ISDIR(info.st_mode)) {

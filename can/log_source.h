@@ -23,7 +23,7 @@ struct LogBlock {
 class LogSource {
  public:
   /// A line longer than this is no frame.
-  static constexpr std::size_t kBufferBytes = 256 * 1024;
+  static constexpr std::size_t kBufferBytes = 262'144;
 
   virtual ~LogSource() = default;
   Expected<LogBlock> next();

@@ -35,7 +35,7 @@ Expected<OutputFile> OutputFile::open(const std::string& path) {
   if (path.empty()) return OutputFile(kDiscard, "", false);
   if (path == "-") return OutputFile(STDOUT_FILENO, "standard output", false);
   const int fd = ::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
-  if (fd < 0) return fail(path, std::string("cannot be written: ") + std::strerror(errno));
+  if (fd < 0) return fail(path, "cannot be written: " + system_reason());
   return OutputFile(fd, path, true);
 }
 
@@ -47,7 +47,7 @@ void OutputFile::flush() {
     const ssize_t written = ::write(fd_, at, left);
     if (written < 0 && errno == EINTR) continue;
     if (written < 0) {
-      error_ = Error{name_, std::string("cannot be written: ") + std::strerror(errno), {}};
+      error_ = Error{name_, "cannot be written: " + system_reason(), {}};
       return;
     }
     at += written;
@@ -67,7 +67,7 @@ void OutputFile::write(std::string_view text) {
 Expected<void> OutputFile::close() {
   flush();
   if (owned_ && ::close(std::exchange(fd_, kDiscard)) != 0 && !error_) {
-    error_ = Error{name_, std::string("cannot be written: ") + std::strerror(errno), {}};
+    error_ = Error{name_, "cannot be written: " + system_reason(), {}};
   }
   owned_ = false;
   if (error_) return tl::unexpected(*error_);

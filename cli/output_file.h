@@ -22,7 +22,7 @@ class OutputFile {
   ~OutputFile();
 
   /// Room for at least `size` bytes; commit() what was used of it. size ≤ kRoomMax.
-  static constexpr std::size_t kRoomMax = 16 * 1024;
+  static constexpr std::size_t kRoomMax = 16'384;
   char* room(std::size_t size) {
     if (kBufferBytes - used_ < size) flush();
     return buffer_.get() + used_;
@@ -35,7 +35,7 @@ class OutputFile {
 
  private:
   OutputFile(int fd, std::string name, bool owned);
-  static constexpr std::size_t kBufferBytes = 128 * 1024;
+  static constexpr std::size_t kBufferBytes = 131'072;
   int fd_;
   std::string name_;
   bool owned_;

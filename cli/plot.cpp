@@ -175,7 +175,7 @@ std::string ReplayPlot::script(const std::string& path, const PlotTexts& texts) 
 }
 
 Expected<void> ReplayPlot::draw(const std::string& path, const PlotTexts& texts) const {
-  if (const auto good = check_path(path); !good) return good;
+  if (auto good = check_path(path); !good) return good;
   if (buckets_.empty())
     return fail(path, "there is nothing to draw: no pair of samples came together");
   std::FILE* gnuplot = ::popen("gnuplot", "w");

@@ -23,7 +23,7 @@ LeastSquares::LeastSquares(int order, double from_s, double width_s)
 
 std::optional<LeastSquares::Fit> LeastSquares::fit() const {
   const int size = order_ + 1;
-  if (count_ < 2U * static_cast<unsigned>(size)) return std::nullopt;
+  if (count_ < 2 * static_cast<std::uint64_t>(size)) return std::nullopt;
   if (x_max_ - x_min_ < 2.0 * kCoverageMin) return std::nullopt;
   using Matrix =
       Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kOrderMax + 1, kOrderMax + 1>;

@@ -40,6 +40,15 @@ can::BusIndex bus_index(std::vector<std::string>& buses, const std::string& name
   return static_cast<can::BusIndex>(buses.size() - 1);
 }
 
+std::string required_bus(TomlReader& reader) {
+  const std::string name = reader.required_text("bus", "can0");
+  if (name.size() > kInterfaceNameMax) {
+    reader.complain(reader.where("bus"), fmt::format("\"{}\" is no interface name", name),
+                    "at most 15 characters, as `ip link` shows them");
+  }
+  return name;
+}
+
 const dbc::Database* DatabaseCache::get(const std::string& path, TomlReader& reader) {
   const auto known = files_.find(path);
   if (known != files_.end()) return known->second.get();
@@ -66,13 +75,9 @@ SignalResolver::SignalResolver(TomlReader& reader, DatabaseCache& cache,
                                const std::string& config_folder, std::vector<std::string>& buses,
                                std::vector<Error>& warnings)
     : reader_(reader), warnings_(warnings) {
-  bus_ = reader.required_text("bus", "can0");
+  bus_ = required_bus(reader);
   const std::string dbc = reader.required_text("dbc", "bench.dbc");
   const std::string message = reader.required_text("message", "GYRO_A");
-  if (bus_.size() > kInterfaceNameMax) {
-    reader.complain(reader.where("bus"), fmt::format("\"{}\" is no interface name", bus_),
-                    "at most 15 characters, as `ip link` shows them");
-  }
   if (bus_.empty() || dbc.empty() || message.empty()) return;
   bus_index_ = bus_index(buses, bus_);
   dbc_path_ = (std::filesystem::path(config_folder) / dbc).lexically_normal().string();
@@ -118,7 +123,7 @@ std::string SignalResolver::signal_place(const dbc::Signal& signal) const {
 
 std::optional<dbc::SignalCodec> SignalResolver::codec(const dbc::Signal& signal) {
   auto made = dbc::SignalCodec::make(signal, message_->size_bytes, signal_place(signal));
-  if (made) return std::move(*made);
+  if (made) return *made;
   reader_.complain(made.error().where, made.error().what, made.error().remedy);
   return std::nullopt;
 }
