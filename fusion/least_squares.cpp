@@ -32,8 +32,9 @@ std::optional<LeastSquares::Fit> LeastSquares::fit() const {
   Vector right(size);
   for (int i = 0; i < size; ++i) {
     right(i) = products_[static_cast<std::size_t>(i)];
-    for (int j = 0; j < size; ++j)
-      normal(i, j) = moments_[static_cast<std::size_t>(i + j)];
+    for (int j = 0; j < size; ++j) {
+      normal(i, j) = moments_[static_cast<std::size_t>(i) + static_cast<std::size_t>(j)];
+    }
   }
   const Vector solution = normal.ldlt().solve(right);
   Fit result;
