@@ -90,18 +90,25 @@ class BusMap {
     return map;
   }
 
-  can::BusIndex index(can::BusIndex log_bus, const can::InterfaceTable& interfaces) {
+  struct Buses {
+    can::BusIndex plan = kForeignBus;  ///< index in the plan
+    can::BusIndex all = 0;             ///< index in interfaces(), over all logs
+  };
+  Buses look_up(can::BusIndex log_bus, const can::InterfaceTable& of_log) {
     while (known_.size() <= log_bus) {
-      known_.push_back(look_up(interfaces.name(static_cast<can::BusIndex>(known_.size()))));
+      const std::string& name = of_log.name(static_cast<can::BusIndex>(known_.size()));
+      known_.push_back({plan_index(name), interfaces_.index_of(name).value_or(0)});
     }
     return known_[log_bus];
   }
+
+  [[nodiscard]] const std::vector<std::string>& interfaces() const { return interfaces_.names(); }
 
   void new_log() { known_.clear(); }
 
  private:
   explicit BusMap(const gateway::Plan& plan) : plan_(&plan) {}
-  [[nodiscard]] can::BusIndex look_up(const std::string& name) const {
+  [[nodiscard]] can::BusIndex plan_index(const std::string& name) const {
     const auto mapped = std::find_if(entries_.begin(), entries_.end(),
                                      [&](const auto& entry) { return entry.first == name; });
     const std::string& wanted = mapped == entries_.end() ? name : mapped->second;
@@ -111,7 +118,8 @@ class BusMap {
   }
   const gateway::Plan* plan_;
   std::vector<std::pair<std::string, std::string>> entries_;
-  std::vector<can::BusIndex> known_;
+  std::vector<Buses> known_;  ///< by the present log's own index
+  can::InterfaceTable interfaces_;
 };
 
 class Replay {
@@ -135,7 +143,7 @@ class Replay {
     can::LogReader reader(std::move(*source));
     run_records(path, reader, *bytes);
     summary_.logs.push_back({path, reader.counts()});
-    summary_.interfaces = reader.interfaces().names();
+    summary_.interfaces = buses_.interfaces();
     if (reader.error()) return tl::unexpected(*reader.error());
     return {};
   }
@@ -160,10 +168,10 @@ class Replay {
       if (first_) summary_.first_s = to_seconds(record.stamp.time_since_epoch());
       first_ = false;
       last_ = record.stamp;
-      summary_.ids.add(record.bus, record.frame);
+      const BusMap::Buses buses = buses_.look_up(record.bus, reader.interfaces());
+      summary_.ids.add(buses.all, record.frame);
       sink_.fraction_digits = record.fraction_digits;
-      pipeline_.receive(buses_.index(record.bus, reader.interfaces()), record.frame, record.stamp,
-                        sink_);
+      pipeline_.receive(buses.plan, record.frame, record.stamp, sink_);
       if (--until_progress == 0) {
         until_progress = kFramesPerProgress;
         progress.update(bytes.bytes_read(), bytes.bytes_total(), reader.counts().frames);
@@ -248,6 +256,21 @@ void warn_of_doubts(const ReplaySummary& summary, const gateway::Plan& plan) {
   }
 }
 
+// Two senders of one identifier: whoever reads VG_Rate would get both.
+void warn_of_other_senders(const ReplaySummary& summary, const gateway::Plan& plan) {
+  const gateway::OutputPlan& output = plan.output;
+  for (const IdCounts::Row& row : summary.ids.rows()) {
+    const bool ours =
+        row.id == output.rate_id || row.id == output.bias_id || row.id == output.model_id;
+    if (!ours || row.extended || summary.interfaces[row.bus] != plan.buses[output.bus]) continue;
+    warn(
+        {"output",
+         fmt::format("identifier {:03X} is on {} already, in {} frames of the log", row.id,
+                     plan.buses[output.bus], row.frames),
+         "if they are not an earlier run of the gateway, choose other rate_id, bias_id, model_id"});
+  }
+}
+
 int write_results(const ReplayOptions& options, const gateway::Plan& plan,
                   const ReplaySummary& summary, const ReplayPlot& plot) {
   if (!options.json.empty()) {
@@ -298,6 +321,7 @@ int run_replay(const ReplayOptions& options) {
   if (!trouble) trouble = explain_silence(summary, plan, options.logs.front());
   const int written = write_results(options, plan, summary, replay.plot());
   warn_of_doubts(summary, plan);
+  warn_of_other_senders(summary, plan);
   if (trouble) return report(*trouble);
   return written;
 }
