@@ -183,6 +183,7 @@ std::optional<GyroPlan> read_gyro(const toml::table& table, std::size_t index, C
 
 void read_gyros(TomlReader& root, Context& context) {
   const toml::array* tables = root.array("gyro");
+  if (tables == nullptr && root.has("gyro")) return;
   const std::size_t count = tables == nullptr ? 0 : tables->size();
   if (count != 2) {
     root.complain(count == 0 ? context.file : root.where("gyro"),
@@ -388,7 +389,7 @@ void read_output(TomlReader& root, Context& context) {
     return;
   }
   TomlReader reader(*table, context.file, "[output]", context.errors);
-  const std::string bus = reader.required_text("bus", "can0");
+  const std::string bus = required_bus(reader);
   if (!bus.empty()) plan.output.bus = bus_index(plan.buses, bus);
   plan.output.rate_id = read_output_id(reader, "rate_id", plan.output.rate_id);
   plan.output.bias_id = read_output_id(reader, "bias_id", plan.output.bias_id);

@@ -31,6 +31,14 @@ constexpr Duration kTimeOutMax = std::chrono::seconds(1);
 constexpr Duration kBiasPeriod = std::chrono::milliseconds(100);
 constexpr Duration kBiasGrace = std::chrono::milliseconds(50);
 
+// A log's stamps end here; with the offset of clocks that were set back they must still fit 64
+// bits.
+constexpr TimePoint kTimeMax = time_from_ns(9'000'000'000'000'000'000);
+
+// A frame that comes so long after something was due follows a silence of the whole bus, or carries
+// a stamp of garbage.
+constexpr Duration kOverdueMax = std::chrono::seconds(30);
+
 TimePoint whole_microseconds(TimePoint t) {
   return TimePoint{Duration{to_ns(t) - to_ns(t) % 1000}};
 }
@@ -64,7 +72,9 @@ struct Pipeline::Impl {
   void calibrate(const fusion::AlignedPair& pair);
   void calibrate_with(const fusion::AlignedPair& pair, double true_rate_dps);
 
+  void let_time_pass(TimePoint stamp, FrameSink& sink);
   void do_what_is_due(TimePoint t, TimePoint stamp, FrameSink& sink);
+  [[nodiscard]] bool can_be_time(TimePoint stamp) const;
   void enter_state(TimePoint stamp, FrameSink& sink);
   [[nodiscard]] State present_state() const;
   [[nodiscard]] Duration time_out(std::size_t gyro) const;
@@ -102,6 +112,7 @@ struct Pipeline::Impl {
   std::size_t alone = kNobody;          ///< gyro that speaks alone
   TimePoint next_bias{};
   TimePoint deadline{};  ///< nothing is due before; may lie too early, never too late
+  TimePoint suspect{};   ///< stamp far ahead that nobody has confirmed yet
 };
 
 Pipeline::Impl::Impl(const Plan& the_plan)
@@ -126,7 +137,7 @@ void Pipeline::Impl::receive(can::BusIndex bus, const can::Frame& frame, TimePoi
                              FrameSink& sink) {
   const std::uint8_t roles = router.roles(bus, frame);
   if (roles == 0) {
-    advance(stamp, sink);
+    let_time_pass(stamp, sink);
     return;
   }
   stamp = whole_microseconds(stamp);
@@ -144,7 +155,11 @@ void Pipeline::Impl::receive_gyro(std::size_t gyro, const can::Frame& frame, Tim
   own.missing += input.missing;
   if (input.reject) {
     refuse(*input.reject);
-    advance(stamp, sink);
+    let_time_pass(stamp, sink);
+    return;
+  }
+  if (!can_be_time(stamp)) {
+    refuse(Reject::kStampJump);
     return;
   }
   TimePoint t;
@@ -175,13 +190,13 @@ void Pipeline::Impl::receive_reference(const can::Frame& frame, TimePoint stamp,
   ++status.reference_frames;
   double rate_dps = 0.0;
   TimePoint t;
-  const bool usable = !decode_quantity(plan.reference->rate, frame, rate_dps);
+  const bool usable = can_be_time(stamp) && !decode_quantity(plan.reference->rate, frame, rate_dps);
   const auto verdict =
       usable ? guard.check(kReferenceStream, stamp, t) : fusion::StampGuard::Verdict::kUnconfirmed;
   if (verdict == fusion::StampGuard::Verdict::kUnconfirmed ||
       verdict == fusion::StampGuard::Verdict::kRepeated) {
     ++status.reference_rejected;
-    advance(stamp, sink);
+    let_time_pass(stamp, sink);
     return;
   }
   if (verdict == fusion::StampGuard::Verdict::kClockStep) {
@@ -195,7 +210,7 @@ void Pipeline::Impl::receive_reference(const can::Frame& frame, TimePoint stamp,
     calibrate_with(ready->pair, ready->true_rate_dps);
     if (calibrated) enter_state(stamp, sink);
   }
-  advance(stamp, sink);
+  let_time_pass(stamp, sink);
 }
 
 void Pipeline::Impl::take_sample(std::size_t gyro, TimePoint t, double rate_dps, TimePoint stamp,
@@ -240,15 +255,17 @@ void Pipeline::Impl::take_single(std::size_t gyro, TimePoint t, double rate_dps,
   if (t <= newest) return;
   newest = t;
   alone = gyro;
+  // A gyro that was never compared with the other one is not believed, whatever the method.
+  const bool valid = calibrated && status.pairs > 0;
   fusion::VirtualRate rate;
-  if (calibrated) rate = corrector->carry_on(gyro, seconds(t), rate_dps);
+  if (valid) rate = corrector->carry_on(gyro, seconds(t), rate_dps);
   enter_state(stamp, sink);
   if (observer != nullptr) {
     std::array<double, 2> raw_dps{kNone, kNone};
     raw_dps[gyro] = rate_dps;
-    observer->on_rate(stamp, raw_dps, calibrated ? rate.rate_dps : kNone);
+    observer->on_rate(stamp, raw_dps, valid ? rate.rate_dps : kNone);
   }
-  send_rate(rate, calibrated, t, Duration::zero(), stamp, sink);
+  send_rate(rate, valid, t, Duration::zero(), stamp, sink);
   send_bias_when_due(t, stamp, sink);
 }
 
@@ -307,6 +324,22 @@ bool Pipeline::Impl::single_is_wanted(std::size_t gyro, TimePoint t) const {
   return status.pairs > 0 || t - first_heard > kTimeOutMax;
 }
 
+bool Pipeline::Impl::can_be_time(TimePoint stamp) const {
+  return stamp >= TimePoint{} && stamp <= kTimeMax - guard.offset();
+}
+
+// Nobody has judged the stamp of a frame that is not a sample. Garbage far ahead would stop
+// time-outs and VG_Bias until then, so the next such frame must agree with it.
+void Pipeline::Impl::let_time_pass(TimePoint stamp, FrameSink& sink) {
+  if (!can_be_time(stamp)) return;
+  const TimePoint t = whole_microseconds(stamp) + guard.offset();
+  if (t < deadline) return;
+  const bool far_ahead = deadline != TimePoint{} && t - deadline > kOverdueMax;
+  const bool confirmed = t >= suspect && t - suspect <= kOverdueMax;
+  suspect = far_ahead ? t : TimePoint{};
+  if (!far_ahead || confirmed) do_what_is_due(t, stamp, sink);
+}
+
 void Pipeline::Impl::do_what_is_due(TimePoint t, TimePoint stamp, FrameSink& sink) {
   TimePoint next = TimePoint::max();
   for (std::size_t gyro = 0; gyro < 2; ++gyro) {
@@ -330,6 +363,7 @@ void Pipeline::Impl::do_what_is_due(TimePoint t, TimePoint stamp, FrameSink& sin
 }
 
 void Pipeline::Impl::advance(TimePoint now, FrameSink& sink) {
+  if (!can_be_time(now)) return;
   const TimePoint t = whole_microseconds(now) + guard.offset();
   if (t >= deadline) do_what_is_due(t, now, sink);
 }
@@ -418,7 +452,8 @@ void Pipeline::advance(TimePoint now, FrameSink& out) {
 }
 
 TimePoint Pipeline::next_deadline() const {
-  return impl_->deadline - impl_->guard.offset();
+  // Time passes in whole microseconds: due a fraction earlier it would be due and not done.
+  return std::chrono::ceil<std::chrono::microseconds>(impl_->deadline - impl_->guard.offset());
 }
 
 const Status& Pipeline::status() const {

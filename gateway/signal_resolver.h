@@ -64,6 +64,9 @@ class SignalResolver {
   const dbc::Message* message_ = nullptr;
 };
 
+/// The key "bus" of any table, after a complaint where it cannot be an interface.
+std::string required_bus(TomlReader& reader);
+
 /// Adds the name when it is new.
 can::BusIndex bus_index(std::vector<std::string>& buses, const std::string& name);
 

@@ -10,6 +10,8 @@
 #include <vector>
 
 #define TOML_EXCEPTIONS 0
+// What its parser asserts, of "[!name]" for one, it then reports as an error of the text as well.
+#define TOML_ASSERT static_cast<void>
 #include <toml++/toml.h>
 
 #include "base/error.h"
