@@ -35,6 +35,31 @@ bool Aligner::Ring::contains(TimePoint t) const {
   return false;
 }
 
+std::size_t Aligner::Ring::count_until(TimePoint until) const {
+  std::size_t count = size_;
+  while (count > 0 && (*this)[count - 1].t > until)
+    --count;
+  return count;
+}
+
+Duration Aligner::Ring::usual_interval(TimePoint until) const {
+  const std::size_t end = count_until(until);
+  const std::size_t begin = end - std::min(end, kSamplesJudged);
+  const auto mean = [&](Duration longest) {
+    Duration sum{0};
+    Duration::rep count = 0;
+    for (std::size_t i = begin + 1; i < end; ++i) {
+      const Duration interval = (*this)[i].t - (*this)[i - 1].t;
+      if (interval > longest) continue;
+      sum += interval;
+      ++count;
+    }
+    return sum / std::max<Duration::rep>(count, 1);
+  };
+  // A gap among the first samples is no interval.
+  return mean(from_seconds(to_seconds(mean(Duration::max())) * kGapIntervals));
+}
+
 bool Aligner::push(std::size_t gyro, TimePoint t, double rate_dps) {
   Ring& ring = rings_[gyro];
   if (any_used_[gyro] && t <= used_until_[gyro]) return false;
@@ -53,31 +78,37 @@ bool Aligner::push(std::size_t gyro, TimePoint t, double rate_dps) {
 }
 
 // How long pairs would wait for the other gyro if `pace` set the instants, on average.
-Duration Aligner::mean_wait(std::size_t pace) const {
+Duration Aligner::mean_wait(std::size_t pace, TimePoint until) const {
   const Ring& own = rings_[pace];
   const Ring& other = rings_[1 - pace];
   Duration sum{0};
   Duration::rep waited = 0;
   std::size_t next = 0;
-  for (std::size_t i = 0; i < own.size(); ++i) {
+  const std::size_t end = own.count_until(until);
+  for (std::size_t i = end - std::min(end, kSamplesJudged); i < end; ++i) {
     while (next < other.size() && other[next].t < own[i].t)
       ++next;
     if (next == 0 || next == other.size()) continue;
+    if (other[next].t - other[next - 1].t > gap_[1 - pace]) continue;
     sum += other[next].t - own[i].t;
     ++waited;
   }
   return waited == 0 ? Duration::max() : sum / waited;
 }
 
+// Judged on the samples up to one instant that both gyros have reached: which of two buses the
+// kernel served first makes no difference.
 void Aligner::choose_pace() {
-  const bool enough = std::min(rings_[0].size(), rings_[1].size()) >= kSamplesToChoose ||
-                      (std::max(rings_[0].size(), rings_[1].size()) == kCapacity - 1 &&
-                       std::min(rings_[0].size(), rings_[1].size()) >= 2);
-  if (!enough) return;
+  if (std::min(rings_[0].size(), rings_[1].size()) < kSamplesToChoose) return;
+  const TimePoint until =
+      std::max(rings_[0][kSamplesToChoose - 1].t, rings_[1][kSamplesToChoose - 1].t);
+  if (std::min(rings_[0].back().t, rings_[1].back().t) < until) return;
   for (std::size_t gyro = 0; gyro < 2; ++gyro) {
     const Ring& ring = rings_[gyro];
-    interval_[gyro] = (ring.back().t - ring[0].t) / static_cast<Duration::rep>(ring.size() - 1);
+    interval_[gyro] = ring.usual_interval(until);
     gap_[gyro] = from_seconds(to_seconds(interval_[gyro]) * kGapIntervals);
+    const std::size_t last = ring.count_until(until) - 1;
+    burst_until_ = std::max(burst_until_, ring[ring[last].t == until ? last : last + 1].t);
   }
   const double ratio = to_seconds(interval_[0]) / to_seconds(interval_[1]);
   if (ratio > kSameRate) {
@@ -85,53 +116,51 @@ void Aligner::choose_pace() {
   } else if (ratio < 1.0 / kSameRate) {
     pace_ = 1;
   } else {
-    pace_ = mean_wait(0) <= mean_wait(1) ? 0 : 1;
+    pace_ = mean_wait(0, until) <= mean_wait(1, until) ? 0 : 1;
   }
   const bool averages = std::max(ratio, 1.0 / ratio) >= kAverageRatio;
   half_window_ = averages ? interval_[pace_] / 2 : Duration::zero();
-  burst_until_ = std::max(rings_[0].back().t, rings_[1].back().t);
   chosen_ = true;
+}
+
+// Samples that no pair at or behind `needed` can use; the last one before it is still a neighbour.
+void Aligner::drop_before(TimePoint needed, std::size_t gyro) {
+  Ring& ring = rings_[gyro];
+  std::size_t stale = 0;
+  while (stale + 1 < ring.size() && ring[stale + 1].t <= needed)
+    ++stale;
+  if (stale == 0) return;
+  used_until_[gyro] = ring[stale - 1].t;
+  any_used_[gyro] = true;
+  ring.pop_front(stale);
 }
 
 bool Aligner::pop(AlignedPair& pair) {
   if (!chosen_) return false;
   Ring& own = rings_[pace_];
-  Ring& other = rings_[1 - pace_];
+  const Ring& other = rings_[1 - pace_];
   while (!own.empty()) {
     pair.t = own[0].t;
-    // Samples of the other gyro that no later pair can need.
-    const TimePoint needed = pair.t - half_window_;
-    std::size_t stale = 0;
-    while (stale + 1 < other.size() && other[stale + 1].t <= needed)
-      ++stale;
-    if (stale > 0) {
-      used_until_[1 - pace_] = other[stale - 1].t;
-      any_used_[1 - pace_] = true;
-      other.pop_front(stale);
-    }
-    bool wait = false;
-    const bool paired = half_window_ == Duration::zero() ? interpolate(other, pair, 1 - pace_, wait)
-                                                         : average(other, pair, 1 - pace_, wait);
-    if (wait) return false;
+    // While a pair waits nothing is dropped: an earlier sample may still come in late.
+    if (other.empty() || other.back().t < pair.t + half_window_) return false;
+    drop_before(pair.t - half_window_, 1 - pace_);
+    const bool paired = half_window_ == Duration::zero() ? interpolate(other, pair, 1 - pace_)
+                                                         : average(other, pair, 1 - pace_);
     pair.rate_dps[pace_] = own[0].rate_dps;
     used_until_[pace_] = pair.t;
     any_used_[pace_] = true;
     own.pop_front();
     if (paired) {
-      pair.complete = std::max(pair.complete, std::max(pair.t, burst_until_));
-      if (own.empty()) burst_until_ = TimePoint{};
+      pair.complete = std::max({pair.complete, pair.t, burst_until_});
       return true;
     }
     ++counts_.unpaired[pace_];
   }
-  burst_until_ = TimePoint{};
   return false;
 }
 
-bool Aligner::interpolate(const Ring& other, AlignedPair& pair, std::size_t other_index,
-                          bool& wait) {
-  wait = other.empty() || other.back().t < pair.t;
-  if (wait || other[0].t > pair.t) return false;
+bool Aligner::interpolate(const Ring& other, AlignedPair& pair, std::size_t other_index) {
+  if (other[0].t > pair.t) return false;
   // pop() has left the last sample at or before the pair in front.
   const Sample& before = other[0];
   if (before.t == pair.t) {
@@ -148,11 +177,10 @@ bool Aligner::interpolate(const Ring& other, AlignedPair& pair, std::size_t othe
   return true;
 }
 
-bool Aligner::average(const Ring& other, AlignedPair& pair, std::size_t other_index, bool& wait) {
+bool Aligner::average(const Ring& other, AlignedPair& pair, std::size_t other_index) {
   const TimePoint from = pair.t - half_window_;
   const TimePoint to = pair.t + half_window_;
-  wait = other.empty() || other.back().t < to;
-  if (wait || other[0].t > from) return false;
+  if (other[0].t > from) return false;
   double area = 0.0;
   for (std::size_t i = 0; i + 1 < other.size() && other[i].t < to; ++i) {
     const Sample& a = other[i];
@@ -176,7 +204,6 @@ void Aligner::clear() {
   for (Ring& ring : rings_)
     ring.clear();
   any_used_ = {};
-  burst_until_ = TimePoint{};
 }
 
 }  // namespace vgyro::fusion

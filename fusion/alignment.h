@@ -26,6 +26,8 @@ class Aligner {
   static constexpr std::size_t kCapacity = 512;
   /// Samples of each gyro before the pacing gyro is chosen.
   static constexpr std::size_t kSamplesToChoose = 8;
+  /// The choice looks back over no more of them than this.
+  static constexpr std::size_t kSamplesJudged = 64;
   /// An interval longer than this many of its own usual ones is a gap: nothing is interpolated in
   /// it.
   static constexpr double kGapIntervals = 4.0;
@@ -73,6 +75,9 @@ class Aligner {
     /// Keeps the stamps ascending. Precondition: size() < kCapacity, no equal stamp inside.
     void insert(const Sample& sample);
     [[nodiscard]] bool contains(TimePoint t) const;
+    /// Of the samples at or before `until`: their usual interval, and one more than the last index.
+    [[nodiscard]] Duration usual_interval(TimePoint until) const;
+    [[nodiscard]] std::size_t count_until(TimePoint until) const;
 
    private:
     static_assert((kCapacity & (kCapacity - 1)) == 0);
@@ -82,16 +87,17 @@ class Aligner {
   };
 
   void choose_pace();
-  [[nodiscard]] Duration mean_wait(std::size_t pace) const;
-  bool interpolate(const Ring& other, AlignedPair& pair, std::size_t other_index, bool& wait);
-  bool average(const Ring& other, AlignedPair& pair, std::size_t other_index, bool& wait);
+  [[nodiscard]] Duration mean_wait(std::size_t pace, TimePoint until) const;
+  void drop_before(TimePoint needed, std::size_t gyro);
+  bool interpolate(const Ring& other, AlignedPair& pair, std::size_t other_index);
+  bool average(const Ring& other, AlignedPair& pair, std::size_t other_index);
 
   std::array<Ring, 2> rings_;
   std::array<Duration, 2> interval_{};
   std::array<Duration, 2> gap_{};
   std::array<TimePoint, 2> used_until_{};  ///< samples at or before this come too late
   std::array<bool, 2> any_used_{};
-  TimePoint burst_until_{};  ///< pairs of the start-up buffer became complete only then
+  TimePoint burst_until_{};  ///< earlier pairs waited for the choice until then
   Duration half_window_{0};  ///< of the averaging; 0 where interpolation does
   std::size_t pace_ = 0;
   bool chosen_ = false;

@@ -24,6 +24,7 @@ Calibrator::Sums Calibrator::empty_sums(double from_s) const {
 
 void Calibrator::begin(double t_s) {
   started_ = true;
+  moved_ = false;
   level_known_ = false;
   from_s_ = t_s;
   calm_until_s_ = t_s;

@@ -32,8 +32,8 @@ StampGuard::Verdict StampGuard::consider(std::size_t stream_index, TimePoint& ti
   }
   if (stream_index >= kLeaders) return Verdict::kUnconfirmed;
   TimePoint newest = stream.last;
-  for (const Stream& other : streams_) {
-    if (other.seen) newest = std::max(newest, other.last);
+  for (std::size_t leader = 0; leader < kLeaders; ++leader) {
+    if (streams_[leader].seen) newest = std::max(newest, streams_[leader].last);
   }
   // Nobody knows how long the step took; one microsecond keeps the order.
   const Duration shift = newest + std::chrono::microseconds(1) - time;
