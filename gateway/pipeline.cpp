@@ -77,12 +77,14 @@ struct Pipeline::Impl {
   [[nodiscard]] bool can_be_time(TimePoint stamp) const;
   void enter_state(TimePoint stamp, FrameSink& sink);
   [[nodiscard]] State present_state() const;
+  [[nodiscard]] Duration usual_interval(std::size_t gyro) const;
   [[nodiscard]] Duration time_out(std::size_t gyro) const;
   [[nodiscard]] Duration bias_grace() const;
   [[nodiscard]] bool single_is_wanted(std::size_t gyro, TimePoint t) const;
 
   void send_rate(const fusion::VirtualRate& rate, bool valid, TimePoint t, Duration age,
                  TimePoint stamp, FrameSink& sink);
+  [[nodiscard]] fusion::Drift present_drift() const;
   void send_bias(TimePoint stamp, FrameSink& sink);
   void send_bias_when_due(TimePoint t, TimePoint stamp, FrameSink& sink);
   [[nodiscard]] Quality quality() const;
@@ -140,7 +142,6 @@ void Pipeline::Impl::receive(can::BusIndex bus, const can::Frame& frame, TimePoi
     let_time_pass(stamp, sink);
     return;
   }
-  stamp = whole_microseconds(stamp);
   if ((roles & kReference) != 0) receive_reference(frame, stamp, sink);
   if ((roles & kGyro1) != 0) receive_gyro(0, frame, stamp, sink);
   if ((roles & kGyro2) != 0) receive_gyro(1, frame, stamp, sink);
@@ -163,7 +164,7 @@ void Pipeline::Impl::receive_gyro(std::size_t gyro, const can::Frame& frame, Tim
     return;
   }
   TimePoint t;
-  switch (guard.check(gyro, stamp, t)) {
+  switch (guard.check(gyro, whole_microseconds(stamp), t)) {
     case fusion::StampGuard::Verdict::kRepeated:
       refuse(Reject::kStampRepeated);
       return;
@@ -191,8 +192,8 @@ void Pipeline::Impl::receive_reference(const can::Frame& frame, TimePoint stamp,
   double rate_dps = 0.0;
   TimePoint t;
   const bool usable = can_be_time(stamp) && !decode_quantity(plan.reference->rate, frame, rate_dps);
-  const auto verdict =
-      usable ? guard.check(kReferenceStream, stamp, t) : fusion::StampGuard::Verdict::kUnconfirmed;
+  const auto verdict = usable ? guard.check(kReferenceStream, whole_microseconds(stamp), t)
+                              : fusion::StampGuard::Verdict::kUnconfirmed;
   if (verdict == fusion::StampGuard::Verdict::kUnconfirmed ||
       verdict == fusion::StampGuard::Verdict::kRepeated) {
     ++status.reference_rejected;
@@ -263,7 +264,7 @@ void Pipeline::Impl::take_single(std::size_t gyro, TimePoint t, double rate_dps,
   if (observer != nullptr) {
     std::array<double, 2> raw_dps{kNone, kNone};
     raw_dps[gyro] = rate_dps;
-    observer->on_rate(stamp, raw_dps, valid ? rate.rate_dps : kNone);
+    observer->on_rate(t - guard.offset(), raw_dps, valid ? rate.rate_dps : kNone);
   }
   send_rate(rate, valid, t, Duration::zero(), stamp, sink);
   send_bias_when_due(t, stamp, sink);
@@ -307,15 +308,20 @@ void Pipeline::Impl::enter_state(TimePoint stamp, FrameSink& sink) {
   send_bias(stamp, sink);
 }
 
+// Of the samples that made the choice; where the clock was set among them it says nothing.
+Duration Pipeline::Impl::usual_interval(std::size_t gyro) const {
+  return std::min<Duration>(aligner.interval(gyro), kTimeOutMax);
+}
+
 // Samples of a slow gyro keep their right to drive VG_Bias.
 Duration Pipeline::Impl::bias_grace() const {
   if (!aligner.chosen()) return kBiasGrace;
-  return std::max<Duration>(kBiasGrace, 2 * aligner.interval(aligner.pacing_gyro()));
+  return std::max<Duration>(kBiasGrace, 2 * usual_interval(aligner.pacing_gyro()));
 }
 
 Duration Pipeline::Impl::time_out(std::size_t gyro) const {
   if (!aligner.chosen()) return kTimeOutMax;
-  return std::clamp<Duration>(kTimeOutIntervals * aligner.interval(gyro), kTimeOutMin, kTimeOutMax);
+  return std::clamp<Duration>(kTimeOutIntervals * usual_interval(gyro), kTimeOutMin, kTimeOutMax);
 }
 
 // A gyro speaks alone only when the other one has really gone: not while pairs are about to start.
@@ -404,11 +410,15 @@ void Pipeline::Impl::send_rate(const fusion::VirtualRate& rate, bool valid, Time
            stamp);
 }
 
+fusion::Drift Pipeline::Impl::present_drift() const {
+  const bool known = calibrated && status.pairs > 0 && newest != TimePoint::min();
+  if (!known) return {{kNone, kNone}, kNone, kNone, kNone};
+  return corrector->drift(seconds(newest));
+}
+
 void Pipeline::Impl::send_bias(TimePoint stamp, FrameSink& sink) {
   ++status.biases_out;
-  const fusion::Drift drift = calibrated && status.pairs > 0
-                                  ? corrector->drift(seconds(newest))
-                                  : fusion::Drift{{kNone, kNone}, kNone, kNone, kNone};
+  const fusion::Drift drift = present_drift();
   sink.put(encoder.bias({drift.bias_dps, bias_mode(), health()}), stamp);
   sink.put(encoder.model({drift.slope_dps_s, drift.bias_sigma_dps, drift.slope_sigma_dps_s}),
            stamp);
@@ -421,9 +431,7 @@ void Pipeline::Impl::send_bias_when_due(TimePoint t, TimePoint stamp, FrameSink&
 }
 
 const Status& Pipeline::Impl::refreshed_status() {
-  const fusion::Drift drift = calibrated && status.pairs > 0
-                                  ? corrector->drift(seconds(newest))
-                                  : fusion::Drift{{kNone, kNone}, kNone, kNone, kNone};
+  const fusion::Drift drift = present_drift();
   for (std::size_t gyro = 0; gyro < 2; ++gyro) {
     status.gyros[gyro].bias_dps = drift.bias_dps[gyro];
     status.gyros[gyro].heard = heard[gyro];
