@@ -2,6 +2,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "base/nearest.h"
 #include "cli/commands.h"
 #include "gateway/config.h"
 
@@ -23,7 +24,7 @@ void add_method(CLI::App& command, std::string& method) {
 
 CLI::App* add_check(CLI::App& app, CheckOptions& options, std::string& method) {
   CLI::App* command = app.add_subcommand(
-      "check", "Explain a configuration before it is trusted: which bits of which frame are used");
+      "check", "Explain a configuration before it is trusted: which bits are used");
   command->add_option("CONFIG", options.config, "configuration, e.g. vgyro.toml")->required();
   add_method(*command, method);
   return command;
@@ -31,7 +32,7 @@ CLI::App* add_check(CLI::App& app, CheckOptions& options, std::string& method) {
 
 CLI::App* add_decode(CLI::App& app, DecodeOptions& options) {
   CLI::App* command = app.add_subcommand(
-      "decode", "Show the signals of every frame that the DBC files know, one JSON object a line");
+      "decode", "Show what DBC files know of a log, frame by frame, as JSON lines");
   command->add_option("--dbc", options.dbc_files, "DBC file; may be given several times")
       ->required()
       ->allow_extra_args(false);
@@ -47,12 +48,12 @@ CLI::App* add_replay(CLI::App& app, ReplayOptions& options, std::string& method)
   command->add_option("--config", options.config, "configuration, e.g. vgyro.toml")->required();
   add_method(*command, method);
   command->add_option("-o,--output", options.output,
-                      "where the output frames go, as candump lines; default: standard output");
+                      "output frames as candump lines; default: standard output");
   command->add_option("--json", options.json, "summary as JSON; - is standard output");
   command->add_option("--plot", options.plot, "picture of rates and drifts: .svg, .png or .pdf");
   command
       ->add_option("--map", options.bus_map,
-                   "LOGNAME=CONFIGNAME: take an interface of the log for one of the configuration; "
+                   "LOGNAME=CONFIGNAME: the log's interface for one of the configuration;\n"
                    "may be given several times")
       ->allow_extra_args(false);
   command->add_flag("-q,--quiet", options.quiet, "no summary on stderr");
@@ -62,6 +63,18 @@ CLI::App* add_replay(CLI::App& app, ReplayOptions& options, std::string& method)
       "The same input gives the same bytes out, on every run.\n"
       "Example: vgyro replay --config vgyro.toml -o out.log --plot drift.svg drive.log.xz");
   return command;
+}
+
+// CLI11 would only say that a subcommand is missing.
+std::optional<vgyro::Error> unknown_command(const CLI::App& app, int argc, char** argv) {
+  if (argc < 2 || argv[1][0] == '-') return std::nullopt;
+  std::vector<std::string> names;
+  for (const CLI::App* command : app.get_subcommands([](const CLI::App*) { return true; }))
+    names.push_back(command->get_name());
+  const std::string name = argv[1];
+  if (std::find(names.begin(), names.end(), name) != names.end()) return std::nullopt;
+  return vgyro::Error{"vgyro", "there is no command \"" + name + "\"",
+                      vgyro::suggest_name(name, names)};
 }
 
 }  // namespace
@@ -75,6 +88,10 @@ int main(int argc, char** argv) {
   CLI::App* check = add_check(app, options.check, options.method);
   CLI::App* decode = add_decode(app, options.decode);
   CLI::App* replay = add_replay(app, options.replay, options.method);
+  if (const auto unknown = unknown_command(app, argc, argv)) {
+    report(*unknown);
+    return kWrongUsage;
+  }
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

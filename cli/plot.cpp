@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <sys/wait.h>
+#include <cstdlib>
+#include <filesystem>
+#include <unistd.h>
 
 #include <fmt/format.h>
 
@@ -101,9 +103,19 @@ void ReplayPlot::add_bias(TimePoint t, const std::array<double, 2>& bias_dps) {
 }
 
 Expected<void> ReplayPlot::check_path(const std::string& path) {
-  if (!terminal_of(ending_of(path)).empty()) return {};
-  return fail(path, "is no kind of picture that can be drawn",
-              "a name ending in .svg, .png or .pdf");
+  if (terminal_of(ending_of(path)).empty()) {
+    return fail(path, "is no kind of picture that can be drawn",
+                "a name ending in .svg, .png or .pdf");
+  }
+  const std::string folder = std::filesystem::path(path).parent_path().string();
+  if (::access(folder.empty() ? "." : folder.c_str(), W_OK) != 0) {
+    return fail(path, "cannot be written: " + system_reason());
+  }
+  // Not by trying: a pipe to a program that is not there ends this one.
+  if (::system("command -v gnuplot >/dev/null 2>&1") != 0) {
+    return fail(path, "cannot be drawn: there is no gnuplot", "apt-get install gnuplot-nox");
+  }
+  return {};
 }
 
 void ReplayPlot::write_data(std::FILE* to) const {
@@ -178,13 +190,16 @@ Expected<void> ReplayPlot::draw(const std::string& path, const PlotTexts& texts)
   if (auto good = check_path(path); !good) return good;
   if (buckets_.empty())
     return fail(path, "there is nothing to draw: no pair of samples came together");
+  std::FILE* to = std::fopen(path.c_str(), "wb");
+  if (to == nullptr) return fail(path, "cannot be written: " + system_reason());
+  std::fclose(to);
   std::FILE* gnuplot = ::popen("gnuplot", "w");
   if (gnuplot == nullptr) return fail(path, "cannot be drawn: gnuplot could not be started");
   write_data(gnuplot);
   fmt::print(gnuplot, "{}", script(path, texts));
   const int status = ::pclose(gnuplot);
   if (status == 0) return {};
-  return fail(path, "was not drawn: gnuplot is missing or failed", "apt-get install gnuplot-nox");
+  return fail(path, "was not drawn: gnuplot failed, as it says above");
 }
 
 }  // namespace vgyro::cli

@@ -1,6 +1,7 @@
 #include <cmath>
 #include <cstdio>
 #include <limits>
+#include <sys/stat.h>
 
 #include <fmt/core.h>
 #include <nlohmann/json.hpp>
@@ -205,6 +206,33 @@ class Replay {
   std::uint64_t frames_seen_ = 0;
 };
 
+std::string causes_of_rejection(const gateway::GyroStatus& gyro) {
+  std::string causes;
+  for (std::size_t i = 0; i < gateway::kRejectCount; ++i) {
+    if (gyro.rejected[i] == 0) continue;
+    causes += fmt::format("{}{} {}", causes.empty() ? "" : ", ", gyro.rejected[i],
+                          to_string(static_cast<gateway::Reject>(i)));
+  }
+  return causes;
+}
+
+// Frames of both gyros and yet no pair.
+std::optional<Error> explain_no_pair(const gateway::Status& status, const gateway::Plan& plan,
+                                     const std::string& logs) {
+  if (status.pairs > 0) return std::nullopt;
+  for (std::size_t i = 0; i < 2; ++i) {
+    if (status.gyros[i].samples > 0) continue;
+    return Error{logs,
+                 fmt::format("no frame of gyro {} could be used: {}", plan.gyros[i].name,
+                             causes_of_rejection(status.gyros[i])),
+                 "`vgyro check` shows which bits are read, `vgyro decode` what the log holds"};
+  }
+  return Error{logs,
+               fmt::format("the gyros {} and {} never spoke at the same time, or too shortly",
+                           plan.gyros[0].name, plan.gyros[1].name),
+               "a recording in which both are there is needed"};
+}
+
 // Why nothing came out, in words that lead to the remedy.
 std::optional<Error> explain_silence(const ReplaySummary& summary, const gateway::Plan& plan,
                                      const std::string& logs) {
@@ -227,7 +255,27 @@ std::optional<Error> explain_silence(const ReplaySummary& summary, const gateway
         fmt::format("the log's interfaces are: {}; --map LOGNAME={} takes one of them for {}",
                     names, plan.gyros[i].bus, plan.gyros[i].bus)};
   }
-  return std::nullopt;
+  return explain_no_pair(summary.status, plan, logs);
+}
+
+// Before an output of an earlier run is written over: are the logs there, and is none of them the
+// output?
+Expected<void> check_files(const ReplayOptions& options) {
+  for (const std::string& log : options.logs) {
+    struct stat input {};
+    if (log == "-") continue;
+    if (::stat(log.c_str(), &input) != 0) return fail(log, "cannot be opened: " + system_reason());
+    if (!S_ISREG(input.st_mode)) continue;
+    if (const auto opened = can::open_log(log); !opened) return tl::unexpected(opened.error());
+    for (const std::string& path : {options.output, options.json, options.plot}) {
+      struct stat output {};
+      const bool there = !path.empty() && path != "-" && ::stat(path.c_str(), &output) == 0;
+      if (there && output.st_dev == input.st_dev && output.st_ino == input.st_ino) {
+        return fail(path, "is also the input and would be overwritten", "choose another name");
+      }
+    }
+  }
+  return {};
 }
 
 void warn_of_doubts(const ReplaySummary& summary, const gateway::Plan& plan) {
@@ -276,7 +324,9 @@ int write_results(const ReplayOptions& options, const gateway::Plan& plan,
   if (!options.json.empty()) {
     auto json = OutputFile::open(options.json);
     if (!json) return report(json.error());
-    json->write(to_json(summary, plan).dump(2) + "\n");
+    // A log's interface names may be any bytes.
+    constexpr auto kReplace = nlohmann::ordered_json::error_handler_t::replace;
+    json->write(to_json(summary, plan).dump(2, ' ', false, kReplace) + "\n");
     if (const auto closed = json->close(); !closed) return report(closed.error());
   }
   if (!options.quiet) fmt::print(stderr, "{}", to_text(summary, plan));
@@ -305,6 +355,7 @@ int run_replay(const ReplayOptions& options) {
   }
   auto buses = BusMap::make(options.bus_map, plan);
   if (!buses) return report(buses.error());
+  if (const auto good = check_files(options); !good) return report(good.error());
   auto output = OutputFile::open(options.output);
   if (!output) return report(output.error());
 
