@@ -1,0 +1,11 @@
+#pragma once
+
+// Replaces the test program's operator new by one that counts.
+
+#include <cstddef>
+
+namespace vgyro {
+
+std::size_t allocations_so_far();
+
+}  // namespace vgyro

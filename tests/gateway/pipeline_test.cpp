@@ -1,0 +1,791 @@
+#include "gateway/pipeline.h"
+
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <random>
+
+#include <gtest/gtest.h>
+
+#include "tests/gateway/rig.h"
+
+namespace vgyro::gateway {
+namespace {
+
+using rig::at_ms;
+using rig::Collector;
+using rig::constant;
+using rig::merge;
+using rig::ms;
+using rig::RateOf;
+using rig::RateSeen;
+using rig::Recording;
+using rig::stream_a;
+using rig::stream_b;
+
+constexpr double kTrue_dps = 2.0;
+constexpr double kBiasA_dps = 0.5;
+constexpr double kBiasB_dps = -0.3;
+
+// At rest for the second of the calibration, then turning.
+RateOf gyro_with(double bias_dps, Duration begin = Duration{0}) {
+  const double from_s = to_seconds(begin) + 1.2;
+  return [=](double t_s) { return bias_dps + (t_s < from_s ? 0.0 : kTrue_dps); };
+}
+Recording a(Duration from, Duration to) {
+  return stream_a(from, to, gyro_with(kBiasA_dps));
+}
+Recording b(Duration from, Duration to) {
+  return stream_b(from, to, gyro_with(kBiasB_dps));
+}
+Recording both(Duration to) {
+  return merge({a(ms(0), to), b(ms(0), to)});
+}
+Recording shifted(Recording recording, Duration by) {
+  for (rig::Event& event : recording)
+    event.stamp += by;
+  return recording;
+}
+
+struct Bench {
+  explicit Bench(const Plan& plan = rig::two_gyros()) : pipeline(plan) {}
+  void play(const Recording& recording) { rig::play(pipeline, recording, out); }
+  /// With the daemon's timer, and the states that were passed through.
+  void play_live(const Recording& recording, TimePoint until) {
+    for (const rig::Event& event : recording) {
+      step_to(event.stamp);
+      pipeline.receive(event.bus, event.frame, event.stamp, out);
+      note_state();
+    }
+    step_to(until);
+  }
+  void step_to(TimePoint until) {
+    while (pipeline.next_deadline() < until) {
+      pipeline.advance(std::max(pipeline.next_deadline(), last), out);
+      note_state();
+      ++wake_ups;
+    }
+    last = std::max(last, until);
+  }
+  void note_state() {
+    const State state = pipeline.status().state;
+    if (states.empty() || states.back() != state) states.push_back(state);
+  }
+  [[nodiscard]] std::vector<RateSeen> rates() const { return rig::rates_seen(out); }
+
+  Pipeline pipeline;
+  Collector out;
+  std::vector<State> states;
+  TimePoint last;
+  int wake_ups = 0;
+};
+
+std::uint64_t health_of(const rig::Output& bias) {
+  return rig::bits(bias.frame, 59, 5);
+}
+std::uint64_t mode_of(const rig::Output& bias) {
+  return rig::bits(bias.frame, 56, 3);
+}
+
+std::vector<std::vector<std::uint8_t>> rate_payloads(const Collector& out,
+                                                     TimePoint from = TimePoint::min()) {
+  std::vector<std::vector<std::uint8_t>> payloads;
+  for (const rig::Output& output : out.with_id(0x610)) {
+    if (output.stamp < from) continue;
+    payloads.emplace_back(output.frame.payload().begin(), output.frame.payload().end());
+  }
+  return payloads;
+}
+
+// --- states --------------------------------------------------------------------------------------
+
+// The life of a gateway: one gyro goes and comes back, then both go and come back one by one.
+TEST(PipelineStates, WalkAsTheirTableSays) {
+  Bench run;
+  run.play_live(merge({a(ms(0), ms(6000)), a(ms(8000), ms(10000)),  //
+                       b(ms(0), ms(3000)), b(ms(4000), ms(6000)), b(ms(8500), ms(10000))}),
+                at_ms(10000));
+  const std::vector<State> expected{State::kWaiting,  State::kCalibrating, State::kRunning,
+                                    State::kDegraded, State::kRunning,     State::kDegraded,
+                                    State::kLost,     State::kDegraded,    State::kRunning};
+  EXPECT_EQ(run.states, expected);
+  EXPECT_EQ(run.pipeline.status().gyros[0].time_outs, 1U);
+  EXPECT_EQ(run.pipeline.status().gyros[1].time_outs, 2U);
+}
+
+// A gyro that goes while both should be calibrated: not enough is known to run on the other one.
+TEST(PipelineStates, WaitAgainWhenAGyroGoesDuringCalibration) {
+  Bench run;
+  run.play_live(merge({a(ms(0), ms(3000)), b(ms(0), ms(500)), b(ms(1500), ms(3000))}), at_ms(3000));
+  EXPECT_EQ(run.states, (std::vector{State::kWaiting, State::kCalibrating, State::kWaiting,
+                                     State::kCalibrating, State::kRunning}));
+  for (const RateSeen& rate : run.rates()) {
+    EXPECT_EQ(rate.valid, rate.state == State::kRunning || rate.state == State::kDegraded);
+  }
+}
+
+// Whoever listens to VG_Bias learns of a change of state at once, not at the next tenth of a
+// second.
+TEST(PipelineStates, AreToldByVgBiasAtOnce) {
+  Bench run;
+  std::vector<TimePoint> changes;
+  State before = State::kWaiting;
+  for (const rig::Event& event : merge({a(ms(0), ms(3000)), b(ms(0), ms(2007))})) {
+    rig::receive_with_timer(run.pipeline, event, run.out);
+    if (run.pipeline.status().state == before) continue;
+    before = run.pipeline.status().state;
+    ASSERT_FALSE(run.out.frames.empty());
+    const auto biases = run.out.with_id(0x611);
+    ASSERT_FALSE(biases.empty());
+    EXPECT_LE(event.stamp - biases.back().stamp, ms(10));
+    changes.push_back(biases.back().stamp);
+  }
+  EXPECT_EQ(changes.size(), 3U);  // calibrating, running, degraded
+}
+
+// VB_Mode follows: nothing known, calibrating, tracking, hold.
+TEST(PipelineStates, AreReflectedInTheBiasMode) {
+  Bench run;
+  run.play_live(merge({a(ms(0), ms(4000)), b(ms(500), ms(3000))}), at_ms(4000));
+  std::vector<std::uint64_t> modes;
+  for (const rig::Output& bias : run.out.with_id(0x611)) {
+    if (modes.empty() || modes.back() != mode_of(bias)) modes.push_back(mode_of(bias));
+  }
+  EXPECT_EQ(modes, (std::vector<std::uint64_t>{0, 1, 2, 3}));
+}
+
+// --- rates ---------------------------------------------------------------------------------------
+
+// With two gyros every aligned pair gives exactly one VG_Rate, and nothing else does.
+TEST(PipelineRates, OneVgRatePerPair) {
+  Bench run;
+  run.play(both(ms(5000)));
+  const Status& status = run.pipeline.status();
+  EXPECT_GT(status.pairs, 490U);
+  EXPECT_EQ(run.rates().size(), status.pairs);
+  EXPECT_EQ(status.rates_out, status.pairs);
+  EXPECT_EQ(status.rates_out_valid,
+            static_cast<std::uint64_t>(std::count_if(
+                run.out.frames.begin(), run.out.frames.end(), [](const rig::Output& output) {
+                  return output.frame.id == 0x610 && rig::rate_seen(output).valid;
+                })));
+}
+
+// A receiver must not take a number from a gateway that does not know its biases yet.
+TEST(PipelineRates, AreInvalidWhileCalibrating) {
+  Bench run;
+  run.play(both(ms(900)));
+  ASSERT_GT(run.rates().size(), 80U);
+  for (const RateSeen& rate : run.rates()) {
+    EXPECT_EQ(rate.raw, -0x800000);
+    EXPECT_FALSE(rate.valid);
+    EXPECT_EQ(rate.state, State::kCalibrating);
+    EXPECT_EQ(rate.quality, 0U);
+  }
+}
+
+// Without noise the corrected rate is the true one, to the step of the frame, from the first on.
+TEST(PipelineRates, AreTheTrueRateOnceCalibrated) {
+  Bench run;
+  run.play(both(ms(6000)));
+  std::size_t valid = 0;
+  for (const RateSeen& rate : run.rates()) {
+    if (!rate.valid) continue;
+    ++valid;
+    const TimePoint instant = rate.stamp - from_seconds(rate.age_ms * 1e-3);
+    if (std::abs(to_seconds(instant - at_ms(1200))) < 0.02) continue;  // between rest and turning
+    const double expected = instant < at_ms(1200) ? 0.0 : kTrue_dps;
+    ASSERT_NEAR(rate.rate_dps, expected, rig::kRateStep_dps) << to_seconds(instant - TimePoint{});
+    ASSERT_EQ(rate.quality, 15U);
+  }
+  EXPECT_GT(valid, 480U);
+  EXPECT_NEAR(run.pipeline.status().gyros[0].bias_dps, kBiasA_dps, 1e-9);
+  EXPECT_NEAR(run.pipeline.status().gyros[1].bias_dps, kBiasB_dps, 1e-9);
+}
+
+// The Earth turns under a platform at rest: what the configuration says is taken as the truth.
+TEST(PipelineRates, KeepTheRateThatTheCalibrationWasTold) {
+  Plan plan = rig::two_gyros();
+  plan.calibration.rate_dps = 0.25;
+  Bench run(plan);
+  run.play(merge({stream_a(ms(0), ms(2000), constant(0.25 + kBiasA_dps)),
+                  stream_b(ms(0), ms(2000), constant(0.25 + kBiasB_dps))}));
+  EXPECT_NEAR(run.rates().back().rate_dps, 0.25, rig::kRateStep_dps);
+}
+
+// The rate refers to stamp − age; here gyro b completes each pair of gyro a 3 ms later, or gyro a
+// one of gyro b 7 ms later.
+TEST(PipelineRates, TellTheirAge) {
+  Bench run;
+  run.play(both(ms(3000)));
+  const std::vector<RateSeen> rates = run.rates();
+  for (std::size_t i = 20; i < rates.size(); ++i) {
+    ASSERT_EQ(rates[i].age_ms, 3.0) << i;
+    ASSERT_EQ((rates[i].stamp - ms(3)).time_since_epoch() % ms(10), Duration{0});
+  }
+}
+
+// `mean` needs no calibration and has no biases, but it too needs both gyros to begin with.
+TEST(PipelineRates, OfTheMeanAreValidFromTheFirstPairOn) {
+  Plan plan = rig::two_gyros();
+  plan.corrector.method = Method::kMean;
+  Bench run(plan);
+  run.play(both(ms(1000)));
+  ASSERT_FALSE(run.rates().empty());
+  for (const RateSeen& rate : run.rates()) {
+    EXPECT_TRUE(rate.valid);
+    EXPECT_EQ(rate.state, State::kRunning);
+    EXPECT_NEAR(rate.rate_dps, 0.5 * (kBiasA_dps + kBiasB_dps), rig::kRateStep_dps);
+  }
+  EXPECT_TRUE(std::isnan(run.pipeline.status().gyros[0].bias_dps));
+}
+
+// Beyond ± 419 deg/s VG_Rate has no number: the frame says so and the summary counts it.
+TEST(PipelineRates, BeyondTheFrameAreSentInvalidAndCounted) {
+  Bench run;
+  const auto fast = [](double t_s) { return t_s < 2.0 ? 0.0 : 500.0; };
+  run.play(merge({stream_a(ms(0), ms(3000), fast), stream_b(ms(0), ms(3000), fast)}));
+  const Status& status = run.pipeline.status();
+  std::uint64_t invalid = 0;
+  for (const RateSeen& rate : run.rates()) {
+    if (rate.state == State::kRunning && !rate.valid) ++invalid;
+    EXPECT_EQ(rate.valid, rate.raw != -0x800000);
+    EXPECT_LT(std::abs(rate.rate_dps), 420.0);
+  }
+  EXPECT_GT(invalid, 90U);
+  EXPECT_EQ(status.rates_out_of_range, invalid);
+  EXPECT_TRUE(std::isnan(status.rate_dps));
+}
+
+// Rest until 2 s, then swaying, then rest again from 5 s on.
+Recording swaying_platform(std::uint32_t seed) {
+  auto rng = std::make_shared<std::mt19937>(seed);
+  const auto rate = [rng](double bias_dps) {
+    return [rng, bias_dps](double t_s) {
+      std::normal_distribution<double> noise(bias_dps, 0.01);
+      return noise(*rng) + (t_s > 2.0 && t_s < 5.0 ? 3.0 * std::sin(t_s - 2.0) : 0.0);
+    };
+  };
+  return merge({stream_a(ms(0), ms(11'000), rate(kBiasA_dps)),
+                stream_b(ms(0), ms(11'000), rate(kBiasB_dps))});
+}
+
+// Motion learnt as drift would be published for ever: the calibration begins again and waits.
+TEST(PipelineRates, WaitForRestWhenThePlatformMoves) {
+  Plan plan = rig::two_gyros();
+  plan.calibration.rest_s = 4.0;
+  Bench run(plan);
+  run.play(swaying_platform(3));
+  const Status& status = run.pipeline.status();
+  EXPECT_EQ(status.state, State::kRunning);
+  EXPECT_GE(status.calibration_restarts, 1U);
+  EXPECT_FALSE(status.moved_in_calibration);
+  EXPECT_EQ(run.rates().back().quality, 15U);
+  for (const RateSeen& rate : run.rates()) {
+    if (rate.valid) {
+      EXPECT_GE(rate.stamp, at_ms(9000)) << "seed 3";
+    }
+  }
+  // 0.01 deg/s over 400 samples, at the end of a fitted line: 0.001 deg/s.
+  EXPECT_NEAR(status.gyros[0].bias_dps, kBiasA_dps, 0.006);
+}
+
+// Where the user accepts motion, it is not hidden: quality 8, and a flag.
+TEST(PipelineRates, SayWhenMotionWasAccepted) {
+  Plan plan = rig::two_gyros();
+  plan.calibration.rest_s = 4.0;
+  plan.calibration.when_moving = fusion::WhenMoving::kAccept;
+  Bench run(plan);
+  run.play(swaying_platform(3));
+  EXPECT_TRUE(run.pipeline.status().moved_in_calibration);
+  const std::vector<RateSeen> rates = run.rates();
+  const auto first =
+      std::find_if(rates.begin(), rates.end(), [](const auto& r) { return r.valid; });
+  ASSERT_NE(first, rates.end());
+  EXPECT_LE(first->stamp, at_ms(4100));
+  EXPECT_EQ(first->quality, 8U);
+  EXPECT_EQ(rates.back().quality, 8U);
+}
+
+// --- bias frames ---------------------------------------------------------------------------------
+
+// Ten VG_Bias and ten VG_Model a second, on the grid of the bus's time.
+TEST(PipelineBias, ComesTenTimesASecond) {
+  Bench run;
+  run.play(both(ms(10'000)));
+  std::size_t steady = 0;
+  TimePoint last;
+  for (const rig::Output& bias : run.out.with_id(0x611)) {
+    if (bias.stamp < at_ms(2000)) continue;
+    if (steady++ > 0) {
+      EXPECT_EQ(bias.stamp - last, ms(100));
+    }
+    last = bias.stamp;
+  }
+  EXPECT_EQ(steady, 80U);
+  EXPECT_EQ(run.out.with_id(0x611).size(), run.out.with_id(0x612).size());
+  EXPECT_EQ(run.pipeline.status().biases_out, run.out.with_id(0x611).size());
+}
+
+// What the frame says is what the status says.
+TEST(PipelineBias, CarriesTheBiasesOfTheStatus) {
+  Bench run;
+  run.play(both(ms(4000)));
+  const rig::Output bias = run.out.with_id(0x611).back();
+  EXPECT_NEAR(static_cast<double>(rig::signed_bits(bias.frame, 16, 20)) * 1e-5, kBiasA_dps, 5.1e-6);
+  EXPECT_NEAR(static_cast<double>(rig::signed_bits(bias.frame, 36, 20)) * 1e-5, kBiasB_dps, 5.1e-6);
+  EXPECT_EQ(health_of(bias), 0U);
+}
+
+// A gateway without any gyro still says every tenth of a second that it is there and what is wrong.
+TEST(PipelineBias, IsAHeartbeatOnASilentBus) {
+  Bench run;
+  run.play_live(both(ms(2000)), at_ms(2000));
+  const std::size_t before = run.out.with_id(0x611).size();
+  run.step_to(at_ms(12'000));
+  const auto biases = run.out.with_id(0x611);
+  EXPECT_GE(biases.size() - before, 95U);
+  EXPECT_LE(biases.size() - before, 105U);
+  EXPECT_EQ(health_of(biases.back()), 3U);
+  EXPECT_EQ(run.pipeline.status().state, State::kLost);
+}
+
+// Before the first frame there is nothing to say but that.
+TEST(PipelineBias, IsAHeartbeatBeforeTheFirstFrame) {
+  Bench run;
+  run.pipeline.advance(TimePoint{std::chrono::hours(480'000)}, run.out);
+  ASSERT_EQ(run.out.with_id(0x611).size(), 1U);
+  EXPECT_EQ(health_of(run.out.frames.front()), 3U);
+  EXPECT_EQ(rig::signed_bits(run.out.frames.front().frame, 16, 20), -0x80000);
+}
+
+// --- one gyro ------------------------------------------------------------------------------------
+
+// The surviving gyro's rate less its own last bias, with quality and health that say so.
+TEST(PipelineDegraded, RateIsTheSurvivorsLessItsBias) {
+  Plan plan = rig::two_gyros();
+  plan.calibration.rate_dps = kTrue_dps;
+  for (const std::size_t gone : {0U, 1U}) {
+    Bench run(plan);
+    run.play(
+        merge({stream_a(ms(0), ms(gone == 0 ? 3000 : 5000), constant(kTrue_dps + kBiasA_dps)),
+               stream_b(ms(0), ms(gone == 1 ? 3000 : 5000), constant(kTrue_dps + kBiasB_dps))}));
+    EXPECT_EQ(run.pipeline.status().state, State::kDegraded);
+    std::size_t degraded = 0;
+    for (const RateSeen& rate : run.rates()) {
+      if (rate.state != State::kDegraded) continue;
+      ++degraded;
+      ASSERT_TRUE(rate.valid);
+      ASSERT_EQ(rate.quality, 4U);
+      ASSERT_NEAR(rate.rate_dps, kTrue_dps, rig::kRateStep_dps);
+    }
+    EXPECT_GT(degraded, 180U);
+    EXPECT_EQ(health_of(run.out.with_id(0x611).back()), gone == 0 ? 1U : 2U);
+    EXPECT_FALSE(run.pipeline.status().gyros[gone].heard);
+    EXPECT_TRUE(run.pipeline.status().gyros[1 - gone].heard);
+  }
+}
+
+// The rate must not jump when a gyro goes or returns: noise apart, nothing has changed.
+TEST(PipelineDegraded, RateDoesNotStepOnTheWayInOrOut) {
+  constexpr double kSigma_dps = 0.01;
+  std::mt19937 rng(11);
+  std::normal_distribution<double> noise(0.0, kSigma_dps);
+  const auto noisy = [&](double bias_dps) {
+    return [&, bias_dps](double) { return bias_dps + noise(rng); };
+  };
+  Bench run;
+  run.play(merge({stream_a(ms(0), ms(9000), noisy(kBiasA_dps)),
+                  stream_b(ms(0), ms(3000), noisy(kBiasB_dps)),
+                  stream_b(ms(5000), ms(9000), noisy(kBiasB_dps))}));
+  std::size_t degraded = 0;
+  for (const RateSeen& rate : run.rates()) {
+    if (!rate.valid) continue;
+    degraded += rate.state == State::kDegraded ? 1U : 0U;
+    // Six sigma of one gyro's sample, and its bias known from 100 samples, extrapolated.
+    ASSERT_NEAR(rate.rate_dps, 0.0, 6.0 * kSigma_dps * 1.5) << "seed 11";
+  }
+  EXPECT_GT(degraded, 150U);
+  EXPECT_EQ(run.pipeline.status().state, State::kRunning);
+}
+
+// Every instant is sent once, in order, whether one gyro spoke or two.
+TEST(PipelineDegraded, InstantsGrowThroughEveryChange) {
+  Bench run;
+  run.play(merge({a(ms(0), ms(4000)), a(ms(5500), ms(9000)), b(ms(0), ms(3000)),
+                  b(ms(3500), ms(6500)), b(ms(7000), ms(9000))}));
+  TimePoint before = TimePoint::min();
+  for (const RateSeen& rate : run.rates()) {
+    const TimePoint instant = rate.stamp - from_seconds(rate.age_ms * 1e-3);
+    if (rate.age_ms < 7.5) {
+      EXPECT_GT(instant, before);
+    }
+    before = std::max(before, instant);
+  }
+  EXPECT_GE(before, at_ms(8980));
+}
+
+// One gyro alone from the start was never compared with anything: invalid frames after a second of
+// waiting, so that receivers see a live gateway, and never a valid one. Of `mean` too.
+TEST(PipelineDegraded, OneGyroFromTheStartIsNeverValid) {
+  for (const Method method : {Method::kMutual, Method::kMean}) {
+    Plan plan = rig::two_gyros();
+    plan.corrector.method = method;
+    Bench run(plan);
+    run.play(a(ms(0), ms(5000)));
+    const std::vector<RateSeen> rates = run.rates();
+    ASSERT_GT(rates.size(), 380U);
+    EXPECT_GT(rates.front().stamp, at_ms(1000));
+    EXPECT_LE(rates.front().stamp, at_ms(1020));
+    for (const RateSeen& rate : rates) {
+      ASSERT_FALSE(rate.valid);
+      ASSERT_EQ(rate.raw, -0x800000);
+      ASSERT_EQ(rate.state, State::kWaiting);
+    }
+  }
+}
+
+// Two gyros that never speak at the same time cannot be paired: no pair is made up, no valid rate.
+TEST(PipelineDegraded, GyrosThatNeverMeetAreNeverPaired) {
+  Bench run;
+  run.play(merge(
+      {a(ms(0), ms(2000)), b(ms(2500), ms(4500)), a(ms(5000), ms(7000)), b(ms(7500), ms(9500))}));
+  EXPECT_EQ(run.pipeline.status().pairs, 0U);
+  EXPECT_EQ(run.pipeline.status().rates_out_valid, 0U);
+  EXPECT_EQ(run.pipeline.status().state, State::kWaiting);
+}
+
+// --- time ----------------------------------------------------------------------------------------
+
+// A host's clock that is set back by seconds costs a few frames, is counted, and nothing else.
+TEST(PipelineTime, ClockSetBackIsCountedAndSurvived) {
+  Bench run;
+  Recording recording = both(ms(3000));
+  const Recording after = shifted(both(ms(6000)), Duration{0});
+  for (const rig::Event& event : after) {
+    if (event.stamp < at_ms(3000)) continue;
+    recording.push_back(event);
+    recording.back().stamp -= ms(2500);
+  }
+  run.play(recording);
+  const Status& status = run.pipeline.status();
+  EXPECT_EQ(status.clock_steps, 1U);
+  EXPECT_EQ(status.state, State::kRunning);
+  for (const GyroStatus& gyro : status.gyros) {
+    EXPECT_GE(gyro.samples, gyro.frames - 6);
+    EXPECT_EQ(gyro.samples + rig::rejected_total(gyro), gyro.frames);
+  }
+  const RateSeen last = run.rates().back();
+  EXPECT_TRUE(last.valid);
+  EXPECT_NEAR(last.rate_dps, kTrue_dps, rig::kRateStep_dps);
+  EXPECT_EQ(last.stamp,
+            recording.back().stamp - recording.back().stamp.time_since_epoch() % ms(10) + ms(3));
+}
+
+// Set back again and again, as far as a log's stamps can go: time stays inside its 64 bits.
+TEST(PipelineTime, ClockSetBackByCenturiesTwiceIsSurvived) {
+  constexpr TimePoint kLatest = time_from_ns(9'000'000'000'000'000'000 - 3'000'000'000);
+  Bench run;
+  Recording recording;
+  for (int round = 0; round < 3; ++round) {
+    for (const Duration by : {kLatest.time_since_epoch(), Duration{0}}) {
+      const Recording part = shifted(both(ms(1000)), by);
+      recording.insert(recording.end(), part.begin(), part.end());
+    }
+  }
+  run.play(recording);
+  for (const GyroStatus& gyro : run.pipeline.status().gyros) {
+    EXPECT_EQ(gyro.samples + rig::rejected_total(gyro), gyro.frames);
+  }
+  EXPECT_GT(run.pipeline.next_deadline(), time_from_ns(-9'000'000'000'000'000'000));
+}
+
+// One stamp of garbage on a gyro's frame is refused and leaves no trace in the rates.
+TEST(PipelineTime, SingleGarbageStampIsRefused) {
+  for (const std::int64_t garbage_s : {0L, 1L, 100'000L, 9'000'000'000L}) {
+    Bench clean;
+    Bench dirty;
+    const Recording recording = shifted(both(ms(4000)), std::chrono::seconds(5000));
+    clean.play(recording);
+    Recording spoilt = recording;
+    rig::Event extra = spoilt[500];
+    extra.stamp = TimePoint{std::chrono::seconds(garbage_s)};
+    spoilt.insert(spoilt.begin() + 500, extra);
+    dirty.play(spoilt);
+    EXPECT_EQ(dirty.pipeline.status().clock_steps, 0U);
+    EXPECT_EQ(rig::rejected(dirty.pipeline, 0, Reject::kStampJump), 1U) << garbage_s;
+    EXPECT_EQ(rate_payloads(dirty.out), rate_payloads(clean.out)) << garbage_s;
+    EXPECT_EQ(dirty.out.with_id(0x611).size(), clean.out.with_id(0x611).size()) << garbage_s;
+  }
+}
+
+// A frame of nobody's with a stamp of garbage must not stop the clockwork of the bias frames, nor
+// the watch over the gyros.
+TEST(PipelineTime, GarbageStampOfAForeignFrameDoesNotStopTheClockwork) {
+  Bench run;
+  Recording recording = both(ms(4000));
+  recording.insert(recording.begin() + 400,
+                   {0, rig::frame_of(0x7FF, {1}), TimePoint{std::chrono::hours(1'000'000)}});
+  for (const rig::Event& event : a(ms(4000), ms(6000)))
+    recording.push_back(event);
+  run.play(recording);
+  std::size_t later = 0;
+  for (const rig::Output& bias : run.out.with_id(0x611)) {
+    if (bias.stamp > at_ms(3000) && bias.stamp <= at_ms(6000)) ++later;
+  }
+  EXPECT_GE(later, 29U);
+  EXPECT_EQ(run.pipeline.status().state, State::kDegraded);
+}
+
+// The same for a gyro's own frame that is refused for another reason before its stamp is judged.
+TEST(PipelineTime, GarbageStampOfARefusedFrameDoesNotStopTheClockwork) {
+  Bench run;
+  Recording recording = both(ms(4000));
+  recording.insert(recording.begin() + 400,
+                   {0, rig::frame_of(rig::kIdA, {1}), TimePoint{std::chrono::hours(1'000'000)}});
+  run.play(recording);
+  EXPECT_EQ(rig::rejected(run.pipeline, 0, Reject::kTruncated), 1U);
+  EXPECT_EQ(run.out.with_id(0x611).back().stamp, at_ms(3903));
+  EXPECT_EQ(run.pipeline.status().state, State::kRunning);
+}
+
+// Frames of nobody's only let time pass: they are neither counted nor answered.
+TEST(PipelineTime, ForeignFramesOnlyAdvanceTime) {
+  Bench run;
+  run.play(both(ms(2000)));
+  const std::uint64_t rates = run.pipeline.status().rates_out;
+  for (int t = 2000; t < 4000; ++t) {
+    run.pipeline.receive(0, rig::frame_of(0x300, {0xFF, 0xFF}), at_ms(t), run.out);
+  }
+  EXPECT_EQ(run.pipeline.status().state, State::kLost);
+  EXPECT_EQ(run.pipeline.status().rates_out, rates);
+  EXPECT_EQ(run.pipeline.status().gyros[0].frames, 200U);
+}
+
+// Stamps are used in whole microseconds: what candump would not have written changes nothing.
+TEST(PipelineTime, NoiseBelowAMicrosecondChangesNothing) {
+  std::mt19937 rng(17);
+  std::uniform_int_distribution<std::int64_t> noise_ns(0, 999);
+  Bench exact;
+  Bench noisy;
+  Recording recording = both(ms(5000));
+  exact.play(recording);
+  for (rig::Event& event : recording)
+    event.stamp += Duration(noise_ns(rng));
+  noisy.play(recording);
+  ASSERT_EQ(exact.out.frames.size(), noisy.out.frames.size());
+  for (std::size_t i = 0; i < exact.out.frames.size(); ++i) {
+    ASSERT_EQ(exact.out.frames[i].frame, noisy.out.frames[i].frame) << i;
+  }
+}
+
+// --- the same input gives the same output --------------------------------------------------------
+
+Recording jittery(std::uint32_t seed, Duration period_a, Duration period_b) {
+  std::mt19937 rng(seed);
+  std::normal_distribution<double> noise(0.0, 0.02);
+  std::uniform_int_distribution<std::int64_t> jitter_us(0, 1500);
+  const auto rate = [&](double) { return noise(rng); };
+  Recording first = rig::stream(0, rig::kIdA, ms(0), ms(4000), period_a, rate);
+  Recording second = rig::stream(1, rig::kIdB, ms(3), ms(4000), period_b, rate);
+  for (Recording* part : {&first, &second}) {
+    for (rig::Event& event : *part)
+      event.stamp += std::chrono::microseconds(jitter_us(rng));
+  }
+  return merge({first, second});
+}
+
+// Two sockets are read one after the other: frames of one bus may come up to `slack` late behind
+// those of the other, while each bus keeps its own order.
+Recording reordered(const Recording& recording, std::uint32_t seed, Duration slack) {
+  std::mt19937 rng(seed);
+  std::array<Recording, 2> by_bus;
+  for (const rig::Event& event : recording)
+    by_bus[event.bus].push_back(event);
+  Recording result;
+  std::array<std::size_t, 2> next{};
+  while (next[0] < by_bus[0].size() || next[1] < by_bus[1].size()) {
+    const auto left = [&](std::size_t bus) { return next[bus] < by_bus[bus].size(); };
+    std::size_t bus = left(0) ? 0 : 1;
+    if (left(0) && left(1)) {
+      const Duration ahead = by_bus[0][next[0]].stamp - by_bus[1][next[1]].stamp;
+      bus = ahead > slack ? 1 : ahead < -slack ? 0 : rng() % 2;
+    }
+    result.push_back(by_bus[bus][next[bus]++]);
+  }
+  return result;
+}
+
+// Twice the same frames, twice the same bytes and stamps.
+TEST(PipelineRepeats, ItselfByteForByte) {
+  const Recording recording = jittery(1, ms(10), ms(7));
+  Bench first;
+  Bench second;
+  first.play(recording);
+  second.play(recording);
+  EXPECT_GT(first.out.frames.size(), 300U);
+  EXPECT_EQ(first.out.frames, second.out.frames);
+}
+
+// The order in which two buses are read, within 20 ms, does not show in VG_Rate. Only the ages of
+// the pairs that waited for the choice of the pacing gyro may tell when it was made.
+TEST(PipelineRepeats, ItselfWhenTheBusesAreReadInAnotherOrder) {
+  for (const Duration period_b : {ms(10), ms(2), ms(25)}) {
+    const Recording recording = jittery(2, ms(10), period_b);
+    Bench straight;
+    straight.play(recording);
+    ASSERT_GT(rate_payloads(straight.out).size(), 100U);
+    for (std::uint32_t seed = 0; seed < 20; ++seed) {
+      Bench mixed;
+      mixed.play(reordered(recording, seed, ms(20)));
+      ASSERT_EQ(straight.out.with_id(0x610).size(), mixed.out.with_id(0x610).size());
+      ASSERT_EQ(rate_payloads(straight.out, at_ms(500)), rate_payloads(mixed.out, at_ms(500)))
+          << "seed " << seed << ", period " << to_seconds(period_b);
+    }
+  }
+}
+
+// Other traffic on the same buses does not show in VG_Rate, even where a gyro goes and returns.
+TEST(PipelineRepeats, ItselfAmongForeignFrames) {
+  const Recording recording =
+      merge({a(ms(0), ms(3000)), a(ms(3700), ms(6000)), b(ms(0), ms(4000)), b(ms(5000), ms(6000))});
+  Bench alone;
+  alone.play(recording);
+  rig::Dice dice(5);
+  Recording crowded;
+  for (const rig::Event& event : recording) {
+    for (std::uint32_t i = dice.below(5); i > 0; --i) {
+      crowded.push_back({static_cast<can::BusIndex>(dice.below(3)),
+                         rig::frame_of(0x200 + dice.below(0x500), {1, 2, 3}), event.stamp});
+    }
+    crowded.push_back(event);
+  }
+  Bench among;
+  among.play(crowded);
+  EXPECT_EQ(rate_payloads(alone.out), rate_payloads(among.out));
+}
+
+// A plan is copied in: the pipeline may be moved and outlive the plan it was made from.
+TEST(PipelineRepeats, ItselfAfterAMove) {
+  Bench run;
+  run.play(both(ms(3000)));
+  auto plan = std::make_unique<Plan>(rig::two_gyros());
+  Pipeline first(*plan);
+  plan.reset();
+  Pipeline second(std::move(first));
+  Collector out;
+  rig::play(second, both(ms(3000)), out);
+  EXPECT_EQ(out.frames, run.out.frames);
+}
+
+// --- reference -----------------------------------------------------------------------------------
+
+RateOf rocking(double bias_dps) {
+  return [bias_dps](double t_s) { return bias_dps + 30.0 * std::sin(2.0 * t_s); };
+}
+
+// With a reference the platform may move: biases come out right although it never rested.
+TEST(PipelineReference, CalibratesOnAMovingPlatform) {
+  Bench run(rig::with_reference());
+  run.play(merge({stream_a(ms(0), ms(4000), rocking(kBiasA_dps)),
+                  stream_b(ms(0), ms(4000), rocking(kBiasB_dps)),
+                  rig::stream(0, rig::kIdReference, ms(0), ms(4000), ms(10), rocking(0.0))}));
+  const Status& status = run.pipeline.status();
+  EXPECT_EQ(status.state, State::kRunning);
+  EXPECT_FALSE(status.moved_in_calibration);
+  // Chords of a sine of 30 deg/s and 2 rad/s over 10 ms miss it by 1.5e-3 deg/s at most; the line
+  // fitted to a window is carried on over the next one.
+  EXPECT_NEAR(status.gyros[0].bias_dps, kBiasA_dps, 5e-3);
+  EXPECT_NEAR(status.gyros[1].bias_dps, kBiasB_dps, 5e-3);
+  EXPECT_EQ(status.reference_frames, 400U);
+  EXPECT_EQ(status.reference_rejected, 0U);
+}
+
+// No reference, no calibration: better no rate than one against an invented truth.
+TEST(PipelineReference, WithoutItNothingBecomesValid) {
+  Bench run(rig::with_reference());
+  run.play(both(ms(5000)));
+  EXPECT_EQ(run.pipeline.status().state, State::kCalibrating);
+  EXPECT_EQ(run.pipeline.status().rates_out_valid, 0U);
+}
+
+// Reference frames that cannot be used are counted and do not count as truth.
+TEST(PipelineReference, RefusesTruncatedAndRepeatedFrames) {
+  Bench run(rig::with_reference());
+  Recording reference = rig::stream(0, rig::kIdReference, ms(0), ms(4000), ms(10), rocking(0.0));
+  for (std::size_t i = 0; i < reference.size(); i += 10)
+    reference[i].frame.length = 2;
+  const Recording again(reference.begin() + 1, reference.begin() + 3);
+  run.play(merge({stream_a(ms(0), ms(4000), rocking(kBiasA_dps)),
+                  stream_b(ms(0), ms(4000), rocking(kBiasB_dps)), reference, again}));
+  EXPECT_EQ(run.pipeline.status().reference_rejected, 42U);
+  EXPECT_NEAR(run.pipeline.status().gyros[0].bias_dps, kBiasA_dps, 5e-3);
+}
+
+// --- deadlines -----------------------------------------------------------------------------------
+
+// Asking when nothing is due does nothing: that is what makes it cheap to ask for every frame.
+TEST(PipelineDeadline, NothingHappensBeforeIt) {
+  Bench run;
+  run.play(both(ms(2000)));
+  const std::size_t frames = run.out.frames.size();
+  const TimePoint deadline = run.pipeline.next_deadline();
+  ASSERT_GT(deadline, at_ms(1993));
+  run.pipeline.advance(deadline - std::chrono::microseconds(1), run.out);
+  EXPECT_EQ(run.out.frames.size(), frames);
+  EXPECT_EQ(run.pipeline.next_deadline(), deadline);
+}
+
+// A deadline that is still due after advance() would make the daemon spin. Any history, with gaps,
+// steps of the clock and garbage, has a deadline in the future after each advance.
+TEST(PipelineDeadline, IsNeverDueAfterAdvance) {
+  for (std::uint32_t seed = 0; seed < 40; ++seed) {
+    rig::Dice dice(seed);
+    Plan plan = rig::two_gyros();
+    plan.calibration.rest_s = 0.2;
+    Bench run(plan);
+    std::int64_t now_us = dice.one_in(2) ? 0 : 1'700'000'000'000'000;
+    for (int i = 0; i < 1500; ++i) {
+      const std::uint32_t kind = dice.below(1000);
+      now_us += dice.below(20'000);
+      if (kind == 0) now_us += dice.below(5'000'000);
+      if (kind == 1) now_us = std::max<std::int64_t>(0, now_us - dice.below(5'000'000));
+      const TimePoint now{std::chrono::microseconds(now_us) + Duration(dice.below(1000))};
+      const auto bus = static_cast<can::BusIndex>(dice.below(2));
+      const std::uint32_t id = dice.one_in(10) ? 0x300 : bus == 0 ? rig::kIdA : rig::kIdB;
+      run.pipeline.receive(bus, rig::rate_frame(id, 0.001 * dice.below(100)), now, run.out);
+      if (!dice.one_in(4)) continue;
+      run.pipeline.advance(now, run.out);
+      ASSERT_GT(run.pipeline.next_deadline(), now) << "seed " << seed << ", step " << i;
+      const TimePoint due = run.pipeline.next_deadline();
+      if (!dice.one_in(50)) continue;
+      run.pipeline.advance(due, run.out);
+      ASSERT_GT(run.pipeline.next_deadline(), due) << "seed " << seed << ", step " << i;
+    }
+  }
+}
+
+// On a silent bus the timer is needed some ten times a second, not a thousand times.
+TEST(PipelineDeadline, WakesASilentGatewayAboutTenTimesASecond) {
+  Bench run;
+  run.play_live(both(ms(2000)), at_ms(2000));
+  run.wake_ups = 0;
+  run.step_to(at_ms(12'000));
+  EXPECT_GE(run.wake_ups, 60);
+  EXPECT_LE(run.wake_ups, 220);
+}
+
+// A gyro that goes silent is noticed within its time-out although no frame says so.
+TEST(PipelineDeadline, NoticesASilentGyroInTime) {
+  Bench run;
+  run.play(both(ms(2000)));
+  while (run.pipeline.status().gyros[0].heard || run.pipeline.status().gyros[1].heard) {
+    const TimePoint due = run.pipeline.next_deadline();
+    ASSERT_LT(due, at_ms(2500));
+    run.pipeline.advance(due, run.out);
+  }
+  EXPECT_EQ(run.pipeline.status().state, State::kLost);
+}
+
+}  // namespace
+}  // namespace vgyro::gateway

@@ -1,0 +1,77 @@
+#include "gateway/units.h"
+
+#include <cmath>
+#include <numbers>
+
+#include <gtest/gtest.h>
+
+namespace vgyro::gateway {
+namespace {
+
+double converted(Dimension dimension, std::string_view unit, double value) {
+  const auto conversion = convert_unit(dimension, unit);
+  if (!conversion) return std::nan("");
+  return value * conversion->scale + conversion->shift;
+}
+
+// One turn per minute, said in every family of spellings, is 6 deg/s.
+TEST(Units, TurnEveryRateIntoDegreesPerSecond) {
+  constexpr double kRad = std::numbers::pi / 180.0;
+  EXPECT_DOUBLE_EQ(converted(Dimension::kRate, "deg/s", 6.0), 6.0);
+  EXPECT_DOUBLE_EQ(converted(Dimension::kRate, "°/s", 6.0), 6.0);
+  EXPECT_DOUBLE_EQ(converted(Dimension::kRate, "mdps", 6000.0), 6.0);
+  EXPECT_DOUBLE_EQ(converted(Dimension::kRate, "deg/h", 21600.0), 6.0);
+  EXPECT_DOUBLE_EQ(converted(Dimension::kRate, "rad/s", 6.0 * kRad), 6.0);
+  EXPECT_DOUBLE_EQ(converted(Dimension::kRate, "mrad/s", 6000.0 * kRad), 6.0);
+  EXPECT_DOUBLE_EQ(converted(Dimension::kRate, "rpm", 1.0), 6.0);
+}
+
+// Water freezes at 0 degC however the sensor says it.
+TEST(Units, TurnEveryTemperatureIntoCelsius) {
+  EXPECT_DOUBLE_EQ(converted(Dimension::kTemperature, "degC", 20.0), 20.0);
+  EXPECT_NEAR(converted(Dimension::kTemperature, "K", 273.15), 0.0, 1e-12);
+  EXPECT_NEAR(converted(Dimension::kTemperature, "degF", 32.0), 0.0, 1e-12);
+  EXPECT_NEAR(converted(Dimension::kTemperature, "degF", 212.0), 100.0, 1e-12);
+}
+
+// Standard gravity and the mile are definitions; the factors must carry them exactly.
+TEST(Units, TurnAccelerationIntoGAndSpeedIntoMetresPerSecond) {
+  EXPECT_DOUBLE_EQ(converted(Dimension::kAcceleration, "m/s^2", 9.80665), 1.0);
+  EXPECT_DOUBLE_EQ(converted(Dimension::kAcceleration, "mg", 1000.0), 1.0);
+  EXPECT_DOUBLE_EQ(converted(Dimension::kSpeed, "km/h", 36.0), 10.0);
+  EXPECT_DOUBLE_EQ(converted(Dimension::kSpeed, "mph", 1.0), 0.44704);
+}
+
+// DBC authors do not agree on letter case and blanks.
+TEST(Units, IgnoreLetterCaseAndBlanks) {
+  EXPECT_DOUBLE_EQ(converted(Dimension::kRate, " Deg / S ", 1.0), 1.0);
+  EXPECT_DOUBLE_EQ(converted(Dimension::kRate, "RAD/S", std::numbers::pi), 180.0);
+  EXPECT_DOUBLE_EQ(converted(Dimension::kSpeed, "Km/H", 3.6), 1.0);
+}
+
+// A unit of another dimension is not a rate with a strange scale: m/s must not pass as deg/s.
+TEST(Units, RefuseOtherDimensions) {
+  for (const std::string_view unit : {"m/s", "deg", "V", "", "g", "degC", "deg/s^2", "rad"}) {
+    EXPECT_FALSE(convert_unit(Dimension::kRate, unit)) << unit;
+  }
+  EXPECT_FALSE(convert_unit(Dimension::kTemperature, "deg/s"));
+  EXPECT_FALSE(convert_unit(Dimension::kAcceleration, "m/s"));
+  EXPECT_FALSE(convert_unit(Dimension::kSpeed, "m/s^2"));
+}
+
+// What a message recommends must itself be accepted.
+TEST(Units, RecommendOnlyWhatIsAccepted) {
+  for (const Dimension dimension :
+       {Dimension::kRate, Dimension::kTemperature, Dimension::kAcceleration, Dimension::kSpeed}) {
+    std::string_view rest = recommended_units(dimension);
+    ASSERT_FALSE(rest.empty());
+    while (!rest.empty()) {
+      const std::string_view unit = rest.substr(0, rest.find(", "));
+      EXPECT_TRUE(convert_unit(dimension, unit)) << unit;
+      rest.remove_prefix(std::min(rest.size(), unit.size() + 2));
+    }
+  }
+}
+
+}  // namespace
+}  // namespace vgyro::gateway
