@@ -1,0 +1,90 @@
+#!/usr/bin/python3
+"""`vgyro check`: what it resolved, for people; and every bad input with its place and remedy."""
+
+import unittest
+
+import bench
+
+
+class Check(bench.Bench):
+    def check_replaced(self, old, new, file="vgyro.toml"):
+        text = self.read(file)
+        self.assertIn(old, text)
+        self.write(file, text.replace(old, new, 1))
+        return self.bad("check", "vgyro.toml")
+
+    def test_names_bus_id_signal_unit_and_scale(self):
+        # Nobody can trust a config whose meaning must be guessed.
+        text = self.good("check", "vgyro.toml").stdout.decode()
+        self.assertIn("vgyro.toml: good", text)
+        left = next(line for line in text.splitlines() if "gyro left" in line)
+        for part in ("can0", "101", "GYRO_A.RateZ", "deg/s", "32 bits", "bit 0", "Intel", "signed", "1e-06"):
+            self.assertIn(part, left)
+        right = next(line for line in text.splitlines() if "gyro right" in line)
+        for part in ("can1", "102", "GYRO_B.Rate", "deg/s", "Motorola", "float"):
+            self.assertIn(part, right)
+        for part in ("sign flipped", "Temp in degC", "Counter, runs 0 to 255", "Status == 0", "-2000 to 2000"):
+            self.assertIn(part, text)
+
+    def test_names_calibration_corrector_and_output(self):
+        # The other half of what a run depends on.
+        text = self.good("check", "vgyro.toml").stdout.decode()
+        for part in ("first 1 s of rest", "0.0032 deg/s", "mutual", "window 1 s", "order 1", "VG_Rate 610",
+                     "VG_Bias 611", "VG_Model 612", "classic CAN"):
+            self.assertIn(part, text)
+
+    def test_says_nothing_on_stderr_when_all_is_well(self):
+        # Warnings must mean something.
+        self.assertEqual(self.good("check", "vgyro.toml").stderr, b"")
+
+    def test_lines_fit_a_terminal(self):
+        # Wrapped tables cannot be read.
+        for line in self.good("check", "vgyro.toml").stdout.decode().splitlines():
+            self.assertLessEqual(len(line), 120, line)
+
+    def test_bad_input_names_file_line_and_remedy(self):
+        # Each mistake: where it is, what is wrong, what would be right.
+        cases = (
+            ('temperature = "Temp"', 'temprature = "Temp"', 'vgyro.toml:7: ', 'did you mean "temperature"?'),
+            ('message = "GYRO_A"', 'message = "GYRO_X"', 'vgyro.toml:5: ', 'did you mean "GYRO_A"?'),
+            ('rate = "RateZ"', 'rate = "RateY"', 'vgyro.toml:6: ', 'did you mean "RateZ"?'),
+            ('rate = "RateZ"', 'rate = "Temp"', 'vgyro.toml:6: ', 'deg/s, rad/s, deg/h'),
+            ('sign = -1', 'sign = "up"', 'vgyro.toml:17: ', 'must be a whole number'),
+            ('method = "mutual"', 'method = "optimal"', 'vgyro.toml:24: ', 'mutual'),
+            ('order = 1', 'order = ', 'vgyro.toml:26: ', ''),
+            ('dbc = "bench.dbc"', 'dbc = "bank.dbc"', 'vgyro.toml:4: ', 'No such file'),
+        )
+        for old, new, place, remedy in cases:
+            with self.subTest(new):
+                self.write("vgyro.toml", bench.CONFIG)
+                said = self.check_replaced(old, new)
+                self.assertIn(place, said)
+                self.assertIn(remedy, said)
+                self.assertEqual(len(said.splitlines()), 1, said)
+
+    def test_tells_all_mistakes_at_once(self):
+        # One look, one edit.
+        text = bench.CONFIG.replace('"RateZ"', '"RateX"').replace("sign = -1", "sign = 5").replace("order = 1", "order = 7")
+        self.write("vgyro.toml", text)
+        said = self.bad("check", "vgyro.toml").splitlines()
+        self.assertEqual(len(said), 3, said)
+        self.assertTrue(all(line.startswith("error: vgyro.toml:") for line in said), said)
+
+    def test_missing_config_is_named(self):
+        # The most frequent mistake of all.
+        self.assertIn("nowhere.toml: ", self.bad("check", "nowhere.toml"))
+        self.assertIn("No such file", self.bad("check", "nowhere.toml"))
+
+    def test_folder_is_no_config(self):
+        # Tab completion stops there.
+        self.assertIn("directory", self.bad("check", "."))
+
+    def test_odd_dbc_line_is_a_warning_with_its_place(self):
+        # The gyro's own signals are fine, so the file is usable; but the user should know.
+        self.write("bench.dbc", bench.BENCH_DBC + "\nBO_ 300 HALF\n")
+        done = self.good("check", "vgyro.toml")
+        self.assertIn("warning: bench.dbc:", done.stderr.decode())
+
+
+if __name__ == "__main__":
+    unittest.main()

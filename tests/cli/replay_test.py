@@ -1,0 +1,427 @@
+#!/usr/bin/python3
+"""`vgyro replay`: what comes out, what the summary counts, and what is said of bad input."""
+
+import collections
+import json
+import lzma
+import os
+import re
+import resource
+import struct
+import subprocess
+import unittest
+
+import bench
+
+RATE, BIAS, MODEL = "610", "611", "612"
+
+
+def frames(text):
+    """(stamp text, bus, id text, payload) of candump lines."""
+    found = []
+    for line in text.splitlines():
+        match = re.fullmatch(r"\((\d+\.\d+)\) (\S+) ([0-9A-F]+)#([0-9A-F]*)", line)
+        assert match, line
+        found.append((match[1], match[2], match[3], bytes.fromhex(match[4])))
+    return found
+
+
+def rate_of(payload):
+    """deg/s of VG_Rate, None where invalid."""
+    raw = int.from_bytes(payload[2:5], "little", signed=True)
+    valid = payload[6] >> 7
+    assert valid == (raw != -(1 << 23)), payload.hex()
+    return raw * 5e-5 if valid else None
+
+
+class Replay(bench.Bench):
+    def setUp(self):
+        super().setUp()
+        self.lines = bench.two_gyros(4)
+        self.write("in.log", "".join(self.lines))
+
+    def replay(self, *arguments, **options):
+        return self.good("replay", "--config", "vgyro.toml", *arguments, **options)
+
+    def summary(self, *logs, lines=None, arguments=()):
+        if lines is not None:
+            self.write("in.log", "".join(lines))
+        done = self.replay("--json", "-", "-q", *arguments, *(logs or ("in.log",)))
+        return json.loads(done.stdout)
+
+    def refuse(self, *arguments, **options):
+        return self.bad("replay", "--config", "vgyro.toml", *arguments, **options)
+
+
+class Output(Replay):
+    def test_frames_go_to_standard_output(self):
+        # The plain call is a filter: log in, log out.
+        out = frames(self.replay("in.log").stdout.decode())
+        self.assertEqual({f[2] for f in out}, {RATE, BIAS, MODEL})
+        self.assertEqual({f[1] for f in out}, {"can0"})
+        rates = [rate_of(f[3]) for f in out if f[2] == RATE]
+        self.assertGreater(len(rates), 390)
+        self.assertIsNone(rates[0])
+        self.assertAlmostEqual(rates[-1], 0.0032, delta=3e-5)
+
+    def test_each_line_carries_the_stamp_of_the_frame_that_caused_it(self):
+        # That is what makes an output log comparable with its input.
+        stamps = {line[1:18] for line in self.lines}
+        for frame in frames(self.replay("in.log").stdout.decode()):
+            self.assertIn(frame[0], stamps)
+
+    def test_the_same_input_gives_the_same_bytes(self):
+        # On every run, into a file or a pipe, from a file, a pipe or an archive.
+        first = self.replay("in.log").stdout
+        text = "".join(self.lines).encode()
+        (self.folder / "in.log.xz").write_bytes(lzma.compress(text))
+        self.replay("-o", "out.log", "in.log")
+        self.assertEqual((self.folder / "out.log").read_bytes(), first)
+        self.assertEqual(self.replay("in.log").stdout, first)
+        self.assertEqual(self.replay("-", stdin=text).stdout, first)
+        self.assertEqual(self.replay("in.log.xz").stdout, first)
+
+    def test_several_logs_are_one_recording(self):
+        # candump -l begins a new file now and then.
+        whole = self.replay("in.log").stdout
+        self.write("first.log", "".join(self.lines[:301]))
+        self.write("second.log", "".join(self.lines[301:]))
+        self.assertEqual(self.replay("first.log", "second.log").stdout, whole)
+
+    def test_method_may_be_chosen_on_the_command_line(self):
+        # The plain mean keeps the gyros' own biases: 0.5 and -0.3 deg/s.
+        out = frames(self.replay("--method", "mean", "in.log").stdout.decode())
+        rates = [rate_of(f[3]) for f in out if f[2] == RATE]
+        self.assertAlmostEqual(rates[-1], 0.1032, delta=3e-5)
+        self.assertIsNotNone(rates[0])
+
+    def test_map_takes_interfaces_of_the_log_for_those_of_the_config(self):
+        # Somebody else's log has somebody else's interface names.
+        renamed = "".join(self.lines).replace(" can0 ", " slcan7 ").replace(" can1 ", " can0 ")
+        self.write("other.log", renamed)
+        mapped = self.replay("--map", "slcan7=can0", "--map", "can0=can1", "other.log").stdout
+        self.assertEqual(mapped, self.replay("in.log").stdout)
+
+    def test_fd_output_is_written_as_fd_lines(self):
+        # 32 bytes with a bit-rate switch.
+        self.write("vgyro.toml", bench.CONFIG + "fd = true\n")
+        lines = self.replay("in.log").stdout.decode().splitlines()
+        rates = [line for line in lines if " 610#" in line]
+        self.assertGreater(len(rates), 390)
+        for line in rates:
+            self.assertRegex(line, r"^\(\d+\.\d{6}\) can0 610##[0-9A-F][0-9A-F]{64}$")
+
+    def test_nanosecond_logs_stay_nanosecond_logs(self):
+        # Newer candumps write nine digits.
+        self.write("in.log", "".join(self.lines).replace(") can", "789) can"))
+        for line in self.replay("in.log").stdout.decode().splitlines():
+            self.assertRegex(line, r"^\(\d+\.\d{6}789\)")
+
+    def test_stdin_streams(self):
+        # Live behind candump: frames come out before the input ends.
+        import select
+        process = subprocess.Popen([bench.VGYRO, "replay", "--config", "vgyro.toml", "-q", "-"], stdin=subprocess.PIPE,
+                                   stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, cwd=self.folder)
+        try:
+            process.stdin.write("".join(self.lines).encode())
+            process.stdin.flush()
+            readable, _, _ = select.select([process.stdout], [], [], 20)
+            self.assertTrue(readable, "nothing came within 20 s")
+        finally:
+            process.stdin.close()
+            process.stdout.read()
+            code = process.wait(timeout=20)
+            process.stdout.close()
+        self.assertEqual(code, 0)
+
+    def test_stderr_has_a_summary_and_no_progress_bar(self):
+        # In a log file escape sequences are noise; --quiet leaves nothing.
+        said = self.replay("-o", "out.log", "in.log").stderr.decode()
+        self.assertNotRegex(said, "[\r\x1b]")
+        for part in ("in.log: 800 frames", "gyro left", "gyro right", "valid rates", "ended in state running"):
+            self.assertIn(part, said)
+        self.assertEqual(self.replay("-q", "-o", "out.log", "in.log").stderr, b"")
+
+
+class Summary(Replay):
+    def test_counts_agree_with_a_count_of_the_log(self):
+        # Frames by interface and id, counted here by a line of Python.
+        junk = ["(1700000001.000000) can1 555#00\n", "(1700000001.000000) can2 00000101#00\n"]
+        lines = self.lines[:200] + junk * 3 + self.lines[200:]
+        counted = collections.Counter()
+        for line in lines:
+            _, bus, frame = line.split()
+            counted[bus, int(frame.split("#")[0], 16), len(frame.split("#")[0]) == 8] += 1
+        found = self.summary(lines=lines)
+        self.assertEqual({(r["bus"], r["id"], r["extended"]): r["frames"] for r in found["frames_by_id"]}, dict(counted))
+        self.assertEqual({r["id"]: r["gyro"] for r in found["frames_by_id"] if not r["extended"]},
+                         {0x101: "left", 0x102: "right", 0x555: None})
+        self.assertEqual(found["logs"][0]["frames"], len(lines))
+        self.assertEqual([g["frames"] for g in found["gyros"]], [400, 400])
+        self.assertEqual([g["samples"] for g in found["gyros"]], [400, 400])
+
+    def test_counts_agree_with_the_frames_that_came_out(self):
+        # The same run, both outputs.
+        done = self.replay("-o", "out.log", "--json", "sum.json", "in.log")
+        self.assertEqual(done.stdout, b"")
+        found = json.loads(self.read("sum.json"))
+        out = frames(self.read("out.log"))
+        rates = [rate_of(f[3]) for f in out if f[2] == RATE]
+        valid = [r for r in rates if r is not None]
+        self.assertEqual(found["out"]["frames"], len(out))
+        self.assertEqual(found["out"]["rates"], len(rates))
+        self.assertEqual(found["out"]["rates_valid"], len(valid))
+        self.assertEqual(found["out"]["biases"], sum(f[2] == BIAS for f in out))
+        self.assertEqual(found["pairs"], len(rates))
+        self.assertAlmostEqual(found["out"]["mean_rate_dps"], sum(valid) / len(valid), delta=2.5e-5)
+        self.assertEqual(found["final_state"], "running")
+        self.assertAlmostEqual(found["gyros"][0]["bias_dps"], 0.5, delta=1e-5)
+        self.assertAlmostEqual(found["gyros"][1]["bias_dps"], -0.3, delta=1e-5)
+        self.assertAlmostEqual(found["gyros"][0]["temperature_c"], 25.0)
+        self.assertIsNone(found["gyros"][1]["temperature_c"])
+        self.assertAlmostEqual(found["last_s"] - found["first_s"], 3.993, places=6)
+
+    def test_several_logs_with_different_interfaces_are_kept_apart(self):
+        # Each log has its own first interface.
+        self.write("a.log", "".join(l for l in self.lines if "can0" in l))
+        self.write("b.log", "(1700000009.0) can7 001#00\n" + "".join(l for l in self.lines if "can1" in l))
+        done = self.run_vgyro("replay", "--config", "vgyro.toml", "--json", "-", "-q", "a.log", "b.log")
+        found = json.loads(done.stdout)
+        self.assertEqual({(r["bus"], r["id"]): r["frames"] for r in found["frames_by_id"]},
+                         {("can0", 0x101): 400, ("can1", 0x102): 400, ("can7", 1): 1})
+        self.assertEqual([log["frames"] for log in found["logs"]], [400, 401])
+
+    def test_every_cause_of_rejection_is_counted(self):
+        # One spoilt frame of each kind among good ones, each counted where it belongs.
+        lines = list(self.lines)
+        a = [i for i, line in enumerate(lines) if " 101#" in line]
+        b = [i for i, line in enumerate(lines) if " 102#" in line]
+        lines[b[200]] = lines[b[200]].split("#")[0] + "#3F80\n"
+        lines[b[205]] = lines[b[205]].split("#")[0] + "#7FC00000\n"
+        lines[b[210]] = lines[b[210]].split("#")[0] + "#7F800000\n"
+        lines[b[215]] = lines[b[215]].split("#")[0] + "#7149F2CA\n"  # 1e30
+        lines[b[220]] = lines[b[220]].split("#")[0] + "#R4\n"
+        lines[b[225]] = lines[b[225]] * 2
+        lines[a[230]] = lines[a[230]][:-3] + "01\n"  # Status 1
+        lines[a[235]] = lines[a[235]][:-5] + lines[a[234]][-5:]  # the counter of the frame before
+        lines[b[240]] = "(1700009999.000000)" + lines[b[240]][19:]
+        found = self.summary(lines=lines)
+        left, right = (g["rejected"] for g in found["gyros"])
+        self.assertEqual({k: v for k, v in right.items() if v},
+                         {"truncated": 1, "not_finite": 2, "out_of_range": 1, "not_data": 1, "stamp_repeated": 1,
+                          "stamp_jump": 1})
+        self.assertEqual({k: v for k, v in left.items() if v}, {"flagged_invalid": 1, "counter_repeated": 1})
+        for gyro in found["gyros"]:
+            self.assertEqual(gyro["frames"], gyro["samples"] + sum(gyro["rejected"].values()))
+        self.assertEqual(found["final_state"], "running")
+        self.assertAlmostEqual(found["out"]["mean_rate_dps"], 0.0032, delta=1e-3)
+
+    def test_lost_frames_and_gaps_are_told(self):
+        # Two seconds of one gyro missing, and its counter says how many frames that was, less the silence.
+        lines = [l for i, l in enumerate(self.lines) if not (" 101#" in l and 500 <= i < 508)]
+        found = self.summary(lines=lines)
+        self.assertEqual(found["gyros"][0]["missing_by_counter"], 4)
+        lines = [l for l in bench.two_gyros(8) if not 1700000003.0 <= float(l[1:18]) < 1700000005.0]
+        found = self.summary(lines=lines)
+        self.assertEqual(found["gaps"]["count"], 1)
+        self.assertAlmostEqual(found["gaps"]["longest"][0]["length_s"], 2.01, delta=0.02)
+        self.assertAlmostEqual(found["gaps"]["longest"][0]["from_s"], 3.0, delta=0.05)
+
+    def test_stamps_back_by_seconds_are_counted(self):
+        # The host's clock was set while candump ran.
+        lines = bench.two_gyros(3) + bench.two_gyros(6, begin_us=1_699_999_990_000_000)[600:]
+        found = self.summary(lines=lines)
+        self.assertEqual(found["clock_steps"], 1)
+        self.assertEqual(found["final_state"], "running")
+
+    def test_junk_lines_are_counted_with_their_numbers(self):
+        # The user can look at line 3.
+        lines = [*self.lines[:2], "(17) can0 nonsense\n", "DROPCOUNT: 5\n", *self.lines[2:]]
+        log = self.summary(lines=lines)["logs"][0]
+        self.assertEqual(log["malformed_lines"], 1)
+        self.assertEqual(log["other_lines"], 1)
+        self.assertEqual(log["first_malformed"][0]["line"], 3)
+        said = self.replay("-o", "out.log", "in.log").stderr.decode()
+        self.assertIn("line 3: ", said)
+
+    def test_log_that_ends_inside_a_line_is_used_up_to_there(self):
+        # The disk was full, or the power went.
+        lines = [*self.lines[:-1], self.lines[-1][:-6]]
+        log = self.summary(lines=lines)["logs"][0]
+        self.assertEqual((log["frames"], log["cut_off_lines"]), (799, 1))
+        self.assertIn("ends inside line 800", self.replay("-o", "out.log", "in.log").stderr.decode())
+
+    def test_json_is_valid_whatever_the_interfaces_are_called(self):
+        # A log may hold any bytes there.
+        text = b"(1.0) c\xff\xfen 001#00\n" + "".join(self.lines).encode()
+        self.write("in.log", text)
+        json.loads(self.replay("--json", "-", "-q", "in.log").stdout)
+
+    def test_json_on_standard_output_stands_alone(self):
+        # With `--json -` the frames go only where -o says.
+        found = self.replay("--json", "-", "-q", "-o", "out.log", "in.log")
+        self.assertEqual(json.loads(found.stdout)["format"], 1)
+        self.assertGreater(len(self.read("out.log")), 1000)
+
+    def test_summary_does_not_depend_on_the_run(self):
+        # Nothing of the machine or the hour is in it.
+        self.assertEqual(self.summary(), self.summary())
+
+
+class BadInput(Replay):
+    def test_missing_log(self):
+        # Told before anything is written over.
+        self.write("out.log", "precious\n")
+        self.assertIn("nowhere.log: cannot be opened: No such file", self.refuse("-o", "out.log", "nowhere.log"))
+        self.assertEqual(self.read("out.log"), "precious\n")
+
+    def test_second_log_missing(self):
+        # Not after an hour with the first one.
+        self.write("out.log", "precious\n")
+        self.assertIn("nowhere.log", self.refuse("-o", "out.log", "in.log", "nowhere.log"))
+        self.assertEqual(self.read("out.log"), "precious\n")
+
+    def test_empty_log_and_no_log_at_all(self):
+        # A log of nothing is no success.
+        self.write("empty.log", "")
+        self.write("prose.log", "Dear diary,\nno frames today.\n")
+        for log in ("empty.log", "prose.log", "/dev/null"):
+            said = self.refuse("-q", log)
+            self.assertIn("holds no CAN frame", said)
+            self.assertIn("candump -L", said)
+
+    def test_directory(self):
+        # Tab completion stops there.
+        self.assertIn("is a directory, not a log", self.refuse("-q", "."))
+
+    def test_damaged_archive(self):
+        # What came before the damage is not lost, but the end is told.
+        packed = lzma.compress("".join(self.lines).encode())
+        (self.folder / "cut.log.xz").write_bytes(packed[: len(packed) // 2])
+        (self.folder / "text.log.xz").write_bytes(b"hello, I am text" * 9)
+        self.assertIn("cut.log.xz: ends in the middle", self.refuse("-q", "cut.log.xz"))
+        self.assertIn("text.log.xz: is not an .xz file", self.refuse("-q", "text.log.xz"))
+
+    def test_one_gyro_missing_lists_the_interfaces_of_the_log(self):
+        # Nine times out of ten it is the name of the interface.
+        self.write("in.log", "".join(self.lines).replace("can1", "vcan5"))
+        said = self.refuse("-q", "in.log")
+        for part in ("no frame of gyro right", "GYRO_B 102 on can1", "can0, vcan5", "--map LOGNAME=can1"):
+            self.assertIn(part, said)
+
+    def test_gyro_without_a_usable_frame_says_why(self):
+        # All frames there and none used: the DBC file is not that of this gyro.
+        self.write("in.log", "".join(l[:-5] + "\n" if " 102#" in l else l for l in self.lines))
+        said = self.refuse("-q", "in.log")
+        for part in ("no frame of gyro right could be used", "400 truncated"):
+            self.assertIn(part, said)
+
+    def test_gyros_that_never_meet_say_so(self):
+        # Two logs of two days.
+        later = bench.two_gyros(4, begin_us=1_700_009_000_000_000)
+        self.write("in.log", "".join([l for l in self.lines if "can0" in l] + [l for l in later if "can1" in l]))
+        self.assertIn("never spoke at the same time", self.refuse("-q", "in.log"))
+
+    def test_unwritable_output(self):
+        # /dev/full is a full disk; a folder that is not there cannot be written to.
+        self.assertIn("/dev/full: cannot be written: No space left", self.refuse("-q", "-o", "/dev/full", "in.log"))
+        self.assertIn("/dev/full: cannot be written", self.refuse("-q", "-o", "out.log", "--json", "/dev/full", "in.log"))
+        self.assertIn("nowhere/out.log: cannot be written: No such file", self.refuse("-o", "nowhere/out.log", "in.log"))
+        with open("/dev/full", "wb") as full:
+            self.assertIn("standard output: cannot be written", self.refuse("-q", "in.log", stdout=full))
+
+    def test_output_over_the_input_is_refused(self):
+        # A slip that would destroy the recording.
+        before = self.read("in.log")
+        os.link(self.folder / "in.log", self.folder / "other_name.log")
+        for arguments in (("-o", "in.log", "in.log"), ("-o", "other_name.log", "in.log"), ("--json", "in.log", "in.log"),
+                          ("-o", "./in.log", "in.log")):
+            self.assertIn("is also the input", self.refuse(*arguments))
+            self.assertEqual(self.read("in.log"), before)
+
+    def test_bad_map(self):
+        # The three ways to get it wrong.
+        self.assertIn("is not LOGNAME=CONFIGNAME", self.refuse("--map", "can0", "in.log"))
+        self.assertIn("is not LOGNAME=CONFIGNAME", self.refuse("--map", "=can0", "in.log"))
+        self.assertIn('did you mean "can1"?', self.refuse("--map", "x=cann1", "in.log"))
+
+    def test_bad_config_is_told_as_by_check(self):
+        # The same words in both places.
+        self.write("vgyro.toml", bench.CONFIG.replace("order = 1", "order = 8"))
+        self.assertEqual(self.refuse("in.log"), self.bad("check", "vgyro.toml"))
+
+    def test_uncalibrated_log_warns(self):
+        # Shorter than the rest that the config asks for: frames come out, none is valid.
+        self.write("vgyro.toml", bench.CONFIG.replace("rest_s = 1.0", "rest_s = 10.0"))
+        done = self.replay("-o", "out.log", "in.log")
+        self.assertRegex(done.stderr.decode(), r"warning: calibration: not complete: [34]\.\d of 10 s")
+        self.assertTrue(all(rate_of(f[3]) is None for f in frames(self.read("out.log")) if f[2] == RATE))
+
+
+class Plot(Replay):
+    def test_svg_and_png_are_drawn(self):
+        # A picture with something in it, and a PNG that is one.
+        self.replay("-q", "-o", "out.log", "--plot", "a.svg", "in.log")
+        self.replay("-q", "-o", "out.log", "--plot", "a.png", "in.log")
+        svg = self.read("a.svg")
+        self.assertIn("<svg", svg)
+        for part in ("virtual gyro", "gyro left", "gyro right"):
+            self.assertIn(part, svg)
+        self.assertGreater(len(svg), 20_000)
+        png = (self.folder / "a.png").read_bytes()
+        self.assertEqual(png[:8], b"\x89PNG\r\n\x1a\n")
+        width, height = struct.unpack(">II", png[16:24])
+        self.assertGreater(min(width, height), 500)
+
+    def test_unknown_ending_is_refused_before_the_work(self):
+        # Not after an hour of replay.
+        for name in ("a.jpg", "a", "svg"):
+            said = self.refuse("-o", "out.log", "--plot", name, "in.log")
+            self.assertIn(".svg, .png or .pdf", said)
+            self.assertFalse((self.folder / "out.log").exists())
+
+    def test_picture_that_cannot_be_written_is_refused_before_the_work(self):
+        # Neither this.
+        said = self.refuse("-q", "-o", "out.log", "--plot", "nowhere/a.svg", "in.log")
+        self.assertIn("nowhere/a.svg: cannot be written: No such file", said)
+        self.assertFalse((self.folder / "out.log").exists())
+
+    def test_missing_gnuplot_is_an_error_that_says_what_to_install(self):
+        # Not a crash by a broken pipe, however much there is to draw.
+        self.write("in.log", "".join(bench.two_gyros(30)))
+        said = self.refuse("-q", "-o", "out.log", "--plot", "a.svg", "in.log", environment={"PATH": str(self.folder)})
+        self.assertIn("gnuplot", said)
+        self.assertIn("apt-get install gnuplot-nox", said)
+
+    def test_names_with_quotes_draw(self):
+        # Names are the user's, gnuplot's syntax is not.
+        self.write("vgyro.toml", bench.CONFIG.replace('"left"', "\"it's `left`\""))
+        self.replay("-q", "-o", "out.log", "--plot", "it's.svg", "in.log")
+        self.assertGreater((self.folder / "it's.svg").stat().st_size, 1000)
+
+
+class Memory(Replay):
+    def peak_kb(self, repeats):
+        """Peak resident memory of a replay from stdin of the same recording, again and again."""
+        read_end, write_end = os.pipe()
+        with open(self.folder / "out.log", "wb") as out:
+            process = subprocess.Popen([bench.VGYRO, "replay", "--config", "vgyro.toml", "-q", "-"], stdin=read_end,
+                                       stdout=out, cwd=self.folder)
+        os.close(read_end)
+        with os.fdopen(write_end, "wb") as pipe:
+            for i in range(repeats):
+                pipe.write("".join(bench.two_gyros(20, begin_us=(1_700_000_000 + 20 * i) * 1_000_000)).encode())
+        _, status, usage = os.wait4(process.pid, 0)
+        process.returncode = os.waitstatus_to_exitcode(status)
+        self.assertEqual(process.returncode, 0)
+        return usage.ru_maxrss
+
+    @unittest.skipIf(bench.SANITIZED, "a sanitizer keeps freed memory")
+    def test_does_not_grow_with_the_log(self):
+        # Days of traffic through a pipe must not fill the memory.
+        self.peak_kb(1)
+        self.assertLessEqual(abs(self.peak_kb(30) - self.peak_kb(3)), 1024)
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,66 @@
+#!/usr/bin/python3
+"""Help texts and wrong usage: what a user meets first."""
+
+import re
+import unittest
+
+import bench
+
+COMMANDS = {
+    "check": {"CONFIG", "--method"},
+    "decode": {"--dbc", "--text", "LOG"},
+    "replay": {"--config", "--method", "-o", "--output", "--json", "--plot", "--map", "-q", "--quiet", "LOG"},
+}
+
+
+class Usage(bench.Bench):
+    def help_of(self, *command):
+        return self.good(*command, "--help").stdout.decode()
+
+    def test_help_of_each_command_names_every_option(self):
+        # An option that help does not name does not exist.
+        for command, options in COMMANDS.items():
+            text = self.help_of(command)
+            for option in options:
+                self.assertRegex(text, rf"(?<![\w-]){re.escape(option)}(?![\w-])", command)
+
+    def test_help_hides_no_option_that_the_test_does_not_know(self):
+        # Keeps the list above true.
+        for command, options in COMMANDS.items():
+            named = set(re.findall(r"(?:^|[\s,])(--?[a-z][\w-]*)", self.help_of(command).split("Example:")[0], re.MULTILINE))
+            self.assertEqual(named - options - {"-h", "--help", "-L"}, set(), command)
+
+    def test_help_fits_100_columns(self):
+        # Wrapped by the terminal it would be hard to read.
+        for command in ((), *((c,) for c in COMMANDS)):
+            for line in self.help_of(*command).splitlines():
+                self.assertLessEqual(len(line), 100, line)
+
+    def test_help_names_every_command_and_exit_code(self):
+        # The way in.
+        text = self.help_of()
+        for part in (*COMMANDS, "Exit codes", "0 done", "1 bad input", "2 wrong usage"):
+            self.assertIn(part, text)
+
+    def test_wrong_usage_is_code_2_and_says_what_is_missing(self):
+        # Scripts tell a slip of the call from bad data by it.
+        for arguments, part in (
+            ((), "subcommand"),
+            (("fly",), "fly"),
+            (("check",), "CONFIG"),
+            (("decode", "in.log"), "--dbc"),
+            (("replay", "--config", "vgyro.toml"), "LOG"),
+            (("replay", "in.log"), "--config"),
+            (("replay", "--config", "vgyro.toml", "--method", "median", "in.log"), "median"),
+            (("replay", "--config", "vgyro.toml", "--colour", "in.log"), "--colour"),
+        ):
+            with self.subTest(arguments):
+                self.assertIn(part, self.bad(*arguments, code=2))
+
+    def test_version_is_told(self):
+        # The first question of any bug report.
+        self.assertRegex(self.good("--version").stdout.decode(), r"^vgyro \d+\.\d+\.\d+\n$")
+
+
+if __name__ == "__main__":
+    unittest.main()
