@@ -1,0 +1,196 @@
+// After start-up the frame path allocates nothing: a heap that is slow, full or torn must not come
+// between a frame and the rate. Counts every operator new of this program.
+
+#include <atomic>
+#include <cstdlib>
+#include <new>
+
+#include <gtest/gtest.h>
+
+#include "fusion/alignment.h"
+#include "fusion/calibration.h"
+#include "fusion/corrector.h"
+#include "fusion/stamp_guard.h"
+#include "tests/fusion/random.h"
+
+namespace {
+
+std::atomic<std::uint64_t> allocations{0};
+
+void* counted(std::size_t bytes) {
+  ++allocations;
+  void* const memory = std::malloc(bytes == 0 ? 1 : bytes);
+  if (memory == nullptr) throw std::bad_alloc();
+  return memory;
+}
+
+void* counted_aligned(std::size_t bytes, std::size_t alignment) {
+  ++allocations;
+  void* const memory =
+      std::aligned_alloc(alignment, (bytes + alignment - 1) / alignment * alignment);
+  if (memory == nullptr) throw std::bad_alloc();
+  return memory;
+}
+
+}  // namespace
+
+// The whole family: where one were missing, its memory would be freed by another allocator's
+// delete.
+void* operator new(std::size_t bytes) {
+  return counted(bytes);
+}
+void* operator new[](std::size_t bytes) {
+  return counted(bytes);
+}
+void* operator new(std::size_t bytes, const std::nothrow_t& /*tag*/) noexcept {
+  ++allocations;
+  return std::malloc(bytes);
+}
+void* operator new[](std::size_t bytes, const std::nothrow_t& /*tag*/) noexcept {
+  ++allocations;
+  return std::malloc(bytes);
+}
+void* operator new(std::size_t bytes, std::align_val_t alignment) {
+  return counted_aligned(bytes, static_cast<std::size_t>(alignment));
+}
+void* operator new[](std::size_t bytes, std::align_val_t alignment) {
+  return counted_aligned(bytes, static_cast<std::size_t>(alignment));
+}
+void operator delete(void* memory) noexcept {
+  std::free(memory);
+}
+void operator delete[](void* memory) noexcept {
+  std::free(memory);
+}
+void operator delete(void* memory, std::size_t /*bytes*/) noexcept {
+  std::free(memory);
+}
+void operator delete[](void* memory, std::size_t /*bytes*/) noexcept {
+  std::free(memory);
+}
+void operator delete(void* memory, std::align_val_t /*alignment*/) noexcept {
+  std::free(memory);
+}
+void operator delete[](void* memory, std::align_val_t /*alignment*/) noexcept {
+  std::free(memory);
+}
+void operator delete(void* memory, std::size_t /*bytes*/, std::align_val_t /*alignment*/) noexcept {
+  std::free(memory);
+}
+void operator delete[](void* memory, std::size_t /*bytes*/,
+                       std::align_val_t /*alignment*/) noexcept {
+  std::free(memory);
+}
+
+namespace vgyro::fusion {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr int kSamples = 10'000;
+constexpr TimePoint kStart = time_from_ns(1'700'000'000'000'000'000);
+
+/// Allocations while `work` runs.
+template <class Work>
+std::uint64_t allocations_of(Work&& work) {
+  const std::uint64_t before = allocations;
+  work();
+  return allocations - before;
+}
+
+// Without this the other tests could not fail.
+TEST(Allocation, IsSeenByTheCounter) {
+  std::unique_ptr<Corrector> corrector;
+  EXPECT_EQ(allocations_of([&corrector] { corrector = make_mean_corrector(); }), 1U);
+  EXPECT_GE(allocations_of([] { std::vector<double> values(100, 1.0); }), 1U);
+}
+
+TEST(Allocation, IsNotDoneByTheAligner) {
+  Aligner aligner;
+  Random random(1);
+  std::uint64_t pairs = 0;
+  EXPECT_EQ(allocations_of([&] {
+              AlignedPair pair;
+              for (int i = 0; i < kSamples; ++i) {
+                aligner.push(0, kStart + i * 10ms, random.normal());
+                // Reordered, with gaps, and silent for long: every path is walked.
+                if (i % 1000 < 300) continue;
+                aligner.push(1, kStart + (i ^ 1) * 10ms + 3ms, random.normal());
+                while (aligner.pop(pair))
+                  ++pairs;
+                if (i == kSamples / 2) aligner.clear();
+              }
+            }),
+            0U);
+  EXPECT_GT(pairs, 1000U);
+}
+
+TEST(Allocation, IsNotDoneByAveragingEither) {
+  Aligner aligner;
+  std::uint64_t pairs = 0;
+  EXPECT_EQ(allocations_of([&] {
+              AlignedPair pair;
+              for (int i = 0; i < kSamples; ++i) {
+                aligner.push(0, kStart + i * 2ms, 1.0);
+                if (i % 5 == 0) aligner.push(1, kStart + i * 2ms, 1.0);
+                while (aligner.pop(pair))
+                  ++pairs;
+              }
+            }),
+            0U);
+  EXPECT_GT(pairs, 1900U);
+}
+
+TEST(Allocation, IsNotDoneByTheStampGuard) {
+  StampGuard guard;
+  EXPECT_EQ(allocations_of([&guard] {
+              TimePoint t;
+              for (int i = 0; i < kSamples; ++i) {
+                const Duration set_back = i > kSamples / 2 ? 3600s : 0s;
+                guard.check(static_cast<std::size_t>(i) % 3, kStart + i * 5ms - set_back, t);
+              }
+            }),
+            0U);
+  EXPECT_GT(guard.offset(), 3590s) << "the step was taken up";
+}
+
+TEST(Allocation, IsNotDoneByLeastSquares) {
+  for (int order = 0; order <= kOrderMax; ++order) {
+    double value = 0.0;
+    EXPECT_EQ(allocations_of([&value, order] {
+                LeastSquares window(order, 0.0, 100.0);
+                for (int i = 0; i < kSamples; ++i)
+                  window.add(0.01 * i, 1.0);
+                value = window.fit()->polynomial.at(50.0);
+              }),
+              0U)
+        << order;
+    EXPECT_NEAR(value, 1.0, 1e-12);
+  }
+}
+
+TEST(Allocation, IsNotDoneByCalibratorAndCorrector) {
+  for (int order = 0; order <= kOrderMax; ++order) {
+    Calibrator calibrator(order, 20.0);
+    const auto corrector = make_mutual_corrector(order, 1.0);
+    Random random(1);
+    EXPECT_EQ(allocations_of([&] {
+                bool started = false;
+                for (int i = 0; i < kSamples; ++i) {
+                  const RatePair pair{0.01 * i, {random.normal(), random.normal()}};
+                  if (started) {
+                    corrector->update(pair);
+                  } else if (!calibrator.add(pair.t_s, pair.rate_dps, 0.0)) {
+                    corrector->start(calibrator.result());
+                    started = true;
+                  }
+                }
+              }),
+              0U)
+        << order;
+    EXPECT_GE(corrector->windows().completed, 70U);
+  }
+}
+
+}  // namespace
+}  // namespace vgyro::fusion

@@ -1,0 +1,212 @@
+#include "fusion/stamp_guard.h"
+
+#include <algorithm>
+
+#include <gtest/gtest.h>
+
+#include "tests/fusion/random.h"
+
+namespace vgyro::fusion {
+namespace {
+
+using namespace std::chrono_literals;
+using Verdict = StampGuard::Verdict;
+
+constexpr std::size_t kReference = 2;
+constexpr TimePoint kStart = time_from_ns(1'700'000'000'000'000'000);
+
+/// A guard with all streams running at 100 Hz up to `until` behind kStart.
+StampGuard running_until(Duration until) {
+  StampGuard guard;
+  TimePoint t;
+  for (Duration d{0}; d <= until; d += 10ms) {
+    for (std::size_t stream = 0; stream < StampGuard::kStreams; ++stream)
+      EXPECT_EQ(guard.check(stream, kStart + d, t), Verdict::kAccepted);
+  }
+  return guard;
+}
+
+struct Checked {
+  Verdict verdict;
+  Duration since_start;
+};
+
+Checked check(StampGuard& guard, std::size_t stream, Duration since_start) {
+  TimePoint t;
+  const Verdict verdict = guard.check(stream, kStart + since_start, t);
+  return {verdict, t - kStart};
+}
+
+// As long as stamps are in order nothing is changed, wherever the clock began.
+TEST(StampGuard, PassesOrderlyStampsOnUnchanged) {
+  for (const TimePoint start : {time_from_ns(0), kStart}) {
+    StampGuard guard;
+    TimePoint t;
+    for (int i = 0; i < 1000; ++i) {
+      const TimePoint raw = start + i * 10ms;
+      ASSERT_EQ(guard.check(static_cast<std::size_t>(i) % 3, raw, t), Verdict::kAccepted);
+      ASSERT_EQ(t, raw);
+    }
+    EXPECT_EQ(guard.offset(), 0ns);
+  }
+}
+
+// The same frame seen twice must not count twice.
+TEST(StampGuard, RefusesARepeatedStamp) {
+  StampGuard guard = running_until(100ms);
+  EXPECT_EQ(check(guard, 0, 100ms).verdict, Verdict::kRepeated);
+  EXPECT_EQ(check(guard, 0, 100ms).verdict, Verdict::kRepeated);
+  EXPECT_EQ(check(guard, 0, 110ms).verdict, Verdict::kAccepted);
+  EXPECT_EQ(check(guard, 1, 110ms).verdict, Verdict::kAccepted) << "streams may share a stamp";
+}
+
+// Two queues of one kernel deliver a little out of order: that is no clock that was set.
+TEST(StampGuard, LetsSmallReorderingPass) {
+  StampGuard guard = running_until(1s);
+  const Checked late = check(guard, 0, 1s - 249ms);
+  EXPECT_EQ(late.verdict, Verdict::kAccepted);
+  EXPECT_EQ(late.since_start, 751ms);
+  EXPECT_EQ(check(guard, 0, 1s).verdict, Verdict::kRepeated) << "the newest stays the newest";
+  EXPECT_EQ(check(guard, 0, 1010ms).verdict, Verdict::kAccepted);
+  EXPECT_EQ(guard.offset(), 0ns);
+}
+
+// A garbage stamp in the middle of good ones, far ahead or far behind, leaves no trace.
+TEST(StampGuard, RefusesSingleOutliers) {
+  for (const Duration outlier : std::initializer_list<Duration>{-1'699'999'999s, -3600s, -1s,
+                                                                -252ms, 10s + 100ms, 24h * 365}) {
+    StampGuard guard = running_until(1s);
+    for (int i = 1; i <= 5; ++i) {
+      EXPECT_EQ(check(guard, 0, 1s + outlier + i * 1ms).verdict, Verdict::kUnconfirmed)
+          << to_seconds(outlier);
+      const Checked good = check(guard, 0, 1s + i * 10ms);
+      EXPECT_EQ(good.verdict, Verdict::kAccepted);
+      EXPECT_EQ(good.since_start, 1s + i * 10ms);
+    }
+    EXPECT_EQ(guard.offset(), 0ns);
+  }
+}
+
+// Garbage is rarely consistent: stamps that do not follow each other confirm nothing.
+TEST(StampGuard, RefusesOutliersThatDoNotAgree) {
+  constexpr std::uint64_t kSeed = 1;
+  SCOPED_TRACE(::testing::Message() << "seed " << kSeed);
+  Random random(kSeed);
+  StampGuard guard = running_until(1s);
+  for (int i = 0; i < 10'000; ++i) {
+    const auto outlier = std::chrono::hours(1 + static_cast<int>(random.below(100'000)));
+    ASSERT_EQ(check(guard, 0, i % 2 == 0 ? outlier : -outlier).verdict, Verdict::kUnconfirmed);
+  }
+  EXPECT_EQ(check(guard, 0, 1010ms).since_start, 1010ms);
+}
+
+// A silent bus comes back after minutes: the third stamp is believed, and time goes on as it says.
+TEST(StampGuard, BelievesThreeAgreeingStampsBehindALongGap) {
+  StampGuard guard = running_until(1s);
+  EXPECT_EQ(check(guard, 0, 600s).verdict, Verdict::kUnconfirmed);
+  EXPECT_EQ(check(guard, 0, 600s + 10ms).verdict, Verdict::kUnconfirmed);
+  const Checked third = check(guard, 0, 600s + 20ms);
+  EXPECT_EQ(third.verdict, Verdict::kAccepted);
+  EXPECT_EQ(third.since_start, 600s + 20ms);
+  EXPECT_EQ(check(guard, 0, 600s + 30ms).since_start, 600s + 30ms);
+  EXPECT_EQ(guard.offset(), 0ns);
+}
+
+// Up to ten seconds need no confirmation: no frame is lost to an ordinary pause.
+TEST(StampGuard, TakesAnOrdinaryPauseAtOnce) {
+  StampGuard guard = running_until(1s);
+  EXPECT_EQ(check(guard, 0, 11s).verdict, Verdict::kAccepted);
+}
+
+// The host's clock was set back: the axis goes on from the newest time of any stream, and the other
+// streams follow without a step of their own.
+TEST(StampGuard, TakesASteppedBackClockUpMonotonically) {
+  for (const Duration step : {300ms, 1000ms, 3'600'000ms}) {
+    StampGuard guard = running_until(1s);
+    TimePoint t;
+    ASSERT_EQ(guard.check(1, kStart + 1015ms, t), Verdict::kAccepted);
+    EXPECT_EQ(check(guard, 0, 1020ms - step).verdict, Verdict::kUnconfirmed);
+    EXPECT_EQ(check(guard, 0, 1030ms - step).verdict, Verdict::kUnconfirmed);
+    const Checked third = check(guard, 0, 1040ms - step);
+    EXPECT_EQ(third.verdict, Verdict::kClockStep);
+    EXPECT_EQ(third.since_start, 1015ms + 1us) << "newest of all streams, and a little";
+    EXPECT_EQ(guard.offset(), step - 25ms + 1us);
+    for (int i = 0; i < 100; ++i) {
+      const Duration raw = 1045ms + i * 10ms - step;
+      const Checked other = check(guard, 1, raw);
+      EXPECT_EQ(other.verdict, Verdict::kAccepted);
+      EXPECT_EQ(other.since_start, raw + guard.offset());
+      EXPECT_GT(other.since_start, 1015ms);
+      EXPECT_EQ(check(guard, 0, raw + 5ms).verdict, Verdict::kAccepted);
+    }
+  }
+}
+
+// A clock that is set again and again never takes the axis back, and never stops the streams.
+TEST(StampGuard, KeepsTheAxisMonotoneOverManySteps) {
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    SCOPED_TRACE(::testing::Message() << "seed " << seed);
+    Random random(seed);
+    StampGuard guard;
+    Duration clock{0};
+    std::array<TimePoint, 2> last{};
+    TimePoint newest{};
+    int steps = 0;
+    int accepted = 0;
+    for (int i = 0; i < 20'000; ++i) {
+      clock += 5ms;
+      if (random.below(500) == 0) clock -= from_seconds(random.uniform(0.3, 5000.0));
+      const std::size_t stream = static_cast<std::size_t>(i) % 2;
+      TimePoint t;
+      const Verdict verdict = guard.check(stream, kStart + clock, t);
+      if (verdict == Verdict::kUnconfirmed) continue;
+      ASSERT_NE(verdict, Verdict::kRepeated);
+      if (verdict == Verdict::kClockStep) {
+        ++steps;
+        ASSERT_GT(t, newest);
+      }
+      ++accepted;
+      ASSERT_GT(t, last[stream]) << i;
+      last[stream] = t;
+      newest = std::max(newest, t);
+    }
+    EXPECT_GT(steps, 10);
+    // Each step costs the five stamps till one stream has sent three.
+    EXPECT_GE(accepted, 20'000 - 6 * (steps + 5));
+  }
+}
+
+// A reference has a clock of its own more often than not: it waits until it agrees with the gyros.
+TEST(StampGuard, LetsNoReferenceSetTheClockBack) {
+  StampGuard guard = running_until(100s);
+  for (int i = 0; i < 1000; ++i)
+    ASSERT_EQ(check(guard, kReference, 20s + i * 10ms).verdict, Verdict::kUnconfirmed);
+  EXPECT_EQ(guard.offset(), 0ns);
+  EXPECT_EQ(check(guard, 0, 100s + 10ms).since_start, 100s + 10ms);
+  EXPECT_EQ(check(guard, kReference, 100s + 10ms).verdict, Verdict::kAccepted);
+}
+
+// A reference that ran an hour ahead must not pull the gyros there when their clock steps back.
+TEST(StampGuard, LetsNoReferenceAheadMoveTheGyrosTime) {
+  StampGuard guard = running_until(10s);
+  for (int i = 0; i < 3; ++i)
+    check(guard, kReference, 3600s + i * 10ms);
+  check(guard, 0, 5s);
+  check(guard, 0, 5s + 10ms);
+  const Checked third = check(guard, 0, 5s + 20ms);
+  EXPECT_EQ(third.verdict, Verdict::kClockStep);
+  EXPECT_EQ(third.since_start, 10s + 1us);
+}
+
+// When the gyros' clock steps back, a reference on the same host goes on with them.
+TEST(StampGuard, CarriesTheReferenceOverAStepOfTheGyrosClock) {
+  StampGuard guard = running_until(10s);
+  for (int i = 0; i < 3; ++i)
+    check(guard, 0, 5s + i * 10ms);
+  const Checked reference = check(guard, kReference, 5s + 25ms);
+  EXPECT_EQ(reference.verdict, Verdict::kAccepted);
+  EXPECT_EQ(reference.since_start, 10s + 5ms + 1us);
+}
+
+}  // namespace
+}  // namespace vgyro::fusion
