@@ -211,6 +211,7 @@ TEST(CandumpForm, TakesLinesWithoutAParenthesisForRemarks) {
   }
 }
 
+// The cause stands in the summary; it must name the part of the line that is wrong.
 TEST(CandumpForm, TellsWhatIsWrongWithAStamp) {
   EXPECT_EQ(why_malformed("("), "stamp: the seconds are no number");
   EXPECT_EQ(why_malformed("(-1.000000) can0 123#"), "stamp: the seconds are no number");
@@ -225,6 +226,7 @@ TEST(CandumpForm, TellsWhatIsWrongWithAStamp) {
   EXPECT_EQ(why_malformed("(1.5e3) can0 123#"), "stamp: no closing parenthesis");
 }
 
+// A line that lost its interface shifts everything; the frame must not become the name.
 TEST(CandumpForm, TellsWhatIsWrongWithAnInterface) {
   EXPECT_EQ(why_malformed("(1.5)"), "no interface name");
   EXPECT_EQ(why_malformed("(1.5) "), "no interface name");
@@ -233,6 +235,7 @@ TEST(CandumpForm, TellsWhatIsWrongWithAnInterface) {
   EXPECT_EQ(parse("(1.5) " + std::string(31, 'c') + " 123#11").interface, std::string(31, 'c'));
 }
 
+// A digit more or less would be another message: no identifier is guessed.
 TEST(CandumpForm, TellsWhatIsWrongWithAnIdentifier) {
   EXPECT_EQ(why_malformed("(1.5) can0"), "no \"#\" behind the identifier");
   EXPECT_EQ(why_malformed_frame("123"), "no \"#\" behind the identifier");
@@ -247,6 +250,7 @@ TEST(CandumpForm, TellsWhatIsWrongWithAnIdentifier) {
   EXPECT_EQ(why_malformed_frame("80000123#11"), "identifier: above 1FFFFFFF");
 }
 
+// A payload that is not whole would be decoded to a wrong rate.
 TEST(CandumpForm, TellsWhatIsWrongWithAPayload) {
   EXPECT_EQ(why_malformed_frame("123#112"), "payload: an odd number of hex digits");
   EXPECT_EQ(why_malformed_frame("123#1.1"), "payload: an odd number of hex digits");
@@ -262,6 +266,7 @@ TEST(CandumpForm, TellsWhatIsWrongWithAPayload) {
   EXPECT_EQ(why_malformed_frame("123#R7_9"), "raw DLC: only with 8 bytes");
 }
 
+// Five digits promise an XL frame; what does not keep the promise is told as such.
 TEST(CandumpForm, TellsWhatIsWrongWithAnXlFrame) {
   const std::string form = "XL frame: not VVPPP#FF:SS:AAAAAAAA#";
   EXPECT_EQ(why_malformed_frame("45123#"), form);

@@ -105,6 +105,7 @@ TEST_F(OpenLog, HandsOutWholeLines) {
   }
 }
 
+// Who mistyped a path must see the path and why.
 TEST_F(OpenLog, NamesTheFileThatItCannotOpen) {
   const auto missing = open_log(folder_ + "/missing.log");
   ASSERT_FALSE(missing);
@@ -120,7 +121,6 @@ TEST_F(OpenLog, CallsBeforeEveryWait) {
   const auto source = log_from_text("(1.0) can0 123#\n(2.0) can0 123#\n", 16);
   int waits = 0;
   source->before_wait([&waits] { ++waits; });
-  LogReader reader(log_from_text(""));
   EXPECT_EQ(source->next()->text, "(1.0) can0 123#\n");
   EXPECT_EQ(waits, 1);
   EXPECT_EQ(source->next()->text, "(2.0) can0 123#\n");

@@ -383,6 +383,15 @@ TEST(Aligner, HoldsNoMoreThanItsBuffersWhenOnlyOneGyroSpeaks) {
   EXPECT_EQ(aligner.counts().unpaired[0], 1'000'000U - Aligner::kCapacity);
 }
 
+// In a full buffer there is no place for what is older than its oldest sample.
+TEST(Aligner, RefusesALateSampleInAFullBufferRatherThanLoseANewOne) {
+  Aligner aligner;
+  for (int i = 0; i < static_cast<int>(Aligner::kCapacity); ++i)
+    ASSERT_TRUE(aligner.push(0, kStart + i * 10ms, 1.0));
+  EXPECT_FALSE(aligner.push(0, kStart - 5ms, 1.0));
+  EXPECT_TRUE(aligner.push(0, kStart + 15ms, 1.0));
+}
+
 // A gyro that is switched on later is paired from its first neighbours on.
 TEST(Aligner, PairsAGyroThatComesMuchLater) {
   const Stream a = stream_of(100.0, 0ms, 60.0, line_a);

@@ -105,6 +105,7 @@ TEST(Allocation, IsSeenByTheCounter) {
   EXPECT_GE(allocations_of([] { std::vector<double> values(100, 1.0); }), 1U);
 }
 
+// Waiting, late, refused, forgotten: no path of a sample goes through the heap.
 TEST(Allocation, IsNotDoneByTheAligner) {
   Aligner aligner;
   Random random(1);
@@ -125,6 +126,7 @@ TEST(Allocation, IsNotDoneByTheAligner) {
   EXPECT_GT(pairs, 1000U);
 }
 
+// The mean over an interval needs no memory of its own.
 TEST(Allocation, IsNotDoneByAveragingEither) {
   Aligner aligner;
   std::uint64_t pairs = 0;
@@ -141,6 +143,7 @@ TEST(Allocation, IsNotDoneByAveragingEither) {
   EXPECT_GT(pairs, 1900U);
 }
 
+// A step of the clock is taken up in place.
 TEST(Allocation, IsNotDoneByTheStampGuard) {
   StampGuard guard;
   EXPECT_EQ(allocations_of([&guard] {
@@ -154,6 +157,7 @@ TEST(Allocation, IsNotDoneByTheStampGuard) {
   EXPECT_GT(guard.offset(), 3590s) << "the step was taken up";
 }
 
+// The small system is solved on the stack, at every order.
 TEST(Allocation, IsNotDoneByLeastSquares) {
   for (int order = 0; order <= kOrderMax; ++order) {
     double value = 0.0;
@@ -169,6 +173,7 @@ TEST(Allocation, IsNotDoneByLeastSquares) {
   }
 }
 
+// From the first pair of the calibration through dozens of windows.
 TEST(Allocation, IsNotDoneByCalibratorAndCorrector) {
   for (int order = 0; order <= kOrderMax; ++order) {
     Calibrator calibrator(order, 20.0);

@@ -100,6 +100,14 @@ TEST(StampGuard, RefusesOutliersThatDoNotAgree) {
   EXPECT_EQ(check(guard, 0, 1010ms).since_start, 1010ms);
 }
 
+// Nor do stamps that follow each other at no rate of any gyro.
+TEST(StampGuard, RefusesOutliersThatLieFarApart) {
+  StampGuard guard = running_until(1s);
+  for (int i = 1; i < 100; ++i)
+    ASSERT_EQ(check(guard, 0, i * 3600s).verdict, Verdict::kUnconfirmed);
+  EXPECT_EQ(check(guard, 0, 1010ms).since_start, 1010ms);
+}
+
 // A silent bus comes back after minutes: the third stamp is believed, and time goes on as it says.
 TEST(StampGuard, BelievesThreeAgreeingStampsBehindALongGap) {
   StampGuard guard = running_until(1s);
@@ -196,6 +204,8 @@ TEST(StampGuard, LetsNoReferenceAheadMoveTheGyrosTime) {
   const Checked third = check(guard, 0, 5s + 20ms);
   EXPECT_EQ(third.verdict, Verdict::kClockStep);
   EXPECT_EQ(third.since_start, 10s + 1us);
+  EXPECT_EQ(check(guard, kReference, 5s + 30ms).verdict, Verdict::kAccepted)
+      << "and its own clock, set right with theirs, is believed at once";
 }
 
 // When the gyros' clock steps back, a reference on the same host goes on with them.
