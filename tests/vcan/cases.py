@@ -16,7 +16,7 @@ import verdicts
 from verdicts import require
 
 SOURCE = Path(os.environ.get("VGYRO_SOURCE", Path(__file__).resolve().parents[2]))
-BIN = Path(os.environ.get("VGYRO_BIN", SOURCE / "build/release/bin"))
+BIN = Path(os.environ.get("VGYRO_BIN", SOURCE / "build/release/bin")).resolve()
 sys.path.insert(0, str(SOURCE / "tests/twin"))
 import make_twin  # noqa: E402
 
