@@ -26,8 +26,9 @@ class FrameSink {
   virtual void put(const can::Frame& frame, TimePoint stamp) = 0;
 };
 
-/// For those who draw or add up: every virtual rate with what it was made of, before it is
-/// quantised into a frame. NaN stands for a missing gyro and for an invalid rate.
+/// For those who draw or add up: every virtual rate with what it was made of, before it becomes a
+/// frame, also where it is beyond what the frame can carry. NaN stands for a missing gyro, and for a
+/// rate that is not known yet.
 class RateObserver {
  public:
   virtual ~RateObserver() = default;
