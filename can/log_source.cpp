@@ -165,6 +165,8 @@ class TextSource : public LogSource {
 
 Expected<std::unique_ptr<LogSource>> open_log(const std::string& path) {
   if (path == "-") {
+    // Fewer turns between the writer and this process; a file or a terminal has no such size.
+    ::fcntl(STDIN_FILENO, F_SETPIPE_SZ, static_cast<int>(LogSource::kBufferBytes));
     return std::make_unique<FileSource>(STDIN_FILENO, "standard input", 0, false);
   }
   const int fd = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
