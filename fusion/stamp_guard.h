@@ -18,7 +18,7 @@ class StampGuard {
   /// Only the first streams, the gyros, may move the clock; a reference that jumps back waits.
   static constexpr std::size_t kLeaders = 2;
   static constexpr Duration kReorderMax = std::chrono::milliseconds(250);
-  static constexpr Duration kForwardMax = std::chrono::seconds(10);
+  static constexpr Duration kForwardMax = std::chrono::seconds(1);
   static constexpr Duration kConfirmWithin = std::chrono::seconds(1);
   static constexpr int kConfirmations = 3;
 

@@ -120,10 +120,22 @@ TEST(StampGuard, BelievesThreeAgreeingStampsBehindALongGap) {
   EXPECT_EQ(guard.offset(), 0ns);
 }
 
-// Up to ten seconds need no confirmation: no frame is lost to an ordinary pause.
+// Up to one second needs no confirmation: no frame is lost to an ordinary pause.
 TEST(StampGuard, TakesAnOrdinaryPauseAtOnce) {
   StampGuard guard = running_until(1s);
-  EXPECT_EQ(check(guard, 0, 11s).verdict, Verdict::kAccepted);
+  EXPECT_EQ(check(guard, 0, 2s).verdict, Verdict::kAccepted);
+}
+
+// One stamp a few seconds ahead would make all that follow look set back, and move the axis.
+TEST(StampGuard, IsNotMovedByOneStampSecondsAhead) {
+  StampGuard guard = running_until(1s);
+  EXPECT_EQ(check(guard, 0, 6s).verdict, Verdict::kUnconfirmed);
+  for (Duration raw = 1010ms; raw < 8s; raw += 10ms) {
+    const Checked next = check(guard, 0, raw);
+    ASSERT_EQ(next.verdict, Verdict::kAccepted);
+    ASSERT_EQ(next.since_start, raw);
+  }
+  EXPECT_EQ(guard.offset(), 0ns);
 }
 
 // The host's clock was set back: the axis goes on from the newest time of any stream, and the other
