@@ -36,7 +36,7 @@ void Calibrator::begin(double t_s) {
 
 bool Calibrator::close_block() {
   const auto count = static_cast<double>(block_.count);
-  if (block_.count == 0) return true;
+  if (block_.count < kBlockPairsMin) return true;
   const double common = block_.common / count;
   const double mean = block_.difference / count;
   const double variance = std::max(block_.difference_squares / count - mean * mean, 0.0);
@@ -61,7 +61,8 @@ bool Calibrator::finish(const Sums& sums, double t_s) {
 bool Calibrator::add(double t_s, const std::array<double, 2>& rate_dps, double true_rate_dps) {
   if (!started_) begin(t_s);
   const bool complete = t_s - from_s_ >= rest_s_;
-  if (complete || t_s - block_.from_s >= kBlock_s) {
+  const bool block_full = t_s - block_.from_s >= kBlock_s && block_.count >= kBlockPairsMin;
+  if (complete || block_full) {
     const bool still = close_block();
     moved_ = moved_ || (!still && when_moving_ == WhenMoving::kAccept);
     if (!still && when_moving_ == WhenMoving::kWait) {

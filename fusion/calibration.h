@@ -39,6 +39,8 @@ class Calibrator {
   /// On top, this many standard errors of a block's mean, from the noise of the difference.
   static constexpr double kNoiseFactor = 10.0;
   static constexpr double kBlock_s = 1.0;
+  /// Fewer pairs are not judged; slow gyros get longer blocks.
+  static constexpr std::uint64_t kBlockPairsMin = 8;
   /// Motion that begins after this share of rest_s ends the calibration instead of spoiling it.
   static constexpr double kEnoughShare = 0.9;
 

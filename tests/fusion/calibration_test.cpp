@@ -231,6 +231,24 @@ TEST(Calibrator, TellsNoMotionWhereItWasAllowedAndThereWasNone) {
   EXPECT_NEAR(calibrator.result().sum.slope_at(30.0), 2e-3, 1e-13);
 }
 
+// A second of a slow gyro holds one or two pairs, whose noise must not be taken for motion.
+TEST(Calibrator, CompletesWithSlowGyrosToo) {
+  for (const double rate_hz : {0.8, 1.0, 2.7, 5.0}) {
+    for (std::uint64_t seed = 1; seed <= 50; ++seed) {
+      SCOPED_TRACE(::testing::Message() << rate_hz << " Hz, seed " << seed);
+      Random random(seed);
+      Pair pair;
+      pair.sigma_dps = 0.3;
+      Calibrator calibrator(1, 60.0);
+      double t_s = 0.0;
+      while (t_s < 100.0 && calibrator.add(t_s, pair.at(t_s, random), 0.0))
+        t_s += 1.0 / rate_hz;
+      EXPECT_LT(t_s, 61.5);
+      EXPECT_EQ(calibrator.restarts(), 0U);
+    }
+  }
+}
+
 // What was thrown away after a hole plays no part in the judgement of what was used.
 TEST(Calibrator, ForgetsMotionBeforeAHole) {
   Random random(1);
