@@ -49,6 +49,7 @@ def check_programs():
 
 
 def run(folder, selected, where):
+    folder.mkdir(parents=True, exist_ok=True)
     plan = []
     for case in selected:
         case_folder = folder / case.name
@@ -65,10 +66,11 @@ def run(folder, selected, where):
         print(f"vcan: the guest failed ({code})\n{guest.read_text() if guest.exists() else ''}")
     print(f"vcan: ran for {time.monotonic() - begin:.0f} s {where.name}")
 
-    failed = 0
+    failed = []
     for case in selected:
         passed, text = cases.judge(case, folder / case.name)
-        failed += not passed
+        if not passed:
+            failed.append(case)
         print(f"  {'pass' if passed else 'FAIL'}  {case.name}: {case.says}\n        {text}")
     return failed
 
@@ -83,11 +85,18 @@ def main():
         print("vcan: no recordings of real cars (VGYRO_RECORDINGS is not set to a folder with car_rav4)")
     with tempfile.TemporaryDirectory(prefix="vgyro-vcan-") as scratch:
         folder = Path(arguments.keep or scratch).resolve()
-        failed = run(folder, selected, where)
+        failed = run(folder / "first", selected, where)
+        again = failed
+        if failed:
+            # The cases play in real time; a host that stood still for a quarter of a second breaks one, a
+            # fault of the product breaks it again.
+            print(f"vcan: once more: {', '.join(case.name for case in failed)}")
+            failed = run(folder / "second", failed, where)
     if failed:
-        print(f"vcan: {failed} of {len(selected)} cases FAILED {where.name}")
+        print(f"vcan: {len(failed)} of {len(selected)} cases FAILED twice {where.name}")
         return 1
-    print(f"vcan: {len(selected)} cases passed {where.name}")
+    note = f", {len(again)} of them on the second run ({', '.join(c.name for c in again)})" if again else ""
+    print(f"vcan: {len(selected)} cases passed {where.name}{note}")
     return 0
 
 
