@@ -16,8 +16,9 @@ constexpr int kDone = 0;
 constexpr int kBadInput = 1;
 constexpr int kWrongUsage = 2;
 
-int run(const std::string& config, vgyro::daemon::Log& log) {
-  const vgyro::gateway::ConfigResult loaded = vgyro::gateway::load_config(config);
+int run(const std::string& config, const std::string& method, vgyro::daemon::Log& log) {
+  const vgyro::gateway::ConfigResult loaded =
+      vgyro::gateway::load_config(config, {vgyro::gateway::method_from(method)});
   if (!loaded) {
     for (const vgyro::Error& error : loaded.error())
       log.error("{}", error.message());
@@ -41,9 +42,12 @@ int main(int argc, char** argv) {
       "Runs in the foreground until SIGTERM; as a service: systemctl start vgyrod.",
       "vgyrod");
   std::string config;
+  std::string method;
   app.add_option("--config", config, "The gateway's configuration (vgyro.toml)")
       ->required()
       ->type_name("FILE");
+  app.add_option("--method", method, "corrector instead of the configured one")
+      ->check(CLI::IsMember({"mutual", "mean"}));
   app.set_version_flag("--version", "vgyrod " VGYRO_VERSION);
   app.footer(
       "`vgyro check FILE` explains a configuration before it is trusted.\n"
@@ -57,7 +61,7 @@ int main(int argc, char** argv) {
   std::signal(SIGPIPE, SIG_IGN);  // a reader of stderr that went away must not stop the gateway
   vgyro::daemon::Log log;
   try {
-    return run(config, log);
+    return run(config, method, log);
   } catch (const std::exception& error) {
     log.error("{}", error.what());
     return kBadInput;
