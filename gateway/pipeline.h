@@ -27,8 +27,8 @@ class FrameSink {
 };
 
 /// For those who draw or add up: every virtual rate with what it was made of, before it becomes a
-/// frame, also where it is beyond what the frame can carry. NaN stands for a missing gyro, and for a
-/// rate that is not known yet.
+/// frame, also where it is beyond what the frame can carry. NaN stands for a missing gyro, and for
+/// a rate that is not known yet.
 class RateObserver {
  public:
   virtual ~RateObserver() = default;
