@@ -25,11 +25,11 @@ constexpr std::array<std::int8_t, 256> make_hex_values() {
   std::array<std::int8_t, 256> table{};
   for (auto& entry : table)
     entry = -1;
-  for (int i = 0; i < 10; ++i)
-    table[static_cast<std::size_t>('0' + i)] = static_cast<std::int8_t>(i);
-  for (int i = 0; i < 6; ++i) {
-    table[static_cast<std::size_t>('a' + i)] = static_cast<std::int8_t>(10 + i);
-    table[static_cast<std::size_t>('A' + i)] = static_cast<std::int8_t>(10 + i);
+  for (std::size_t i = 0; i < 10; ++i)
+    table[std::size_t{'0'} + i] = static_cast<std::int8_t>(i);
+  for (std::size_t i = 0; i < 6; ++i) {
+    table[std::size_t{'a'} + i] = static_cast<std::int8_t>(10 + i);
+    table[std::size_t{'A'} + i] = static_cast<std::int8_t>(10 + i);
   }
   return table;
 }
@@ -345,7 +345,7 @@ void LogReader::remember_interface(BusIndex bus) {
   if (known_count_ == known_.size() || name.size() > 7) return;
   KnownInterface& known = known_[known_count_++];
   char text[8] = {};
-  std::memcpy(text, name.data(), name.size());
+  std::copy(name.begin(), name.end(), text);
   text[name.size()] = ' ';
   known.length = static_cast<std::uint8_t>(name.size() + 1);
   known.mask = known.length == 8 ? ~0ULL : (1ULL << (8U * known.length)) - 1;
@@ -483,7 +483,7 @@ namespace {
 template <unsigned digits>
 char* put_decimal(char* out, std::uint32_t value) {
   for (unsigned i = digits; i >= 2; i -= 2) {
-    std::memcpy(out + i - 2, &kDecimalPairs[2 * (value % 100)], 2);
+    std::memcpy(out + i - 2, &kDecimalPairs[2 * std::size_t{value % 100}], 2);
     value /= 100;
   }
   if constexpr (digits % 2 != 0) out[0] = static_cast<char>('0' + value % 10);

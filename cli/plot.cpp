@@ -112,6 +112,7 @@ Expected<void> ReplayPlot::check_path(const std::string& path) {
     return fail(path, "cannot be written: " + system_reason());
   }
   // Not by trying: a pipe to a program that is not there ends this one.
+  // NOLINTNEXTLINE(concurrency-mt-unsafe): the program has one thread
   if (::system("command -v gnuplot >/dev/null 2>&1") != 0) {
     return fail(path, "cannot be drawn: there is no gnuplot", "apt-get install gnuplot-nox");
   }

@@ -41,7 +41,7 @@ can::BusIndex bus_index(std::vector<std::string>& buses, const std::string& name
 }
 
 std::string required_bus(TomlReader& reader) {
-  const std::string name = reader.required_text("bus", "can0");
+  std::string name = reader.required_text("bus", "can0");
   if (name.size() > kInterfaceNameMax) {
     reader.complain(reader.where("bus"), fmt::format("\"{}\" is no interface name", name),
                     "at most 15 characters, as `ip link` shows them");
