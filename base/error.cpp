@@ -1,6 +1,5 @@
 #include "base/error.h"
 
-#include <cerrno>
 #include <system_error>
 
 #include <fmt/core.h>
@@ -13,8 +12,8 @@ std::string Error::message() const {
   return text;
 }
 
-std::string system_reason() {
-  return std::system_category().message(errno);
+std::string system_reason(int error) {
+  return std::system_category().message(error);
 }
 
 std::string at_line(const std::string& file, unsigned line) {

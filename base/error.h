@@ -2,6 +2,7 @@
 
 // Bad input as a value: where it is, what is wrong, and what would be right.
 
+#include <cerrno>
 #include <string>
 #include <utility>
 
@@ -25,8 +26,8 @@ inline tl::unexpected<Error> fail(std::string where, std::string what, std::stri
   return tl::unexpected<Error>(Error{std::move(where), std::move(what), std::move(remedy)});
 }
 
-/// What the last failed system call says of itself.
-std::string system_reason();
+/// What a failed system call says of itself; the last one, where no error number is given.
+std::string system_reason(int error = errno);
 
 /// "file:line"
 std::string at_line(const std::string& file, unsigned line);

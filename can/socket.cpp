@@ -14,7 +14,6 @@
 #include <net/if_arp.h>
 #include <sys/ioctl.h>
 #include <sys/socket.h>
-#include <system_error>
 #include <unistd.h>
 #include <utility>
 #include <vector>
@@ -31,10 +30,6 @@ struct Link {
   int index = 0;
   bool fd_frames = false;
 };
-
-std::string reason(int error) {
-  return std::generic_category().message(error);
-}
 
 template <class T>
 bool set_option(int fd, int level, int name, const T& value) {
@@ -55,7 +50,7 @@ Expected<int> open_raw(const std::string& interface) {
                 "load it with `modprobe can-raw`; Debian's -cloud- kernels and most containers' "
                 "hosts lack it");
   }
-  return fail(interface, "no CAN socket: " + reason(errno));
+  return fail(interface, "no CAN socket: " + system_reason(errno));
 }
 
 Expected<Link> find_link(int fd, const std::string& interface) {
@@ -186,15 +181,15 @@ Expected<Socket> Socket::open(const std::string& interface, std::span<const Filt
   if (!link) return tl::unexpected(link.error());
   socket.fd_frames_ = link->fd_frames;
   // All before bind(): nothing unwanted or unstamped is ever queued.
-  if (!set_filters(*fd, filters)) return fail(interface, "no CAN filters: " + reason(errno));
+  if (!set_filters(*fd, filters)) return fail(interface, "no CAN filters: " + system_reason(errno));
   set_buffers(*fd, options);
   if (!set_stamps_and_drop_count(*fd)) {
-    return fail(interface, "no kernel time stamps: " + reason(errno));
+    return fail(interface, "no kernel time stamps: " + system_reason(errno));
   }
   if (link->fd_frames && !set_option(*fd, SOL_CAN_RAW, CAN_RAW_FD_FRAMES, 1)) {
-    return fail(interface, "no CAN FD frames: " + reason(errno));
+    return fail(interface, "no CAN FD frames: " + system_reason(errno));
   }
-  if (!bind_to(*fd, link->index)) return fail(interface, "cannot bind: " + reason(errno));
+  if (!bind_to(*fd, link->index)) return fail(interface, "cannot bind: " + system_reason(errno));
   socklen_t size = sizeof(socket.receive_buffer_bytes_);
   ::getsockopt(*fd, SOL_SOCKET, SO_RCVBUF, &socket.receive_buffer_bytes_, &size);
   return socket;

@@ -1,6 +1,5 @@
 #include "daemon/bus.h"
 
-#include <system_error>
 #include <utility>
 
 namespace vgyro::daemon {
@@ -48,7 +47,7 @@ bool Bus::refill() {
       close_dead("the interface was removed");
       break;
     case can::ReceiveStatus::kFailed:
-      close_dead(std::generic_category().message(socket_->last_errno()));
+      close_dead(system_reason(socket_->last_errno()));
       break;
   }
   return !batch_.frames.empty();

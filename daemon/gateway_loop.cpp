@@ -6,7 +6,6 @@
 #include <csignal>
 #include <ctime>
 #include <sys/signalfd.h>
-#include <system_error>
 #include <systemd/sd-daemon.h>
 #include <unistd.h>
 #include <utility>
@@ -28,10 +27,6 @@ TimePoint host_clock() {
   timespec now{};
   ::clock_gettime(CLOCK_REALTIME, &now);
   return time_from_ns(static_cast<std::int64_t>(now.tv_sec) * 1'000'000'000 + now.tv_nsec);
-}
-
-std::string reason(int error) {
-  return std::generic_category().message(error);
 }
 
 std::vector<can::Filter> filters_of(const gateway::Plan& plan, std::size_t bus) {
@@ -61,10 +56,10 @@ GatewayLoop::~GatewayLoop() {
 
 Expected<void> GatewayLoop::start() {
   epoll_fd_ = ::epoll_create1(EPOLL_CLOEXEC);
-  if (epoll_fd_ < 0) return fail("epoll", reason(errno));
+  if (epoll_fd_ < 0) return fail("epoll", system_reason(errno));
   for (std::size_t i = 0; i < buses_.size(); ++i) {
     if (const Expected<void> opened = buses_[i].open(); !opened) return opened;
-    if (!poll_bus(i)) return fail(buses_[i].name(), "cannot poll: " + reason(errno));
+    if (!poll_bus(i)) return fail(buses_[i].name(), "cannot poll: " + system_reason(errno));
   }
   if (const Expected<void> checked = check_output(); !checked) return checked;
   return start_events();
@@ -88,7 +83,7 @@ bool GatewayLoop::poll_bus(std::size_t index) {
 Expected<void> GatewayLoop::start_events() {
   sd_event* events = nullptr;
   int result = sd_event_new(&events);
-  if (result < 0) return fail("sd-event", reason(-result));
+  if (result < 0) return fail("sd-event", system_reason(-result));
   events_.reset(events);
 
   sigset_t signals;
@@ -102,13 +97,13 @@ Expected<void> GatewayLoop::start_events() {
     result = sd_event_add_time_relative(events, nullptr, CLOCK_MONOTONIC, kSecondUsec, 0,
                                         &on_second, this);
   }
-  if (result < 0) return fail("sd-event", reason(-result));
+  if (result < 0) return fail("sd-event", system_reason(-result));
 
   epoll_event event{};
   event.events = EPOLLIN;
   event.data.u32 = kEventsTag;
   if (::epoll_ctl(epoll_fd_, EPOLL_CTL_ADD, sd_event_get_fd(events), &event) != 0) {
-    return fail("sd-event", reason(errno));
+    return fail("sd-event", system_reason(errno));
   }
   return {};
 }
@@ -124,7 +119,7 @@ Expected<void> GatewayLoop::run() {
   while (!stopping_) {
     const int count =
         ::epoll_wait(epoll_fd_, ready.data(), static_cast<int>(ready.size()), timeout_ms());
-    if (count < 0 && errno != EINTR) return fail("epoll", reason(errno));
+    if (count < 0 && errno != EINTR) return fail("epoll", system_reason(errno));
     const std::span<const epoll_event> events{ready.data(),
                                               static_cast<std::size_t>(std::max(count, 0))};
     if (const Expected<void> done = cycle(events); !done) return done;
@@ -141,7 +136,7 @@ Expected<void> GatewayLoop::serve_events(bool armed) {
     if (result > 0) result = sd_event_dispatch(events_.get());
     if (result >= 0) result = sd_event_prepare(events_.get());
     if (result == 0) return {};
-    if (result < 0) return fail("sd-event", reason(-result));
+    if (result < 0) return fail("sd-event", system_reason(-result));
   }
 }
 
