@@ -19,7 +19,7 @@ struct Options {
 
 void add_method(CLI::App& command, std::string& method) {
   command.add_option("--method", method, "corrector instead of the configured one")
-      ->check(CLI::IsMember({"mutual", "mean"}));
+      ->check(CLI::IsMember({"optimal", "mutual", "mean"}));
 }
 
 CLI::App* add_check(CLI::App& app, CheckOptions& options, std::string& method) {

@@ -47,7 +47,7 @@ int main(int argc, char** argv) {
       ->required()
       ->type_name("FILE");
   app.add_option("--method", method, "corrector instead of the configured one")
-      ->check(CLI::IsMember({"mutual", "mean"}));
+      ->check(CLI::IsMember({"optimal", "mutual", "mean"}));
   app.set_version_flag("--version", "vgyrod " VGYRO_VERSION);
   app.footer(
       "`vgyro check FILE` explains a configuration before it is trusted.\n"

@@ -147,6 +147,7 @@ bool Aligner::pop(AlignedPair& pair) {
     const bool paired = half_window_ == Duration::zero() ? interpolate(other, pair, 1 - pace_)
                                                          : average(other, pair, 1 - pace_);
     pair.rate_dps[pace_] = own[0].rate_dps;
+    pair.noise_gain[pace_] = 1.0;
     used_until_[pace_] = pair.t;
     any_used_[pace_] = true;
     own.pop_front();
@@ -165,12 +166,15 @@ bool Aligner::interpolate(const Ring& other, AlignedPair& pair, std::size_t othe
   const Sample& before = other[0];
   if (before.t == pair.t) {
     pair.rate_dps[other_index] = before.rate_dps;
+    pair.noise_gain[other_index] = 1.0;
     pair.complete = pair.t;
     return true;
   }
   const Sample& after = other[1];
   if (after.t - before.t > gap_[other_index]) return false;
   pair.rate_dps[other_index] = line_at(pair.t, before.t, before.rate_dps, after.t, after.rate_dps);
+  const double share = to_seconds(pair.t - before.t) / to_seconds(after.t - before.t);
+  pair.noise_gain[other_index] = (1.0 - share) * (1.0 - share) + share * share;
   pair.complete = after.t;
   used_until_[other_index] = before.t;
   any_used_[other_index] = true;
@@ -197,6 +201,7 @@ bool Aligner::average(const Ring& other, AlignedPair& pair, std::size_t other_in
   }
   any_used_[other_index] = true;
   pair.rate_dps[other_index] = area / to_seconds(to - from);
+  pair.noise_gain[other_index] = to_seconds(interval_[other_index]) / to_seconds(to - from);
   return true;
 }
 

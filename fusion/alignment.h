@@ -19,6 +19,9 @@ struct AlignedPair {
   TimePoint t;         ///< the instant that both rates refer to
   TimePoint complete;  ///< stamp of the sample that completed the pair
   std::array<double, 2> rate_dps{};
+  /// White-noise variance of each rate relative to one raw sample: interpolation and averaging
+  /// lower it.
+  std::array<double, 2> noise_gain{1.0, 1.0};
 };
 
 class Aligner {

@@ -7,14 +7,20 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <optional>
 
 #include "fusion/calibration.h"
+#include "fusion/drift_memory.h"
+#include "fusion/gyro_parameters.h"
 
 namespace vgyro::fusion {
 
 struct RatePair {
   double t_s = 0.0;
   std::array<double, 2> rate_dps{};
+  /// White-noise variance of each rate relative to one raw sample of its gyro: below 1 where it was
+  /// interpolated or averaged.
+  std::array<double, 2> noise_gain{1.0, 1.0};
 };
 
 struct VirtualRate {
@@ -26,7 +32,7 @@ struct VirtualRate {
 struct Drift {
   std::array<double, 2> bias_dps{};  ///< NaN where the method has none
   double slope_dps_s = 0.0;          ///< of the drift that is taken off the virtual rate; NaN
-  double bias_sigma_dps = 0.0;       ///< NaN where the method makes no statement
+  double bias_sigma_dps = 0.0;       ///< of what is taken off the virtual rate; NaN likewise
   double slope_sigma_dps_s = 0.0;    ///< NaN likewise
 };
 
@@ -35,20 +41,50 @@ struct WindowCounts {
   std::uint64_t skipped = 0;  ///< too few pairs: the drift was held
 };
 
+/// What a wheel-speed signal says of the vehicle.
+enum class Wheels : std::uint8_t { kUnknown, kStanding, kRolling };
+
+/// What the method does at present, for people and for VG_Bias.
+struct Condition {
+  bool stopped = false;              ///< standing still: the common drift is being learned
+  bool disagree = false;             ///< the gyros contradict each other; which is wrong is open
+  std::array<bool, 2> noisy{};       ///< the noise of this gyro is far above what it was
+  std::uint64_t stops = 0;           ///< stops learned from
+  std::uint64_t stops_refused = 0;   ///< steady, but both gyros had moved together
+  std::uint64_t disagreements = 0;   ///< times that `disagree` began
+};
+
 class Corrector {
  public:
   virtual ~Corrector() = default;
 
   [[nodiscard]] virtual bool needs_calibration() const = 0;
-  /// Must be called once before the other calls where needs_calibration().
+  /// The pairs of the initial calibration, with their true rate, before start().
+  virtual void calibrate(const RatePair& /*pair*/, double /*true_rate_dps*/) {}
+  /// The platform moved: what calibrate() was given so far is worthless.
+  virtual void restart_calibration() {}
+  /// Must be called once before update() where needs_calibration().
   virtual void start(const Calibration& calibration) = 0;
-  /// The next pair; t_s grows from call to call.
+  /// Instead of a calibration: what was known `age_s` seconds before `t_s`. False when this method
+  /// keeps no memory, or the memory cannot be right; then nothing has changed.
+  virtual bool resume(const DriftMemory& /*memory*/, double /*age_s*/, double /*t_s*/) {
+    return false;
+  }
+
+  /// The next pair; t_s grows from call to call, also across update_alone().
   virtual VirtualRate update(const RatePair& pair) = 0;
-  /// One gyro alone, its drift as last known.
-  [[nodiscard]] virtual VirtualRate carry_on(std::size_t gyro, double t_s,
-                                             double rate_dps) const = 0;
+  /// One gyro alone: the rate of the other one is not used.
+  virtual VirtualRate update_alone(std::size_t gyro, const RatePair& pair) = 0;
+  /// What the wheels say from now on.
+  virtual void set_wheels(Wheels /*wheels*/) {}
+
   [[nodiscard]] virtual Drift drift(double t_s) const = 0;
   [[nodiscard]] virtual WindowCounts windows() const = 0;
+  [[nodiscard]] virtual Condition condition() const { return {}; }
+  /// To be kept across a restart; nothing before there is anything to keep.
+  [[nodiscard]] virtual std::optional<DriftMemory> memory(double /*t_s*/) const {
+    return std::nullopt;
+  }
 };
 
 /// ½(y₁ + y₂) as it comes: the rival that every method must beat.
@@ -56,5 +92,16 @@ std::unique_ptr<Corrector> make_mean_corrector();
 
 /// The paper's mutual calibration. order 0…kOrderMax, window_s > 0.
 std::unique_ptr<Corrector> make_mutual_corrector(int order, double window_s);
+
+struct OptimalSettings {
+  double window_s = 10.0;
+  /// The true rate at a stop; without it stops teach nothing.
+  std::optional<double> stop_rate_dps = 0.0;
+  std::array<GyroParameters, 2> gyros;
+};
+
+/// Weights from the gyros' noise, drift shared out by a Kalman filter over windows, stops:
+/// docs/optimal.md.
+std::unique_ptr<Corrector> make_optimal_corrector(const OptimalSettings& settings);
 
 }  // namespace vgyro::fusion

@@ -15,10 +15,9 @@ class MeanCorrector final : public Corrector {
   VirtualRate update(const RatePair& pair) override {
     return {0.5 * (pair.rate_dps[0] + pair.rate_dps[1]), kNone, pair.rate_dps};
   }
-  [[nodiscard]] VirtualRate carry_on(std::size_t gyro, double /*t_s*/,
-                                     double rate_dps) const override {
-    VirtualRate alone{rate_dps, kNone, {kNone, kNone}};
-    alone.corrected_dps[gyro] = rate_dps;
+  VirtualRate update_alone(std::size_t gyro, const RatePair& pair) override {
+    VirtualRate alone{pair.rate_dps[gyro], kNone, {kNone, kNone}};
+    alone.corrected_dps[gyro] = pair.rate_dps[gyro];
     return alone;
   }
   [[nodiscard]] Drift drift(double /*t_s*/) const override {

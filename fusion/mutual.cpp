@@ -43,8 +43,8 @@ class MutualCorrector final : public Corrector {
         {pair.rate_dps[0] - 0.5 * (sum + difference), pair.rate_dps[1] - 0.5 * (sum - difference)}};
   }
 
-  [[nodiscard]] VirtualRate carry_on(std::size_t gyro, double t_s, double rate_dps) const override {
-    VirtualRate alone{rate_dps - drift(t_s).bias_dps[gyro], kNone, {kNone, kNone}};
+  VirtualRate update_alone(std::size_t gyro, const RatePair& pair) override {
+    VirtualRate alone{pair.rate_dps[gyro] - drift(pair.t_s).bias_dps[gyro], kNone, {kNone, kNone}};
     alone.corrected_dps[gyro] = alone.rate_dps;
     return alone;
   }

@@ -310,6 +310,9 @@ void read_calibration(TomlReader& root, Context& context) {
     reader.complain(reader.where("source"), fmt::format("source is \"{}\"", source),
                     suggest_name(source, {"rest", "reference"}));
   }
+  // The reference tells the rate while calibrating; what it will be at a stop it does not tell.
+  plan.stop_rate_dps = plan.rate_dps;
+  if (plan.from_reference && !rate && !latitude) plan.stop_rate_dps = std::nullopt;
   read_when_moving(reader, plan);
   if (plan.from_reference && !root.has("reference")) {
     reader.complain(reader.where("source"), "source = \"reference\" needs a [reference] table");
@@ -326,15 +329,9 @@ void read_corrector(TomlReader& root, Context& context, const ConfigOverrides& o
   if (const auto name = reader.text("method")) {
     const auto method = method_from(*name);
     if (method && !overrides.method) plan.method = *method;
-    if (!method && *name == "optimal") {
-      if (!overrides.method) {
-        reader.complain(reader.where("method"), "method \"optimal\" is not in this version yet",
-                        "set method = \"mutual\" (the paper's method) or \"mean\", or say "
-                        "--method mutual");
-      }
-    } else if (!method) {
+    if (!method) {
       reader.complain(reader.where("method"), fmt::format("there is no method \"{}\"", *name),
-                      suggest_name(*name, {"mutual", "mean"}));
+                      suggest_name(*name, {"optimal", "mutual", "mean"}));
     }
   }
   plan.window_s = number_within(reader, "window_s", plan.window_s, 0.0, kWindowMax_s, "s");
@@ -404,11 +401,20 @@ void read_output(TomlReader& root, Context& context) {
 std::optional<Method> method_from(std::string_view name) {
   if (name == "mean") return Method::kMean;
   if (name == "mutual") return Method::kMutual;
+  if (name == "optimal") return Method::kOptimal;
   return std::nullopt;
 }
 
 std::string_view to_string(Method method) {
-  return method == Method::kMean ? "mean" : "mutual";
+  switch (method) {
+    case Method::kMean:
+      return "mean";
+    case Method::kMutual:
+      return "mutual";
+    case Method::kOptimal:
+      break;
+  }
+  return "optimal";
 }
 
 ConfigResult load_config(const std::string& path, const ConfigOverrides& overrides) {

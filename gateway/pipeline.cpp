@@ -48,9 +48,18 @@ TimePoint next_on_grid(TimePoint t) {
   return TimePoint{Duration{to_ns(t) / period * period + period}};
 }
 
-std::unique_ptr<fusion::Corrector> make_corrector(const CorrectorPlan& plan) {
-  if (plan.method == Method::kMean) return fusion::make_mean_corrector();
-  return fusion::make_mutual_corrector(plan.order, plan.window_s);
+std::unique_ptr<fusion::Corrector> make_corrector(const Plan& plan) {
+  switch (plan.corrector.method) {
+    case Method::kMean:
+      return fusion::make_mean_corrector();
+    case Method::kMutual:
+      return fusion::make_mutual_corrector(plan.corrector.order, plan.corrector.window_s);
+    case Method::kOptimal:
+      break;
+  }
+  return fusion::make_optimal_corrector({.window_s = plan.corrector.window_s,
+                                         .stop_rate_dps = plan.calibration.stop_rate_dps,
+                                         .gyros = plan.corrector.gyros});
 }
 
 }  // namespace
@@ -122,7 +131,7 @@ Pipeline::Impl::Impl(const Plan& the_plan)
       router(plan),
       inputs{GyroInput(plan.gyros[0]), GyroInput(plan.gyros[1])},
       calibrator(plan.corrector.order, plan.calibration.rest_s, plan.calibration.when_moving),
-      corrector(make_corrector(plan.corrector)),
+      corrector(make_corrector(plan)),
       encoder(plan.output) {
   calibrated = !corrector->needs_calibration();
   status.rate_dps = kNone;
@@ -240,7 +249,7 @@ void Pipeline::Impl::take_pair(const fusion::AlignedPair& pair, TimePoint stamp,
   if (!calibrated) calibrate(pair);
   if (calibrated && !was_calibrated) enter_state(stamp, sink);
   fusion::VirtualRate rate;
-  if (calibrated) rate = corrector->update({seconds(pair.t), pair.rate_dps});
+  if (calibrated) rate = corrector->update({seconds(pair.t), pair.rate_dps, pair.noise_gain});
   // While one gyro was missing the other spoke alone, perhaps for later instants than this.
   if (pair.t <= newest) return;
   newest = pair.t;
@@ -259,7 +268,11 @@ void Pipeline::Impl::take_single(std::size_t gyro, TimePoint t, double rate_dps,
   // A gyro that was never compared with the other one is not believed, whatever the method.
   const bool valid = calibrated && status.pairs > 0;
   fusion::VirtualRate rate;
-  if (valid) rate = corrector->carry_on(gyro, seconds(t), rate_dps);
+  if (valid) {
+    fusion::RatePair single{.t_s = seconds(t)};
+    single.rate_dps[gyro] = rate_dps;
+    rate = corrector->update_alone(gyro, single);
+  }
   enter_state(stamp, sink);
   if (observer != nullptr) {
     std::array<double, 2> raw_dps{kNone, kNone};
@@ -284,9 +297,13 @@ void Pipeline::Impl::calibrate(const fusion::AlignedPair& pair) {
 
 void Pipeline::Impl::calibrate_with(const fusion::AlignedPair& pair, double true_rate_dps) {
   const bool used = calibrator.add(seconds(pair.t), pair.rate_dps, true_rate_dps);
+  if (calibrator.restarts() != status.calibration_restarts) corrector->restart_calibration();
   status.calibrated_s = calibrator.covered_s();
   status.calibration_restarts = calibrator.restarts();
-  if (used) return;
+  if (used) {
+    corrector->calibrate({seconds(pair.t), pair.rate_dps, pair.noise_gain}, true_rate_dps);
+    return;
+  }
   corrector->start(calibrator.result());
   calibrated = true;
   status.moved_in_calibration = calibrator.result().in_motion;

@@ -13,10 +13,11 @@
 #include "dbc/codec.h"
 #include "dbc/multiplex.h"
 #include "fusion/calibration.h"
+#include "fusion/gyro_parameters.h"
 
 namespace vgyro::gateway {
 
-enum class Method : std::uint8_t { kMean, kMutual };
+enum class Method : std::uint8_t { kMean, kMutual, kOptimal };
 
 /// A frame identifier on a bus: matches when (id & mask) == (frame.id & mask) and the format
 /// agrees.
@@ -100,13 +101,15 @@ struct CalibrationPlan {
   double rest_s = 60.0;
   double rate_dps = 0.0;        ///< true rate along the axis while calibrating at rest
   bool from_reference = false;  ///< calibrate against [reference] instead
+  std::optional<double> stop_rate_dps = 0.0;  ///< true rate at a stop, where it is known
   fusion::WhenMoving when_moving = fusion::WhenMoving::kWait;
 };
 
 struct CorrectorPlan {
-  Method method = Method::kMutual;
+  Method method = Method::kOptimal;
   double window_s = 10.0;
-  int order = 1;
+  int order = 1;                                ///< of `mutual`
+  std::array<fusion::GyroParameters, 2> gyros;  ///< what the model file knows of the noise
 };
 
 struct OutputPlan {

@@ -50,7 +50,7 @@ class Check(bench.Bench):
             ('rate = "RateZ"', 'rate = "RateY"', 'vgyro.toml:6: ', 'did you mean "RateZ"?'),
             ('rate = "RateZ"', 'rate = "Temp"', 'vgyro.toml:6: ', 'deg/s, rad/s, deg/h'),
             ('sign = -1', 'sign = "up"', 'vgyro.toml:17: ', 'must be a whole number'),
-            ('method = "mutual"', 'method = "optimal"', 'vgyro.toml:24: ', 'mutual'),
+            ('method = "mutual"', 'method = "optimum"', 'vgyro.toml:24: ', 'did you mean "optimal"?'),
             ('order = 1', 'order = ', 'vgyro.toml:26: ', ''),
             ('dbc = "bench.dbc"', 'dbc = "bank.dbc"', 'vgyro.toml:4: ', 'No such file'),
         )

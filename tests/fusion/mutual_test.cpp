@@ -12,6 +12,12 @@
 namespace vgyro::fusion {
 namespace {
 
+VirtualRate alone(Corrector& corrector, std::size_t gyro, double t_s, double rate_dps) {
+  RatePair pair{.t_s = t_s};
+  pair.rate_dps[gyro] = rate_dps;
+  return corrector.update_alone(gyro, pair);
+}
+
 constexpr double kStart_s = 60.0;
 
 Polynomial constant(double value) {
@@ -237,7 +243,7 @@ TEST(MutualCorrector, TakesAScaleFactorMismatchForDriftAndIsWrongWhenTheTurnEnds
     if (t_s >= kTurnEnd_s && t_s < kTurnEnd_s + 10.0) {
       EXPECT_NEAR(out.corrected_dps[0], -looks_like, 1e-12) << t_s;
       EXPECT_NEAR(out.corrected_dps[1], looks_like, 1e-12) << t_s;
-      EXPECT_NEAR(corrector->carry_on(1, t_s, turn_dps).rate_dps, looks_like, 1e-12) << t_s;
+      EXPECT_NEAR(alone(*corrector, 1, t_s, turn_dps).rate_dps, looks_like, 1e-12) << t_s;
     }
     if (t_s >= kTurnEnd_s + 10.0) {
       EXPECT_NEAR(out.corrected_dps[0], 0.0, 1e-12) << "a window at rest unlearns it, " << t_s;
@@ -306,11 +312,11 @@ TEST(MutualCorrector, PassesOverASilenceOfAnyLengthInOneStep) {
 // When one gyro falls silent, the other goes on less its own last drift.
 TEST(MutualCorrector, CarriesOnWithOneGyroLessItsOwnDrift) {
   const auto corrector = started(1, 10.0, calibration_of(constant(0.5), constant(0.1)));
-  const VirtualRate first = corrector->carry_on(0, 61.0, 10.0);
+  const VirtualRate first = alone(*corrector, 0, 61.0, 10.0);
   EXPECT_DOUBLE_EQ(first.rate_dps, 10.0 - 0.3);
   EXPECT_DOUBLE_EQ(first.corrected_dps[0], 10.0 - 0.3);
   EXPECT_TRUE(std::isnan(first.corrected_dps[1]));
-  EXPECT_DOUBLE_EQ(corrector->carry_on(1, 61.0, 10.0).rate_dps, 10.0 - 0.2);
+  EXPECT_DOUBLE_EQ(alone(*corrector, 1, 61.0, 10.0).rate_dps, 10.0 - 0.2);
 }
 
 // The slope that is published is the one that is taken off: half of the sum's.
@@ -331,7 +337,7 @@ TEST(MeanCorrector, AveragesAndKnowsNothing) {
   EXPECT_EQ(out.rate_dps, 2.5);
   EXPECT_EQ(out.corrected_dps, (std::array<double, 2>{1.0, 4.0}));
   EXPECT_TRUE(std::isnan(out.sigma_dps));
-  EXPECT_EQ(mean->carry_on(1, 0.0, 4.0).rate_dps, 4.0);
+  EXPECT_EQ(alone(*mean, 1, 0.0, 4.0).rate_dps, 4.0);
   EXPECT_TRUE(std::isnan(mean->drift(0.0).bias_dps[0]));
   EXPECT_EQ(mean->windows().completed, 0U);
 }

@@ -567,10 +567,7 @@ TEST_F(Config, RefusesNumbersOutsideTheirLimits) {
   }
 }
 
-// `optimal` is known and not there yet; any other word is a mistake.
 TEST_F(Config, RefusesMethodsItDoesNotHave) {
-  expect_error("\"mutual\"", "\"optimal\"", "method",
-               {"method \"optimal\" is not in this version", "mutual"});
   expect_error("\"mutual\"", "\"mutal\"", "method",
                {"there is no method \"mutal\"", "did you mean \"mutual\"?"});
 }

@@ -378,7 +378,6 @@ class CarCase:
     def rewritten_config(self):
         """As recorded, but on identifiers that the car itself does not use."""
         text = (self.source / "vgyro.toml").read_text(encoding="utf-8")
-        text = text.replace('method = "optimal"', 'method = "mutual"')
         return text.replace("[output]", f"[output]\nrate_id = {self.ids[0]}\nbias_id = {self.ids[1]}\nmodel_id = {self.ids[2]}", 1)
 
     def judge(self, folder, result):

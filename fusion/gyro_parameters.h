@@ -1,0 +1,28 @@
+#pragma once
+
+// Noise and drift of one gyro in IEEE 952 terms. What is not given is estimated from the data.
+
+#include <array>
+#include <cstddef>
+#include <optional>
+
+namespace vgyro::fusion {
+
+/// Exponentially correlated drift: a usual model of bias instability.
+struct GaussMarkov {
+  double sigma_dps = 0.0;
+  double tau_s = 1.0;
+};
+
+struct GyroParameters {
+  static constexpr std::size_t kGaussMarkovMax = 3;
+
+  std::optional<double> white_dps_rthz;  ///< N, angle random walk
+  std::optional<double> walk_dps_rts;    ///< K, rate random walk
+  std::array<GaussMarkov, kGaussMarkovMax> gauss_markov{};
+  std::size_t gauss_markov_count = 0;
+  double rate_noise_rthz = 0.0;  ///< white noise of density rate_noise_rthz · |Ω|, on top of N
+  double resolution_dps = 0.0;   ///< step of the values, 0 when unknown
+};
+
+}  // namespace vgyro::fusion
