@@ -41,6 +41,9 @@ struct ReplayOptions {
 };
 int run_replay(const ReplayOptions& options);
 
+/// The kinds of effects that a model file may hold.
+int run_model_list();
+
 /// "error: where: what; remedy" on stderr; returns kBadInput.
 int report(const Error& error);
 int report(const std::vector<Error>& errors);

@@ -65,6 +65,13 @@ CLI::App* add_replay(CLI::App& app, ReplayOptions& options, std::string& method)
   return command;
 }
 
+CLI::App* add_model(CLI::App& app) {
+  CLI::App* command = app.add_subcommand("model", "What a model file may hold: model list");
+  command->add_subcommand("list", "every kind of effect, its parameters and their limits");
+  command->require_subcommand(1);
+  return command;
+}
+
 // CLI11 would only say that a subcommand is missing.
 std::optional<vgyro::Error> unknown_command(const CLI::App& app, int argc, char** argv) {
   if (argc < 2 || argv[1][0] == '-') return std::nullopt;
@@ -88,6 +95,7 @@ int main(int argc, char** argv) {
   CLI::App* check = add_check(app, options.check, options.method);
   CLI::App* decode = add_decode(app, options.decode);
   CLI::App* replay = add_replay(app, options.replay, options.method);
+  CLI::App* model = add_model(app);
   if (const auto unknown = unknown_command(app, argc, argv)) {
     report(*unknown);
     return kWrongUsage;
@@ -102,6 +110,7 @@ int main(int argc, char** argv) {
   options.replay.method = method;
   if (check->parsed()) return run_check(options.check);
   if (decode->parsed()) return run_decode(options.decode);
+  if (model->parsed()) return run_model_list();
   // Frames are the main result; they give way only to a summary that wants the same place.
   const bool output_given = replay->count("--output") > 0;
   if (!output_given && options.replay.json != "-") options.replay.output = "-";

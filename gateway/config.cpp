@@ -9,9 +9,9 @@
 
 #include "base/file.h"
 #include "base/nearest.h"
+#include "base/toml_reader.h"
 #include "fusion/polynomial.h"
 #include "gateway/signal_resolver.h"
-#include "gateway/toml_reader.h"
 
 namespace vgyro::gateway {
 

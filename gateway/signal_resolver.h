@@ -10,9 +10,9 @@
 #include <string>
 #include <vector>
 
+#include "base/toml_reader.h"
 #include "dbc/database.h"
 #include "gateway/plan.h"
-#include "gateway/toml_reader.h"
 #include "gateway/units.h"
 
 namespace vgyro::gateway {

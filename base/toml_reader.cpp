@@ -1,4 +1,4 @@
-#include "gateway/toml_reader.h"
+#include "base/toml_reader.h"
 
 #include <algorithm>
 
@@ -6,7 +6,7 @@
 
 #include "base/nearest.h"
 
-namespace vgyro::gateway {
+namespace vgyro {
 
 TomlReader::TomlReader(const toml::table& table, std::string file, std::string title,
                        std::vector<Error>& errors)
@@ -96,4 +96,4 @@ void TomlReader::finish() {
   }
 }
 
-}  // namespace vgyro::gateway
+}  // namespace vgyro

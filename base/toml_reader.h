@@ -16,7 +16,7 @@
 
 #include "base/error.h"
 
-namespace vgyro::gateway {
+namespace vgyro {
 
 class TomlReader {
  public:
@@ -56,4 +56,4 @@ class TomlReader {
   std::vector<std::string> asked_;
 };
 
-}  // namespace vgyro::gateway
+}  // namespace vgyro

@@ -1,0 +1,52 @@
+#include <fmt/core.h>
+
+#include "cli/commands.h"
+#include "model/catalogue.h"
+
+namespace vgyro::cli {
+
+namespace {
+
+std::string_view heading(model::Nature nature) {
+  switch (nature) {
+    case model::Nature::kOffset:
+      return "added to the reading; the gateway takes it back";
+    case model::Nature::kResponse:
+      return "added in dependence on the rate; the gateway takes it back";
+    case model::Nature::kLag:
+      return "the reading comes late; the gateway dates it back";
+    case model::Nature::kClip:
+      return "the finished reading is changed; what is lost is lost";
+    case model::Nature::kNoise:
+      return "noise; the gateway weights the gyros by it";
+    case model::Nature::kDisturbance:
+      break;
+  }
+  return "frames or stamps go wrong; known to the simulator";
+}
+
+void print_kind(const model::KindInfo& kind) {
+  fmt::print("  {:<28}{}\n", kind.name, kind.meaning);
+  for (const model::Parameter& parameter : kind.parameters) {
+    fmt::print("    {:<26}{}{}\n", parameter.name, parameter.limits(),
+               parameter.preset ? fmt::format("; {:g} unless given", *parameter.preset) : "");
+  }
+}
+
+}  // namespace
+
+int run_model_list() {
+  bool first = true;
+  for (const model::Nature nature :
+       {model::Nature::kOffset, model::Nature::kResponse, model::Nature::kLag, model::Nature::kClip,
+        model::Nature::kNoise, model::Nature::kDisturbance}) {
+    fmt::print("{}{}\n", first ? "" : "\n", heading(nature));
+    first = false;
+    for (const model::KindInfo& kind : model::catalogue()) {
+      if (kind.nature == nature) print_kind(kind);
+    }
+  }
+  return kDone;
+}
+
+}  // namespace vgyro::cli

@@ -1,0 +1,252 @@
+#include "model/catalogue.h"
+
+#include <algorithm>
+#include <array>
+#include <cassert>
+#include <cmath>
+#include <numbers>
+
+#include <fmt/core.h>
+
+namespace vgyro::model {
+
+namespace {
+
+using Form = Parameter::Form;
+using P = Parameters;
+using S = Surroundings;
+
+constexpr double kRateMax_dps = 1e5;
+constexpr double kTimeMax_s = 1e9;
+// No gyro is written so far off that it answers backwards or ten times too strongly.
+constexpr double kScaleMin = -0.9;
+constexpr double kScaleMax = 9.0;
+constexpr double kLagMax_s = 0.25;
+constexpr double kFrequencyMax_hz = 1e5;
+
+constexpr Parameter kReference{
+    .name = "reference_c", .unit = "degC", .minimum = -273.15, .maximum = 1000.0, .preset = 25.0};
+
+constexpr Parameter number(std::string_view name, std::string_view unit, double limit) {
+  return {.name = name, .unit = unit, .minimum = -limit, .maximum = limit};
+}
+constexpr Parameter not_negative(std::string_view name, std::string_view unit, double limit) {
+  return {.name = name, .unit = unit, .minimum = 0.0, .maximum = limit};
+}
+constexpr Parameter positive(std::string_view name, std::string_view unit, double limit) {
+  return {.name = name, .unit = unit, .minimum = 0.0, .maximum = limit, .above_minimum = true};
+}
+
+constexpr std::array kBias{number("value_dps", "deg/s", kRateMax_dps)};
+constexpr std::array kBiasRamp{number("slope_dps_s", "(deg/s)/s", 1e3)};
+constexpr std::array kBiasStep{number("size_dps", "deg/s", kRateMax_dps),
+                               number("at_s", "s", kTimeMax_s)};
+constexpr std::array kWarmUp{number("amplitude_dps", "deg/s", kRateMax_dps),
+                             positive("tau_s", "s", kTimeMax_s)};
+constexpr std::array kTemperatureBias{number("coefficient_dps_k", "(deg/s)/K", 1e3), kReference};
+constexpr std::array kTemperatureBiasQuadratic{number("coefficient_dps_k2", "(deg/s)/K^2", 1e3),
+                                               kReference};
+constexpr std::array kTemperatureRateBias{number("coefficient_dps_s_k", "(deg/s)/(K/s)", 1e5)};
+constexpr std::array kScaleFactor{
+    Parameter{.name = "error", .unit = "", .minimum = kScaleMin, .maximum = kScaleMax}};
+constexpr std::array kScaleFactorAsymmetry{number("error", "", 0.9)};
+constexpr std::array kScaleFactorQuadratic{number("coefficient_per_dps", "1/(deg/s)", 1.0)};
+constexpr std::array kScaleFactorCubic{number("coefficient_per_dps2", "1/(deg/s)^2", 1.0)};
+constexpr std::array kScaleFactorTemperature{number("coefficient_per_k", "1/K", 1.0), kReference};
+constexpr std::array kGSensitivity{
+    Parameter{.name = "axis", .unit = "", .minimum = 0.0, .maximum = 2.0, .form = Form::kAxis},
+    number("coefficient_dps_g", "(deg/s)/g", 1e3)};
+constexpr std::array kVibrationRectification{number("coefficient_dps_g2", "(deg/s)/g^2", 1e3)};
+constexpr std::array kDelay{number("seconds", "s", kLagMax_s)};
+constexpr std::array kBandwidth{positive("cutoff_hz", "Hz", kFrequencyMax_hz)};
+constexpr std::array kAngleHarmonic{
+    Parameter{
+        .name = "harmonic", .unit = "", .minimum = 1.0, .maximum = 100.0, .form = Form::kWhole},
+    number("amplitude_dps", "deg/s", kRateMax_dps), number("phase_rad", "rad", 1e3)};
+constexpr std::array kLine{positive("frequency_hz", "Hz", kFrequencyMax_hz),
+                           number("amplitude_dps", "deg/s", kRateMax_dps),
+                           number("phase_rad", "rad", 1e3)};
+constexpr std::array kSaturation{positive("limit_dps", "deg/s", kRateMax_dps)};
+constexpr std::array kDeadBand{not_negative("width_dps", "deg/s", kRateMax_dps)};
+constexpr std::array kQuantization{positive("step_dps", "deg/s", kRateMax_dps)};
+constexpr std::array kWhiteNoise{not_negative("density_dps_rthz", "deg/s/sqrt(Hz)", 1e3)};
+constexpr std::array kRateRandomWalk{not_negative("density_dps_rts", "deg/s/sqrt(s)", 1e3)};
+constexpr std::array kGaussMarkov{not_negative("sigma_dps", "deg/s", 1e3),
+                                  positive("tau_s", "s", kTimeMax_s)};
+constexpr std::array kRateNoise{not_negative("ratio_rthz", "1/sqrt(Hz)", 1.0)};
+constexpr std::array kSpikes{not_negative("rate_hz", "1/s", kFrequencyMax_hz),
+                             number("size_dps", "deg/s", kRateMax_dps)};
+constexpr std::array kStuck{number("from_s", "s", kTimeMax_s), number("to_s", "s", kTimeMax_s)};
+constexpr std::array kDroppedFrames{not_negative("fraction", "", 1.0)};
+constexpr std::array kClockSkew{number("ppm", "1e-6", 1e5)};
+constexpr std::array kTimestampJitter{not_negative("sigma_s", "s", 10.0)};
+
+constexpr KindInfo kCatalogue[] = {
+    {Kind::kBias, "bias", "value", Nature::kOffset, kBias, kNeedsNothing,
+     [](const P& p, double, const S&) { return p[0]; }},
+    {Kind::kBiasRamp, "bias_ramp", "slope * t", Nature::kOffset, kBiasRamp, kNeedsNothing,
+     [](const P& p, double, const S& s) { return p[0] * s.t_s; }},
+    {Kind::kBiasStep, "bias_step", "size, once t >= at", Nature::kOffset, kBiasStep, kNeedsNothing,
+     [](const P& p, double, const S& s) { return s.t_s >= p[1] ? p[0] : 0.0; }},
+    {Kind::kWarmUp, "warm_up", "amplitude * exp(-t / tau)", Nature::kOffset, kWarmUp, kNeedsNothing,
+     [](const P& p, double, const S& s) { return p[0] * std::exp(-s.t_s / p[1]); }},
+    {Kind::kTemperatureBias, "temperature_bias", "c * (T - ref)", Nature::kOffset, kTemperatureBias,
+     kNeedsTemperature,
+     [](const P& p, double, const S& s) { return p[0] * (s.temperature_c - p[1]); }},
+    {Kind::kTemperatureBiasQuadratic, "temperature_bias_quadratic", "c * (T - ref)^2",
+     Nature::kOffset, kTemperatureBiasQuadratic, kNeedsTemperature,
+     [](const P& p, double, const S& s) {
+       const double excess_c = s.temperature_c - p[1];
+       return p[0] * excess_c * excess_c;
+     }},
+    {Kind::kTemperatureRateBias, "temperature_rate_bias", "c * dT/dt", Nature::kOffset,
+     kTemperatureRateBias, kNeedsTemperature,
+     [](const P& p, double, const S& s) { return p[0] * s.temperature_slope_c_s; }},
+    {Kind::kScaleFactor, "scale_factor", "e * rate", Nature::kResponse, kScaleFactor, kNeedsNothing,
+     [](const P& p, double rate, const S&) { return p[0] * rate; },
+     [](const P& p, double, const S&) { return p[0]; }},
+    {Kind::kScaleFactorAsymmetry, "scale_factor_asymmetry", "e * |rate|", Nature::kResponse,
+     kScaleFactorAsymmetry, kNeedsNothing,
+     [](const P& p, double rate, const S&) { return p[0] * std::abs(rate); },
+     [](const P& p, double rate, const S&) { return rate < 0.0 ? -p[0] : p[0]; }},
+    {Kind::kScaleFactorQuadratic, "scale_factor_quadratic", "c * rate^2", Nature::kResponse,
+     kScaleFactorQuadratic, kNeedsNothing,
+     [](const P& p, double rate, const S&) { return p[0] * rate * rate; },
+     [](const P& p, double rate, const S&) { return 2.0 * p[0] * rate; }},
+    {Kind::kScaleFactorCubic, "scale_factor_cubic", "c * rate^3", Nature::kResponse,
+     kScaleFactorCubic, kNeedsNothing,
+     [](const P& p, double rate, const S&) { return p[0] * rate * rate * rate; },
+     [](const P& p, double rate, const S&) { return 3.0 * p[0] * rate * rate; }},
+    {Kind::kScaleFactorTemperature, "scale_factor_temperature", "c * (T - ref) * rate",
+     Nature::kResponse, kScaleFactorTemperature, kNeedsTemperature,
+     [](const P& p, double rate, const S& s) { return p[0] * (s.temperature_c - p[1]) * rate; },
+     [](const P& p, double, const S& s) { return p[0] * (s.temperature_c - p[1]); }},
+    {Kind::kGSensitivity, "g_sensitivity", "c * acceleration along the axis", Nature::kOffset,
+     kGSensitivity, kNeedsAcceleration,
+     [](const P& p, double, const S& s) {
+       return p[1] * s.acceleration_g[static_cast<std::size_t>(p[0])];
+     }},
+    {Kind::kVibrationRectification, "vibration_rectification", "c * variance of |a| over 1 s",
+     Nature::kOffset, kVibrationRectification, kNeedsAcceleration,
+     [](const P& p, double, const S& s) { return p[0] * s.vibration_g2; }},
+    {Kind::kDelay, "delay", "rate(t - seconds) instead of rate(t)", Nature::kLag, kDelay},
+    {Kind::kBandwidth, "bandwidth", "first-order low-pass of the rate", Nature::kLag, kBandwidth},
+    {Kind::kAngleHarmonic, "angle_harmonic", "A * cos(n * angle + phase)", Nature::kOffset,
+     kAngleHarmonic, kNeedsNothing,
+     [](const P& p, double, const S& s) { return p[1] * std::cos(p[0] * s.angle_rad + p[2]); }},
+    {Kind::kLine, "line", "A * sin(2 pi f t + phase)", Nature::kOffset, kLine, kNeedsNothing,
+     [](const P& p, double, const S& s) {
+       // Whole periods first, so that the phase keeps its digits after a year.
+       const double periods = p[0] * s.t_s;
+       return p[1] * std::sin(2.0 * std::numbers::pi * (periods - std::floor(periods)) + p[2]);
+     }},
+    {Kind::kSaturation, "saturation", "clipped at +-limit", Nature::kClip, kSaturation},
+    {Kind::kDeadBand, "dead_band", "0 while below the width", Nature::kClip, kDeadBand},
+    {Kind::kQuantization, "quantization", "rounded to the step", Nature::kClip, kQuantization},
+    {Kind::kWhiteNoise, "white_noise", "angle random walk N", Nature::kNoise, kWhiteNoise},
+    {Kind::kRateRandomWalk, "rate_random_walk", "random-walk drift K", Nature::kNoise,
+     kRateRandomWalk},
+    {Kind::kGaussMarkov, "gauss_markov", "exponentially correlated drift", Nature::kNoise,
+     kGaussMarkov},
+    {Kind::kRateNoise, "rate_noise", "white noise of density ratio * |rate|", Nature::kNoise,
+     kRateNoise},
+    {Kind::kSpikes, "spikes", "outliers", Nature::kDisturbance, kSpikes},
+    {Kind::kStuck, "stuck", "value frozen", Nature::kDisturbance, kStuck},
+    {Kind::kDroppedFrames, "dropped_frames", "frames missing", Nature::kDisturbance,
+     kDroppedFrames},
+    {Kind::kClockSkew, "clock_skew", "stamps run fast (positive)", Nature::kDisturbance,
+     kClockSkew},
+    {Kind::kTimestampJitter, "timestamp_jitter", "stamps randomly late", Nature::kDisturbance,
+     kTimestampJitter},
+};
+static_assert(std::size(kCatalogue) == kKindCount);
+
+constexpr bool in_order_of_kind() {
+  for (std::size_t i = 0; i < kKindCount; ++i) {
+    if (static_cast<std::size_t>(kCatalogue[i].kind) != i) return false;
+  }
+  return true;
+}
+static_assert(in_order_of_kind());
+
+}  // namespace
+
+bool Parameter::allows(double value) const {
+  if (form == Form::kWhole && value != std::floor(value)) return false;
+  return value <= maximum && (above_minimum ? value > minimum : value >= minimum);
+}
+
+std::string Parameter::limits() const {
+  if (form == Form::kAxis) return "\"x\", \"y\" or \"z\"";
+  const std::string space = unit.empty() ? "" : " ";
+  if (above_minimum)
+    return fmt::format("above {:g} and up to {:g}{}{}", minimum, maximum, space, unit);
+  return fmt::format("{}{:g} to {:g}{}{}", form == Form::kWhole ? "a whole number, " : "", minimum,
+                     maximum, space, unit);
+}
+
+std::span<const KindInfo> catalogue() {
+  return kCatalogue;
+}
+
+const KindInfo& info(Kind kind) {
+  return kCatalogue[static_cast<std::size_t>(kind)];
+}
+
+const KindInfo* find_kind(std::string_view name) {
+  const auto* const found = std::find_if(std::begin(kCatalogue), std::end(kCatalogue),
+                                         [&](const KindInfo& row) { return row.name == name; });
+  return found == std::end(kCatalogue) ? nullptr : found;
+}
+
+std::vector<std::string> kind_names() {
+  std::vector<std::string> names;
+  for (const KindInfo& row : kCatalogue)
+    names.emplace_back(row.name);
+  return names;
+}
+
+double added_dps(const Effect& effect, double rate_dps, const Surroundings& surroundings) {
+  const KindInfo& row = info(effect.kind);
+  assert(row.added != nullptr);
+  const double added = row.added(effect.parameters, rate_dps, surroundings);
+  return std::isnan(added) ? 0.0 : added;
+}
+
+double clipped_dps(const Effect& effect, double reading_dps) {
+  const double limit_dps = effect.parameters[0];
+  switch (effect.kind) {
+    case Kind::kSaturation:
+      return std::clamp(reading_dps, -limit_dps, limit_dps);
+    case Kind::kDeadBand:
+      return std::abs(reading_dps) < limit_dps ? 0.0 : reading_dps;
+    case Kind::kQuantization:
+      return std::round(reading_dps / limit_dps) * limit_dps;
+    default:
+      assert(info(effect.kind).nature != Nature::kClip);
+      return reading_dps;
+  }
+}
+
+double lag_s(const Effect& effect) {
+  if (effect.kind == Kind::kDelay) return effect.parameters[0];
+  assert(effect.kind == Kind::kBandwidth);
+  return 1.0 / (2.0 * std::numbers::pi * effect.parameters[0]);
+}
+
+std::string parameters_text(const Effect& effect) {
+  std::string text;
+  const std::span<const Parameter> parameters = info(effect.kind).parameters;
+  for (std::size_t i = 0; i < parameters.size(); ++i) {
+    if (i > 0) text += ", ";
+    text += fmt::format("{} ", parameters[i].name);
+    if (parameters[i].form == Form::kAxis) {
+      text += "xyz"[static_cast<std::size_t>(effect.parameters[i])];
+    } else {
+      text += fmt::format("{:g}", effect.parameters[i]);
+    }
+  }
+  return text;
+}
+
+}  // namespace vgyro::model

@@ -1,0 +1,83 @@
+#pragma once
+
+// Every kind of effect: its name and parameters in the model file, what it does to a gyro, and, of
+// the deterministic ones, its equation. The simulator adds what the live path takes back, so both
+// ask here; a new kind is a new row.
+//
+// A gyro reads  clip(Ω(t − lag) + responses + offsets + noise): responses depend on the rate,
+// offsets do not.
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "model/effect.h"
+
+namespace vgyro::model {
+
+/// Where in that chain a kind acts, which decides what can be done about it.
+enum class Nature : std::uint8_t {
+  kOffset,       ///< adds to the reading, whatever the rate
+  kResponse,     ///< adds a function of the rate
+  kLag,          ///< the reading is of an earlier rate
+  kClip,         ///< changes the finished reading; information is lost
+  kNoise,        ///< random, with a known density or variance
+  kDisturbance,  ///< frames or stamps go wrong
+};
+
+/// What an equation needs to know of the surroundings; a bit mask.
+enum Need : std::uint8_t { kNeedsNothing = 0, kNeedsTemperature = 1, kNeedsAcceleration = 2 };
+
+struct Parameter {
+  enum class Form : std::uint8_t { kNumber, kWhole, kAxis };
+
+  std::string_view name;
+  std::string_view unit;
+  double minimum = 0.0;
+  double maximum = 0.0;
+  bool above_minimum = false;  ///< the minimum itself is too little
+  std::optional<double> preset = {};
+  Form form = Form::kNumber;
+
+  /// "above 0 and up to 1e+06 s"
+  [[nodiscard]] std::string limits() const;
+  [[nodiscard]] bool allows(double value) const;
+};
+
+struct KindInfo {
+  using Equation = double (*)(const Parameters& p, double rate_dps, const Surroundings& s);
+
+  Kind kind;
+  std::string_view name;
+  std::string_view meaning;  ///< for people: what the gyro reads in addition
+  Nature nature;
+  std::span<const Parameter> parameters;
+  std::uint8_t needs = kNeedsNothing;
+  Equation added = nullptr;  ///< deg/s; of offsets and responses
+  Equation slope = nullptr;  ///< d added / d rate; of responses
+};
+
+/// All kinds, in the order of Kind.
+std::span<const KindInfo> catalogue();
+const KindInfo& info(Kind kind);
+/// Null for any other word.
+const KindInfo* find_kind(std::string_view name);
+std::vector<std::string> kind_names();
+
+/// What an offset or a response adds to the reading, deg/s; 0 where it depends on something that is
+/// not known.
+double added_dps(const Effect& effect, double rate_dps, const Surroundings& surroundings);
+
+/// What the kinds of Nature::kClip make of a reading.
+double clipped_dps(const Effect& effect, double reading_dps);
+
+/// Of Nature::kLag: how much later than the rate the reading comes, for rates that change slowly.
+double lag_s(const Effect& effect);
+
+/// "error 0.00042", as check and the summaries print it.
+std::string parameters_text(const Effect& effect);
+
+}  // namespace vgyro::model

@@ -1,0 +1,70 @@
+#pragma once
+
+// One effect of the model file: something that makes a gyro read other than the true rate. Kinds,
+// parameters and equations are described in model/catalogue.h; an Effect is only their values.
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+
+namespace vgyro::model {
+
+enum class Kind : std::uint8_t {
+  kBias,
+  kBiasRamp,
+  kBiasStep,
+  kWarmUp,
+  kTemperatureBias,
+  kTemperatureBiasQuadratic,
+  kTemperatureRateBias,
+  kScaleFactor,
+  kScaleFactorAsymmetry,
+  kScaleFactorQuadratic,
+  kScaleFactorCubic,
+  kScaleFactorTemperature,
+  kGSensitivity,
+  kVibrationRectification,
+  kDelay,
+  kBandwidth,
+  kAngleHarmonic,
+  kLine,
+  kSaturation,
+  kDeadBand,
+  kQuantization,
+  kWhiteNoise,
+  kRateRandomWalk,
+  kGaussMarkov,
+  kRateNoise,
+  kSpikes,
+  kStuck,
+  kDroppedFrames,
+  kClockSkew,
+  kTimestampJitter
+};
+inline constexpr std::size_t kKindCount = 30;
+
+inline constexpr std::size_t kParametersMax = 3;
+/// In the order of the catalogue; an axis is 0, 1 or 2.
+using Parameters = std::array<double, kParametersMax>;
+
+struct Effect {
+  std::size_t gyro = 0;  ///< 0 or 1
+  Kind kind = Kind::kBias;
+  Parameters parameters{};
+  unsigned line = 0;  ///< of its table in the model file; 0 when it comes from elsewhere
+};
+
+/// What a gyro's error depends on besides the true rate, at one instant. NaN: not known.
+struct Surroundings {
+  static constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+
+  double t_s = 0.0;  ///< since the first frame of the recording
+  double temperature_c = kUnknown;
+  double temperature_slope_c_s = kUnknown;
+  std::array<double, 3> acceleration_g{kUnknown, kUnknown, kUnknown};
+  double vibration_g2 = kUnknown;  ///< variance of |a| over the last second
+  double angle_rad = 0.0;          ///< ∫Ω dt, up to whole turns
+};
+
+}  // namespace vgyro::model

@@ -1,0 +1,164 @@
+#include "model/file.h"
+
+#include <array>
+#include <cmath>
+#include <optional>
+
+#include <fmt/core.h>
+
+#include "base/file.h"
+#include "base/nearest.h"
+#include "base/toml_reader.h"
+#include "model/catalogue.h"
+
+namespace vgyro::model {
+
+namespace {
+
+constexpr std::int64_t kFormat = 1;
+constexpr std::array<std::string_view, 3> kAxes{"x", "y", "z"};
+
+std::optional<double> read_axis(TomlReader& reader, const Parameter& parameter) {
+  const auto name = reader.text(parameter.name);
+  if (!name) return std::nullopt;
+  for (std::size_t i = 0; i < kAxes.size(); ++i) {
+    if (*name == kAxes[i]) return static_cast<double>(i);
+  }
+  reader.complain(reader.where(parameter.name), fmt::format("there is no axis \"{}\"", *name),
+                  parameter.limits());
+  return std::nullopt;
+}
+
+std::optional<double> read_number(TomlReader& reader, const Parameter& parameter) {
+  const auto value = reader.number(parameter.name);
+  if (!value || parameter.allows(*value)) return value;
+  reader.complain(reader.where(parameter.name), fmt::format("{} is {:g}", parameter.name, *value),
+                  parameter.limits());
+  return std::nullopt;
+}
+
+// A missing one after a complaint of its own.
+std::optional<double> read_parameter(TomlReader& reader, const KindInfo& kind,
+                                     const Parameter& parameter) {
+  if (!reader.has(parameter.name)) {
+    reader.forgive({parameter.name});
+    if (parameter.preset) return parameter.preset;
+    reader.complain(reader.where(), fmt::format("{} needs {}", kind.name, parameter.name),
+                    parameter.limits());
+    return std::nullopt;
+  }
+  return parameter.form == Parameter::Form::kAxis ? read_axis(reader, parameter)
+                                                  : read_number(reader, parameter);
+}
+
+std::optional<std::size_t> read_gyro(TomlReader& reader) {
+  const auto number = reader.integer("gyro");
+  if (number && (*number == 1 || *number == 2)) return static_cast<std::size_t>(*number - 1);
+  if (number || !reader.has("gyro")) {
+    reader.complain(
+        number ? reader.where("gyro") : reader.where(),
+        number ? fmt::format("there is no gyro {}", *number) : std::string("[[effect]] needs gyro"),
+        "gyro = 1 or 2, in the order of the configuration");
+  }
+  return std::nullopt;
+}
+
+const KindInfo* read_kind(TomlReader& reader) {
+  const std::string name = reader.required_text("kind", "scale_factor");
+  if (name.empty()) return nullptr;
+  const KindInfo* kind = find_kind(name);
+  if (kind == nullptr) {
+    reader.complain(reader.where("kind"), fmt::format("there is no kind \"{}\"", name),
+                    suggest_name(name, kind_names()) + "; `vgyro model list` shows them all");
+  }
+  return kind;
+}
+
+void check_together(TomlReader& reader, const Effect& effect) {
+  if (effect.kind == Kind::kStuck && !(effect.parameters[0] < effect.parameters[1])) {
+    reader.complain(reader.where("to_s"), "to_s is not after from_s");
+  }
+}
+
+// Without a good kind nobody can say which other keys are right.
+std::optional<Effect> read_effect(const toml::table& table, const std::string& file,
+                                  std::vector<Error>& errors) {
+  TomlReader reader(table, file, "[[effect]]", errors);
+  const std::size_t errors_before = errors.size();
+  const auto gyro = read_gyro(reader);
+  const KindInfo* kind = read_kind(reader);
+  if (kind == nullptr) return std::nullopt;
+  Effect effect{.gyro = gyro.value_or(0),
+                .kind = kind->kind,
+                .line = static_cast<unsigned>(table.source().begin.line)};
+  for (std::size_t i = 0; i < kind->parameters.size(); ++i) {
+    effect.parameters[i] = read_parameter(reader, *kind, kind->parameters[i]).value_or(0.0);
+  }
+  reader.finish();
+  if (errors.size() > errors_before) return std::nullopt;
+  check_together(reader, effect);
+  return effect;
+}
+
+void read_format(TomlReader& root, const std::string& file) {
+  const auto format = root.integer("format");
+  if (!format && root.has("format")) return;
+  if (format == kFormat) return;
+  root.complain(format ? root.where("format") : file,
+                format ? fmt::format("format is {}", *format) : std::string("format is missing"),
+                "this version reads format = 1");
+}
+
+void check_count(TomlReader& root, Kind kind, std::size_t most, const Model& model) {
+  for (std::size_t gyro = 0; gyro < 2; ++gyro) {
+    std::size_t count = 0;
+    for (const Effect& effect : model.effects) {
+      if (effect.gyro != gyro || effect.kind != kind || ++count != most + 1) continue;
+      root.complain(at_line(model.file, effect.line),
+                    fmt::format("gyro {} has more than {} effects of kind {}", gyro + 1, most,
+                                info(kind).name));
+    }
+  }
+}
+
+}  // namespace
+
+ModelResult parse_model(std::string_view text, const std::string& file) {
+  const toml::parse_result parsed = toml::parse(text, file);
+  if (!parsed) {
+    const toml::parse_error& error = parsed.error();
+    return tl::unexpected(std::vector<Error>{
+        {at_line(file, static_cast<unsigned>(error.source().begin.line)),
+         std::string(error.description()), "strings stand in quotes, effects in [[effect]]"}});
+  }
+  std::vector<Error> errors;
+  Model model{.file = file, .effects = {}};
+  TomlReader root(parsed.table(), file, "the file", errors);
+  read_format(root, file);
+  const toml::array* tables = root.array("effect");
+  const std::size_t count = tables == nullptr ? 0 : tables->size();
+  if (count > kEffectsMax) {
+    root.complain(root.where("effect"), fmt::format("there are {} effects", count),
+                  fmt::format("at most {}", kEffectsMax));
+  }
+  for (std::size_t i = 0; i < std::min(count, kEffectsMax); ++i) {
+    const toml::table* table = tables->get(i)->as_table();
+    if (table == nullptr) {
+      root.complain(root.where("effect"), "effects must be written as [[effect]] tables");
+      break;
+    }
+    if (const auto effect = read_effect(*table, file, errors)) model.effects.push_back(*effect);
+  }
+  root.finish();
+  check_count(root, Kind::kGaussMarkov, kGaussMarkovMax, model);
+  if (!errors.empty()) return tl::unexpected(std::move(errors));
+  return model;
+}
+
+ModelResult load_model(const std::string& path) {
+  const auto text = read_file(path);
+  if (!text) return tl::unexpected(std::vector<Error>{text.error()});
+  return parse_model(*text, path);
+}
+
+}  // namespace vgyro::model

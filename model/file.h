@@ -1,0 +1,32 @@
+#pragma once
+
+// The model file (TOML): a list of effects. docs/model-file.md describes it. All complaints of a
+// file are reported at once, each with its line and what would be right.
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <tl/expected.hpp>
+
+#include "base/error.h"
+#include "model/effect.h"
+
+namespace vgyro::model {
+
+struct Model {
+  std::string file;
+  std::vector<Effect> effects;  ///< in the order of the file
+};
+
+using ModelResult = tl::expected<Model, std::vector<Error>>;
+
+inline constexpr std::size_t kEffectsMax = 256;
+/// Effects of this kind for one gyro.
+inline constexpr std::size_t kGaussMarkovMax = 3;
+
+ModelResult load_model(const std::string& path);
+/// `file` names the text in complaints.
+ModelResult parse_model(std::string_view text, const std::string& file);
+
+}  // namespace vgyro::model

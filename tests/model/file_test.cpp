@@ -1,0 +1,165 @@
+#include "model/file.h"
+
+#include <gtest/gtest.h>
+
+#include "model/catalogue.h"
+
+namespace vgyro::model {
+namespace {
+
+std::vector<std::string> complaints_of(const std::string& text) {
+  const ModelResult result = parse_model(text, "m.toml");
+  std::vector<std::string> messages;
+  if (result) return messages;
+  for (const Error& error : result.error())
+    messages.push_back(error.message());
+  return messages;
+}
+
+std::string effect(const std::string& lines) {
+  return "format = 1\n\n[[effect]]\n" + lines;
+}
+
+// The first effect stands on line 3, its keys from line 4 on.
+struct Bad {
+  std::string text;
+  std::string begins;
+  std::string holds;
+};
+
+TEST(ModelFile, GivesEffectsInTheOrderOfTheFile) {
+  const ModelResult result = parse_model(R"(format = 1
+[[effect]]
+gyro = 1
+kind = "bias"
+value_dps = 0.0331
+[[effect]]
+gyro = 2
+kind = "g_sensitivity"
+axis = "z"
+coefficient_dps_g = -2e-3
+[[effect]]
+gyro = 1
+kind = "temperature_bias"
+coefficient_dps_k = 1
+)",
+                                         "m.toml");
+  ASSERT_TRUE(result);
+  ASSERT_EQ(result->effects.size(), 3U);
+  EXPECT_EQ(result->file, "m.toml");
+  const Effect& bias = result->effects[0];
+  EXPECT_EQ(bias.kind, Kind::kBias);
+  EXPECT_EQ(bias.gyro, 0U);
+  EXPECT_EQ(bias.line, 2U);
+  EXPECT_DOUBLE_EQ(bias.parameters[0], 0.0331);
+  const Effect& g = result->effects[1];
+  EXPECT_EQ(g.kind, Kind::kGSensitivity);
+  EXPECT_EQ(g.gyro, 1U);
+  EXPECT_DOUBLE_EQ(g.parameters[0], 2.0);
+  EXPECT_DOUBLE_EQ(g.parameters[1], -2e-3);
+  const Effect& temperature = result->effects[2];
+  EXPECT_DOUBLE_EQ(temperature.parameters[0], 1.0) << "a whole number is a number";
+  EXPECT_DOUBLE_EQ(temperature.parameters[1], 25.0) << "reference_c is 25 unless it is given";
+}
+
+TEST(ModelFile, MayHoldNoEffect) {
+  const ModelResult result = parse_model("format = 1\n", "m.toml");
+  ASSERT_TRUE(result);
+  EXPECT_TRUE(result->effects.empty());
+}
+
+TEST(ModelFile, NamesLineCauseAndRemedyOfEveryMistake) {
+  const Bad cases[] = {
+      {effect("gyro = 1\nkind = \"scale_facter\"\nerror = 1e-4\n"),
+       "m.toml:5: ", "did you mean \"scale_factor\"?"},
+      {effect("gyro = 1\nkind = \"hum\"\n"), "m.toml:5: ", "vgyro model list"},
+      {effect("gyro = 1\nkind = \"bias\"\nvalue_dsp = 1e-4\n"),
+       "m.toml:3: ", "bias needs value_dps"},
+      {effect("gyro = 1\nkind = \"warm_up\"\namplitude_dps = 1\ntau_s = 0\n"),
+       "m.toml:7: ", "above 0"},
+      {effect("gyro = 1\nkind = \"warm_up\"\namplitude_dps = 1\ntau_s = -5\n"),
+       "m.toml:7: ", "above 0"},
+      {effect("gyro = 1\nkind = \"white_noise\"\ndensity_dps_rthz = -1e-4\n"),
+       "m.toml:6: ", "0 to"},
+      {effect("gyro = 1\nkind = \"bias\"\nvalue_dps = nan\n"), "m.toml:6: ", "value_dps is nan"},
+      {effect("gyro = 1\nkind = \"bias\"\nvalue_dps = inf\n"), "m.toml:6: ", "value_dps is inf"},
+      {effect("gyro = 1\nkind = \"bias\"\nvalue_dps = \"0.1\"\n"),
+       "m.toml:6: ", "must be a number"},
+      {effect("gyro = 3\nkind = \"bias\"\nvalue_dps = 0.1\n"), "m.toml:4: ", "there is no gyro 3"},
+      {effect("gyro = \"a\"\nkind = \"bias\"\nvalue_dps = 0.1\n"), "m.toml:4: ", "whole number"},
+      {effect("kind = \"bias\"\nvalue_dps = 0.1\n"), "m.toml:3: ", "needs gyro"},
+      {effect("gyro = 1\nvalue_dps = 0.1\n"), "m.toml:3: ", "needs kind"},
+      {effect("gyro = 1\nkind = \"g_sensitivity\"\naxis = \"w\"\ncoefficient_dps_g = 1\n"),
+       "m.toml:6: ", "\"x\", \"y\" or \"z\""},
+      {effect("gyro = 1\nkind = \"g_sensitivity\"\naxis = 2\ncoefficient_dps_g = 1\n"),
+       "m.toml:6: ", "string"},
+      {effect("gyro = 1\nkind = \"angle_harmonic\"\nharmonic = 1.5\namplitude_dps = 1\n"
+              "phase_rad = 0\n"),
+       "m.toml:6: ", "whole number"},
+      {effect("gyro = 1\nkind = \"scale_factor\"\nerror = -1\n"), "m.toml:6: ", "-0.9 to 9"},
+      {effect("gyro = 1\nkind = \"stuck\"\nfrom_s = 5\nto_s = 5\n"), "m.toml:7: ", "not after"},
+      {effect("gyro = 1\nkind = \"bias\"\nvalue_dps = 1\nvalue_dps = 2\n"), "m.toml:7: ", ""},
+      {effect("gyro = 1\nkind = \"bias\"\nvalue_dps = 1\nvalve = 2\n"),
+       "m.toml:7: ", "unknown key \"valve\""},
+      {"[[effect]]\ngyro = 1\nkind = \"bias\"\nvalue_dps = 1\n", "m.toml: ", "format is missing"},
+      {"format = 2\n", "m.toml:1: ", "format = 1"},
+      {"format = 1\n[[efect]]\n", "m.toml:2: ", "did you mean \"effect\"?"},
+      {"format = 1\n[effect]\n", "m.toml:2: ", "[[effect]]"},
+      {"format = 1\neffect = [1]\n", "m.toml:2: ", "[[effect]]"},
+      {"format = \n", "m.toml:1: ", ""},
+  };
+  for (const Bad& bad : cases) {
+    SCOPED_TRACE(bad.text);
+    const std::vector<std::string> messages = complaints_of(bad.text);
+    ASSERT_FALSE(messages.empty());
+    bool found = false;
+    for (const std::string& message : messages)
+      found = found || (message.starts_with(bad.begins) && message.find(bad.holds) != message.npos);
+    EXPECT_TRUE(found) << messages.front();
+  }
+}
+
+TEST(ModelFile, SuggestsTheParameterThatWasMeant) {
+  const auto messages = complaints_of(effect("gyro = 1\nkind = \"bias\"\nvalue_dsp = 1\n"));
+  ASSERT_EQ(messages.size(), 2U);
+  EXPECT_EQ(messages[1],
+            "m.toml:6: unknown key \"value_dsp\" in [[effect]]; did you mean \"value_dps\"?");
+}
+
+TEST(ModelFile, ReportsAllMistakesAtOnce) {
+  EXPECT_EQ(complaints_of(
+                "format = 3\n" +
+                effect("gyro = 0\nkind = \"bias\"\nvalue_dps = nan\n").substr(sizeof "format = 1"))
+                .size(),
+            3U);
+}
+
+// The corrector keeps so many; one more must not be lost in silence.
+TEST(ModelFile, RefusesAFourthGaussMarkovDriftOfOneGyro) {
+  const std::string drift =
+      "[[effect]]\ngyro = 2\nkind = \"gauss_markov\"\nsigma_dps = 1e-3\n"
+      "tau_s = 100\n";
+  const std::string three = "format = 1\n" + drift + drift + drift;
+  EXPECT_TRUE(complaints_of(three).empty());
+  const auto messages = complaints_of(three + drift);
+  ASSERT_EQ(messages.size(), 1U);
+  EXPECT_TRUE(messages[0].starts_with("m.toml:17: ")) << messages[0];
+}
+
+TEST(ModelFile, IsBounded) {
+  std::string text = "format = 1\n";
+  for (std::size_t i = 0; i <= kEffectsMax; ++i)
+    text += "[[effect]]\ngyro = 1\nkind = \"bias\"\nvalue_dps = 1\n";
+  const auto messages = complaints_of(text);
+  ASSERT_EQ(messages.size(), 1U);
+  EXPECT_NE(messages[0].find("at most 256"), std::string::npos);
+}
+
+TEST(ModelFile, NamesAFileThatIsNotThere) {
+  const ModelResult result = load_model("/nowhere/m.toml");
+  ASSERT_FALSE(result);
+  EXPECT_EQ(result.error().front().where, "/nowhere/m.toml");
+}
+
+}  // namespace
+}  // namespace vgyro::model
