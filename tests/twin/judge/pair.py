@@ -63,20 +63,25 @@ class Readings:
     there: np.ndarray  # bool: sent
 
 
+class _Lines(list):
+    write = list.append
+
+
 @dataclasses.dataclass(frozen=True)
 class Recording:
     motion: motion.Motion
     dt_s: float
     gyros: tuple
-    log: bytes
+    streams: tuple
+
+    def log(self):
+        """As candump lines."""
+        lines = _Lines()
+        canlog.write(lines, self.streams)
+        return b"".join(lines)
 
 
-class _Bytes(list):
-    def write(self, data):
-        self.append(data)
-
-
-def record(pair, scenario, run_s, seed):
+def simulate(pair, scenario, run_s, seed):
     """One seed's recording."""
     index = list(motion.SCENARIOS).index(scenario.name)
     motion_seed, *gyro_seeds = np.random.SeedSequence((seed, index)).spawn(3)
@@ -89,9 +94,7 @@ def record(pair, scenario, run_s, seed):
         one, frames = _read(gyro, k, t, own_dt, true, np.random.default_rng(gyro_seeds[k]))
         readings.append(one)
         streams.append(frames)
-    out = _Bytes()
-    canlog.write(out, streams)
-    return Recording(true, dt, tuple(readings), b"".join(out))
+    return Recording(true, dt, tuple(readings), tuple(streams))
 
 
 def _read(gyro, k, t, dt, true, rng):

@@ -30,8 +30,8 @@ def takes_model():
     return "--model" in said.stdout
 
 
-def replay(recording, pair, method, mode=None):
-    """The output frames of one run over the recording."""
+def replay(recording, log, pair, method, mode=None):
+    """The output frames of one run over the recording's log."""
     with tempfile.TemporaryDirectory(prefix="vgyro-") as folder:
         config = product.write_config(folder, motion.CALIBRATION_S, rate_dps=motion.EARTH_DPS)
         command = [product.VGYRO, "replay", "--quiet", "--config", config, "--method", method]
@@ -39,7 +39,7 @@ def replay(recording, pair, method, mode=None):
             model = Path(folder) / "model.toml"
             model.write_text(gyro_pair.model_text(pair, recording.motion.scenario))
             command += ["--model", model]
-        done = subprocess.run([*map(str, command), "-"], input=recording.log, capture_output=True, check=False)
+        done = subprocess.run([*map(str, command), "-"], input=log, capture_output=True, check=False)
     if done.returncode != 0:
         raise RuntimeError(f"{done.args}: exit code {done.returncode}\n{done.stderr.decode(errors='replace')}")
     return canlog.read(done.stdout)
@@ -60,12 +60,12 @@ def instants_s(rate, recording):
     return np.where(rate.state == DEGRADED, about_us, best) * 1e-6
 
 
-def heading_errors(t_s, error_dps, run_s):
+def heading_errors(t_s, error_dps, run_s, horizons_s):
     """After each horizon within the run; between two instants the error is held."""
     lengths = np.diff(t_s, append=t_s[-1])
     return {
         horizon: float(np.dot(error_dps, lengths * ((t_s >= motion.BEGIN_S) & (t_s < motion.BEGIN_S + horizon))))
-        for horizon in HORIZONS_S
+        for horizon in horizons_s
         if horizon <= run_s
     }
 
@@ -78,7 +78,7 @@ def mean_square(values):
     return float(np.mean(np.square(values))) if len(values) else float("nan")
 
 
-def judge_product(recording, pair, frames):
+def judge_product(recording, pair, frames, horizons_s=HORIZONS_S):
     """Heading errors; mean squares of what VG_Rate, VG_Bias and VG_Model claim."""
     run_s = recording.motion.run_s
     rate = canlog.virtual_rate(frames)
@@ -93,7 +93,7 @@ def judge_product(recording, pair, frames):
     counted = (t >= motion.BEGIN_S) & (raw_sigma != NOT_AVAILABLE)
     sigma = raw_sigma * SIGMA_STEP_DPS
     result = {
-        "heading_deg": heading_errors(t, error, run_s),
+        "heading_deg": heading_errors(t, error, run_s, horizons_s),
         "gap_s": float(np.maximum(np.diff(t) - 4.0 * recording.dt_s, 0.0).sum()),
         "error2": mean_square(error[last] / sigma[last]),
         "error2_all": mean_square(error[counted] / sigma[counted]),
@@ -129,11 +129,11 @@ def judge_bias(recording, pair, frames):
     }
 
 
-def judge_rivals(recording, pair):
+def judge_rivals(recording, pair, horizons_s=HORIZONS_S):
     run_s = recording.motion.run_s
     paired = rivals.pair_up(recording)
     errors, drifts = rivals.rate_errors(pair, paired)
-    judged = {name: {"heading_deg": heading_errors(paired.t_s, e, run_s)} for name, e in errors.items()}
+    judged = {name: {"heading_deg": heading_errors(paired.t_s, e, run_s, horizons_s)} for name, e in errors.items()}
     half = second_half(paired.t_s, run_s)
     off = drifts - paired.walk_dps
     weights = rivals.weights_of(pair.gyros, paired.there)
@@ -146,10 +146,11 @@ def judge_rivals(recording, pair):
 
 def judge(pair, scenario, run_s, seed, modes=MODES, mutual=True):
     """Everybody on one seed's recording: name → figures. The product is under its modes."""
-    recording = gyro_pair.record(pair, scenario, run_s, seed)
+    recording = gyro_pair.simulate(pair, scenario, run_s, seed)
     judged = judge_rivals(recording, pair)
+    log = recording.log()
     if mutual:
-        judged["mutual"] = judge_product(recording, pair, replay(recording, pair, "mutual"))
+        judged["mutual"] = judge_product(recording, pair, replay(recording, log, pair, "mutual"))
     for mode in modes:
-        judged[mode] = judge_product(recording, pair, replay(recording, pair, "optimal", mode))
+        judged[mode] = judge_product(recording, pair, replay(recording, log, pair, "optimal", mode))
     return judged
