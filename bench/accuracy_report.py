@@ -56,17 +56,17 @@ def mean_of(figures, name):
     return np.where(counts > 0, np.nansum(values, axis=0) / np.maximum(counts, 1), np.nan)
 
 
-def summarise_horizon(found, horizon_s):
+def summarise_horizon(found, horizon_s, expected_deg):
     errors = {name: headings(figures, horizon_s) for name, figures in found.items()}
     errors["better"] = min((errors.pop("gyro_1"), errors.pop("gyro_2")), key=rms)
     best = min(RIVALS, key=lambda name: rms(errors[name]))
-    summary = {"rms_deg": {name: rms(e) for name, e in errors.items()}, "best_rival": best, "modes": {}}
+    summary = {"rms_deg": {name: rms(e) for name, e in errors.items()}, "expected_deg": expected_deg, "best_rival": best, "modes": {}}
     for mode in set(score.MODES) & set(errors):
         summary["modes"][mode] = {
             "to_bound": ratio(errors[mode], errors["bound"]),
             "to_best_rival": ratio(errors[mode], errors[best]),
-            # Distance from the bound's heading in units of it: depends less on the seeds than the ratio.
-            "apart": rms(errors[mode] - errors["bound"]) / rms(errors["bound"]),
+            # Distance from the bound's heading in units of its σ: depends less on the seeds than the ratio.
+            "apart": rms(errors[mode] - errors["bound"]) / expected_deg,
             "gain": {name: rms(errors[name]) / rms(errors[mode]) for name in RIVALS},
         }
     return summary
@@ -88,10 +88,12 @@ def summarise_mode(figures, horizons, mode, scenario):
     return own
 
 
-def summarise(found, scenario):
-    """found: name → figures, one per seed."""
+def summarise(found, scenario, expected):
+    """found: name → figures, one per seed; expected: horizon → σ of the bound's heading error."""
     horizons = {
-        h: summarise_horizon(found, h) for h in HORIZON_NAMES if h in found["bound"][0]["heading_deg"]
+        h: summarise_horizon(found, h, expected[h])
+        for h in HORIZON_NAMES
+        if h in found["bound"][0]["heading_deg"]
     }
     return {
         "horizons": horizons,
@@ -161,12 +163,12 @@ def ratio_cell(summary, mode, horizon_s):
 
 
 def heading_table(summaries, horizon_s):
-    head = ["pair", "scenario", "bound, deg", *(f"{mode} : bound" for mode in score.MODES), *RIVALS.values()]
+    head = ["pair", "scenario", "bound, deg (its σ)", *(f"{mode} : bound" for mode in score.MODES), *RIVALS.values()]
     rows = []
     for (pair, scenario), summary in summaries.items():
         horizon = summary["horizons"].get(horizon_s)
         if horizon:
-            rows.append([pair, scenario, number(horizon["rms_deg"]["bound"]),
+            rows.append([pair, scenario, f"{number(horizon['rms_deg']['bound'])} ({number(horizon['expected_deg'])})",
                          *(ratio_cell(summary, mode, horizon_s) for mode in score.MODES),
                          *(number(horizon["rms_deg"][name]) for name in RIVALS)])
     return table(head, rows) if rows else ""
@@ -186,11 +188,12 @@ def sigma_table(summaries):
 
 
 LEGEND = f"""\
-Ratios are of heading errors rms over the seeds, with their 95 % interval. ✗ misses a limit, ? is not decided by so
-many seeds; limits: {LIMITS['given']} with given parameters, {LIMITS['estimated']} with estimated ones, error² {ERROR2_LIMITS[0]} … {ERROR2_LIMITS[1]}. ✗ rival: a simpler means is better.
+Beside the bound, its σ by its own covariance. Ratios are of heading errors rms over the seeds, with their 95 %
+interval. ✗ misses a limit, ? is not decided by so many seeds; limits: {LIMITS['given']} with given parameters,
+{LIMITS['estimated']} with estimated ones, error² {ERROR2_LIMITS[0]} … {ERROR2_LIMITS[1]}. ✗ rival: a simpler means is better.
 """
 SIGMA_LEGEND = """\
-Heading apart: rms distance from the bound's heading, in units of the bound's. Bias: of what is taken off the virtual
+Heading apart: rms distance from the bound's heading, in units of its σ. Bias: of what is taken off the virtual
 rate, second half of the run. Error²: mean of ((VG_Rate − true) / VG_Sigma)² in the last quarter, in all of the run, and
 with one gyro alone. Bias error²: the same of the bias and VM_BiasSigma, where the wire resolves it.
 """
