@@ -39,8 +39,9 @@ std::vector<can::Filter> filters_of(const gateway::Plan& plan, std::size_t bus) 
 
 }  // namespace
 
-GatewayLoop::GatewayLoop(const gateway::Plan& plan, Log& log)
+GatewayLoop::GatewayLoop(const gateway::Plan& plan, StateKeeper* keeper, Log& log)
     : plan_(plan),
+      keeper_(keeper),
       log_(log),
       reporter_({plan.gyros[0].name, plan.gyros[1].name}, plan.calibration.rest_s, log),
       pipeline_(plan) {
@@ -62,7 +63,17 @@ Expected<void> GatewayLoop::start() {
     if (!poll_bus(i)) return fail(buses_[i].name(), "cannot poll: " + system_reason(errno));
   }
   if (const Expected<void> checked = check_output(); !checked) return checked;
+  take_up_state();
   return start_events();
+}
+
+void GatewayLoop::take_up_state() {
+  if (keeper_ == nullptr) return;
+  const std::optional<gateway::SavedState> state = keeper_->load(plan_);
+  if (!state) return;
+  if (const Expected<void> taken = pipeline_.resume(*state); !taken) {
+    log_.notice("saved state: {}", taken.error().message());
+  }
 }
 
 Expected<void> GatewayLoop::check_output() const {
@@ -125,6 +136,7 @@ Expected<void> GatewayLoop::run() {
     if (const Expected<void> done = cycle(events); !done) return done;
   }
   sd_notify(0, "STOPPING=1\nSTATUS=stopping");
+  if (keeper_ != nullptr) keeper_->finish(pipeline_.memory());
   reporter_.summarize(pipeline_.status(), traffic());
   return {};
 }
@@ -238,6 +250,7 @@ void GatewayLoop::second_passed() {
   reopen_dead_buses();
   const std::string status = reporter_.second_passed(pipeline_.status(), traffic());
   sd_notify(0, ("STATUS=" + status).c_str());
+  if (keeper_ != nullptr && keeper_->second_passed()) keeper_->keep(pipeline_.memory());
 }
 
 void GatewayLoop::reopen_dead_buses() {

@@ -17,6 +17,7 @@
 #include "daemon/bus.h"
 #include "daemon/log.h"
 #include "daemon/reporter.h"
+#include "daemon/state_keeper.h"
 #include "gateway/pipeline.h"
 #include "gateway/plan.h"
 
@@ -24,12 +25,14 @@ namespace vgyro::daemon {
 
 class GatewayLoop final : private gateway::FrameSink {
  public:
-  GatewayLoop(const gateway::Plan& plan, Log& log);
+  /// `keeper` is null where nothing is kept across a restart.
+  GatewayLoop(const gateway::Plan& plan, StateKeeper* keeper, Log& log);
   GatewayLoop(const GatewayLoop&) = delete;
   GatewayLoop& operator=(const GatewayLoop&) = delete;
   ~GatewayLoop() override;
 
-  /// Binds all sockets and catches SIGTERM and SIGINT; an error says what the user can do.
+  /// Takes up what was kept, binds all sockets and catches SIGTERM and SIGINT; an error says what
+  /// the user can do.
   Expected<void> start();
 
   /// Until SIGTERM or SIGINT.
@@ -40,6 +43,7 @@ class GatewayLoop final : private gateway::FrameSink {
 
   void put(const can::Frame& frame, TimePoint stamp) override;
 
+  void take_up_state();
   Expected<void> start_events();
   Expected<void> check_output() const;
   bool poll_bus(std::size_t index);
@@ -59,6 +63,7 @@ class GatewayLoop final : private gateway::FrameSink {
   static int on_second(sd_event_source* source, std::uint64_t usec, void* self);
 
   const gateway::Plan& plan_;
+  StateKeeper* keeper_;
   Log& log_;
   Reporter reporter_;
   gateway::Pipeline pipeline_;

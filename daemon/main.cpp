@@ -2,12 +2,15 @@
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
+#include <optional>
 #include <string>
+#include <string_view>
 
 #include <CLI/CLI.hpp>
 
 #include "daemon/gateway_loop.h"
 #include "daemon/log.h"
+#include "daemon/state_keeper.h"
 #include "gateway/config.h"
 
 namespace {
@@ -16,9 +19,24 @@ constexpr int kDone = 0;
 constexpr int kBadInput = 1;
 constexpr int kWrongUsage = 2;
 
-int run(const std::string& config, const std::string& method, vgyro::daemon::Log& log) {
+struct Options {
+  std::string config;
+  std::string method;
+  std::string state;
+  bool forget = false;
+};
+
+// systemd names the directory that it made for the service; of several the first.
+std::string default_state() {
+  const char* directories = std::getenv("STATE_DIRECTORY");
+  if (directories == nullptr || *directories == '\0') return {};
+  const std::string_view all(directories);
+  return std::string(all.substr(0, all.find(':'))) + "/state.toml";
+}
+
+int run(const Options& options, vgyro::daemon::Log& log) {
   const vgyro::gateway::ConfigResult loaded =
-      vgyro::gateway::load_config(config, {vgyro::gateway::method_from(method)});
+      vgyro::gateway::load_config(options.config, {vgyro::gateway::method_from(options.method)});
   if (!loaded) {
     for (const vgyro::Error& error : loaded.error())
       log.error("{}", error.message());
@@ -27,7 +45,10 @@ int run(const std::string& config, const std::string& method, vgyro::daemon::Log
   for (const vgyro::Error& warning : loaded->warnings)
     log.warning("{}", warning.message());
 
-  vgyro::daemon::GatewayLoop loop(loaded->plan, log);
+  std::optional<vgyro::daemon::StateKeeper> keeper;
+  if (!options.state.empty()) keeper.emplace(options.state, log);
+  if (keeper && options.forget) keeper->forget();
+  vgyro::daemon::GatewayLoop loop(loaded->plan, keeper ? &*keeper : nullptr, log);
   vgyro::Expected<void> result = loop.start();
   if (result) result = loop.run();
   if (!result) log.error("{}", result.error().message());
@@ -41,13 +62,16 @@ int main(int argc, char** argv) {
       "vgyrod: a gateway that reads two gyros from CAN and sends one better gyro.\n"
       "Runs in the foreground until SIGTERM; as a service: systemctl start vgyrod.",
       "vgyrod");
-  std::string config;
-  std::string method;
-  app.add_option("--config", config, "The gateway's configuration (vgyro.toml)")
+  Options options{.config = {}, .method = {}, .state = default_state()};
+  app.add_option("--config", options.config, "The gateway's configuration (vgyro.toml)")
       ->required()
       ->type_name("FILE");
-  app.add_option("--method", method, "corrector instead of the configured one")
+  app.add_option("--method", options.method, "corrector instead of the configured one")
       ->check(CLI::IsMember({"optimal", "mutual", "mean"}));
+  app.add_option("--state", options.state,
+                 "keeps the biases across a restart; default: state.toml in $STATE_DIRECTORY")
+      ->type_name("FILE");
+  app.add_flag("--forget", options.forget, "removes what --state has kept: calibrates anew");
   app.set_version_flag("--version", "vgyrod " VGYRO_VERSION);
   app.footer(
       "`vgyro check FILE` explains a configuration before it is trusted.\n"
@@ -61,7 +85,7 @@ int main(int argc, char** argv) {
   std::signal(SIGPIPE, SIG_IGN);  // a reader of stderr that went away must not stop the gateway
   vgyro::daemon::Log log;
   try {
-    return run(config, method, log);
+    return run(options, log);
   } catch (const std::exception& error) {
     log.error("{}", error.what());
     return kBadInput;

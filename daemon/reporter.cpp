@@ -14,6 +14,15 @@ std::string bias_text(double bias_dps) {
   return std::isfinite(bias_dps) ? fmt::format("{:.2f}", bias_dps * kDegPerHour) : "unknown";
 }
 
+// "3 h"; in the largest unit of which there are two.
+std::string age_text(double age_s) {
+  if (!std::isfinite(age_s)) return "an unknown time";
+  if (age_s < 120.0) return fmt::format("{:.0f} s", age_s);
+  if (age_s < 7200.0) return fmt::format("{:.0f} min", age_s / 60.0);
+  if (age_s < 172'800.0) return fmt::format("{:.0f} h", age_s / 3600.0);
+  return fmt::format("{:.0f} days", age_s / 86'400.0);
+}
+
 }  // namespace
 
 Reporter::Reporter(std::array<std::string, 2> gyro_names, double rest_s, Log& log)
@@ -46,6 +55,7 @@ std::string Reporter::second_passed(const gateway::Status& status, const Traffic
     tell_gyro(names_[k], status.gyros[k], gyros_[k]);
   }
   tell_pipeline(status);
+  tell_restored(status);
   tell_traffic(traffic);
 
   std::string doing{to_string(status.state)};
@@ -53,6 +63,9 @@ std::string Reporter::second_passed(const gateway::Status& status, const Traffic
     doing += fmt::format(" ({:.1f} of {:g} s)", status.calibrated_s, rest_s_);
   } else if (std::isfinite(status.rate_dps)) {
     doing += fmt::format(", {:.5f} deg/s", status.rate_dps);
+  }
+  if (status.restored == gateway::Restored::kTakenUp) {
+    doing += fmt::format(", on biases of {} before the start", age_text(status.restored_age_s));
   }
   const std::uint64_t received = traffic.received - std::exchange(last_received_, traffic.received);
   const std::uint64_t sent =
@@ -101,6 +114,31 @@ void Reporter::tell_pipeline(const gateway::Status& status) {
   }
   if (status.moved_in_calibration && !std::exchange(told_of_motion_, true)) {
     log_.warning("calibrated although the platform moved");
+  }
+}
+
+void Reporter::tell_restored(const gateway::Status& status) {
+  const gateway::Restored before = std::exchange(restored_, status.restored);
+  if (status.restored == before) return;
+  const bool was_told = before == gateway::Restored::kTakenUp;
+  switch (status.restored) {
+    case gateway::Restored::kNothing:
+    case gateway::Restored::kOffered:
+      return;
+    case gateway::Restored::kRefused:
+      log_.warning("the saved biases cannot be right; calibrating");
+      return;
+    case gateway::Restored::kTakenUp:
+    case gateway::Restored::kConfirmed:
+      break;
+  }
+  if (!was_told) {
+    log_.notice("took up the biases of {} ago: {} {:+.5f}, {} {:+.5f} deg/s; the rate ± {:.5f}",
+                age_text(status.restored_age_s), names_[0], status.gyros[0].bias_dps, names_[1],
+                status.gyros[1].bias_dps, status.restored_bias_sigma_dps);
+  }
+  if (status.restored == gateway::Restored::kConfirmed) {
+    log_.notice("a stop has confirmed the biases of the earlier run");
   }
 }
 

@@ -53,12 +53,14 @@ class Reporter {
   std::uint64_t news(Told& told, std::uint64_t count) const;
   void tell_gyro(const std::string& name, const gateway::GyroStatus& gyro, GyroTold& told);
   void tell_pipeline(const gateway::Status& status);
+  void tell_restored(const gateway::Status& status);
   void tell_traffic(const Traffic& traffic);
   [[nodiscard]] std::string biases(const gateway::Status& status) const;
 
   std::array<std::string, 2> names_;
   double rest_s_;
   Log& log_;
+  gateway::Restored restored_ = gateway::Restored::kNothing;
   gateway::State state_ = gateway::State::kWaiting;
   int state_lines_left_ = kStateLinesMost;
   std::uint64_t state_lines_held_ = 0;

@@ -20,6 +20,7 @@ enum class Quality : std::uint8_t {
   kUnusable = 0,
   kOneGyro = 4,
   kCalibrationUncertain = 8,  ///< the platform moved while it should have rested
+  kRestored = 12,             ///< biases of an earlier run, not confirmed yet
   kTwoGyros = 15
 };
 

@@ -1,8 +1,10 @@
 #include "gateway/pipeline.h"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "fusion/alignment.h"
 #include "fusion/calibration.h"
@@ -65,7 +67,7 @@ std::unique_ptr<fusion::Corrector> make_corrector(const Plan& plan) {
 }  // namespace
 
 struct Pipeline::Impl {
-  explicit Impl(const Plan& the_plan);
+  Impl(const Plan& the_plan, std::unique_ptr<fusion::Corrector> the_corrector);
 
   void receive(can::BusIndex bus, const can::Frame& frame, TimePoint stamp, FrameSink& sink);
   void advance(TimePoint now, FrameSink& sink);
@@ -80,6 +82,10 @@ struct Pipeline::Impl {
                    FrameSink& sink);
   void calibrate(const fusion::AlignedPair& pair);
   void calibrate_with(const fusion::AlignedPair& pair, double true_rate_dps);
+
+  void take_up_memory(TimePoint t);
+  void look_for_confirmation();
+  [[nodiscard]] std::optional<SavedState> memory() const;
 
   void let_time_pass(TimePoint stamp, FrameSink& sink);
   void do_what_is_due(TimePoint t, TimePoint stamp, FrameSink& sink);
@@ -113,6 +119,8 @@ struct Pipeline::Impl {
   RateObserver* observer = nullptr;
   Status status;
 
+  std::optional<SavedState> saved;  ///< to be taken up by the first pair
+
   bool calibrated = false;
   bool pairing = false;  ///< pairs flow: both gyros are in use
   std::array<bool, 2> heard{};
@@ -126,12 +134,12 @@ struct Pipeline::Impl {
   TimePoint suspect{};   ///< stamp far ahead that nobody has confirmed yet
 };
 
-Pipeline::Impl::Impl(const Plan& the_plan)
+Pipeline::Impl::Impl(const Plan& the_plan, std::unique_ptr<fusion::Corrector> the_corrector)
     : plan(the_plan),
       router(plan),
       inputs{GyroInput(plan.gyros[0]), GyroInput(plan.gyros[1])},
       calibrator(plan.corrector.order, plan.calibration.rest_s, plan.calibration.when_moving),
-      corrector(make_corrector(plan)),
+      corrector(std::move(the_corrector)),
       encoder(plan.output) {
   calibrated = !corrector->needs_calibration();
   status.rate_dps = kNone;
@@ -238,7 +246,10 @@ void Pipeline::Impl::take_sample(std::size_t gyro, TimePoint t, double rate_dps,
 // --- estimation ----------------------------------------------------------------------------------
 
 void Pipeline::Impl::take_pair(const fusion::AlignedPair& pair, TimePoint stamp, FrameSink& sink) {
-  if (status.pairs == 0) origin = pair.t;
+  if (status.pairs == 0) {
+    origin = pair.t;
+    take_up_memory(pair.t);
+  }
   ++status.pairs;
   if (!pairing) {
     pairing = true;
@@ -250,6 +261,7 @@ void Pipeline::Impl::take_pair(const fusion::AlignedPair& pair, TimePoint stamp,
   if (calibrated && !was_calibrated) enter_state(stamp, sink);
   fusion::VirtualRate rate;
   if (calibrated) rate = corrector->update({seconds(pair.t), pair.rate_dps, pair.noise_gain});
+  if (status.restored == Restored::kTakenUp) look_for_confirmation();
   // While one gyro was missing the other spoke alone, perhaps for later instants than this.
   if (pair.t <= newest) return;
   newest = pair.t;
@@ -307,6 +319,43 @@ void Pipeline::Impl::calibrate_with(const fusion::AlignedPair& pair, double true
   corrector->start(calibrator.result());
   calibrated = true;
   status.moved_in_calibration = calibrator.result().in_motion;
+}
+
+// --- across a restart ----------------------------------------------------------------------------
+
+void Pipeline::Impl::take_up_memory(TimePoint t) {
+  if (!saved) return;
+  const TimePoint stamp = t - guard.offset();
+  const bool age_is_known = stamp >= saved->rate_stamp;
+  const double age_s = age_is_known ? to_seconds(stamp - saved->rate_stamp) : kUnknownAge_s;
+  calibrated = corrector->resume(saved->drift, age_s, seconds(t));
+  status.restored = calibrated ? Restored::kTakenUp : Restored::kRefused;
+  status.restored_age_s = age_is_known ? age_s : kNone;
+  status.restored_bias_sigma_dps = corrector->drift(seconds(t)).bias_sigma_dps;
+}
+
+// A stop measures each gyro against the known rate, as a calibration does; that is why none runs
+// beside restored biases.
+void Pipeline::Impl::look_for_confirmation() {
+  if (corrector->condition().stops > 0) status.restored = Restored::kConfirmed;
+}
+
+std::optional<SavedState> Pipeline::Impl::memory() const {
+  if (!calibrated || status.pairs == 0) return std::nullopt;
+  // Motion learned as drift must not outlive the run.
+  if (status.moved_in_calibration && corrector->condition().stops == 0) return std::nullopt;
+  const std::optional<fusion::DriftMemory> drift = corrector->memory(seconds(newest));
+  if (!drift) return std::nullopt;
+  SavedState state;
+  state.drift = *drift;
+  state.rate_stamp = newest - guard.offset();
+  for (std::size_t gyro = 0; gyro < 2; ++gyro) {
+    state.devices[gyro] = device_of(plan.gyros[gyro]);
+    const double temperature_c = inputs[gyro].temperature_c();
+    if (std::isfinite(temperature_c)) state.temperature_c[gyro] = temperature_c;
+  }
+  state.rest_rate_dps = plan.calibration.rate_dps;
+  return state;
 }
 
 // --- states --------------------------------------------------------------------------------------
@@ -395,6 +444,7 @@ void Pipeline::Impl::advance(TimePoint now, FrameSink& sink) {
 
 Quality Pipeline::Impl::quality() const {
   if (!pairing) return Quality::kOneGyro;
+  if (status.restored == Restored::kTakenUp) return Quality::kRestored;
   return status.moved_in_calibration ? Quality::kCalibrationUncertain : Quality::kTwoGyros;
 }
 
@@ -462,7 +512,9 @@ const Status& Pipeline::Impl::refreshed_status() {
 
 // --- the public face -----------------------------------------------------------------------------
 
-Pipeline::Pipeline(const Plan& plan) : impl_(std::make_unique<Impl>(plan)) {}
+Pipeline::Pipeline(const Plan& plan) : Pipeline(plan, make_corrector(plan)) {}
+Pipeline::Pipeline(const Plan& plan, std::unique_ptr<fusion::Corrector> corrector)
+    : impl_(std::make_unique<Impl>(plan, std::move(corrector))) {}
 Pipeline::Pipeline(Pipeline&&) noexcept = default;
 Pipeline& Pipeline::operator=(Pipeline&&) noexcept = default;
 Pipeline::~Pipeline() = default;
@@ -483,6 +535,22 @@ TimePoint Pipeline::next_deadline() const {
 
 const Status& Pipeline::status() const {
   return impl_->refreshed_status();
+}
+
+std::optional<SavedState> Pipeline::memory() const {
+  return impl_->memory();
+}
+
+Expected<void> Pipeline::resume(const SavedState& state) {
+  assert(impl_->status.gyros[0].frames + impl_->status.gyros[1].frames == 0);
+  if (impl_->plan.corrector.method != Method::kOptimal) {
+    return fail({}, "is of no use to this method: only `optimal` takes up saved biases",
+                "set `method = \"optimal\"` under [corrector] to use it");
+  }
+  if (const Expected<void> same = check_devices(state, impl_->plan); !same) return same;
+  impl_->saved = state;
+  impl_->status.restored = Restored::kOffered;
+  return {};
 }
 
 void Pipeline::observe(RateObserver* observer) {

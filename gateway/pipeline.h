@@ -7,14 +7,21 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
+#include "base/error.h"
 #include "base/time.h"
 #include "can/frame.h"
 #include "gateway/plan.h"
+#include "gateway/saved_state.h"
 #include "gateway/status.h"
+
+namespace vgyro::fusion {
+class Corrector;
+}
 
 namespace vgyro::gateway {
 
@@ -37,7 +44,12 @@ class RateObserver {
 
 class Pipeline {
  public:
+  /// The age of saved biases when the clock cannot tell it: it stands before their stamp.
+  static constexpr double kUnknownAge_s = 30 * 86400.0;
+
   explicit Pipeline(const Plan& plan);
+  /// With a corrector of the caller's instead of the plan's.
+  Pipeline(const Plan& plan, std::unique_ptr<fusion::Corrector> corrector);
   Pipeline(Pipeline&&) noexcept;
   Pipeline& operator=(Pipeline&&) noexcept;
   ~Pipeline();
@@ -54,6 +66,14 @@ class Pipeline {
   [[nodiscard]] TimePoint next_deadline() const;
 
   [[nodiscard]] const Status& status() const;
+
+  /// What to keep across a restart; nothing before there is anything worth it.
+  [[nodiscard]] std::optional<SavedState> memory() const;
+
+  /// Before the first frame: the first pair takes this up instead of a calibration, aged by the
+  /// time between its own stamp and the state's. Error when the state is of other gyros, or the
+  /// method keeps none; then nothing has changed.
+  Expected<void> resume(const SavedState& state);
 
   /// Null to take it off again.
   void observe(RateObserver* observer);

@@ -37,6 +37,15 @@ enum class Reject : std::uint8_t {
 inline constexpr std::size_t kRejectCount = 10;
 std::string_view to_string(Reject reject);
 
+/// What became of the biases that an earlier run had saved.
+enum class Restored : std::uint8_t {
+  kNothing,   ///< there was nothing to take up
+  kOffered,   ///< waits for the first pair
+  kRefused,   ///< the corrector would not have it: calibrates
+  kTakenUp,   ///< in use instead of a calibration, VG_Quality says `restored`
+  kConfirmed  ///< in use, and a stop has been learned from since
+};
+
 struct GyroStatus {
   std::uint64_t frames = 0;   ///< received with the gyro's identifier
   std::uint64_t samples = 0;  ///< of these, handed to the alignment
@@ -67,6 +76,9 @@ struct Status {
   double calibrated_s = 0.0;               ///< calibration progress
   std::uint64_t calibration_restarts = 0;  ///< the platform moved, or the stream had holes
   bool moved_in_calibration = false;       ///< and that was accepted
+  Restored restored = Restored::kNothing;
+  double restored_age_s = 0.0;           ///< of what was taken up; NaN: a clock was set back
+  double restored_bias_sigma_dps = 0.0;  ///< of what was taken off the rate at first
 };
 
 }  // namespace vgyro::gateway

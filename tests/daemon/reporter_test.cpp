@@ -124,5 +124,47 @@ TEST_F(ReporterTest, ShowsTheProgressOfCalibration) {
   EXPECT_EQ(last_line.rfind("calibrating (12.3 of 60 s); bias left unknown", 0), 0U) << last_line;
 }
 
+TEST_F(ReporterTest, SaysWhoseBiasesItTookUpAndWhenTheyAreConfirmed) {
+  status.restored = gateway::Restored::kOffered;
+  EXPECT_EQ(second(), "");
+  status.restored = gateway::Restored::kTakenUp;
+  status.restored_age_s = 3.0 * 3600.0;
+  status.restored_bias_sigma_dps = 0.0002;
+  status.gyros[0].bias_dps = 0.0331;
+  status.gyros[1].bias_dps = -0.0074;
+  EXPECT_NE(second().find("took up the biases of 3 h ago: left +0.03310, right -0.00740 deg/s; the "
+                          "rate ± 0.00020"),
+            std::string::npos);
+  EXPECT_NE(last_line.find("on biases of 3 h before the start"), std::string::npos);
+  EXPECT_EQ(second(), "");
+  status.restored = gateway::Restored::kConfirmed;
+  EXPECT_NE(second().find("a stop has confirmed the biases"), std::string::npos);
+  EXPECT_EQ(last_line.find("before the start"), std::string::npos);
+  EXPECT_EQ(second(), "");
+}
+
+TEST_F(ReporterTest, TellsTheAgeInUnitsThatPeopleUse) {
+  const std::pair<double, const char*> ages[] = {{7.2, "7 s ago"},
+                                                 {300.0, "5 min ago"},
+                                                 {86'400.0, "24 h ago"},
+                                                 {864'000.0, "10 days ago"},
+                                                 {std::nan(""), "an unknown time ago"}};
+  for (const auto& [age_s, text] : ages) {
+    status.restored = gateway::Restored::kNothing;
+    second();
+    status.restored = gateway::Restored::kTakenUp;
+    status.restored_age_s = age_s;
+    EXPECT_NE(second().find(text), std::string::npos) << text;
+  }
+}
+
+TEST_F(ReporterTest, WarnsWhenTheSavedBiasesCannotBeRight) {
+  status.restored = gateway::Restored::kOffered;
+  second();
+  status.restored = gateway::Restored::kRefused;
+  EXPECT_NE(second().find("the saved biases cannot be right; calibrating"), std::string::npos);
+  EXPECT_EQ(second(), "");
+}
+
 }  // namespace
 }  // namespace vgyro::daemon

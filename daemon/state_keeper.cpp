@@ -1,0 +1,130 @@
+#include "daemon/state_keeper.h"
+
+#include <csignal>
+#include <utility>
+
+namespace vgyro::daemon {
+
+StateKeeper::StateKeeper(std::string path, Log& log)
+    : file_(std::move(path), gateway::kSavedStateBytesMax), log_(log) {}
+
+StateKeeper::~StateKeeper() {
+  stop_thread();
+}
+
+std::optional<gateway::SavedState> StateKeeper::load(const gateway::Plan& plan) {
+  file_.clean_up();
+  if (const Expected<void> writable = file_.check_writable(); !writable) tell(writable);
+  const Expected<std::optional<std::string>> text = file_.read();
+  if (!text) {
+    log_.warning("{}", text.error().message());
+    return std::nullopt;
+  }
+  if (!*text) {
+    log_.info("{}: not there yet; the biases will be kept in it", file_.path());
+    return std::nullopt;
+  }
+  Expected<gateway::SavedState> state = gateway::saved_state_from(**text, file_.path());
+  if (!state) {
+    refuse(state.error());
+    return std::nullopt;
+  }
+  if (const Expected<void> same = gateway::check_devices(*state, plan); !same) {
+    refuse(same.error());
+    return std::nullopt;
+  }
+  return std::move(*state);
+}
+
+// Kept, for it may be the file of another pair, or tell what damages files here.
+void StateKeeper::refuse(Error error) {
+  if (error.where.empty()) error.where = file_.path();
+  const bool kept = file_.set_aside().has_value();
+  log_.warning("{}{}", error.message(), kept ? "; it was renamed to " + file_.aside_path() : "");
+}
+
+void StateKeeper::forget() {
+  if (const Expected<void> removed = file_.remove(); !removed) {
+    log_.warning("{}", removed.error().message());
+  } else {
+    log_.notice("{}: forgotten; calibrating anew", file_.path());
+  }
+}
+
+bool StateKeeper::second_passed() {
+  std::optional<Expected<void>> result;
+  {
+    const std::scoped_lock lock(mutex_);
+    result = std::exchange(result_, std::nullopt);
+  }
+  if (result) tell(*result);
+  if (seconds_left_ > 0) --seconds_left_;
+  return seconds_left_ == 0;
+}
+
+void StateKeeper::keep(const std::optional<gateway::SavedState>& state) {
+  if (!state) return;
+  std::string text = gateway::to_text(*state);
+  if (text == latest_) return;  // nothing was learned
+  // A state that would be refused must not replace a good one.
+  if (const auto readable = gateway::saved_state_from(text, file_.path()); !readable) {
+    tell(tl::unexpected(Error{file_.path(), "not written: " + readable.error().what, {}}));
+    return;
+  }
+  latest_ = text;
+  seconds_left_ = kPeriod_s;
+  if (!thread_.joinable()) start_thread();
+  {
+    const std::scoped_lock lock(mutex_);
+    to_write_ = std::move(text);
+  }
+  wake_.notify_one();
+}
+
+void StateKeeper::finish(const std::optional<gateway::SavedState>& state) {
+  keep(state);
+  stop_thread();
+  if (result_) tell(*result_);
+}
+
+void StateKeeper::tell(const Expected<void>& written) {
+  const bool failed_before = std::exchange(failed_, !written);
+  if (!written) latest_.clear();
+  if (!written && !failed_before) log_.warning("{}", written.error().message());
+  if (written && failed_before) log_.notice("{}: written again", file_.path());
+}
+
+// The signals are the event loop's.
+void StateKeeper::start_thread() {
+  sigset_t all;
+  sigset_t before;
+  ::sigfillset(&all);
+  ::pthread_sigmask(SIG_BLOCK, &all, &before);
+  thread_ = std::thread([this] { write_what_comes(); });
+  ::pthread_sigmask(SIG_SETMASK, &before, nullptr);
+}
+
+void StateKeeper::stop_thread() {
+  if (!thread_.joinable()) return;
+  {
+    const std::scoped_lock lock(mutex_);
+    stopping_ = true;
+  }
+  wake_.notify_one();
+  thread_.join();
+}
+
+void StateKeeper::write_what_comes() {
+  std::unique_lock lock(mutex_);
+  for (;;) {
+    wake_.wait(lock, [this] { return stopping_ || to_write_; });
+    if (!to_write_) return;
+    const std::string text = *std::exchange(to_write_, std::nullopt);
+    lock.unlock();
+    const Expected<void> written = file_.write(text);
+    lock.lock();
+    result_ = written;
+  }
+}
+
+}  // namespace vgyro::daemon

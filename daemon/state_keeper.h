@@ -1,0 +1,64 @@
+#pragma once
+
+// Keeps what the pipeline knows of its gyros in a file: taken up at the start, written when
+// something new was learned, at most once a minute, and at the end. A disk may take its time, so a
+// thread of its own writes; only finish() waits. Trouble with the file is told, and never fatal.
+
+#include <condition_variable>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+
+#include "base/error.h"
+#include "daemon/log.h"
+#include "daemon/state_file.h"
+#include "gateway/plan.h"
+#include "gateway/saved_state.h"
+
+namespace vgyro::daemon {
+
+class StateKeeper {
+ public:
+  static constexpr int kPeriod_s = 60;
+
+  StateKeeper(std::string path, Log& log);
+  StateKeeper(const StateKeeper&) = delete;
+  StateKeeper& operator=(const StateKeeper&) = delete;
+  ~StateKeeper();
+
+  /// What an earlier run left, when it is whole and of these gyros. What is not is set aside.
+  std::optional<gateway::SavedState> load(const gateway::Plan& plan);
+
+  /// To start afresh: what an earlier run left is removed.
+  void forget();
+
+  /// To be called about once a second; true when it is time for keep().
+  bool second_passed();
+  void keep(const std::optional<gateway::SavedState>& state);
+
+  /// The last word; returns when it is on the disk.
+  void finish(const std::optional<gateway::SavedState>& state);
+
+ private:
+  void refuse(Error error);
+  void start_thread();
+  void stop_thread();
+  void write_what_comes();
+  void tell(const Expected<void>& written);
+
+  StateFile file_;
+  Log& log_;
+  int seconds_left_ = 0;
+  std::string latest_;   ///< given to the thread, or written
+  bool failed_ = false;  ///< and told
+
+  std::thread thread_;
+  std::mutex mutex_;  ///< guards what follows
+  std::condition_variable wake_;
+  bool stopping_ = false;
+  std::optional<std::string> to_write_;
+  std::optional<Expected<void>> result_;  ///< of the last write, until it is told
+};
+
+}  // namespace vgyro::daemon

@@ -1,0 +1,275 @@
+#include "gateway/saved_state.h"
+
+#include <algorithm>
+#include <cmath>
+#include <lzma.h>
+#include <span>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "base/toml_reader.h"
+
+namespace vgyro::gateway {
+
+namespace {
+
+constexpr std::int64_t kFormat = 1;
+constexpr const char* kRemedy = "the gateway calibrates anew; nothing has to be done";
+
+// The text ends with this and eight digits, so that whatever is cut off takes the checksum along.
+constexpr std::string_view kSealHead = "\n[checksum]\ncrc32 = \"";
+constexpr std::string_view kSealTail = "\"\n";
+constexpr std::size_t kSealBytes = kSealHead.size() + 8 + kSealTail.size();
+
+// What no gyro exceeds, by far; beyond it arithmetic would not stay finite.
+constexpr double kRateMax_dps = 1e5;
+constexpr double kVarianceMax = kRateMax_dps * kRateMax_dps;
+constexpr double kSkewMax_s = 10.0;
+constexpr double kTemperatureMin_c = -273.15;
+constexpr double kTemperatureMax_c = 1000.0;
+constexpr double kWeightSumTolerance = 1e-6;
+
+std::string seal(std::string_view content) {
+  const std::uint32_t crc =
+      ::lzma_crc32(reinterpret_cast<const std::uint8_t*>(content.data()), content.size(), 0);
+  return fmt::format("{}{:08x}{}", kSealHead, crc, kSealTail);
+}
+
+std::string quoted(std::string_view text) {
+  std::string out = "\"";
+  for (const char c : text) {
+    if (c == '"' || c == '\\') out += '\\';
+    out += c;
+  }
+  return out + '"';
+}
+
+bool is_printable(char c) {
+  return c >= 0x20 && c < 0x7F;
+}
+
+// The shortest form that reads back as the same number; with a point, for TOML's whole numbers know
+// no -0.
+std::string shortest(double value) {
+  std::string text = fmt::format("{}", value);
+  if (text.find_first_not_of("-0123456789") == std::string::npos) text += ".0";
+  return text;
+}
+
+std::string listed(std::span<const double> values) {
+  constexpr std::size_t kInLine = 7;
+  std::string out = "[";
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    if (i > 0) out += i % kInLine == 0 ? ",\n  " : ", ";
+    out += shortest(values[i]);
+  }
+  return out + "]";
+}
+
+// --- reading -------------------------------------------------------------------------------------
+
+/// The numbers of one table; the first complaint is kept.
+class Numbers {
+ public:
+  Numbers(const toml::table& table, const std::string& where, std::string title)
+      : reader_(table, where, std::move(title), errors_) {}
+
+  double number(std::string_view key, double minimum, double maximum) {
+    const std::optional<double> value = reader_.number(key);
+    if (!value) missing(key);
+    return checked(key, value.value_or(0.0), minimum, maximum);
+  }
+  std::optional<double> optional_number(std::string_view key, double minimum, double maximum) {
+    if (!reader_.has(key)) return std::nullopt;
+    return number(key, minimum, maximum);
+  }
+  std::int64_t integer(std::string_view key) {
+    const std::optional<std::int64_t> value = reader_.integer(key);
+    if (!value) missing(key);
+    return value.value_or(0);
+  }
+  std::string text(std::string_view key) { return reader_.required_text(key, "gyro"); }
+
+  template <std::size_t kCount>
+  std::array<double, kCount> numbers(std::string_view key, double minimum, double maximum) {
+    std::array<double, kCount> values{};
+    const toml::array* list = reader_.array(key);
+    if (list == nullptr || list->size() != kCount) {
+      reader_.complain(reader_.where(key), fmt::format("{} is no list of {}", key, kCount));
+      return values;
+    }
+    for (std::size_t i = 0; i < kCount; ++i) {
+      const std::optional<double> value =
+          (*list)[i].is_number() ? (*list)[i].value<double>() : std::nullopt;
+      values[i] = checked(key, value.value_or(NAN), minimum, maximum);
+    }
+    return values;
+  }
+
+  void require(bool holds, std::string_view key, const char* what) {
+    if (!holds) reader_.complain(reader_.where(key), fmt::format("{} {}", key, what));
+  }
+
+  void pass_over(std::string_view key) { reader_.forgive({key}); }
+
+  [[nodiscard]] std::optional<Error> finish() {
+    reader_.finish();
+    if (errors_.empty()) return std::nullopt;
+    errors_.front().remedy = kRemedy;
+    return errors_.front();
+  }
+
+ private:
+  void missing(std::string_view key) {
+    reader_.complain(reader_.where(), fmt::format("{} is missing", key));
+  }
+  double checked(std::string_view key, double value, double minimum, double maximum) {
+    if (value >= minimum && value <= maximum) return value;  // NaN is not
+    reader_.complain(reader_.where(key), fmt::format("{} holds {}, which cannot be: {} to {} can",
+                                                     key, value, minimum, maximum));
+    return 0.0;
+  }
+
+  std::vector<Error> errors_;
+  TomlReader reader_;
+};
+
+/// Of gyro 1, of both, of gyro 2.
+bool is_covariance(const std::array<double, 3>& m) {
+  return m[0] >= 0.0 && m[2] >= 0.0 && m[1] * m[1] <= m[0] * m[2];
+}
+bool is_positive_definite(const std::array<double, 3>& m) {
+  return m[0] > 0.0 && m[2] > 0.0 && m[1] * m[1] < m[0] * m[2];
+}
+
+fusion::DriftMemory drift_from(Numbers& table) {
+  fusion::DriftMemory drift;
+  drift.bias_dps = table.numbers<2>("bias_dps", -kRateMax_dps, kRateMax_dps);
+  drift.bias_covariance = table.numbers<3>("bias_covariance", -kVarianceMax, kVarianceMax);
+  table.require(is_positive_definite(drift.bias_covariance), "bias_covariance",
+                "is not positive definite");
+  drift.white_density = table.numbers<3>("white_density", -kVarianceMax, kVarianceMax);
+  table.require(is_covariance(drift.white_density), "white_density", "is no covariance");
+  drift.sample_variance = table.numbers<2>("sample_variance", 0.0, kVarianceMax);
+  drift.walk_weight = table.numbers<fusion::kWalkPairs>("walk_weight", 0.0, 1.0);
+  double sum = 0.0;
+  for (const double weight : drift.walk_weight)
+    sum += weight;
+  table.require(std::abs(sum - 1.0) <= kWeightSumTolerance, "walk_weight", "does not add up to 1");
+  drift.scale_difference = table.number("scale_difference", -1.0, 1.0);
+  drift.scale_difference_sigma = table.number("scale_difference_sigma", 0.0, kRateMax_dps);
+  drift.skew_s = table.number("skew_s", -kSkewMax_s, kSkewMax_s);
+  drift.skew_sigma_s = table.number("skew_sigma_s", 0.0, kRateMax_dps);
+  return drift;
+}
+
+Expected<std::string_view> unsealed(std::string_view text, const std::string& where) {
+  if (text.size() > kSavedStateBytesMax) {
+    return fail(
+        where, fmt::format("is longer than {} bytes, so it is no saved state", kSavedStateBytesMax),
+        kRemedy);
+  }
+  const std::string_view content = text.substr(0, text.size() - std::min(text.size(), kSealBytes));
+  // The parser is given nothing that to_text() does not write: it stumbles over some of Unicode.
+  const bool is_plain = std::all_of(content.begin(), content.end(),
+                                    [](char c) { return c == '\n' || is_printable(c); });
+  if (!is_plain || text.substr(content.size()) != seal(content)) {
+    return fail(where, "is damaged, cut, or no saved state: its checksum does not fit", kRemedy);
+  }
+  return content;
+}
+
+}  // namespace
+
+std::string device_of(const GyroPlan& gyro) {
+  const std::string device = fmt::format(
+      "{}: {} {:#x}{} {} {}{}, {}, scale {}{:+}", gyro.name, gyro.bus, gyro.match.id,
+      gyro.match.extended ? "x" : "", gyro.message, gyro.rate.name,
+      gyro.sign ? " with a sign signal" : "", gyro.rate.layout, gyro.rate.scale, gyro.rate.shift);
+  std::string plain;
+  for (const char c : device)
+    plain +=
+        is_printable(c) ? std::string(1, c) : fmt::format("%{:02X}", static_cast<unsigned char>(c));
+  return plain;
+}
+
+Expected<void> check_devices(const SavedState& state, const Plan& plan) {
+  for (std::size_t gyro = 0; gyro < 2; ++gyro) {
+    const std::string device = device_of(plan.gyros[gyro]);
+    if (state.devices[gyro] == device) continue;
+    return fail({},
+                fmt::format("is of other gyros: of `{}`, but the configuration has `{}`",
+                            state.devices[gyro], device),
+                kRemedy);
+  }
+  if (state.rest_rate_dps != plan.calibration.rate_dps) {
+    return fail({},
+                fmt::format("was learned with {} deg/s as the true rate at rest, but the "
+                            "configuration has {} deg/s",
+                            state.rest_rate_dps, plan.calibration.rate_dps),
+                kRemedy);
+  }
+  return {};
+}
+
+std::string to_text(const SavedState& state) {
+  const fusion::DriftMemory& drift = state.drift;
+  std::string text = fmt::format(
+      "# Biases of two gyros, kept by vgyrod so that a restart need not calibrate again.\n"
+      "# Without this file the gateway calibrates anew. A file changed by hand is refused.\n"
+      "format = {}\nrate_stamp_ns = {}\nrest_rate_dps = {}\n",
+      kFormat, to_ns(state.rate_stamp), shortest(state.rest_rate_dps));
+  for (std::size_t gyro = 0; gyro < 2; ++gyro) {
+    text += fmt::format("device_{} = {}\n", gyro + 1, quoted(state.devices[gyro]));
+    if (state.temperature_c[gyro]) {
+      text +=
+          fmt::format("temperature_{}_c = {}\n", gyro + 1, shortest(*state.temperature_c[gyro]));
+    }
+  }
+  text += fmt::format(
+      "\n[drift]  # covariances: of gyro 1, of both, of gyro 2\n"
+      "bias_dps = {}\nbias_covariance = {}\nwhite_density = {}\nsample_variance = {}\n"
+      "walk_weight = {}\n"
+      "scale_difference = {}\nscale_difference_sigma = {}\nskew_s = {}\nskew_sigma_s = {}\n",
+      listed(drift.bias_dps), listed(drift.bias_covariance), listed(drift.white_density),
+      listed(drift.sample_variance), listed(drift.walk_weight), shortest(drift.scale_difference),
+      shortest(drift.scale_difference_sigma), shortest(drift.skew_s), shortest(drift.skew_sigma_s));
+  return text + seal(text);
+}
+
+Expected<SavedState> saved_state_from(std::string_view text, const std::string& where) {
+  const Expected<std::string_view> content = unsealed(text, where);
+  if (!content) return tl::unexpected(content.error());
+  const toml::parse_result parsed = toml::parse(*content, where);
+  if (!parsed) {
+    return fail(at_line(where, static_cast<unsigned>(parsed.error().source().begin.line)),
+                std::string(parsed.error().description()), kRemedy);
+  }
+  const toml::table& root = parsed.table();
+  const toml::table* drift = root["drift"].as_table();
+  const std::optional<std::int64_t> format = root["format"].value<std::int64_t>();
+  if (drift == nullptr || format != kFormat) {
+    return fail(where, fmt::format("is of another version: only format {} is known", kFormat),
+                kRemedy);
+  }
+  SavedState state;
+  Numbers top(root, where, "saved state");
+  top.pass_over("format");
+  state.rate_stamp = time_from_ns(top.integer("rate_stamp_ns"));
+  top.require(state.rate_stamp >= TimePoint{}, "rate_stamp_ns", "is negative");
+  state.rest_rate_dps = top.number("rest_rate_dps", -kRateMax_dps, kRateMax_dps);
+  for (std::size_t gyro = 0; gyro < 2; ++gyro) {
+    state.devices[gyro] = top.text(fmt::format("device_{}", gyro + 1));
+    state.temperature_c[gyro] = top.optional_number(fmt::format("temperature_{}_c", gyro + 1),
+                                                    kTemperatureMin_c, kTemperatureMax_c);
+  }
+  top.pass_over("drift");
+  if (const std::optional<Error> error = top.finish()) return tl::unexpected(*error);
+  Numbers table(*drift, where, "[drift]");
+  state.drift = drift_from(table);
+  if (const std::optional<Error> error = table.finish()) return tl::unexpected(*error);
+  return state;
+}
+
+}  // namespace vgyro::gateway

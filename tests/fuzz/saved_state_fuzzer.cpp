@@ -1,0 +1,55 @@
+// Any text may stand where the biases of the last run are expected. As it is, its checksum refuses
+// it; with a right checksum behind it, it is refused with a reason, or read, and then what was read
+// says the same when it is written and read again, and is sane.
+
+#include <cassert>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <lzma.h>
+#include <string>
+#include <string_view>
+
+#include <fmt/format.h>
+
+#include "gateway/saved_state.h"
+
+using vgyro::gateway::saved_state_from;
+using vgyro::gateway::SavedState;
+
+namespace {
+
+std::string sealed(const std::string& content) {
+  const std::uint32_t crc =
+      ::lzma_crc32(reinterpret_cast<const std::uint8_t*>(content.data()), content.size(), 0);
+  return content + fmt::format("\n[checksum]\ncrc32 = \"{:08x}\"\n", crc);
+}
+
+void check(const SavedState& state) {
+  const vgyro::fusion::DriftMemory& drift = state.drift;
+  double sum = 0.0;
+  for (const double weight : drift.walk_weight)
+    sum += weight;
+  assert(std::abs(sum - 1.0) < 1e-5);
+  for (const double bias_dps : drift.bias_dps)
+    assert(std::isfinite(bias_dps));
+  assert(drift.bias_covariance[0] > 0.0 && drift.bias_covariance[2] > 0.0);
+  const std::string text = to_text(state);
+  const auto again = saved_state_from(text, "again");
+  assert(again && to_text(*again) == text);
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  const std::string text(reinterpret_cast<const char*>(data), size);
+  for (const std::string& candidate : {text, sealed(text)}) {
+    const auto state = saved_state_from(candidate, "fuzzer");
+    if (state) {
+      check(*state);
+    } else {
+      assert(!state.error().where.empty() && !state.error().what.empty());
+    }
+  }
+  return 0;
+}

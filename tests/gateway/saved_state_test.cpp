@@ -1,0 +1,282 @@
+// The form in which biases survive a restart: exact numbers, and nothing believed that is cut,
+// changed, or cannot be. The checksum is computed here bit by bit, apart from the product's.
+
+#include "gateway/saved_state.h"
+
+#include <bit>
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+#include <random>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "rig.h"
+
+namespace vgyro::gateway {
+namespace {
+
+constexpr const char* kWhere = "state.toml";
+
+std::uint32_t crc32_bit_by_bit(const std::string& bytes) {
+  std::uint32_t crc = 0xFFFFFFFF;
+  for (const char c : bytes) {
+    crc ^= static_cast<unsigned char>(c);
+    for (int bit = 0; bit < 8; ++bit)
+      crc = (crc & 1U) != 0 ? crc >> 1U ^ 0xEDB88320U : crc >> 1U;
+  }
+  return ~crc;
+}
+
+std::string content_of(const std::string& text) {
+  return text.substr(0, text.find("\n[checksum]"));
+}
+
+std::string sealed(const std::string& content) {
+  std::array<char, 64> tail{};
+  std::snprintf(tail.data(), tail.size(), "\n[checksum]\ncrc32 = \"%08x\"\n",
+                crc32_bit_by_bit(content));
+  return content + tail.data();
+}
+
+SavedState plain_state() {
+  SavedState state;
+  state.drift.bias_dps = {0.0331, -0.0074};
+  state.drift.bias_covariance = {4e-8, -1e-9, 9e-8};
+  state.drift.white_density = {6.4e-9, 0.0, 9e-8};
+  state.drift.sample_variance = {1e-6, 2e-6};
+  state.drift.walk_weight.fill(1.0 / static_cast<double>(fusion::kWalkPairs));
+  state.drift.scale_difference = -4e-4;
+  state.drift.scale_difference_sigma = 0.01;
+  state.drift.skew_s = 1e-3;
+  state.drift.skew_sigma_s = 1e-2;
+  state.rate_stamp = time_from_ns(1'700'000'000'123'456'000);
+  state.temperature_c = {25.25, std::nullopt};
+  state.devices = {"a: can0 0x101 GYRO S", "b \"x\\: can1"};
+  state.rest_rate_dps = 0.0032;
+  return state;
+}
+
+std::uint64_t pattern(double value) {
+  return std::bit_cast<std::uint64_t>(value);
+}
+
+template <std::size_t kCount>
+void expect_same(const std::array<double, kCount>& a, const std::array<double, kCount>& b) {
+  for (std::size_t i = 0; i < kCount; ++i)
+    EXPECT_EQ(pattern(a[i]), pattern(b[i])) << a[i] << " and " << b[i];
+}
+
+void expect_same(const SavedState& a, const SavedState& b) {
+  expect_same(a.drift.bias_dps, b.drift.bias_dps);
+  expect_same(a.drift.bias_covariance, b.drift.bias_covariance);
+  expect_same(a.drift.white_density, b.drift.white_density);
+  expect_same(a.drift.sample_variance, b.drift.sample_variance);
+  expect_same(a.drift.walk_weight, b.drift.walk_weight);
+  expect_same<5>({a.drift.scale_difference, a.drift.scale_difference_sigma, a.drift.skew_s,
+                  a.drift.skew_sigma_s, a.rest_rate_dps},
+                 {b.drift.scale_difference, b.drift.scale_difference_sigma, b.drift.skew_s,
+                  b.drift.skew_sigma_s, b.rest_rate_dps});
+  EXPECT_EQ(a.rate_stamp, b.rate_stamp);
+  EXPECT_EQ(a.devices, b.devices);
+  for (std::size_t gyro = 0; gyro < 2; ++gyro) {
+    ASSERT_EQ(a.temperature_c[gyro].has_value(), b.temperature_c[gyro].has_value());
+    expect_same<1>({a.temperature_c[gyro].value_or(0)}, {b.temperature_c[gyro].value_or(0)});
+  }
+}
+
+TEST(SavedState, ComesBackBitForBit) {
+  const auto back = saved_state_from(to_text(plain_state()), kWhere);
+  ASSERT_TRUE(back) << back.error().message();
+  expect_same(plain_state(), *back);
+}
+
+// Any mantissa, from subnormal numbers to the largest that are allowed, and both zeros.
+TEST(SavedState, AnyNumbersComeBackBitForBit) {
+  constexpr std::uint32_t kSeed = 20240607;
+  SCOPED_TRACE(kSeed);
+  std::mt19937_64 rng(kSeed);
+  const auto any = [&](double limit) {
+    const double value = std::ldexp(std::uniform_real_distribution<double>(0.5, 1.0)(rng),
+                                    std::uniform_int_distribution<int>(-1070, 16)(rng));
+    return std::min(value, limit);
+  };
+  const auto signed_any = [&](double limit) {
+    return (rng() & 1U) != 0 ? any(limit) : -any(limit);
+  };
+  for (int round = 0; round < 300; ++round) {
+    SavedState state = plain_state();
+    state.drift.bias_dps = {signed_any(1e5), round == 0 ? -0.0 : signed_any(1e5)};
+    const std::array<double, 2> variance{1e-30 + any(1e9), 1e-30 + any(1e9)};
+    const double limit = std::sqrt(variance[0]) * std::sqrt(variance[1]);
+    state.drift.bias_covariance = {variance[0], signed_any(0.99 * limit), variance[1]};
+    state.drift.sample_variance = {any(1e9), 0.0};
+    state.drift.skew_s = signed_any(10.0);
+    state.drift.scale_difference = signed_any(1.0);
+    double sum = 0.0;
+    for (double& weight : state.drift.walk_weight)
+      sum += weight = any(1.0);
+    for (double& weight : state.drift.walk_weight)
+      weight /= sum;
+    state.temperature_c = {signed_any(100.0), any(100.0)};
+    state.rate_stamp = time_from_ns(static_cast<std::int64_t>(rng() >> 1U));
+    const auto back = saved_state_from(to_text(state), kWhere);
+    ASSERT_TRUE(back) << back.error().message();
+    expect_same(state, *back);
+  }
+}
+
+TEST(SavedState, ChecksumIsCrc32OfAllBytesBeforeIt) {
+  const std::string text = to_text(plain_state());
+  EXPECT_EQ(text, sealed(content_of(text)));
+  EXPECT_LT(text.size(), kSavedStateBytesMax / 2);
+}
+
+TEST(SavedState, CutAnywhereIsRefused) {
+  const std::string text = to_text(plain_state());
+  for (std::size_t size = 0; size < text.size(); ++size)
+    ASSERT_FALSE(saved_state_from(text.substr(0, size), kWhere)) << size;
+}
+
+// Every byte, changed to every other value.
+TEST(SavedState, OneByteChangedIsRefused) {
+  std::string text = to_text(plain_state());
+  for (char& byte : text) {
+    const char right = byte;
+    for (int change = 1; change < 256; ++change) {
+      byte = static_cast<char>(right ^ change);
+      ASSERT_FALSE(saved_state_from(text, kWhere)) << &byte - text.data() << ' ' << change;
+    }
+    byte = right;
+  }
+  EXPECT_TRUE(saved_state_from(text, kWhere));
+}
+
+TEST(SavedState, BytesLostDoubledOrAddedAreRefused) {
+  const std::string text = to_text(plain_state());
+  for (std::size_t at = 0; at < text.size(); ++at) {
+    std::string other = text;
+    ASSERT_FALSE(saved_state_from(other.erase(at, 1), kWhere)) << at;
+    other = text;
+    ASSERT_FALSE(saved_state_from(other.insert(at, 1, text[at]), kWhere)) << at;
+  }
+  EXPECT_FALSE(saved_state_from(text + "\n", kWhere));
+  EXPECT_FALSE(saved_state_from(text + text, kWhere));
+  EXPECT_FALSE(saved_state_from(std::string(kSavedStateBytesMax + 1, 'x'), kWhere));
+}
+
+struct Forgery {
+  const char* from;
+  const char* to;
+  const char* said;  ///< in the message
+};
+
+// With a right checksum, so that nothing but the check of the content stands in the way.
+TEST(SavedState, WhatCannotBeIsRefusedBehindARightChecksum) {
+  const std::string content = content_of(to_text(plain_state()));
+  ASSERT_TRUE(saved_state_from(sealed(content), kWhere));
+  const Forgery forgeries[] = {
+      {"format = 1", "format = 2", "format 1"},
+      {"format = 1", "format = \"1\"", "format 1"},
+      {"[drift]", "[other]", "format 1"},
+      {"bias_dps = [0.0331", "bias_dps = [nan", "bias_dps holds nan"},
+      {"bias_dps = [0.0331", "bias_dps = [inf", "bias_dps holds inf"},
+      {"bias_dps = [0.0331", "bias_dps = [1e300", "bias_dps"},
+      {"bias_dps = [0.0331", "bias_dps = [\"0\"", "bias_dps"},
+      {"bias_dps = [0.0331, ", "bias_dps = [", "no list of 2"},
+      {"bias_dps = [0.0331", "bias_dps = [0.0, 0.0331", "no list of 2"},
+      {"[4e-08, -1e-09, 9e-08]", "[0.0, 0.0, 9e-08]", "positive definite"},
+      {"[4e-08, -1e-09, 9e-08]", "[-4e-08, 0.0, -9e-08]", "positive definite"},
+      {"[4e-08, -1e-09, 9e-08]", "[4e-08, 6.1e-08, 9e-08]", "positive definite"},
+      {"[4e-08, -1e-09, 9e-08]", "[4e-08, -6.1e-08, 9e-08]", "positive definite"},
+      {"white_density = [6.4e-09, 0.0", "white_density = [6.4e-09, 1.0", "no covariance"},
+      {"sample_variance = [1e-06", "sample_variance = [-1e-06", "sample_variance"},
+      {"walk_weight = [", "walk_weight = [0.5, ", "no list of 49"},
+      {"walk_weight = [0.0", "walk_weight = [0.1", "add up to 1"},
+      {"walk_weight = [0.0", "walk_weight = [-0.0", "walk_weight holds"},
+      {"scale_difference = -0.0004", "scale_difference = -1.1", "scale_difference"},
+      {"scale_difference = -0.0004", "scale_differences = -0.0004", "scale_difference is missing"},
+      {"scale_difference_sigma = 0.01", "scale_difference_sigma = -0.01", "scale_difference_sigma"},
+      {"skew_s = 0.001", "skew_s = 11.0", "skew_s"},
+      {"skew_sigma_s = 0.01", "skew_sigma_s = -1.0", "skew_sigma_s"},
+      {"skew_sigma_s = 0.01", "skew_sigma_s = 0.01\nmore = 1", "more"},
+      {"rate_stamp_ns = 1", "rate_stamp_ns = -1", "rate_stamp_ns"},
+      {"rate_stamp_ns = 1", "rate_stamp_ns = 1.", "rate_stamp_ns"},
+      {"rate_stamp_ns = 1", "rate_stamp_ns = 99", ""},
+      {"rest_rate_dps = 0.0032", "rest_rate_dps = nan", "rest_rate_dps"},
+      {"temperature_1_c = 25.25", "temperature_1_c = -300.0", "temperature_1_c"},
+      {"temperature_1_c = 25.25", "temperature_1_c = nan", "temperature_1_c"},
+      {"device_1 = \"a", "device_9 = \"a", "device_1"},
+      {"device_1 = \"a", "device_1 = a\"", ""},
+  };
+  for (const Forgery& forgery : forgeries) {
+    SCOPED_TRACE(forgery.to);
+    std::string forged = content;
+    const std::size_t at = forged.find(forgery.from);
+    ASSERT_NE(at, std::string::npos) << forgery.from;
+    forged.replace(at, std::strlen(forgery.from), forgery.to);
+    const auto state = saved_state_from(sealed(forged), kWhere);
+    ASSERT_FALSE(state);
+    const std::string message = state.error().message();
+    EXPECT_NE(message.find(forgery.said), std::string::npos) << message;
+    EXPECT_EQ(message.find(kWhere), 0U) << message;
+    EXPECT_FALSE(state.error().remedy.empty());
+  }
+}
+
+TEST(SavedState, AnyNameOfAGyroComesBack) {
+  Plan plan = rig::two_gyros();
+  plan.gyros[0].name = "gr\u00F6\u00DFe \"\\\n\x7F = [drift] # \U0001F600";
+  SavedState state = plain_state();
+  state.devices = {device_of(plan.gyros[0]), device_of(plan.gyros[1])};
+  state.rest_rate_dps = plan.calibration.rate_dps;
+  const auto back = saved_state_from(to_text(state), kWhere);
+  ASSERT_TRUE(back) << back.error().message();
+  EXPECT_TRUE(check_devices(*back, plan));
+  plan.gyros[0].name[2] = '\n';
+  EXPECT_FALSE(check_devices(*back, plan));
+}
+
+TEST(SavedState, NothingButPlainTextIsParsed) {
+  const std::string content = content_of(to_text(plain_state()));
+  for (int byte = 0; byte < 256; ++byte) {
+    const std::string text = sealed(content + "\n# " + static_cast<char>(byte));
+    EXPECT_EQ(saved_state_from(text, kWhere).has_value(),
+              byte == '\n' || (byte >= 0x20 && byte < 0x7F))
+        << byte;
+  }
+}
+
+TEST(SavedState, DevicesAreToldApartByAllThatChangesTheBias) {
+  const Plan plan = rig::two_gyros();
+  SavedState state = plain_state();
+  state.devices = {device_of(plan.gyros[0]), device_of(plan.gyros[1])};
+  state.rest_rate_dps = plan.calibration.rate_dps;
+  ASSERT_TRUE(check_devices(state, plan));
+  using Change = void (*)(Plan&);
+  const Change changes[] = {
+      [](Plan& p) { p.gyros[0].name = "c"; },
+      [](Plan& p) { p.gyros[0].bus = "can5"; },
+      [](Plan& p) { p.gyros[1].match.id = 0x105; },
+      [](Plan& p) { p.gyros[1].match.extended = true; },
+      [](Plan& p) { p.gyros[1].message = "OTHER"; },
+      [](Plan& p) { p.gyros[1].rate.name = "RateY"; },
+      [](Plan& p) { p.gyros[0].rate.scale = -1.0; },
+      [](Plan& p) { p.gyros[0].rate.shift = 0.1; },
+      [](Plan& p) { p.gyros[0].rate.layout = "bit 8"; },
+      [](Plan& p) { p.gyros[0].sign = rig::codec_of(rig::signal_of(40, 1)); },
+      [](Plan& p) { std::swap(p.gyros[0], p.gyros[1]); },
+      [](Plan& p) { p.calibration.rate_dps = 0.003; },
+  };
+  for (const Change& change : changes) {
+    Plan other = plan;
+    change(other);
+    const auto same = check_devices(state, other);
+    ASSERT_FALSE(same) << &change - changes;
+    EXPECT_FALSE(same.error().what.empty() || same.error().remedy.empty());
+  }
+}
+
+}  // namespace
+}  // namespace vgyro::gateway
