@@ -38,7 +38,7 @@ PAIRS = {
         Pair("fog_mems", "fibre-optic and MEMS",
              (Gyro(0.0015, 1e-4, 4.6e-6, 2e-5), Gyro(-0.4200, 5e-3, 2e-4, 1e-3))),
         Pair("mems", "two equal MEMS",
-             (Gyro(0.3100, 5e-3, 1.5e-4, 1e-3), Gyro(-0.1800, 5e-3, 1.5e-4, -1e-3))),
+             (Gyro(0.3100, 5e-3, 1.5e-4, 1e-3), Gyro(-0.1800, 5e-3, 1.5e-4, 3e-4))),
     )
 }
 

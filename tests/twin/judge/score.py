@@ -15,7 +15,7 @@ from judge import pair as gyro_pair
 SIGMA_STEP_DPS = 2e-5
 BIAS_SIGMA_STEP_DPS = 1e-5
 NOT_AVAILABLE = 0xFFF
-AGE_MAX_US = 7500
+AGE_STEP_US, AGE_MAX_US = 500, 7500
 DEGRADED = 3
 # A σ of fewer steps than this is the wire's, not the product's.
 STEPS_MIN = 5
@@ -46,18 +46,20 @@ def replay(recording, log, pair, method, mode=None):
 
 
 def instants_s(rate, recording):
-    """What each VG_Rate refers to. VG_Age has steps of 0.5 ms and an end; the instant is a sample's of
-    the gyro that paces, so its stamps say it exactly."""
+    """What each VG_Rate refers to. VG_Age has steps of 0.5 ms and an end; the instant is a sample's of the
+    gyro that paces, so its stamps, less its known delay, say it exactly."""
     about_us = rate.stamps_us - rate.age_us - gyro_pair.START_US
-    best, best_off = None, np.inf
-    for gyro in recording.gyros:
-        own_us = np.rint(gyro.t_s * 1e6).astype(np.int64)
-        last = np.clip(np.searchsorted(own_us, about_us + 260, side="right") - 1, 0, len(own_us) - 1)
-        exact = rate.age_us < AGE_MAX_US
-        off = np.abs(about_us - own_us[last])[exact & (rate.state != DEGRADED)].mean()
-        if off < best_off:
-            best, best_off = own_us[last], off
-    return np.where(rate.state == DEGRADED, about_us, best) * 1e-6
+    ended = rate.age_us >= AGE_MAX_US
+    paired = rate.state != DEGRADED
+    best_us, best_off = about_us, np.inf
+    for k, delay_s in ((0, 0.0), (1, 0.0), (1, recording.motion.scenario.delay_2_s)):
+        own_us = np.rint((recording.gyros[k].t_s - delay_s) * 1e6).astype(np.int64)
+        last_us = own_us[np.clip(np.searchsorted(own_us, about_us + AGE_STEP_US, side="right") - 1, 0, len(own_us) - 1)]
+        off = np.abs(about_us - last_us)
+        if off[paired & ~ended].mean() < best_off:
+            best_off = off[paired & ~ended].mean()
+            best_us = np.where(paired & (ended | (off < AGE_STEP_US)), last_us, about_us)
+    return best_us * 1e-6
 
 
 def heading_errors(t_s, error_dps, run_s, horizons_s):
