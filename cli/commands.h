@@ -44,6 +44,14 @@ int run_replay(const ReplayOptions& options);
 /// The kinds of effects that a model file may hold.
 int run_model_list();
 
+struct AllanOptions {
+  std::string config;
+  std::string json;  ///< "-": standard output; empty: nowhere
+  std::string plot;  ///< empty: none
+  std::string log;
+};
+int run_allan(const AllanOptions& options);
+
 /// "error: where: what; remedy" on stderr; returns kBadInput.
 int report(const Error& error);
 int report(const std::vector<Error>& errors);

@@ -1,4 +1,4 @@
-// vgyro: replays, checks and decodes recordings of the gateway's CAN traffic.
+// vgyro: replays, checks, decodes and judges recordings of the gateway's CAN traffic.
 
 #include <CLI/CLI.hpp>
 
@@ -14,6 +14,7 @@ struct Options {
   CheckOptions check;
   DecodeOptions decode;
   ReplayOptions replay;
+  AllanOptions allan;
   std::string method;
 };
 
@@ -72,6 +73,19 @@ CLI::App* add_model(CLI::App& app) {
   return command;
 }
 
+CLI::App* add_allan(CLI::App& app, AllanOptions& options) {
+  CLI::App* command = app.add_subcommand(
+      "allan", "Measure the gyros' noise: Allan deviation, N, B, K, Q; recommend a window");
+  command->add_option("--config", options.config, "configuration, e.g. vgyro.toml")->required();
+  command->add_option("--json", options.json, "figures as JSON; - is standard output");
+  command->add_option("--plot", options.plot, "picture of the curves: .svg, .png or .pdf");
+  command->add_option("LOG", options.log, "candump log, .xz too; - is standard input")->required();
+  command->footer(
+      "Best on an hour or more at rest; what the figures mean is in docs/allan.md.\n"
+      "Example: vgyro allan --config vgyro.toml --plot allan.svg rest.log.xz");
+  return command;
+}
+
 // CLI11 would only say that a subcommand is missing.
 std::optional<vgyro::Error> unknown_command(const CLI::App& app, int argc, char** argv) {
   if (argc < 2 || argv[1][0] == '-') return std::nullopt;
@@ -96,6 +110,7 @@ int main(int argc, char** argv) {
   CLI::App* decode = add_decode(app, options.decode);
   CLI::App* replay = add_replay(app, options.replay, options.method);
   CLI::App* model = add_model(app);
+  CLI::App* allan = add_allan(app, options.allan);
   if (const auto unknown = unknown_command(app, argc, argv)) {
     report(*unknown);
     return kWrongUsage;
@@ -111,6 +126,7 @@ int main(int argc, char** argv) {
   if (check->parsed()) return run_check(options.check);
   if (decode->parsed()) return run_decode(options.decode);
   if (model->parsed()) return run_model_list();
+  if (allan->parsed()) return run_allan(options.allan);
   // Frames are the main result; they give way only to a summary that wants the same place.
   const bool output_given = replay->count("--output") > 0;
   if (!output_given && options.replay.json != "-") options.replay.output = "-";

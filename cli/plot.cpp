@@ -3,11 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <cstdlib>
-#include <filesystem>
-#include <unistd.h>
 
 #include <fmt/format.h>
+
+#include "cli/gnuplot.h"
 
 namespace vgyro::cli {
 
@@ -15,27 +14,6 @@ namespace {
 
 constexpr double kSecondsPerHour = 3600.0;
 constexpr std::array<const char*, 2> kColours{"#e0a030", "#70a0d0"};
-
-std::string ending_of(const std::string& path) {
-  const std::size_t dot = path.rfind('.');
-  return dot == std::string::npos ? std::string() : path.substr(dot + 1);
-}
-
-std::string terminal_of(const std::string& ending) {
-  if (ending == "svg") return "svg size 1200,1250 dynamic font 'DejaVu Sans,13' background 'white'";
-  if (ending == "png") return "pngcairo size 1200,1250 font 'DejaVu Sans,11'";
-  if (ending == "pdf") return "pdfcairo size 8.3in,11.7in font 'DejaVu Sans,11'";
-  return {};
-}
-
-std::string gnuplot_text(const std::string& text) {
-  std::string result = "'";
-  for (const char c : text) {
-    if (c == '\'') result += '\'';
-    if (c != '\n') result += c;
-  }
-  return result + "'";
-}
 
 }  // namespace
 
@@ -102,23 +80,6 @@ void ReplayPlot::add_bias(TimePoint t, const std::array<double, 2>& bias_dps) {
     bucket.bias[i].add(bias_dps[i]);
 }
 
-Expected<void> ReplayPlot::check_path(const std::string& path) {
-  if (terminal_of(ending_of(path)).empty()) {
-    return fail(path, "is no kind of picture that can be drawn",
-                "a name ending in .svg, .png or .pdf");
-  }
-  const std::string folder = std::filesystem::path(path).parent_path().string();
-  if (::access(folder.empty() ? "." : folder.c_str(), W_OK) != 0) {
-    return fail(path, "cannot be written: " + system_reason());
-  }
-  // Not by trying: a pipe to a program that is not there ends this one.
-  // NOLINTNEXTLINE(concurrency-mt-unsafe): the program has one thread
-  if (::system("command -v gnuplot >/dev/null 2>&1") != 0) {
-    return fail(path, "cannot be drawn: there is no gnuplot", "apt-get install gnuplot-nox");
-  }
-  return {};
-}
-
 void ReplayPlot::write_data(std::FILE* to) const {
   fmt::print(to, "$rates << EOD\n");
   for (std::size_t i = 0; i < buckets_.size(); ++i) {
@@ -168,14 +129,13 @@ std::string ReplayPlot::script(const std::string& path, const PlotTexts& texts) 
   const bool rates = has_rates();
   const int panels = !rates ? 1 : has_biases() ? 4 : 2;
   std::string text = fmt::format(
-      "set terminal {}\nset output {}\nset encoding utf8\n"
-      "set multiplot layout {},1 title {} noenhanced\n"
+      "{}set multiplot layout {},1 title {} noenhanced\n"
       "set grid lc rgb '#dddddd'\nset key outside top right horizontal noenhanced\n"
       "set lmargin 12\nset rmargin 3\nset xrange [0:{:.9g}]\nset datafile missing 'NaN'\n"
       "set ylabel 'rate, deg/s'\n{}"
       "plot $rates u 1:2 w l lc rgb '{}' t {}, '' u 1:3 w l lc rgb '{}' t {}, "
       "'' u 1:4 w l lc rgb '#909090' t 'mean'",
-      terminal_of(ending_of(path)), gnuplot_text(path), panels,
+      picture_script(path, 1200, 1250), panels,
       gnuplot_text(texts.title + (rates ? "" : " (no valid virtual rate)")),
       to_seconds(width_) * static_cast<double>(buckets_.size()),
       rates ? "" : "set xlabel 'time since the first pair, s'\n", kColours[0],
@@ -188,19 +148,13 @@ std::string ReplayPlot::script(const std::string& path, const PlotTexts& texts) 
 }
 
 Expected<void> ReplayPlot::draw(const std::string& path, const PlotTexts& texts) const {
-  if (auto good = check_path(path); !good) return good;
-  if (buckets_.empty())
+  if (buckets_.empty()) {
     return fail(path, "there is nothing to draw: no pair of samples came together");
-  std::FILE* to = std::fopen(path.c_str(), "wb");
-  if (to == nullptr) return fail(path, "cannot be written: " + system_reason());
-  std::fclose(to);
-  std::FILE* gnuplot = ::popen("gnuplot", "w");
-  if (gnuplot == nullptr) return fail(path, "cannot be drawn: gnuplot could not be started");
-  write_data(gnuplot);
-  fmt::print(gnuplot, "{}", script(path, texts));
-  const int status = ::pclose(gnuplot);
-  if (status == 0) return {};
-  return fail(path, "was not drawn: gnuplot failed, as it says above");
+  }
+  return run_gnuplot(path, [&](std::FILE* to) {
+    write_data(to);
+    fmt::print(to, "{}", script(path, texts));
+  });
 }
 
 }  // namespace vgyro::cli

@@ -2,7 +2,7 @@
 
 // The picture of a replay: raw, mean and virtual rate, and each gyro's drift curve over what was
 // measured of it. Samples go into a bounded number of buckets on the way, so a day of data draws as
-// fast as a minute. Drawn by gnuplot; the file's ending says the format: .svg, .png or .pdf.
+// fast as a minute.
 
 #include <array>
 #include <cstdint>
@@ -24,11 +24,8 @@ class ReplayPlot {
   void add_rate(TimePoint t, const std::array<double, 2>& raw_dps, double virtual_dps);
   void add_bias(TimePoint t, const std::array<double, 2>& bias_dps);
 
-  /// Error when the ending is none of the three, gnuplot is missing, or it fails.
+  /// Error when there is nothing to draw, or as run_gnuplot().
   Expected<void> draw(const std::string& path, const PlotTexts& texts) const;
-
-  /// For a check before the long work.
-  static Expected<void> check_path(const std::string& path);
 
  private:
   /// Mean of what fell into one stretch of time.

@@ -9,6 +9,7 @@
 #include "base/nearest.h"
 #include "can/candump.h"
 #include "cli/commands.h"
+#include "cli/gnuplot.h"
 #include "cli/output_file.h"
 #include "cli/plot.h"
 #include "cli/progress.h"
@@ -351,7 +352,7 @@ int run_replay(const ReplayOptions& options) {
       warn(warning);
   }
   if (!options.plot.empty()) {
-    if (const auto good = ReplayPlot::check_path(options.plot); !good) return report(good.error());
+    if (const auto good = check_picture_path(options.plot); !good) return report(good.error());
   }
   auto buses = BusMap::make(options.bus_map, plan);
   if (!buses) return report(buses.error());

@@ -9,6 +9,7 @@ import bench
 COMMANDS = {
     "check": {"CONFIG", "--method"},
     "decode": {"--dbc", "--text", "LOG"},
+    "allan": {"--config", "--json", "--plot", "LOG"},
     "replay": {"--config", "--method", "-o", "--output", "--json", "--plot", "--map", "-q", "--quiet", "LOG"},
 }
 
@@ -51,6 +52,8 @@ class Usage(bench.Bench):
             (("decode", "in.log"), "--dbc"),
             (("replay", "--config", "vgyro.toml"), "LOG"),
             (("replay", "in.log"), "--config"),
+            (("allan", "in.log"), "--config"),
+            (("allan", "--config", "vgyro.toml"), "LOG"),
             (("replay", "--config", "vgyro.toml", "--method", "median", "in.log"), "median"),
             (("replay", "--config", "vgyro.toml", "--colour", "in.log"), "--colour"),
         ):

@@ -1,0 +1,72 @@
+#include <cstdio>
+
+#include <fmt/core.h>
+#include <nlohmann/json.hpp>
+
+#include "analysis/pair_noise.h"
+#include "analysis/recommendation.h"
+#include "cli/allan_plot.h"
+#include "cli/allan_report.h"
+#include "cli/commands.h"
+#include "cli/gnuplot.h"
+#include "cli/output_file.h"
+#include "cli/pair_recording.h"
+#include "gateway/config.h"
+
+namespace vgyro::cli {
+
+namespace {
+
+// Where not even white noise can be told from nothing.
+constexpr double kSecondsMin = 10.0;
+
+Expected<AllanReport> judge(const AllanOptions& options, const gateway::Plan& plan) {
+  const auto recording = read_pair_recording(options.log, plan);
+  if (!recording) return tl::unexpected(recording.error());
+  const double seconds = recording->paired[0].seconds();
+  if (seconds < kSecondsMin) {
+    return fail(
+        options.log,
+        fmt::format("holds {:.1f} s of both gyros, too short to tell noise from drift", seconds),
+        fmt::format("{:g} s at the least; an hour at rest shows drift", kSecondsMin));
+  }
+  AllanReport report{options.log, {plan.gyros[0].name, plan.gyros[1].name}, {}, {}};
+  report.noise = analysis::judge_pair(*recording);
+  if (const auto& fit = report.noise.difference.fit) {
+    report.recommendation = analysis::recommend(*fit, report.noise.difference.seconds);
+  }
+  return report;
+}
+
+Expected<void> write_json(const std::string& path, const AllanReport& report) {
+  auto file = OutputFile::open(path);
+  if (!file) return tl::unexpected(file.error());
+  constexpr auto kReplace = nlohmann::ordered_json::error_handler_t::replace;
+  file->write(to_json(report).dump(2, ' ', false, kReplace) + "\n");
+  return file->close();
+}
+
+}  // namespace
+
+int run_allan(const AllanOptions& options) {
+  const auto loaded = gateway::load_config(options.config);
+  if (!loaded) return report(loaded.error());
+  for (const Error& warning : loaded->warnings)
+    warn(warning);
+  if (!options.plot.empty()) {
+    if (const auto good = check_picture_path(options.plot); !good) return report(good.error());
+  }
+  const auto judged = judge(options, loaded->plan);
+  if (!judged) return report(judged.error());
+  // JSON on standard output stands there alone.
+  fmt::print(options.json == "-" ? stderr : stdout, "{}", to_text(*judged));
+  if (!options.json.empty()) {
+    if (const auto done = write_json(options.json, *judged); !done) return report(done.error());
+  }
+  if (!options.plot.empty()) {
+    if (const auto done = draw_allan(options.plot, *judged); !done) return report(done.error());
+  }
+  return kDone;
+}
+
+}  // namespace vgyro::cli

@@ -1,0 +1,16 @@
+#pragma once
+
+// The picture of `vgyro allan`: all three curves together, then each with its bounds, the fitted
+// model and the parts it is made of.
+
+#include <string>
+
+#include "base/error.h"
+#include "cli/allan_report.h"
+
+namespace vgyro::cli {
+
+/// Error as run_gnuplot().
+Expected<void> draw_allan(const std::string& path, const AllanReport& report);
+
+}  // namespace vgyro::cli

@@ -1,0 +1,30 @@
+#pragma once
+
+// What `vgyro allan` says: as text, as JSON (docs/allan.md has the fields), and as TOML to paste.
+
+#include <array>
+#include <string>
+
+#include <nlohmann/json_fwd.hpp>
+
+#include "analysis/pair_noise.h"
+#include "analysis/recommendation.h"
+
+namespace vgyro::cli {
+
+struct AllanReport {
+  std::string log;
+  std::array<std::string, 2> gyro_names;
+  analysis::PairNoise noise;
+  analysis::Recommendation recommendation;
+};
+
+std::string to_text(const AllanReport& report);
+nlohmann::ordered_json to_json(const AllanReport& report);
+
+/// Lines for the configuration.
+std::string corrector_toml(const AllanReport& report);
+/// [[effect]] tables for the model file; empty where no gyro could be judged.
+std::string model_toml(const AllanReport& report);
+
+}  // namespace vgyro::cli

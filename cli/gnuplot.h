@@ -1,0 +1,25 @@
+#pragma once
+
+// Pictures are drawn by gnuplot; the file's ending says the format: .svg, .png or .pdf.
+
+#include <cstdio>
+#include <functional>
+#include <string>
+
+#include "base/error.h"
+
+namespace vgyro::cli {
+
+/// For a check before the long work: the ending, the folder, and whether there is a gnuplot.
+Expected<void> check_picture_path(const std::string& path);
+
+/// "set terminal …" and "set output …" for a picture of that size; pdf is one page, upright or not.
+std::string picture_script(const std::string& path, int width, int height);
+
+/// Quoted for a gnuplot script.
+std::string gnuplot_text(const std::string& text);
+
+/// Runs the script that `write` sends to gnuplot. Error when gnuplot is missing or fails.
+Expected<void> run_gnuplot(const std::string& path, const std::function<void(std::FILE*)>& write);
+
+}  // namespace vgyro::cli
