@@ -74,8 +74,8 @@ CLI::App* add_model(CLI::App& app) {
 }
 
 CLI::App* add_allan(CLI::App& app, AllanOptions& options) {
-  CLI::App* command = app.add_subcommand(
-      "allan", "Measure the gyros' noise: Allan deviation, N, B, K, Q; recommend a window");
+  CLI::App* command =
+      app.add_subcommand("allan", "Measure the gyros' noise (Allan deviation); recommend a window");
   command->add_option("--config", options.config, "configuration, e.g. vgyro.toml")->required();
   command->add_option("--json", options.json, "figures as JSON; - is standard output");
   command->add_option("--plot", options.plot, "picture of the curves: .svg, .png or .pdf");
