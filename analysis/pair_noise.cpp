@@ -25,9 +25,11 @@ SeriesNoise judge(const Series& series, double interpolation_gain, bool fit) {
   noise.seconds = series.seconds();
   noise.parts = series.parts.size();
   noise.filled_share = series.filled_share;
-  for (const Part& part : series.parts)
+  const auto size = static_cast<double>(series.size());
+  for (const Part& part : series.parts) {
     for (const double rate : part.rate_dps)
-      noise.mean_dps += rate / static_cast<double>(series.size());
+      noise.mean_dps += rate / size;
+  }
   if (fit) {
     noise.fit = fit_noise(step_spectrum(series), {.measured_share = 1.0 - series.filled_share,
                                                   .interpolation_gain = interpolation_gain,

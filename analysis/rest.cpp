@@ -124,6 +124,7 @@ Motion find_motion(const std::array<Series, 2>& paired) {
   const std::vector<Block> blocks = blocks_of(paired);
   if (blocks.empty()) return motion;
   std::vector<double> sums;
+  sums.reserve(blocks.size());
   for (const Block& block : blocks)
     sums.push_back(block.sum_dps);
   const double usual_sum_dps = median(sums);

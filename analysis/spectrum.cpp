@@ -77,9 +77,10 @@ void add_long_part(const std::vector<double>& values, double interval_s,
   const auto least =
       static_cast<std::size_t>(static_cast<double>(kHalfPeriodsMin * of) / kShareOfMeans);
   const std::size_t piece = smooth_size(std::max(kPieceMin, least));
-  for (std::size_t begin = 0; begin + piece <= values.size(); begin += piece)
+  for (std::size_t begin = 0; begin + piece <= values.size(); begin += piece) {
     add_bins(std::span(values).subspan(begin, piece), interval_s, {border_hz, 1.0 / interval_s},
              bins);
+  }
 }
 
 }  // namespace
