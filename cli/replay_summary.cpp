@@ -46,6 +46,22 @@ Json rejected_json(const gateway::GyroStatus& gyro) {
   return rejected;
 }
 
+std::uint64_t times(const gateway::GyroStatus& gyro, gateway::Fault fault) {
+  return gyro.faults[static_cast<std::size_t>(fault)].times;
+}
+
+// Only what happened: most gyros are well.
+Json faults_json(const gateway::GyroStatus& gyro) {
+  Json faults = Json::object();
+  for (std::size_t i = 0; i < gateway::kFaultCount; ++i) {
+    const gateway::FaultRecord& record = gyro.faults[i];
+    if (record.times == 0) continue;
+    faults[std::string(to_string(static_cast<gateway::Fault>(i)))] = {
+        {"times", record.times}, {"last_s", to_seconds(record.last.time_since_epoch())}};
+  }
+  return faults;
+}
+
 std::uint64_t rejected_total(const gateway::GyroStatus& gyro) {
   std::uint64_t total = 0;
   for (const std::uint64_t count : gyro.rejected)
@@ -61,7 +77,8 @@ Json gyro_json(const ReplaySummary& summary, const gateway::Plan& plan, std::siz
           {"rejected", rejected_json(gyro)},
           {"missing_by_counter", gyro.missing},
           {"unpaired", gyro.unpaired},
-          {"time_outs", gyro.time_outs},
+          {"time_outs", times(gyro, gateway::Fault::kSilent)},
+          {"faults", faults_json(gyro)},
           {"mean_rate_dps", number(mean_of(summary.raw_sum_dps[index], summary.raws[index]))},
           {"bias_dps", number(gyro.bias_dps)},
           {"temperature_c", number(gyro.temperature_c)}};
@@ -154,6 +171,8 @@ Json to_json(const ReplaySummary& summary, const gateway::Plan& plan) {
       {"gaps",
        {{"longer_than_s", ReplaySummary::kGap_s}, {"count", summary.gaps}, {"longest", gaps}}},
       {"windows", {{"completed", status.windows}, {"skipped", status.windows_skipped}}},
+      {"stops", {{"learned", status.stops}, {"refused", status.stops_refused}}},
+      {"disagreements", status.disagreements},
       {"calibration",
        {{"covered_s", status.calibrated_s},
         {"restarts", status.calibration_restarts},
@@ -169,6 +188,18 @@ Json to_json(const ReplaySummary& summary, const gateway::Plan& plan) {
 }
 
 namespace {
+
+void put_faults(fmt::memory_buffer& text, const gateway::GyroStatus& gyro, double first_s) {
+  const char* separator = "\n  faults:";
+  for (std::size_t i = 0; i < gateway::kFaultCount; ++i) {
+    const gateway::FaultRecord& record = gyro.faults[i];
+    if (record.times == 0) continue;
+    fmt::format_to(std::back_inserter(text), "{} {} {} times, last at {:.2f} s", separator,
+                   to_string(static_cast<gateway::Fault>(i)), record.times,
+                   to_seconds(record.last.time_since_epoch()) - first_s);
+    separator = ";";
+  }
+}
 
 // What the plain mean of the two would have done over the same instants.
 void put_plain_mean(fmt::memory_buffer& text, const ReplaySummary& summary) {
@@ -219,7 +250,6 @@ std::string to_text(const ReplaySummary& summary, const gateway::Plan& plan) {
                      gyro.bias_dps * kSecondsPerHour);
     }
     if (gyro.missing > 0) fmt::format_to(to, ", {} missing by its counter", gyro.missing);
-    if (gyro.time_outs > 0) fmt::format_to(to, ", silent {} times", gyro.time_outs);
     if (rejected_total(gyro) > 0) {
       fmt::format_to(to, "\n  not used:");
       for (std::size_t k = 0; k < gateway::kRejectCount; ++k) {
@@ -227,6 +257,7 @@ std::string to_text(const ReplaySummary& summary, const gateway::Plan& plan) {
         fmt::format_to(to, " {} {}", gyro.rejected[k], to_string(static_cast<gateway::Reject>(k)));
       }
     }
+    put_faults(text, gyro, summary.first_s);
     fmt::format_to(to, "\n");
   }
   if (status.reference_frames > 0) {
@@ -249,6 +280,11 @@ std::string to_text(const ReplaySummary& summary, const gateway::Plan& plan) {
     fmt::format_to(to, ", {} windows, {} skipped for want of pairs", status.windows,
                    status.windows_skipped);
   }
+  if (status.stops + status.stops_refused > 0) {
+    fmt::format_to(to, "; {} stops learned from, {} refused", status.stops, status.stops_refused);
+  }
+  if (status.disagreements > 0)
+    fmt::format_to(to, "; the gyros disagreed {} times", status.disagreements);
   if (status.clock_steps > 0)
     fmt::format_to(to, "; the clock was set back {} times", status.clock_steps);
   if (summary.gaps > 0) {

@@ -23,6 +23,29 @@ std::string age_text(double age_s) {
   return fmt::format("{:.0f} days", age_s / 86'400.0);
 }
 
+// What is wrong, as the rest of the sentence "gyro left ...".
+const char* sentence(gateway::Fault fault) {
+  switch (fault) {
+    case gateway::Fault::kSilent:
+      return "is silent";
+    case gateway::Fault::kFlaggedInvalid:
+      return "is not used: it says itself that its rate is invalid";
+    case gateway::Fault::kUnreadable:
+      return "is not used: one frame after the other holds no rate";
+    case gateway::Fault::kCounterStuck:
+      return "is not used: its alive counter stands still";
+    case gateway::Fault::kSaturated:
+      return "is not used: it is at the end of its range";
+    case gateway::Fault::kStuck:
+      return "is not used: its value stands still and should not";
+    case gateway::Fault::kDeadBand:
+      return "is not used: it reads 0 inside its dead band";
+    case gateway::Fault::kNoisy:
+      return "has far more noise than before";
+  }
+  return "";
+}
+
 }  // namespace
 
 Reporter::Reporter(std::array<std::string, 2> gyro_names, double rest_s, Log& log)
@@ -37,9 +60,42 @@ void Reporter::state_changed(const gateway::Status& status) {
   --state_lines_left_;
   std::string silent;
   for (std::size_t k = 0; k < status.gyros.size(); ++k) {
-    if (!status.gyros[k].heard) silent += fmt::format(", gyro {} is silent", names_[k]);
+    if (!status.gyros[k].heard && !status.gyros[k].fault)
+      silent += fmt::format(", gyro {} is silent", names_[k]);
   }
   log_.notice("{} (was {}){}", to_string(status.state), to_string(before), silent);
+}
+
+bool Reporter::may_tell_of_health() {
+  if (health_lines_left_ == 0) {
+    ++health_lines_held_;
+    return false;
+  }
+  --health_lines_left_;
+  return true;
+}
+
+void Reporter::fault_changed(std::size_t gyro, const gateway::Status& status) {
+  const auto now = status.gyros[gyro].fault;
+  const auto before = std::exchange(faults_[gyro], now);
+  if (!may_tell_of_health()) return;
+  if (now) {
+    log_.warning("gyro {} {}", names_[gyro], sentence(*now));
+  } else if (status.gyros[gyro].heard) {
+    log_.notice("gyro {} is well again (was {})", names_[gyro], to_string(*before));
+  } else {
+    log_.notice("gyro {} is silent (was {})", names_[gyro], to_string(*before));
+  }
+}
+
+void Reporter::disagreement_changed(const gateway::Status& status) {
+  disagree_ = status.disagree;
+  if (!may_tell_of_health()) return;
+  if (disagree_) {
+    log_.warning("the gyros disagree; which one is wrong cannot be told");
+  } else {
+    log_.notice("the gyros no longer disagree");
+  }
 }
 
 std::string Reporter::second_passed(const gateway::Status& status, const Traffic& traffic) {
@@ -48,6 +104,11 @@ std::string Reporter::second_passed(const gateway::Status& status, const Traffic
     if (state_lines_held_ > 0) {
       log_.warning("{} more changes of state in the last minute", state_lines_held_);
     }
+    if (health_lines_held_ > 0) {
+      log_.warning("{} more changes of health in the last minute", health_lines_held_);
+    }
+    health_lines_held_ = 0;
+    health_lines_left_ = kHealthLinesMost;
     state_lines_held_ = 0;
     state_lines_left_ = kStateLinesMost;
   }

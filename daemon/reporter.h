@@ -6,6 +6,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <string>
 
 #include "can/transmit.h"
@@ -25,9 +26,12 @@ class Reporter {
  public:
   Reporter(std::array<std::string, 2> gyro_names, double rest_s, Log& log);
 
-  /// Logs a change of state. Cheap when there is none.
+  /// Logs a change of state or of a gyro's health. Cheap when there is none.
   void check_state(const gateway::Status& status) {
     if (status.state != state_) state_changed(status);
+    if (status.gyros[0].fault != faults_[0]) fault_changed(0, status);
+    if (status.gyros[1].fault != faults_[1]) fault_changed(1, status);
+    if (status.disagree != disagree_) disagreement_changed(status);
   }
 
   /// To be called about once a second: logs troubles that are new, returns the status line.
@@ -38,6 +42,7 @@ class Reporter {
  private:
   static constexpr std::uint64_t kRepeatSeconds = 60;
   static constexpr int kStateLinesMost = 10;
+  static constexpr int kHealthLinesMost = 10;
 
   /// A counter of troubles, and how much of it has been told.
   struct Told {
@@ -50,6 +55,9 @@ class Reporter {
   };
 
   void state_changed(const gateway::Status& status);
+  void fault_changed(std::size_t gyro, const gateway::Status& status);
+  void disagreement_changed(const gateway::Status& status);
+  [[nodiscard]] bool may_tell_of_health();
   std::uint64_t news(Told& told, std::uint64_t count) const;
   void tell_gyro(const std::string& name, const gateway::GyroStatus& gyro, GyroTold& told);
   void tell_pipeline(const gateway::Status& status);
@@ -64,6 +72,10 @@ class Reporter {
   gateway::State state_ = gateway::State::kWaiting;
   int state_lines_left_ = kStateLinesMost;
   std::uint64_t state_lines_held_ = 0;
+  std::array<std::optional<gateway::Fault>, 2> faults_;
+  bool disagree_ = false;
+  int health_lines_left_ = kHealthLinesMost;
+  std::uint64_t health_lines_held_ = 0;
   std::uint64_t second_ = 0;
   std::array<GyroTold, 2> gyros_;
   Told clock_steps_, rates_out_of_range_, reference_rejected_, windows_skipped_, restarts_;

@@ -205,6 +205,18 @@ bool Aligner::average(const Ring& other, AlignedPair& pair, std::size_t other_in
   return true;
 }
 
+bool Aligner::next_behind(std::size_t gyro, TimePoint t, TimePoint& sample_t,
+                          double& rate_dps) const {
+  const Ring& ring = rings_[gyro];
+  std::size_t first = ring.size();
+  while (first > 0 && ring[first - 1].t > t)
+    --first;
+  if (first == ring.size()) return false;
+  sample_t = ring[first].t;
+  rate_dps = ring[first].rate_dps;
+  return true;
+}
+
 void Aligner::clear() {
   for (Ring& ring : rings_)
     ring.clear();

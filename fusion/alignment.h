@@ -42,6 +42,11 @@ class Aligner {
   /// The next complete pair; t grows from pair to pair.
   bool pop(AlignedPair& pair);
 
+  /// The oldest buffered sample of this gyro behind `t`: for when it will find no partner. False
+  /// when there is none.
+  [[nodiscard]] bool next_behind(std::size_t gyro, TimePoint t, TimePoint& sample_t,
+                                 double& rate_dps) const;
+
   /// Forget all samples, keep the choice: after a step of the clock.
   void clear();
 

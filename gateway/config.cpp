@@ -160,7 +160,8 @@ std::optional<GyroPlan> read_gyro(const toml::table& table, std::size_t index, C
                           .sign = {},
                           .temperature = {},
                           .counter = {},
-                          .valid = {}});
+                          .valid = {},
+                          .saturation_dps = {}});
     read_sign(reader, gyro->rate);
     read_source_address(reader, resolver.message(), gyro->match);
     gyro->counter = read_counter(reader, resolver, *rate_signal);

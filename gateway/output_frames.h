@@ -19,16 +19,29 @@ namespace vgyro::gateway {
 enum class Quality : std::uint8_t {
   kUnusable = 0,
   kOneGyro = 4,
+  kDisagree = 6,              ///< both in use, but they contradict each other
   kCalibrationUncertain = 8,  ///< the platform moved while it should have rested
   kRestored = 12,             ///< biases of an earlier run, not confirmed yet
   kTwoGyros = 15
 };
 
 /// VB_Mode on the wire.
-enum class BiasMode : std::uint8_t { kNone = 0, kCalibrating = 1, kTracking = 2, kHold = 3 };
+enum class BiasMode : std::uint8_t {
+  kNone = 0,
+  kCalibrating = 1,
+  kTracking = 2,
+  kHold = 3,
+  kStop = 4  ///< standing still: both biases are being learned
+};
 
 /// VB_Health on the wire, a bit field.
-enum HealthBit : std::uint8_t { kGyro1Missing = 1U << 0U, kGyro2Missing = 1U << 1U };
+enum HealthBit : std::uint8_t {
+  kGyro1Missing = 1U << 0U,
+  kGyro2Missing = 1U << 1U,
+  kGyro1Suspect = 1U << 2U,
+  kGyro2Suspect = 1U << 3U,
+  kGyrosDisagree = 1U << 4U
+};
 
 struct RateOutput {
   bool valid = false;

@@ -10,6 +10,7 @@
 #include "fusion/calibration.h"
 #include "fusion/corrector.h"
 #include "fusion/stamp_guard.h"
+#include "gateway/gyro_health.h"
 #include "gateway/gyro_input.h"
 #include "gateway/output_frames.h"
 #include "gateway/reference_calibration.h"
@@ -78,8 +79,11 @@ struct Pipeline::Impl {
   void take_sample(std::size_t gyro, TimePoint t, double rate_dps, TimePoint stamp,
                    FrameSink& sink);
   void take_pair(const fusion::AlignedPair& pair, TimePoint stamp, FrameSink& sink);
-  void take_single(std::size_t gyro, TimePoint t, double rate_dps, TimePoint stamp,
+  void take_single(std::size_t gyro, TimePoint t, double rate_dps, Duration age, TimePoint stamp,
                    FrameSink& sink);
+  void refuse(std::size_t gyro, Reject cause, TimePoint t, TimePoint stamp, FrameSink& sink);
+  void set_aside(std::size_t gyro, TimePoint t, TimePoint stamp, FrameSink& sink);
+  void note_condition(TimePoint t);
   void calibrate(const fusion::AlignedPair& pair);
   void calibrate_with(const fusion::AlignedPair& pair, double true_rate_dps);
 
@@ -110,6 +114,7 @@ struct Pipeline::Impl {
   const Plan plan;
   Router router;
   std::array<GyroInput, 2> inputs;
+  std::array<GyroHealth, 2> health_of;
   fusion::StampGuard guard;
   fusion::Aligner aligner;
   fusion::Calibrator calibrator;
@@ -118,13 +123,14 @@ struct Pipeline::Impl {
   OutputEncoder encoder;
   RateObserver* observer = nullptr;
   Status status;
+  fusion::Condition condition;  ///< as of the newest rate
 
   std::optional<SavedState> saved;  ///< to be taken up by the first pair
 
   bool calibrated = false;
-  bool pairing = false;  ///< pairs flow: both gyros are in use
-  std::array<bool, 2> heard{};
-  std::array<TimePoint, 2> last_heard{};
+  bool pairing = false;                   ///< pairs flow: both gyros are in use
+  std::array<bool, 2> heard{};            ///< and may be used
+  std::array<TimePoint, 2> last_heard{};  ///< newest frame, even of a gyro that is set aside
   TimePoint first_heard{};
   TimePoint origin{};                   ///< zero of the estimation's seconds: the first pair
   TimePoint newest = TimePoint::min();  ///< newest instant given to the output
@@ -138,6 +144,7 @@ Pipeline::Impl::Impl(const Plan& the_plan, std::unique_ptr<fusion::Corrector> th
     : plan(the_plan),
       router(plan),
       inputs{GyroInput(plan.gyros[0]), GyroInput(plan.gyros[1])},
+      health_of{GyroHealth(plan.gyros[0]), GyroHealth(plan.gyros[1])},
       calibrator(plan.corrector.order, plan.calibration.rest_s, plan.calibration.when_moving),
       corrector(std::move(the_corrector)),
       encoder(plan.output) {
@@ -168,25 +175,26 @@ void Pipeline::Impl::receive_gyro(std::size_t gyro, const can::Frame& frame, Tim
                                   FrameSink& sink) {
   GyroStatus& own = status.gyros[gyro];
   ++own.frames;
-  const auto refuse = [&](Reject why) { ++own.rejected[static_cast<std::size_t>(why)]; };
+  const auto count = [&](Reject why) { ++own.rejected[static_cast<std::size_t>(why)]; };
   const GyroInput::Result input = inputs[gyro].decode(frame);
   own.missing += input.missing;
-  if (input.reject) {
-    refuse(*input.reject);
+  if (input.reject && !GyroHealth::tells_of_sensor(*input.reject)) {
+    count(*input.reject);
     let_time_pass(stamp, sink);
     return;
   }
   if (!can_be_time(stamp)) {
-    refuse(Reject::kStampJump);
+    count(input.reject.value_or(Reject::kStampJump));
     return;
   }
   TimePoint t;
   switch (guard.check(gyro, whole_microseconds(stamp), t)) {
     case fusion::StampGuard::Verdict::kRepeated:
-      refuse(Reject::kStampRepeated);
+      count(input.reject.value_or(Reject::kStampRepeated));
       return;
     case fusion::StampGuard::Verdict::kUnconfirmed:
-      refuse(Reject::kStampJump);
+      count(input.reject.value_or(Reject::kStampJump));
+      if (input.reject) let_time_pass(stamp, sink);
       return;
     case fusion::StampGuard::Verdict::kClockStep:
       ++status.clock_steps;
@@ -195,13 +203,51 @@ void Pipeline::Impl::receive_gyro(std::size_t gyro, const can::Frame& frame, Tim
     case fusion::StampGuard::Verdict::kAccepted:
       break;
   }
+  GyroHealth& health = health_of[gyro];
+  if (input.reject) {
+    health.refuse(t, *input.reject);
+    refuse(gyro, *input.reject, t, stamp, sink);
+    return;
+  }
+  const GyroHealth* other = heard[1 - gyro] ? &health_of[1 - gyro] : nullptr;
+  const bool can_spare = other != nullptr && calibrated && status.pairs > 0;
+  if (const auto cause = health.judge(t, input.rate_dps, other, can_spare)) {
+    refuse(gyro, *cause, t, stamp, sink);
+    return;
+  }
   if (!aligner.push(gyro, t, input.rate_dps)) {
-    refuse(Reject::kLate);
+    count(Reject::kLate);
     return;
   }
   ++own.samples;
   own.last_rate_dps = input.rate_dps;
   take_sample(gyro, t, input.rate_dps, stamp, sink);
+}
+
+// A frame whose stamp can be believed and whose rate cannot be used.
+void Pipeline::Impl::refuse(std::size_t gyro, Reject cause, TimePoint t, TimePoint stamp,
+                            FrameSink& sink) {
+  ++status.gyros[gyro].rejected[static_cast<std::size_t>(cause)];
+  if (health_of[gyro].set_aside()) {
+    last_heard[gyro] = std::max(last_heard[gyro], t);
+    if (heard[gyro]) set_aside(gyro, t, stamp, sink);
+  }
+  if (t >= deadline) do_what_is_due(t, stamp, sink);
+}
+
+// The other one carries on without waiting for a time-out, and first with what has waited for this
+// one. Beyond an interval it does not look back: VG_Age could not tell how old that is.
+void Pipeline::Impl::set_aside(std::size_t gyro, TimePoint t, TimePoint stamp, FrameSink& sink) {
+  heard[gyro] = false;
+  pairing = false;
+  enter_state(stamp, sink);
+  const std::size_t other = 1 - gyro;
+  if (!heard[other] || status.pairs == 0) return;
+  TimePoint sample_t = std::max(newest, t - usual_interval(other));
+  double rate_dps = 0.0;
+  while (aligner.next_behind(other, sample_t, sample_t, rate_dps)) {
+    take_single(other, sample_t, rate_dps, std::max(t - sample_t, Duration::zero()), stamp, sink);
+  }
 }
 
 void Pipeline::Impl::receive_reference(const can::Frame& frame, TimePoint stamp, FrameSink& sink) {
@@ -234,13 +280,16 @@ void Pipeline::Impl::receive_reference(const can::Frame& frame, TimePoint stamp,
 void Pipeline::Impl::take_sample(std::size_t gyro, TimePoint t, double rate_dps, TimePoint stamp,
                                  FrameSink& sink) {
   if (!heard[0] && !heard[1] && status.pairs == 0) first_heard = t;
+  // First what is due, or a silence of both would be noticed of one alone.
+  if (t >= deadline) do_what_is_due(t, stamp, sink);
   heard[gyro] = true;
   last_heard[gyro] = std::max(last_heard[gyro], t);
-  if (t >= deadline) do_what_is_due(t, stamp, sink);
   fusion::AlignedPair pair;
   while (aligner.pop(pair))
     take_pair(pair, stamp, sink);
-  if (!pairing && single_is_wanted(gyro, t)) take_single(gyro, t, rate_dps, stamp, sink);
+  if (!pairing && single_is_wanted(gyro, t)) {
+    take_single(gyro, t, rate_dps, Duration::zero(), stamp, sink);
+  }
 }
 
 // --- estimation ----------------------------------------------------------------------------------
@@ -259,12 +308,13 @@ void Pipeline::Impl::take_pair(const fusion::AlignedPair& pair, TimePoint stamp,
   const bool was_calibrated = calibrated;
   if (!calibrated) calibrate(pair);
   if (calibrated && !was_calibrated) enter_state(stamp, sink);
-  fusion::VirtualRate rate;
-  if (calibrated) rate = corrector->update({seconds(pair.t), pair.rate_dps, pair.noise_gain});
-  if (status.restored == Restored::kTakenUp) look_for_confirmation();
   // While one gyro was missing the other spoke alone, perhaps for later instants than this.
   if (pair.t <= newest) return;
   newest = pair.t;
+  fusion::VirtualRate rate;
+  if (calibrated) rate = corrector->update({seconds(pair.t), pair.rate_dps, pair.noise_gain});
+  if (calibrated) note_condition(pair.t);
+  if (status.restored == Restored::kTakenUp) look_for_confirmation();
   if (observer != nullptr) {
     observer->on_rate(pair.t - guard.offset(), pair.rate_dps, calibrated ? rate.rate_dps : kNone);
   }
@@ -272,8 +322,15 @@ void Pipeline::Impl::take_pair(const fusion::AlignedPair& pair, TimePoint stamp,
   send_bias_when_due(pair.t, stamp, sink);
 }
 
-void Pipeline::Impl::take_single(std::size_t gyro, TimePoint t, double rate_dps, TimePoint stamp,
-                                 FrameSink& sink) {
+// The corrector's opinion of both; of one gyro alone it has none that is new.
+void Pipeline::Impl::note_condition(TimePoint t) {
+  condition = corrector->condition();
+  for (std::size_t gyro = 0; gyro < 2; ++gyro)
+    health_of[gyro].set_noisy(t, condition.noisy[gyro]);
+}
+
+void Pipeline::Impl::take_single(std::size_t gyro, TimePoint t, double rate_dps, Duration age,
+                                 TimePoint stamp, FrameSink& sink) {
   if (t <= newest) return;
   newest = t;
   alone = gyro;
@@ -284,6 +341,7 @@ void Pipeline::Impl::take_single(std::size_t gyro, TimePoint t, double rate_dps,
     fusion::RatePair single{.t_s = seconds(t)};
     single.rate_dps[gyro] = rate_dps;
     rate = corrector->update_alone(gyro, single);
+    note_condition(t);
   }
   enter_state(stamp, sink);
   if (observer != nullptr) {
@@ -291,7 +349,7 @@ void Pipeline::Impl::take_single(std::size_t gyro, TimePoint t, double rate_dps,
     raw_dps[gyro] = rate_dps;
     observer->on_rate(t - guard.offset(), raw_dps, valid ? rate.rate_dps : kNone);
   }
-  send_rate(rate, valid, t, Duration::zero(), stamp, sink);
+  send_rate(rate, valid, t, age, stamp, sink);
   send_bias_when_due(t, stamp, sink);
 }
 
@@ -415,12 +473,12 @@ void Pipeline::Impl::let_time_pass(TimePoint stamp, FrameSink& sink) {
 void Pipeline::Impl::do_what_is_due(TimePoint t, TimePoint stamp, FrameSink& sink) {
   TimePoint next = TimePoint::max();
   for (std::size_t gyro = 0; gyro < 2; ++gyro) {
-    if (!heard[gyro]) continue;
+    if (!heard[gyro] && !health_of[gyro].set_aside()) continue;
     const TimePoint until = last_heard[gyro] + time_out(gyro);
     if (t >= until) {
+      if (heard[gyro]) pairing = false;
       heard[gyro] = false;
-      pairing = false;
-      ++status.gyros[gyro].time_outs;
+      health_of[gyro].fall_silent(last_heard[gyro]);
       inputs[gyro].forget_counter();
     } else {
       next = std::min(next, until);
@@ -444,6 +502,7 @@ void Pipeline::Impl::advance(TimePoint now, FrameSink& sink) {
 
 Quality Pipeline::Impl::quality() const {
   if (!pairing) return Quality::kOneGyro;
+  if (condition.disagree) return Quality::kDisagree;
   if (status.restored == Restored::kTakenUp) return Quality::kRestored;
   return status.moved_in_calibration ? Quality::kCalibrationUncertain : Quality::kTwoGyros;
 }
@@ -451,11 +510,21 @@ Quality Pipeline::Impl::quality() const {
 BiasMode Pipeline::Impl::bias_mode() const {
   if (!corrector->needs_calibration()) return BiasMode::kNone;
   if (!calibrated) return pairing ? BiasMode::kCalibrating : BiasMode::kNone;
+  if (condition.stopped && (heard[0] || heard[1])) return BiasMode::kStop;
   return pairing ? BiasMode::kTracking : BiasMode::kHold;
 }
 
 std::uint8_t Pipeline::Impl::health() const {
-  return static_cast<std::uint8_t>((heard[0] ? 0 : kGyro1Missing) | (heard[1] ? 0 : kGyro2Missing));
+  const auto missing = [&](std::size_t gyro) {
+    return !heard[gyro] && !health_of[gyro].set_aside();
+  };
+  unsigned bits = 0;
+  if (missing(0)) bits |= kGyro1Missing;
+  if (missing(1)) bits |= kGyro2Missing;
+  if (health_of[0].suspect()) bits |= kGyro1Suspect;
+  if (health_of[1].suspect()) bits |= kGyro2Suspect;
+  if (pairing && condition.disagree) bits |= kGyrosDisagree;
+  return static_cast<std::uint8_t>(bits);
 }
 
 void Pipeline::Impl::send_rate(const fusion::VirtualRate& rate, bool valid, TimePoint t,
@@ -502,9 +571,17 @@ const Status& Pipeline::Impl::refreshed_status() {
   for (std::size_t gyro = 0; gyro < 2; ++gyro) {
     status.gyros[gyro].bias_dps = drift.bias_dps[gyro];
     status.gyros[gyro].heard = heard[gyro];
+    status.gyros[gyro].fault = health_of[gyro].fault();
+    status.gyros[gyro].faults = health_of[gyro].records();
+    for (FaultRecord& record : status.gyros[gyro].faults)
+      record.last -= guard.offset();
     status.gyros[gyro].temperature_c = inputs[gyro].temperature_c();
     status.gyros[gyro].unpaired = aligner.counts().unpaired[gyro];
   }
+  status.disagree = pairing && condition.disagree;
+  status.disagreements = condition.disagreements;
+  status.stops = condition.stops;
+  status.stops_refused = condition.stops_refused;
   status.windows = corrector->windows().completed;
   status.windows_skipped = corrector->windows().skipped;
   return status;

@@ -74,6 +74,8 @@ struct GyroPlan {
   std::optional<Quantity> temperature;
   std::optional<AliveCounter> counter;
   std::optional<Condition> valid;
+  std::optional<double> saturation_dps;  ///< it clips at ± this
+  double dead_band_dps = 0.0;            ///< it reads 0 below this; 0: it has none
 };
 
 struct ReferencePlan {

@@ -14,8 +14,16 @@ std::string_view to_string(Reject reject) {
   constexpr std::array<std::string_view, kRejectCount> kNames{
       "not_data",   "other_page",   "truncated",        "flagged_invalid",
       "not_finite", "out_of_range", "counter_repeated", "stamp_repeated",
-      "late",       "stamp_jump"};
+      "late",       "stamp_jump",   "saturated",        "stuck",
+      "dead_band",  "recovering"};
   return kNames[static_cast<std::size_t>(reject)];
+}
+
+std::string_view to_string(Fault fault) {
+  constexpr std::array<std::string_view, kFaultCount> kNames{
+      "silent",    "flagged_invalid", "unreadable", "counter_stuck",
+      "saturated", "stuck",           "dead_band",  "noisy"};
+  return kNames[static_cast<std::size_t>(fault)];
 }
 
 }  // namespace vgyro::gateway

@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <string_view>
 
 #include "base/time.h"
@@ -16,8 +17,8 @@ enum class State : std::uint8_t {
   kWaiting = 0,      ///< at least one gyro has not been heard since the start
   kCalibrating = 1,  ///< both heard, initial calibration not complete
   kRunning = 2,      ///< both gyros in use
-  kDegraded = 3,     ///< one gyro in use, the other timed out
-  kLost = 4          ///< calibrated, but no gyro is heard
+  kDegraded = 3,     ///< one gyro in use, the other timed out or was set aside
+  kLost = 4          ///< calibrated, but no gyro is in use
 };
 std::string_view to_string(State state);
 
@@ -32,9 +33,13 @@ enum class Reject : std::uint8_t {
   kCounterRepeated,  ///< the alive counter did not move
   kStampRepeated,    ///< same stamp as the sample before
   kLate,             ///< older than a sample already used
-  kStampJump         ///< stamp far from its neighbours, not confirmed by the following ones
+  kStampJump,        ///< stamp far from its neighbours, not confirmed by the following ones
+  kSaturated,        ///< at the end of the sensor's range
+  kStuck,            ///< the value stands still and should not
+  kDeadBand,         ///< 0 of a sensor with a dead band, while the other gyro carries on
+  kRecovering        ///< good again, but not for long enough after a fault
 };
-inline constexpr std::size_t kRejectCount = 10;
+inline constexpr std::size_t kRejectCount = 14;
 std::string_view to_string(Reject reject);
 
 /// What became of the biases that an earlier run had saved.
@@ -46,14 +51,35 @@ enum class Restored : std::uint8_t {
   kConfirmed  ///< in use, and a stop has been learned from since
 };
 
+/// What can be wrong with a gyro. What is neither silence nor a dead band makes it "suspect" in
+/// VB_Health; a noisy gyro stays in use.
+enum class Fault : std::uint8_t {
+  kSilent,          ///< no frame within the time-out
+  kFlaggedInvalid,  ///< it says so itself
+  kUnreadable,      ///< one frame after the other is no rate
+  kCounterStuck,    ///< one frame after the other repeats the alive counter
+  kSaturated,
+  kStuck,
+  kDeadBand,
+  kNoisy  ///< far noisier than it was
+};
+inline constexpr std::size_t kFaultCount = 8;
+std::string_view to_string(Fault fault);
+
+struct FaultRecord {
+  std::uint64_t times = 0;  ///< that it began
+  TimePoint last;           ///< newest instant at which it was so, on the stamps' clock
+};
+
 struct GyroStatus {
   std::uint64_t frames = 0;   ///< received with the gyro's identifier
   std::uint64_t samples = 0;  ///< of these, handed to the alignment
   std::uint64_t missing = 0;  ///< frames lost on the way, by the alive counter
-  std::uint64_t time_outs = 0;
   std::array<std::uint64_t, kRejectCount> rejected{};
   std::uint64_t unpaired = 0;  ///< samples that found no partner: the other gyro had a gap
-  bool heard = false;          ///< a sample arrived within the time-out
+  bool heard = false;          ///< in use: a sample that may be used arrived within the time-out
+  std::optional<Fault> fault;  ///< at present; never kSilent, which `heard` tells
+  std::array<FaultRecord, kFaultCount> faults{};
   double last_rate_dps = 0.0;
   double bias_dps = 0.0;       ///< NaN until calibrated, and for `mean`, which has none
   double temperature_c = 0.0;  ///< NaN when there is none
@@ -79,6 +105,10 @@ struct Status {
   Restored restored = Restored::kNothing;
   double restored_age_s = 0.0;           ///< of what was taken up; NaN: a clock was set back
   double restored_bias_sigma_dps = 0.0;  ///< of what was taken off the rate at first
+  bool disagree = false;                 ///< the gyros contradict each other
+  std::uint64_t disagreements = 0;       ///< times that this began
+  std::uint64_t stops = 0;               ///< stops learned from
+  std::uint64_t stops_refused = 0;       ///< steady, but both gyros had moved together
 };
 
 }  // namespace vgyro::gateway

@@ -210,7 +210,14 @@ class Summary(Replay):
         self.assertEqual({k: v for k, v in right.items() if v},
                          {"truncated": 1, "not_finite": 2, "out_of_range": 1, "not_data": 1, "stamp_repeated": 1,
                           "stamp_jump": 1})
-        self.assertEqual({k: v for k, v in left.items() if v}, {"flagged_invalid": 1, "counter_repeated": 1})
+        # Five good samples follow the invalid one before the gyro is believed again.
+        self.assertEqual({k: v for k, v in left.items() if v},
+                         {"flagged_invalid": 1, "counter_repeated": 1, "recovering": 5})
+        faults = found["gyros"][0]["faults"]
+        self.assertEqual(set(faults), {"flagged_invalid"})
+        self.assertEqual(faults["flagged_invalid"]["times"], 1)
+        self.assertAlmostEqual(faults["flagged_invalid"]["last_s"], float(lines[a[230]][1:18]), delta=1e-6)
+        self.assertEqual(found["gyros"][1]["faults"], {})
         for gyro in found["gyros"]:
             self.assertEqual(gyro["frames"], gyro["samples"] + sum(gyro["rejected"].values()))
         self.assertEqual(found["final_state"], "running")

@@ -75,6 +75,41 @@ TEST_F(ReporterTest, HoldsAFlickeringStateBackAndSaysSo) {
   EXPECT_EQ(count_of("90 more changes of state", later), 1U) << later;
 }
 
+TEST_F(ReporterTest, TellsEachChangeOfHealthOnceWithItsCause) {
+  status.gyros[1].fault = gateway::Fault::kStuck;
+  status.gyros[1].heard = false;
+  std::string said = said_during([&] {
+    reporter.check_state(status);
+    reporter.check_state(status);
+  });
+  EXPECT_EQ(count_of("\n", said), 1U) << said;
+  EXPECT_EQ(count_of("gyro right is not used: its value stands still", said), 1U) << said;
+  status.gyros[1].fault.reset();
+  status.gyros[1].heard = true;
+  status.disagree = true;
+  said = said_during([&] {
+    reporter.check_state(status);
+    reporter.check_state(status);
+  });
+  EXPECT_EQ(count_of("\n", said), 2U) << said;
+  EXPECT_EQ(count_of("gyro right is well again (was stuck)", said), 1U) << said;
+  EXPECT_EQ(count_of("the gyros disagree", said), 1U) << said;
+}
+
+TEST_F(ReporterTest, HoldsAFlickeringHealthBackAndSaysSo) {
+  const std::string said = said_during([&] {
+    for (int i = 0; i < 100; ++i) {
+      status.gyros[0].fault = i % 2 == 0 ? std::optional(gateway::Fault::kSaturated) : std::nullopt;
+      reporter.check_state(status);
+    }
+  });
+  EXPECT_EQ(count_of("\n", said), 10U) << said;
+  std::string later;
+  for (int i = 0; i < 60; ++i)
+    later += second();
+  EXPECT_EQ(count_of("90 more changes of health", later), 1U) << later;
+}
+
 TEST_F(ReporterTest, TellsTheFirstOfEachCauseAtOnceAndTheRestOnceAMinute) {
   rejected(status, 0, Reject::kOutOfRange) = 1;
   EXPECT_EQ(count_of("gyro left: 1 frames not used", second()), 1U);

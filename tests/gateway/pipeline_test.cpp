@@ -107,8 +107,8 @@ TEST(PipelineStates, WalkAsTheirTableSays) {
                                     State::kDegraded, State::kRunning,     State::kDegraded,
                                     State::kLost,     State::kDegraded,    State::kRunning};
   EXPECT_EQ(run.states, expected);
-  EXPECT_EQ(run.pipeline.status().gyros[0].time_outs, 1U);
-  EXPECT_EQ(run.pipeline.status().gyros[1].time_outs, 2U);
+  EXPECT_EQ(rig::times(run.pipeline, 0, Fault::kSilent), 1U);
+  EXPECT_EQ(rig::times(run.pipeline, 1, Fault::kSilent), 2U);
 }
 
 // A gyro that goes while both should be calibrated: not enough is known to run on the other one.

@@ -69,7 +69,8 @@ inline GyroPlan gyro_plan(can::BusIndex bus, std::uint32_t id, const std::string
                   .sign = {},
                   .temperature = {},
                   .counter = {},
-                  .valid = {}};
+                  .valid = {},
+                  .saturation_dps = {}};
 }
 
 /// One second of calibration at rest, windows of one second, order 1.
@@ -238,6 +239,10 @@ class Dice {
 
 inline std::uint64_t rejected(const Pipeline& pipeline, std::size_t gyro, Reject why) {
   return pipeline.status().gyros[gyro].rejected[static_cast<std::size_t>(why)];
+}
+
+inline std::uint64_t times(const Pipeline& pipeline, std::size_t gyro, Fault fault) {
+  return pipeline.status().gyros[gyro].faults[static_cast<std::size_t>(fault)].times;
 }
 
 inline std::uint64_t rejected_total(const GyroStatus& gyro) {

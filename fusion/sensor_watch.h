@@ -1,0 +1,118 @@
+#pragma once
+
+// One gyro's raw values in order → is this a measurement at all? Tells values that stand still
+// where the sensor never did, values at the end of its range, and zeros of a dead band. It learns
+// from the sensor itself how long values repeat and how its noise compares with its steps; a coarse
+// sensor that repeats at rest is believed until the other gyro moves. O(1) a sample, no allocation.
+// Judges one sample at a time: how long a finding lasts is for others to decide.
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+
+#include "base/time.h"
+
+namespace vgyro::fusion {
+
+/// What is known of a sensor beforehand.
+struct SensorLimits {
+  double lowest_dps = -std::numeric_limits<double>::infinity();
+  double highest_dps = std::numeric_limits<double>::infinity();
+  double dead_band_dps = 0.0;  ///< below this it says 0; 0: none
+};
+
+/// Means over half seconds of a fixed grid: has the sensor moved, beyond its own noise?
+class Movement {
+ public:
+  static constexpr Duration kBlock = std::chrono::milliseconds(500);
+
+  void add(TimePoint t, double rate_dps);
+  /// By how much the means of the blocks inside [from, until] differ at least, six sigma taken off.
+  [[nodiscard]] double between(TimePoint from, TimePoint until) const;
+
+ private:
+  static constexpr std::size_t kBlocks = 8;
+  static constexpr int kSamplesMin = 3;
+  struct Block {
+    std::int64_t index = std::numeric_limits<std::int64_t>::min();
+    int count = 0;
+    double first_dps = 0.0;
+    double sum_dps = 0.0;  ///< less the first, so that nothing is lost to rounding
+    double last_dps = 0.0;
+    double squares = 0.0;  ///< of the steps from sample to sample
+    [[nodiscard]] double mean_dps() const { return first_dps + sum_dps / count; }
+    [[nodiscard]] double mean_sigma_dps() const;
+  };
+  std::array<Block, kBlocks> done_;
+  std::size_t next_ = 0;
+  Block open_;
+};
+
+/// How a sensor's values follow each other while it is well.
+class Habit {
+ public:
+  /// A value other than the one before.
+  void change(double from_dps, double to_dps);
+  void repeated(std::uint64_t times) { longest_run_ = times > longest_run_ ? times : longest_run_; }
+
+  /// Its noise is far above its steps, as far as was ever seen: equal values in a row are chance.
+  [[nodiscard]] bool fine() const;
+  [[nodiscard]] std::uint64_t longest_run() const { return longest_run_; }
+  /// Smallest step between values, on the large side while little is known.
+  [[nodiscard]] double step_dps() const { return step_dps_; }
+
+ private:
+  static constexpr int kChangesPerBlock = 32;
+  void close_block();
+
+  int changes_ = 0;
+  double step_before_ = 0.0;
+  double bend_before_ = 0.0;
+  int turns_ = 0;       ///< second differences against the direction of the one before
+  double bends_ = 0.0;  ///< their squares
+  double smallest_ = std::numeric_limits<double>::infinity();  ///< but for zero
+  bool step_known_ = false;
+  std::uint64_t blocks_ = 0;
+  std::uint64_t coarse_blocks_ = 0;
+  std::uint64_t longest_run_ = 1;
+  double step_dps_ = 0.5;  ///< coarser than any sensor worth the name
+};
+
+class SensorWatch {
+ public:
+  explicit SensorWatch(const SensorLimits& limits) : limits_(limits) {}
+
+  enum class Finding : std::uint8_t {
+    kSound,
+    kSaturated,  ///< at the end of the range, known or found
+    kStuck,      ///< the value stands still and should not
+    kBlind       ///< 0 inside the dead band: anything smaller than that
+  };
+  /// The next sample. `other` is the watch of a gyro that turns with this one and is well; else
+  /// null.
+  Finding judge(TimePoint t, double rate_dps, const SensorWatch* other);
+
+ private:
+  void follow(TimePoint t, double rate_dps);
+  [[nodiscard]] bool at_a_limit(double rate_dps);
+  [[nodiscard]] bool clipped(double rate_dps) const;
+  [[nodiscard]] bool stands_still(TimePoint t, double rate_dps, const SensorWatch* other);
+  [[nodiscard]] Duration run_time(TimePoint t) const { return t - run_begin_; }
+
+  SensorLimits limits_;
+  Movement movement_;
+  Habit habit_;
+  bool any_ = false;
+  double last_dps_ = 0.0;
+  TimePoint last_;
+  TimePoint run_begin_;
+  std::uint64_t run_ = 0;      ///< equal values in a row, this one included
+  bool run_is_fault_ = false;  ///< found saturated or stuck
+  Duration longest_run_time_{0};
+  std::int64_t asked_block_ = std::numeric_limits<std::int64_t>::min();
+  double peak_dps_ = 0.0;  ///< largest magnitude before this run
+  double clip_dps_ = std::numeric_limits<double>::infinity();  ///< found: it clips there
+};
+
+}  // namespace vgyro::fusion

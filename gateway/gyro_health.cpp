@@ -1,0 +1,140 @@
+#include "gateway/gyro_health.h"
+
+#include <algorithm>
+
+namespace vgyro::gateway {
+
+namespace {
+
+// One spoilt frame is a hole like any other; this many in a row are a sensor's fault.
+constexpr std::uint32_t kUnusableMost = 2;
+
+// Well again: for so long and so many samples, twice as long after each relapse within a minute.
+// More samples than the alignment's gap, so that no line is drawn across the fault.
+struct Probation {
+  Duration time;
+  std::uint32_t samples;
+};
+constexpr Probation kShort{std::chrono::milliseconds(50), 5};
+constexpr Probation kLong{std::chrono::milliseconds(500), 20};
+constexpr std::uint32_t kRelapsesMost = 4;
+constexpr Duration kRelapseWithin = std::chrono::minutes(1);
+
+Probation probation_of(Fault fault) {
+  return fault == Fault::kStuck || fault == Fault::kCounterStuck ? kLong : kShort;
+}
+
+// At a clip or in a dead band a healthy sensor comes and goes.
+bool is_defect(Fault fault) {
+  return fault != Fault::kSaturated && fault != Fault::kDeadBand;
+}
+
+Reject reject_of(Fault fault) {
+  if (fault == Fault::kSaturated) return Reject::kSaturated;
+  return fault == Fault::kStuck ? Reject::kStuck : Reject::kDeadBand;
+}
+
+fusion::SensorLimits limits_of(const GyroPlan& plan) {
+  const Quantity& rate = plan.rate;
+  const auto value = [&](double raw) { return raw * rate.scale + rate.shift; };
+  const double low = value(std::max(rate.minimum, rate.codec.representable_min()));
+  const double high = value(std::min(rate.maximum, rate.codec.representable_max()));
+  fusion::SensorLimits limits{.lowest_dps = std::min(low, high),
+                              .highest_dps = std::max(low, high),
+                              .dead_band_dps = plan.dead_band_dps};
+  if (plan.sign) limits.lowest_dps = std::min(limits.lowest_dps, -limits.highest_dps);
+  if (plan.sign) limits.highest_dps = -limits.lowest_dps;
+  if (plan.saturation_dps) {
+    limits.lowest_dps = std::max(limits.lowest_dps, -*plan.saturation_dps);
+    limits.highest_dps = std::min(limits.highest_dps, *plan.saturation_dps);
+  }
+  return limits;
+}
+
+}  // namespace
+
+GyroHealth::GyroHealth(const GyroPlan& plan) : watch_(limits_of(plan)) {}
+
+bool GyroHealth::tells_of_sensor(Reject cause) {
+  return cause == Reject::kFlaggedInvalid || cause == Reject::kNotFinite ||
+         cause == Reject::kOutOfRange || cause == Reject::kCounterRepeated;
+}
+
+std::optional<Fault> GyroHealth::fault_in(fusion::SensorWatch::Finding finding,
+                                          bool can_spare) const {
+  using Finding = fusion::SensorWatch::Finding;
+  if (finding == Finding::kSaturated) return Fault::kSaturated;
+  if (finding == Finding::kStuck) return Fault::kStuck;
+  const bool defect = fault_ && is_defect(*fault_);
+  if (finding == Finding::kBlind && can_spare && !defect) return Fault::kDeadBand;
+  return std::nullopt;
+}
+
+std::optional<Reject> GyroHealth::judge(TimePoint t, double rate_dps, const GyroHealth* other,
+                                        bool can_spare) {
+  unusable_in_row_ = 0;
+  const auto finding = watch_.judge(t, rate_dps, other != nullptr ? &other->watch_ : nullptr);
+  if (const auto found = fault_in(finding, can_spare)) {
+    bad(t, *found);
+    return reject_of(*found);
+  }
+  if (!fault_) return std::nullopt;
+  ++good_in_row_;
+  if (!recovered(t)) return Reject::kRecovering;
+  if (is_defect(*fault_)) {
+    last_episode_end_ = t;
+    any_episode_ = true;
+  }
+  fault_.reset();
+  return std::nullopt;
+}
+
+void GyroHealth::refuse(TimePoint t, Reject cause) {
+  if (cause == Reject::kFlaggedInvalid) {
+    unusable_in_row_ = 0;
+    bad(t, Fault::kFlaggedInvalid);
+  } else if (++unusable_in_row_ > kUnusableMost) {
+    bad(t, cause == Reject::kCounterRepeated ? Fault::kCounterStuck : Fault::kUnreadable);
+  }
+}
+
+void GyroHealth::bad(TimePoint t, Fault fault) {
+  if (!fault_ && is_defect(fault)) {
+    const bool relapse = any_episode_ && t - last_episode_end_ < kRelapseWithin;
+    relapses_ = relapse ? std::min(relapses_ + 1, kRelapsesMost) : 0;
+  }
+  note(t, fault, fault_ != fault);
+  fault_ = fault;
+  last_bad_ = t;
+  good_in_row_ = 0;
+}
+
+void GyroHealth::note(TimePoint t, Fault fault, bool begins) {
+  FaultRecord& record = records_[static_cast<std::size_t>(fault)];
+  if (begins) ++record.times;
+  record.last = t;
+}
+
+bool GyroHealth::recovered(TimePoint t) const {
+  const Probation probation = probation_of(*fault_);
+  const Duration time = is_defect(*fault_) ? probation.time * (1U << relapses_) : probation.time;
+  return good_in_row_ > probation.samples && t - last_bad_ >= time;
+}
+
+void GyroHealth::fall_silent(TimePoint t) {
+  fault_.reset();
+  unusable_in_row_ = 0;
+  note(t, Fault::kSilent, true);
+}
+
+void GyroHealth::set_noisy(TimePoint t, bool noisy) {
+  if (noisy) note(t, Fault::kNoisy, !noisy_);
+  noisy_ = noisy;
+}
+
+std::optional<Fault> GyroHealth::fault() const {
+  if (fault_) return fault_;
+  return noisy_ ? std::optional(Fault::kNoisy) : std::nullopt;
+}
+
+}  // namespace vgyro::gateway

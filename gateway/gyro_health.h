@@ -1,0 +1,63 @@
+#pragma once
+
+// May this gyro be used? Gathers what its frames and its values say of its health, sets it aside at
+// once when they say no, and takes it back when it has been well for a while: longer each time that
+// it relapses. Keeps the books of faults. Whether it speaks at all is the pipeline's to know.
+
+#include <array>
+#include <cstdint>
+#include <optional>
+
+#include "base/time.h"
+#include "fusion/sensor_watch.h"
+#include "gateway/plan.h"
+#include "gateway/status.h"
+
+namespace vgyro::gateway {
+
+class GyroHealth {
+ public:
+  explicit GyroHealth(const GyroPlan& plan);
+
+  /// A rate that the frame says is one. Nothing when it may be used, else the cause why not.
+  /// `other` is the other gyro when that is in use, else null. `can_spare`: without this one the
+  /// other carries on, so that a zero of the dead band need not be used.
+  std::optional<Reject> judge(TimePoint t, double rate_dps, const GyroHealth* other,
+                              bool can_spare);
+  /// A frame that holds no rate, for this cause, with a stamp that can be believed.
+  void refuse(TimePoint t, Reject cause);
+  /// It timed out: silent is all that is known of it.
+  void fall_silent(TimePoint t);
+  /// The corrector's opinion of its noise. A noisy gyro stays in use, with the weight it deserves.
+  void set_noisy(TimePoint t, bool noisy);
+
+  /// Is the cause one that tells of the sensor, not of somebody else's frame?
+  static bool tells_of_sensor(Reject cause);
+
+  [[nodiscard]] bool set_aside() const { return fault_.has_value(); }
+  /// For VB_Health. Zeros of a dead band are no defect.
+  [[nodiscard]] bool suspect() const { return noisy_ || (fault_ && *fault_ != Fault::kDeadBand); }
+  /// What is wrong at present; what sets it aside comes first.
+  [[nodiscard]] std::optional<Fault> fault() const;
+  [[nodiscard]] const std::array<FaultRecord, kFaultCount>& records() const { return records_; }
+
+ private:
+  [[nodiscard]] std::optional<Fault> fault_in(fusion::SensorWatch::Finding finding,
+                                              bool can_spare) const;
+  void bad(TimePoint t, Fault fault);
+  void note(TimePoint t, Fault fault, bool begins);
+  [[nodiscard]] bool recovered(TimePoint t) const;
+
+  fusion::SensorWatch watch_;
+  std::array<FaultRecord, kFaultCount> records_{};
+  std::optional<Fault> fault_;  ///< for which it is set aside
+  bool noisy_ = false;
+  std::uint32_t unusable_in_row_ = 0;
+  TimePoint last_bad_;
+  TimePoint last_episode_end_;
+  bool any_episode_ = false;
+  std::uint32_t good_in_row_ = 0;
+  std::uint32_t relapses_ = 0;
+};
+
+}  // namespace vgyro::gateway
