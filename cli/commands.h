@@ -32,6 +32,7 @@ int run_decode(const DecodeOptions& options);
 struct ReplayOptions {
   std::string config;
   std::optional<gateway::Method> method;
+  std::string state;                 ///< file of biases to start with; empty: none
   std::string output;                ///< "-": standard output; empty: nowhere
   std::string json;                  ///< likewise
   std::string plot;                  ///< empty: none

@@ -48,6 +48,8 @@ CLI::App* add_replay(CLI::App& app, ReplayOptions& options, std::string& method)
       "replay", "Run the gateway over recorded traffic, as fast as the machine can");
   command->add_option("--config", options.config, "configuration, e.g. vgyro.toml")->required();
   add_method(*command, method);
+  command->add_option("--state", options.state,
+                      "starts with the biases that vgyrod kept in this file; it is only read");
   command->add_option("-o,--output", options.output,
                       "output frames as candump lines; default: standard output");
   command->add_option("--json", options.json, "summary as JSON; - is standard output");

@@ -6,6 +6,7 @@
 #include <fmt/core.h>
 #include <nlohmann/json.hpp>
 
+#include "base/file.h"
 #include "base/nearest.h"
 #include "can/candump.h"
 #include "cli/commands.h"
@@ -16,6 +17,7 @@
 #include "cli/replay_summary.h"
 #include "gateway/config.h"
 #include "gateway/pipeline.h"
+#include "gateway/saved_state.h"
 
 namespace vgyro::cli {
 
@@ -136,6 +138,9 @@ class Replay {
         totals_(summary_, options.plot.empty() ? nullptr : &plot_) {
     pipeline_.observe(&totals_);
   }
+
+  /// Before the first log.
+  Expected<void> take_up(const gateway::SavedState& state) { return pipeline_.resume(state); }
 
   Expected<void> run_log(const std::string& path) {
     auto source = can::open_log(path);
@@ -341,6 +346,20 @@ int write_results(const ReplayOptions& options, const gateway::Plan& plan,
   return kDone;
 }
 
+// Nothing where none is wanted.
+Expected<std::optional<gateway::SavedState>> read_state(const std::string& path,
+                                                        const gateway::Plan& plan) {
+  constexpr const char* kRemedy = "leave --state away to calibrate anew";
+  if (path.empty()) return std::nullopt;
+  const auto text = read_file(path);
+  if (!text) return tl::unexpected(text.error());
+  auto state = gateway::saved_state_from(*text, path);
+  if (!state) return fail(path, state.error().what, kRemedy);
+  const auto same = gateway::check_devices(*state, plan);
+  if (!same) return fail(path, same.error().what, kRemedy);
+  return std::move(*state);
+}
+
 }  // namespace
 
 int run_replay(const ReplayOptions& options) {
@@ -357,10 +376,15 @@ int run_replay(const ReplayOptions& options) {
   auto buses = BusMap::make(options.bus_map, plan);
   if (!buses) return report(buses.error());
   if (const auto good = check_files(options); !good) return report(good.error());
+  const auto state = read_state(options.state, plan);
+  if (!state) return report(state.error());
   auto output = OutputFile::open(options.output);
   if (!output) return report(output.error());
 
   Replay replay(options, plan, *output, std::move(*buses));
+  if (*state) {
+    if (const auto taken = replay.take_up(**state); !taken) return report(taken.error());
+  }
   std::optional<Error> trouble;
   for (const std::string& log : options.logs) {
     if (const auto ran = replay.run_log(log); !ran) {

@@ -152,6 +152,8 @@ fusion::DriftMemory drift_from(Numbers& table) {
   drift.white_density = table.numbers<3>("white_density", -kVarianceMax, kVarianceMax);
   table.require(is_covariance(drift.white_density), "white_density", "is no covariance");
   drift.sample_variance = table.numbers<2>("sample_variance", 0.0, kVarianceMax);
+  const auto ratios = table.numbers<fusion::kWalkRatios_per_s.size()>("walk_ratio_per_s", 0.0, 1e9);
+  table.require(ratios == fusion::kWalkRatios_per_s, "walk_ratio_per_s", "are of another version");
   drift.walk_weight = table.numbers<fusion::kWalkPairs>("walk_weight", 0.0, 1.0);
   double sum = 0.0;
   for (const double weight : drift.walk_weight)
@@ -188,9 +190,10 @@ std::string device_of(const GyroPlan& gyro) {
       gyro.match.extended ? "x" : "", gyro.message, gyro.rate.name,
       gyro.sign ? " with a sign signal" : "", gyro.rate.layout, gyro.rate.scale, gyro.rate.shift);
   std::string plain;
-  for (const char c : device)
+  for (const char c : device) {
     plain +=
         is_printable(c) ? std::string(1, c) : fmt::format("%{:02X}", static_cast<unsigned char>(c));
+  }
   return plain;
 }
 
@@ -230,11 +233,12 @@ std::string to_text(const SavedState& state) {
   text += fmt::format(
       "\n[drift]  # covariances: of gyro 1, of both, of gyro 2\n"
       "bias_dps = {}\nbias_covariance = {}\nwhite_density = {}\nsample_variance = {}\n"
-      "walk_weight = {}\n"
+      "walk_ratio_per_s = {}\nwalk_weight = {}\n"
       "scale_difference = {}\nscale_difference_sigma = {}\nskew_s = {}\nskew_sigma_s = {}\n",
       listed(drift.bias_dps), listed(drift.bias_covariance), listed(drift.white_density),
-      listed(drift.sample_variance), listed(drift.walk_weight), shortest(drift.scale_difference),
-      shortest(drift.scale_difference_sigma), shortest(drift.skew_s), shortest(drift.skew_sigma_s));
+      listed(drift.sample_variance), listed(fusion::kWalkRatios_per_s), listed(drift.walk_weight),
+      shortest(drift.scale_difference), shortest(drift.scale_difference_sigma),
+      shortest(drift.skew_s), shortest(drift.skew_sigma_s));
   return text + seal(text);
 }
 

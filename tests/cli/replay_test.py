@@ -10,6 +10,7 @@ import resource
 import struct
 import subprocess
 import unittest
+import zlib
 
 import bench
 
@@ -329,6 +330,17 @@ class BadInput(Replay):
         later = bench.two_gyros(4, begin_us=1_700_009_000_000_000)
         self.write("in.log", "".join([l for l in self.lines if "can0" in l] + [l for l in later if "can1" in l]))
         self.assertIn("never spoke at the same time", self.refuse("-q", "in.log"))
+
+    def test_saved_state_that_cannot_be_used(self):
+        whole = b"format = 2\n"
+        whole += b'\n[checksum]\ncrc32 = "%08x"\n' % zlib.crc32(whole)
+        for text, said in (None, "cannot be read"), (b"format = 1\n", "is damaged"), (whole, "only format 1"):
+            if text is not None:
+                (self.folder / "state.toml").write_bytes(text)
+            message = self.refuse("--state", "state.toml", "-o", "out.log", "in.log")
+            self.assertIn("state.toml: ", message)
+            self.assertIn(said, message)
+            self.assertFalse((self.folder / "out.log").exists())
 
     def test_unwritable_output(self):
         # /dev/full is a full disk; a folder that is not there cannot be written to.
