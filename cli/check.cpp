@@ -2,6 +2,7 @@
 
 #include "cli/commands.h"
 #include "gateway/config.h"
+#include "gateway/model_plan.h"
 
 namespace vgyro::cli {
 
@@ -39,6 +40,18 @@ void print_gyro(const gateway::GyroPlan& gyro) {
   if (gyro.valid) detail("valid when", gyro.valid->text);
 }
 
+void print_model(const gateway::Plan& plan) {
+  if (!plan.model) return;
+  fmt::print("  {:<14}{}, {} effects\n", "model", plan.model->file, plan.model->effects.size());
+  for (std::size_t gyro = 0; gyro < 2; ++gyro) {
+    fmt::print("    gyro {}\n", plan.gyros[gyro].name);
+    for (const model::Effect& effect : gateway::effects_of(plan, gyro)) {
+      fmt::print("      {:<15}{:<28}{}\n", gateway::treatment(effect.kind),
+                 model::info(effect.kind).name, model::parameters_text(effect));
+    }
+  }
+}
+
 void print_plan(const gateway::Plan& plan) {
   fmt::print("  {:<14}{:<8}{:<10}{:<26}{:<8}{}\n", "", "bus", "id", "signal", "unit", "bits");
   for (const gateway::GyroPlan& gyro : plan.gyros)
@@ -69,7 +82,9 @@ void print_plan(const gateway::Plan& plan) {
     fmt::print(", window {:g} s, drift polynomial of order {}", plan.corrector.window_s,
                plan.corrector.order);
   }
-  fmt::print("\n  {:<14}{:<8}VG_Rate {:03X}, VG_Bias {:03X}, VG_Model {:03X}, {}\n", "output",
+  fmt::print("\n");
+  print_model(plan);
+  fmt::print("  {:<14}{:<8}VG_Rate {:03X}, VG_Bias {:03X}, VG_Model {:03X}, {}\n", "output",
              plan.buses[plan.output.bus], plan.output.rate_id, plan.output.bias_id,
              plan.output.model_id, plan.output.fd ? "VG_Rate as CAN FD" : "classic CAN");
 }
@@ -77,7 +92,7 @@ void print_plan(const gateway::Plan& plan) {
 }  // namespace
 
 int run_check(const CheckOptions& options) {
-  const auto loaded = gateway::load_config(options.config, {options.method});
+  const auto loaded = gateway::load_config(options.config, {options.method, options.model});
   if (!loaded) return report(loaded.error());
   for (const Error& warning : loaded->warnings)
     warn(warning);

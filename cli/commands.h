@@ -19,6 +19,7 @@ inline constexpr int kWrongUsage = 2;
 struct CheckOptions {
   std::string config;
   std::optional<gateway::Method> method;
+  std::optional<std::string> model;  ///< path, instead of the configured one
 };
 int run_check(const CheckOptions& options);
 
@@ -32,6 +33,7 @@ int run_decode(const DecodeOptions& options);
 struct ReplayOptions {
   std::string config;
   std::optional<gateway::Method> method;
+  std::optional<std::string> model;  ///< path, instead of the configured one
   std::string state;                 ///< file of biases to start with; empty: none
   std::string output;                ///< "-": standard output; empty: nowhere
   std::string json;                  ///< likewise

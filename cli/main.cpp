@@ -18,16 +18,17 @@ struct Options {
   std::string method;
 };
 
-void add_method(CLI::App& command, std::string& method) {
+void add_overrides(CLI::App& command, std::string& method, std::optional<std::string>& model) {
   command.add_option("--method", method, "corrector instead of the configured one")
       ->check(CLI::IsMember({"optimal", "mutual", "mean"}));
+  command.add_option("--model", model, "model file instead of the configured one");
 }
 
 CLI::App* add_check(CLI::App& app, CheckOptions& options, std::string& method) {
   CLI::App* command = app.add_subcommand(
       "check", "Explain a configuration before it is trusted: which bits are used");
   command->add_option("CONFIG", options.config, "configuration, e.g. vgyro.toml")->required();
-  add_method(*command, method);
+  add_overrides(*command, method, options.model);
   return command;
 }
 
@@ -47,7 +48,7 @@ CLI::App* add_replay(CLI::App& app, ReplayOptions& options, std::string& method)
   CLI::App* command = app.add_subcommand(
       "replay", "Run the gateway over recorded traffic, as fast as the machine can");
   command->add_option("--config", options.config, "configuration, e.g. vgyro.toml")->required();
-  add_method(*command, method);
+  add_overrides(*command, method, options.model);
   command->add_option("--state", options.state,
                       "starts with the biases that vgyrod kept in this file; it is only read");
   command->add_option("-o,--output", options.output,

@@ -363,7 +363,7 @@ Expected<std::optional<gateway::SavedState>> read_state(const std::string& path,
 }  // namespace
 
 int run_replay(const ReplayOptions& options) {
-  const auto loaded = gateway::load_config(options.config, {options.method});
+  const auto loaded = gateway::load_config(options.config, {options.method, options.model});
   if (!loaded) return report(loaded.error());
   const gateway::Plan& plan = loaded->plan;
   if (!options.quiet) {

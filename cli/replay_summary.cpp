@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "gateway/config.h"
+#include "gateway/model_plan.h"
 
 namespace vgyro::cli {
 
@@ -84,6 +85,23 @@ Json gyro_json(const ReplaySummary& summary, const gateway::Plan& plan, std::siz
           {"temperature_c", number(gyro.temperature_c)}};
 }
 
+// Null without a model; `waits_for` names what was never heard, so that its effects stayed in.
+Json model_json(const ReplaySummary& summary, const gateway::Plan& plan) {
+  if (!plan.model) return nullptr;
+  Json effects = Json::array();
+  for (const model::Effect& effect : plan.model->effects) {
+    effects.push_back({{"gyro", effect.gyro + 1},
+                       {"kind", model::info(effect.kind).name},
+                       {"treatment", gateway::treatment(effect.kind)}});
+  }
+  Json waits_for = Json::array();
+  for (std::size_t gyro = 0; gyro < 2; ++gyro) {
+    for (const std::string_view input : gateway::inputs_text(summary.status.gyros[gyro].waits_for))
+      waits_for.push_back({{"gyro", gyro + 1}, {"input", input}});
+  }
+  return {{"file", plan.model->file}, {"effects", effects}, {"waits_for", waits_for}};
+}
+
 const gateway::GyroPlan* gyro_of(const gateway::Plan& plan, const std::string& interface,
                                  const IdCounts::Row& row) {
   for (const gateway::GyroPlan& gyro : plan.gyros) {
@@ -159,6 +177,7 @@ Json to_json(const ReplaySummary& summary, const gateway::Plan& plan) {
   return {
       {"format", 1},
       {"method", gateway::to_string(plan.corrector.method)},
+      {"model", model_json(summary, plan)},
       {"logs", logs},
       {"first_s", summary.first_s},
       {"last_s", summary.last_s},
@@ -166,6 +185,9 @@ Json to_json(const ReplaySummary& summary, const gateway::Plan& plan) {
       {"error_frames", summary.ids.error_frames()},
       {"gyros", {gyro_json(summary, plan, 0), gyro_json(summary, plan, 1)}},
       {"reference", {{"frames", status.reference_frames}, {"rejected", status.reference_rejected}}},
+      {"accelerometer",
+       {{"frames", status.accelerometer_frames}, {"rejected", status.accelerometer_rejected}}},
+      {"speed", {{"frames", status.speed_frames}, {"rejected", status.speed_rejected}}},
       {"pairs", status.pairs},
       {"clock_steps", status.clock_steps},
       {"gaps",
@@ -263,6 +285,16 @@ std::string to_text(const ReplaySummary& summary, const gateway::Plan& plan) {
   if (status.reference_frames > 0) {
     fmt::format_to(to, "reference     {} frames, {} not used\n", status.reference_frames,
                    status.reference_rejected);
+  }
+  if (plan.model) {
+    fmt::format_to(to, "model         {}, {} effects\n", plan.model->file,
+                   plan.model->effects.size());
+  }
+  for (std::size_t i = 0; i < 2; ++i) {
+    for (const std::string_view input : gateway::inputs_text(status.gyros[i].waits_for)) {
+      fmt::format_to(to, "  gyro {}: effects of {} not taken back, it was never heard\n",
+                     plan.gyros[i].name, input);
+    }
   }
   fmt::format_to(to, "virtual gyro  {} pairs, {} valid rates", status.pairs,
                  status.rates_out_valid);

@@ -22,6 +22,7 @@ constexpr int kWrongUsage = 2;
 struct Options {
   std::string config;
   std::string method;
+  std::optional<std::string> model;
   std::string state;
   bool forget = false;
 };
@@ -35,8 +36,8 @@ std::string default_state() {
 }
 
 int run(const Options& options, vgyro::daemon::Log& log) {
-  const vgyro::gateway::ConfigResult loaded =
-      vgyro::gateway::load_config(options.config, {vgyro::gateway::method_from(options.method)});
+  const vgyro::gateway::ConfigResult loaded = vgyro::gateway::load_config(
+      options.config, {vgyro::gateway::method_from(options.method), options.model});
   if (!loaded) {
     for (const vgyro::Error& error : loaded.error())
       log.error("{}", error.message());
@@ -62,12 +63,14 @@ int main(int argc, char** argv) {
       "vgyrod: a gateway that reads two gyros from CAN and sends one better gyro.\n"
       "Runs in the foreground until SIGTERM; as a service: systemctl start vgyrod.",
       "vgyrod");
-  Options options{.config = {}, .method = {}, .state = default_state()};
+  Options options{.config = {}, .method = {}, .model = {}, .state = default_state()};
   app.add_option("--config", options.config, "The gateway's configuration (vgyro.toml)")
       ->required()
       ->type_name("FILE");
   app.add_option("--method", options.method, "corrector instead of the configured one")
       ->check(CLI::IsMember({"optimal", "mutual", "mean"}));
+  app.add_option("--model", options.model, "model file instead of the configured one")
+      ->type_name("FILE");
   app.add_option("--state", options.state,
                  "keeps the biases across a restart; default: state.toml in $STATE_DIRECTORY")
       ->type_name("FILE");

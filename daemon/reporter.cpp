@@ -5,6 +5,8 @@
 
 #include <fmt/format.h>
 
+#include "gateway/model_plan.h"
+
 namespace vgyro::daemon {
 namespace {
 
@@ -149,11 +151,22 @@ void Reporter::tell_gyro(const std::string& name, const gateway::GyroStatus& gyr
                    to_string(static_cast<gateway::Reject>(cause)));
     }
   }
+  tell_waiting(name, gyro, told);
   if (const std::uint64_t n = news(told.missing, gyro.missing); n > 0) {
     log_.warning("gyro {}: {} frames missing by its counter", name, n);
   }
   if (const std::uint64_t n = news(told.unpaired, gyro.unpaired); n > 0) {
     log_.info("gyro {}: {} samples found no partner: the other gyro had a gap", name, n);
+  }
+}
+
+// Once, when the first frames had time to come.
+void Reporter::tell_waiting(const std::string& name, const gateway::GyroStatus& gyro,
+                            GyroTold& told) {
+  if (!gyro.heard || gyro.waits_for == 0 || second_ < kRepeatSeconds) return;
+  if (std::exchange(told.waiting, true)) return;
+  for (const std::string_view input : gateway::inputs_text(gyro.waits_for)) {
+    log_.warning("gyro {}: effects of {} are not taken back, it was never heard", name, input);
   }
 }
 
@@ -166,6 +179,12 @@ void Reporter::tell_pipeline(const gateway::Status& status) {
   }
   if (const std::uint64_t n = news(reference_rejected_, status.reference_rejected); n > 0) {
     log_.warning("{} frames of the reference not used", n);
+  }
+  if (const std::uint64_t n = news(accelerometer_rejected_, status.accelerometer_rejected); n > 0) {
+    log_.warning("{} frames of the accelerometer not used", n);
+  }
+  if (const std::uint64_t n = news(speed_rejected_, status.speed_rejected); n > 0) {
+    log_.warning("{} frames of the speed not used", n);
   }
   if (const std::uint64_t n = news(windows_skipped_, status.windows_skipped); n > 0) {
     log_.warning("{} windows had too few pairs: drifts held", n);

@@ -52,6 +52,7 @@ class Reporter {
   struct GyroTold {
     std::array<Told, gateway::kRejectCount> rejected;
     Told missing, unpaired;
+    bool waiting = false;
   };
 
   void state_changed(const gateway::Status& status);
@@ -60,6 +61,7 @@ class Reporter {
   [[nodiscard]] bool may_tell_of_health();
   std::uint64_t news(Told& told, std::uint64_t count) const;
   void tell_gyro(const std::string& name, const gateway::GyroStatus& gyro, GyroTold& told);
+  void tell_waiting(const std::string& name, const gateway::GyroStatus& gyro, GyroTold& told);
   void tell_pipeline(const gateway::Status& status);
   void tell_restored(const gateway::Status& status);
   void tell_traffic(const Traffic& traffic);
@@ -78,7 +80,8 @@ class Reporter {
   std::uint64_t health_lines_held_ = 0;
   std::uint64_t second_ = 0;
   std::array<GyroTold, 2> gyros_;
-  Told clock_steps_, rates_out_of_range_, reference_rejected_, windows_skipped_, restarts_;
+  Told clock_steps_, rates_out_of_range_, reference_rejected_, accelerometer_rejected_,
+      speed_rejected_, windows_skipped_, restarts_;
   Told lost_by_kernel_, stale_, overflow_, failed_;
   bool told_of_motion_ = false;
   std::uint64_t last_received_ = 0;

@@ -62,6 +62,7 @@ Duration Aligner::Ring::usual_interval(TimePoint until) const {
 
 bool Aligner::push(std::size_t gyro, TimePoint t, double rate_dps) {
   Ring& ring = rings_[gyro];
+  t -= lag_[gyro];
   if (any_used_[gyro] && t <= used_until_[gyro]) return false;
   if (!ring.empty() && t <= ring.back().t && ring.contains(t)) return false;
   if (ring.size() == kCapacity) {
@@ -90,7 +91,8 @@ Duration Aligner::mean_wait(std::size_t pace, TimePoint until) const {
       ++next;
     if (next == 0 || next == other.size()) continue;
     if (other[next].t - other[next - 1].t > gap_[1 - pace]) continue;
-    sum += other[next].t - own[i].t;
+    const Duration wait = other[next].t + lag_[1 - pace] - (own[i].t + lag_[pace]);
+    sum += std::max(wait, Duration::zero());
     ++waited;
   }
   return waited == 0 ? Duration::max() : sum / waited;
@@ -108,7 +110,8 @@ void Aligner::choose_pace() {
     interval_[gyro] = ring.usual_interval(until);
     gap_[gyro] = from_seconds(to_seconds(interval_[gyro]) * kGapIntervals);
     const std::size_t last = ring.count_until(until) - 1;
-    burst_until_ = std::max(burst_until_, ring[ring[last].t == until ? last : last + 1].t);
+    const TimePoint reached = ring[ring[last].t == until ? last : last + 1].t;
+    burst_until_ = std::max(burst_until_, reached + lag_[gyro]);
   }
   const double ratio = to_seconds(interval_[0]) / to_seconds(interval_[1]);
   if (ratio > kSameRate) {
@@ -152,7 +155,8 @@ bool Aligner::pop(AlignedPair& pair) {
     any_used_[pace_] = true;
     own.pop_front();
     if (paired) {
-      pair.complete = std::max({pair.complete, pair.t, burst_until_});
+      pair.complete =
+          std::max({pair.complete + lag_[1 - pace_], pair.t + lag_[pace_], burst_until_});
       return true;
     }
     ++counts_.unpaired[pace_];

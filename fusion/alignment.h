@@ -5,6 +5,7 @@
 // its two neighbours, or, where it is at least kAverageRatio times faster, by the mean of its
 // interpolant over one pace interval, so that none of its information is lost and nothing aliases.
 // A pair is complete with the first sample of the other gyro at or behind it; that is the latency.
+// Readings that are known to come late are dated back first.
 // Buffers are bounded; a sample that can no longer be paired is counted, never used.
 
 #include <array>
@@ -17,7 +18,7 @@ namespace vgyro::fusion {
 
 struct AlignedPair {
   TimePoint t;         ///< the instant that both rates refer to
-  TimePoint complete;  ///< stamp of the sample that completed the pair
+  TimePoint complete;  ///< stamp, not dated back, of the sample that completed the pair
   std::array<double, 2> rate_dps{};
   /// White-noise variance of each rate relative to one raw sample: interpolation and averaging
   /// lower it.
@@ -35,6 +36,9 @@ class Aligner {
   /// it.
   static constexpr double kGapIntervals = 4.0;
   static constexpr double kAverageRatio = 1.5;
+
+  /// `lag`: a sample stamped t is of the rate at t − lag.
+  explicit Aligner(std::array<Duration, 2> lag = {}) : lag_(lag) {}
 
   /// False when the sample is older than what has already been used.
   bool push(std::size_t gyro, TimePoint t, double rate_dps);
@@ -100,12 +104,13 @@ class Aligner {
   bool interpolate(const Ring& other, AlignedPair& pair, std::size_t other_index);
   bool average(const Ring& other, AlignedPair& pair, std::size_t other_index);
 
-  std::array<Ring, 2> rings_;
+  std::array<Duration, 2> lag_;
+  std::array<Ring, 2> rings_;  ///< at the instants of the rates
   std::array<Duration, 2> interval_{};
   std::array<Duration, 2> gap_{};
   std::array<TimePoint, 2> used_until_{};  ///< samples at or before this come too late
   std::array<bool, 2> any_used_{};
-  TimePoint burst_until_{};  ///< earlier pairs waited for the choice until then
+  TimePoint burst_until_{};  ///< stamp: earlier pairs waited for the choice until then
   Duration half_window_{0};  ///< of the averaging; 0 where interpolation does
   std::size_t pace_ = 0;
   bool chosen_ = false;

@@ -14,8 +14,8 @@ namespace vgyro::fusion {
 
 class StampGuard {
  public:
-  static constexpr std::size_t kStreams = 3;
-  /// Only the first streams, the gyros, may move the clock; a reference that jumps back waits.
+  static constexpr std::size_t kStreams = 5;
+  /// Only the first streams, the gyros, may move the clock; anything else that jumps back waits.
   static constexpr std::size_t kLeaders = 2;
   static constexpr Duration kReorderMax = std::chrono::milliseconds(250);
   static constexpr Duration kForwardMax = std::chrono::seconds(1);

@@ -11,6 +11,7 @@
 #include "base/nearest.h"
 #include "base/toml_reader.h"
 #include "fusion/polynomial.h"
+#include "gateway/model_plan.h"
 #include "gateway/signal_resolver.h"
 
 namespace vgyro::gateway {
@@ -321,9 +322,25 @@ void read_calibration(TomlReader& root, Context& context) {
   reader.finish();
 }
 
+// A file that cannot be opened is a mistake of the line that names it.
+void read_model(const std::string& path, const std::string& named_at, Context& context) {
+  auto loaded = model::load_model(path);
+  if (loaded) {
+    context.resolved.plan.model = std::move(*loaded);
+    return;
+  }
+  for (Error& error : loaded.error()) {
+    if (error.where == path && !named_at.empty()) {
+      error = {named_at, error.message(), "model is a path relative to the configuration file"};
+    }
+    context.errors.push_back(std::move(error));
+  }
+}
+
 void read_corrector(TomlReader& root, Context& context, const ConfigOverrides& overrides) {
   CorrectorPlan& plan = context.resolved.plan.corrector;
   if (overrides.method) plan.method = *overrides.method;
+  if (overrides.model) read_model(*overrides.model, {}, context);
   const toml::table* table = root.table("corrector");
   if (table == nullptr) return;
   TomlReader reader(*table, context.file, "[corrector]", context.errors);
@@ -335,6 +352,10 @@ void read_corrector(TomlReader& root, Context& context, const ConfigOverrides& o
                       suggest_name(*name, {"optimal", "mutual", "mean"}));
     }
   }
+  if (const auto name = reader.text("model"); name && !overrides.model) {
+    const auto path = (std::filesystem::path(context.folder) / *name).lexically_normal();
+    read_model(path.string(), reader.where("model"), context);
+  }
   plan.window_s = number_within(reader, "window_s", plan.window_s, 0.0, kWindowMax_s, "s");
   if (const auto order = reader.integer("order")) {
     if (*order < 0 || *order > fusion::kOrderMax) {
@@ -345,6 +366,14 @@ void read_corrector(TomlReader& root, Context& context, const ConfigOverrides& o
     }
   }
   reader.finish();
+}
+
+// Precondition: nothing was complained of so far.
+void apply_knowledge(Context& context) {
+  Plan& plan = context.resolved.plan;
+  for (std::size_t gyro = 0; gyro < 2; ++gyro)
+    plan.corrector.gyros[gyro].resolution_dps = plan.gyros[gyro].rate.step;
+  if (plan.model) apply_model(model::Model(*plan.model), plan, context.errors);
 }
 
 std::uint32_t read_output_id(TomlReader& reader, std::string_view key, std::uint32_t fallback) {
@@ -448,6 +477,7 @@ ConfigResult load_config(const std::string& path, const ConfigOverrides& overrid
   read_corrector(root, context, overrides);
   read_output(root, context);
   root.finish();
+  if (context.errors.empty()) apply_knowledge(context);
   if (!context.errors.empty()) return tl::unexpected(std::move(context.errors));
   return std::move(context.resolved);
 }

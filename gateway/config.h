@@ -22,7 +22,8 @@ struct Resolved {
 using ConfigResult = tl::expected<Resolved, std::vector<Error>>;
 
 struct ConfigOverrides {
-  std::optional<Method> method;  ///< instead of [corrector] method
+  std::optional<Method> method = {};      ///< instead of [corrector] method
+  std::optional<std::string> model = {};  ///< path, instead of [corrector] model
 };
 
 /// Reads the file; DBC paths inside are relative to it.

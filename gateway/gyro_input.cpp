@@ -89,6 +89,7 @@ GyroInput::Result GyroInput::decode(const can::Frame& frame) {
   }
   const auto payload = frame.payload();
   if (!plan_.rate.presence.always() && !plan_.rate.presence.holds(payload)) {
+    keep_temperature(frame);
     result.reject = Reject::kOtherPage;
     return result;
   }
@@ -107,8 +108,15 @@ GyroInput::Result GyroInput::decode(const can::Frame& frame) {
   result.reject = convert(plan_.rate, payload, result.rate_dps);
   if (result.reject) return result;
   if (plan_.sign && plan_.sign->decode(payload).raw != 0) result.rate_dps = -result.rate_dps;
-  if (plan_.temperature) newest_ = frame;
+  keep_temperature(frame);
   return result;
+}
+
+// It may stand on a page of its own.
+void GyroInput::keep_temperature(const can::Frame& frame) {
+  if (!plan_.temperature) return;
+  const dbc::Presence& presence = plan_.temperature->presence;
+  if (presence.always() || presence.holds(frame.payload())) newest_ = frame;
 }
 
 }  // namespace vgyro::gateway

@@ -27,12 +27,14 @@ class GyroInput {
   /// After a silence the counter says nothing about how many frames are missing.
   void forget_counter() { counter_known_ = false; }
 
-  /// Of the newest frame that was used; NaN when there is none. Decoded when asked for.
+  /// Of the newest frame that was used or told nothing else; NaN when there is none. Decoded when
+  /// asked for.
   [[nodiscard]] double temperature_c() const;
 
  private:
   /// False when the counter stands still.
   bool count(std::span<const std::uint8_t> payload, std::uint32_t& missing);
+  void keep_temperature(const can::Frame& frame);
 
   const GyroPlan& plan_;
   std::size_t bytes_needed_;

@@ -107,7 +107,9 @@ void OutputEncoder::put_fd_rate(const RateOutput& output) {
   const auto corrected = [&](std::size_t gyro) {
     return valid ? signed_field(output.corrected_dps[gyro] * kFdRatePerDps, 32) : 0x80000000U;
   };
-  const auto instant_us = static_cast<std::uint64_t>(to_ns(output.instant) / 1000);
+  // Of a log that starts at zero, readings that are dated back may be of before.
+  const auto instant_us =
+      static_cast<std::uint64_t>(std::max<std::int64_t>(to_ns(output.instant), 0) / 1000);
   const auto age_us = static_cast<std::uint64_t>(
       std::clamp<std::int64_t>((output.age.count() + 500) / 1000, 0, 65535));
   std::uint8_t* data = rate_.data.data();

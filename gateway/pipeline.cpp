@@ -8,13 +8,16 @@
 
 #include "fusion/alignment.h"
 #include "fusion/calibration.h"
+#include "fusion/compensation.h"
 #include "fusion/corrector.h"
 #include "fusion/stamp_guard.h"
 #include "gateway/gyro_health.h"
 #include "gateway/gyro_input.h"
+#include "gateway/model_plan.h"
 #include "gateway/output_frames.h"
 #include "gateway/reference_calibration.h"
 #include "gateway/router.h"
+#include "gateway/surroundings.h"
 
 namespace vgyro::gateway {
 
@@ -65,6 +68,10 @@ std::unique_ptr<fusion::Corrector> make_corrector(const Plan& plan) {
                                          .gyros = plan.corrector.gyros});
 }
 
+fusion::Compensation make_compensation(const Plan& plan, std::size_t gyro) {
+  return fusion::Compensation(effects_of(plan, gyro));
+}
+
 }  // namespace
 
 struct Pipeline::Impl {
@@ -76,6 +83,8 @@ struct Pipeline::Impl {
 
   void receive_gyro(std::size_t gyro, const can::Frame& frame, TimePoint stamp, FrameSink& sink);
   void receive_reference(const can::Frame& frame, TimePoint stamp, FrameSink& sink);
+  void receive_surroundings(std::uint8_t roles, const can::Frame& frame, TimePoint stamp);
+  [[nodiscard]] double take_back(std::size_t gyro, TimePoint t, double reading_dps);
   void take_sample(std::size_t gyro, TimePoint t, double rate_dps, TimePoint stamp,
                    FrameSink& sink);
   void take_pair(const fusion::AlignedPair& pair, TimePoint stamp, FrameSink& sink);
@@ -99,6 +108,7 @@ struct Pipeline::Impl {
   [[nodiscard]] Duration usual_interval(std::size_t gyro) const;
   [[nodiscard]] Duration time_out(std::size_t gyro) const;
   [[nodiscard]] Duration bias_grace() const;
+  [[nodiscard]] Duration lag_most() const;
   [[nodiscard]] bool single_is_wanted(std::size_t gyro, TimePoint t) const;
 
   void send_rate(const fusion::VirtualRate& rate, bool valid, TimePoint t, Duration age,
@@ -109,12 +119,16 @@ struct Pipeline::Impl {
   [[nodiscard]] Quality quality() const;
   [[nodiscard]] BiasMode bias_mode() const;
   [[nodiscard]] std::uint8_t health() const;
+  void tell_surroundings(TimePoint t, double rate_dps, bool valid);
   [[nodiscard]] double seconds(TimePoint t) const { return to_seconds(t - origin); }
 
   const Plan plan;
   Router router;
   std::array<GyroInput, 2> inputs;
   std::array<GyroHealth, 2> health_of;
+  Surroundings surroundings;
+  std::array<fusion::Compensation, 2> compensations;
+  std::array<std::uint8_t, 2> needs{};  ///< model::Need of the gyro's effects
   fusion::StampGuard guard;
   fusion::Aligner aligner;
   fusion::Calibrator calibrator;
@@ -145,6 +159,9 @@ Pipeline::Impl::Impl(const Plan& the_plan, std::unique_ptr<fusion::Corrector> th
       router(plan),
       inputs{GyroInput(plan.gyros[0]), GyroInput(plan.gyros[1])},
       health_of{GyroHealth(plan.gyros[0]), GyroHealth(plan.gyros[1])},
+      surroundings(plan),
+      compensations{make_compensation(plan, 0), make_compensation(plan, 1)},
+      aligner({compensations[0].lag(), compensations[1].lag()}),
       calibrator(plan.corrector.order, plan.calibration.rest_s, plan.calibration.when_moving),
       corrector(std::move(the_corrector)),
       encoder(plan.output) {
@@ -154,6 +171,10 @@ Pipeline::Impl::Impl(const Plan& the_plan, std::unique_ptr<fusion::Corrector> th
     gyro.last_rate_dps = kNone;
     gyro.bias_dps = kNone;
     gyro.temperature_c = kNone;
+  }
+  for (std::size_t gyro = 0; gyro < 2; ++gyro) {
+    for (const model::Effect& effect : effects_of(plan, gyro))
+      needs[gyro] |= model::info(effect.kind).needs;
   }
 }
 
@@ -165,6 +186,11 @@ void Pipeline::Impl::receive(can::BusIndex bus, const can::Frame& frame, TimePoi
   if (roles == 0) {
     let_time_pass(stamp, sink);
     return;
+  }
+  if (can_be_time(stamp)) surroundings.begin(whole_microseconds(stamp) + guard.offset());
+  if ((roles & (kAccelerometer | kSpeed)) != 0) {
+    receive_surroundings(roles, frame, stamp);
+    let_time_pass(stamp, sink);
   }
   if ((roles & kReference) != 0) receive_reference(frame, stamp, sink);
   if ((roles & kGyro1) != 0) receive_gyro(0, frame, stamp, sink);
@@ -215,13 +241,40 @@ void Pipeline::Impl::receive_gyro(std::size_t gyro, const can::Frame& frame, Tim
     refuse(gyro, *cause, t, stamp, sink);
     return;
   }
-  if (!aligner.push(gyro, t, input.rate_dps)) {
+  const double rate_dps = take_back(gyro, t, input.rate_dps);
+  if (!aligner.push(gyro, t, rate_dps)) {
     count(Reject::kLate);
     return;
   }
   ++own.samples;
   own.last_rate_dps = input.rate_dps;
-  take_sample(gyro, t, input.rate_dps, stamp, sink);
+  take_sample(gyro, t, rate_dps, stamp, sink);
+}
+
+// The reading less what the model knows of it.
+double Pipeline::Impl::take_back(std::size_t gyro, TimePoint t, double reading_dps) {
+  surroundings.reach(t);
+  if (!compensations[gyro].takes_any()) return reading_dps;
+  if ((needs[gyro] & model::kNeedsTemperature) != 0) {
+    surroundings.add_temperature(gyro, t, inputs[gyro].temperature_c());
+  }
+  return compensations[gyro].correct(reading_dps, surroundings.at(gyro, t));
+}
+
+void Pipeline::Impl::receive_surroundings(std::uint8_t roles, const can::Frame& frame,
+                                          TimePoint stamp) {
+  const bool timely = can_be_time(stamp);
+  const TimePoint raw = whole_microseconds(stamp);
+  if ((roles & kAccelerometer) != 0) {
+    ++status.accelerometer_frames;
+    const bool used = timely && surroundings.receive_acceleration(frame, raw, guard);
+    if (!used) ++status.accelerometer_rejected;
+  }
+  if ((roles & kSpeed) != 0) {
+    ++status.speed_frames;
+    const bool used = timely && surroundings.receive_speed(frame, raw, guard);
+    if (!used) ++status.speed_rejected;
+  }
 }
 
 // A frame whose stamp can be believed and whose rate cannot be used.
@@ -243,7 +296,7 @@ void Pipeline::Impl::set_aside(std::size_t gyro, TimePoint t, TimePoint stamp, F
   enter_state(stamp, sink);
   const std::size_t other = 1 - gyro;
   if (!heard[other] || status.pairs == 0) return;
-  TimePoint sample_t = std::max(newest, t - usual_interval(other));
+  TimePoint sample_t = std::max(newest, t - compensations[other].lag() - usual_interval(other));
   double rate_dps = 0.0;
   while (aligner.next_behind(other, sample_t, sample_t, rate_dps)) {
     take_single(other, sample_t, rate_dps, std::max(t - sample_t, Duration::zero()), stamp, sink);
@@ -268,6 +321,7 @@ void Pipeline::Impl::receive_reference(const can::Frame& frame, TimePoint stamp,
     aligner.clear();
   }
   reference.add_reference(t, rate_dps);
+  if (!calibrated && plan.calibration.from_reference) surroundings.add_rate(t, rate_dps);
   while (!calibrated && plan.calibration.from_reference) {
     const auto ready = reference.next();
     if (!ready) break;
@@ -288,7 +342,8 @@ void Pipeline::Impl::take_sample(std::size_t gyro, TimePoint t, double rate_dps,
   while (aligner.pop(pair))
     take_pair(pair, stamp, sink);
   if (!pairing && single_is_wanted(gyro, t)) {
-    take_single(gyro, t, rate_dps, Duration::zero(), stamp, sink);
+    const Duration lag = compensations[gyro].lag();
+    take_single(gyro, t - lag, rate_dps, std::max(lag, Duration::zero()), stamp, sink);
   }
 }
 
@@ -311,15 +366,17 @@ void Pipeline::Impl::take_pair(const fusion::AlignedPair& pair, TimePoint stamp,
   // While one gyro was missing the other spoke alone, perhaps for later instants than this.
   if (pair.t <= newest) return;
   newest = pair.t;
+  corrector->set_wheels(surroundings.wheels(pair.t));
   fusion::VirtualRate rate;
   if (calibrated) rate = corrector->update({seconds(pair.t), pair.rate_dps, pair.noise_gain});
+  tell_surroundings(pair.t, rate.rate_dps, calibrated);
   if (calibrated) note_condition(pair.t);
   if (status.restored == Restored::kTakenUp) look_for_confirmation();
   if (observer != nullptr) {
     observer->on_rate(pair.t - guard.offset(), pair.rate_dps, calibrated ? rate.rate_dps : kNone);
   }
   send_rate(rate, calibrated, pair.t, pair.complete - pair.t, stamp, sink);
-  send_bias_when_due(pair.t, stamp, sink);
+  send_bias_when_due(pair.t + lag_most(), stamp, sink);
 }
 
 // The corrector's opinion of both; of one gyro alone it has none that is new.
@@ -340,9 +397,11 @@ void Pipeline::Impl::take_single(std::size_t gyro, TimePoint t, double rate_dps,
   if (valid) {
     fusion::RatePair single{.t_s = seconds(t)};
     single.rate_dps[gyro] = rate_dps;
+    corrector->set_wheels(surroundings.wheels(t));
     rate = corrector->update_alone(gyro, single);
     note_condition(t);
   }
+  tell_surroundings(t, rate.rate_dps, valid);
   enter_state(stamp, sink);
   if (observer != nullptr) {
     std::array<double, 2> raw_dps{kNone, kNone};
@@ -350,7 +409,21 @@ void Pipeline::Impl::take_single(std::size_t gyro, TimePoint t, double rate_dps,
     observer->on_rate(t - guard.offset(), raw_dps, valid ? rate.rate_dps : kNone);
   }
   send_rate(rate, valid, t, age, stamp, sink);
-  send_bias_when_due(t, stamp, sink);
+  send_bias_when_due(t + lag_most(), stamp, sink);
+}
+
+// Until the virtual rate can be believed the platform does what the calibration takes for granted.
+void Pipeline::Impl::tell_surroundings(TimePoint t, double rate_dps, bool valid) {
+  if (valid) {
+    surroundings.add_rate(t, rate_dps);
+  } else if (!plan.calibration.from_reference) {
+    surroundings.add_rate(t, plan.calibration.rate_dps);
+  }
+}
+
+// What the bus has reached when a rate dated back comes out.
+Duration Pipeline::Impl::lag_most() const {
+  return std::max({compensations[0].lag(), compensations[1].lag(), Duration::zero()});
 }
 
 void Pipeline::Impl::calibrate(const fusion::AlignedPair& pair) {
@@ -549,7 +622,12 @@ void Pipeline::Impl::send_rate(const fusion::VirtualRate& rate, bool valid, Time
 fusion::Drift Pipeline::Impl::present_drift() const {
   const bool known = calibrated && status.pairs > 0 && newest != TimePoint::min();
   if (!known) return {{kNone, kNone}, kNone, kNone, kNone};
-  return corrector->drift(seconds(newest));
+  fusion::Drift drift = corrector->drift(seconds(newest));
+  for (std::size_t gyro = 0; gyro < 2; ++gyro) {
+    if (!compensations[gyro].takes_any()) continue;
+    drift.bias_dps[gyro] += compensations[gyro].zero_offset_dps(surroundings.at(gyro, newest));
+  }
+  return drift;
 }
 
 void Pipeline::Impl::send_bias(TimePoint stamp, FrameSink& sink) {
@@ -576,6 +654,7 @@ const Status& Pipeline::Impl::refreshed_status() {
     for (FaultRecord& record : status.gyros[gyro].faults)
       record.last -= guard.offset();
     status.gyros[gyro].temperature_c = inputs[gyro].temperature_c();
+    status.gyros[gyro].waits_for = surroundings.missing(gyro, needs[gyro]);
     status.gyros[gyro].unpaired = aligner.counts().unpaired[gyro];
   }
   status.disagree = pairing && condition.disagree;

@@ -14,6 +14,7 @@
 #include "dbc/multiplex.h"
 #include "fusion/calibration.h"
 #include "fusion/gyro_parameters.h"
+#include "model/file.h"
 
 namespace vgyro::gateway {
 
@@ -39,6 +40,7 @@ struct Quantity {
   double minimum = 0.0;  ///< accepted values, in the DBC's unit
   double maximum = 0.0;
   std::string layout;  ///< for people: "32 bits from bit 0, Intel, signed, x 1e-06"
+  double step = 0.0;   ///< between neighbouring values, in the product's unit; 0 for floats
 };
 
 enum class Comparison : std::uint8_t {
@@ -74,8 +76,8 @@ struct GyroPlan {
   std::optional<Quantity> temperature;
   std::optional<AliveCounter> counter;
   std::optional<Condition> valid;
-  std::optional<double> saturation_dps;  ///< it clips at ± this
-  double dead_band_dps = 0.0;            ///< it reads 0 below this; 0: it has none
+  std::optional<double> saturation_dps = {};  ///< from the model file: it clips at ± this
+  double dead_band_dps = 0.0;                 ///< likewise: it reads 0 below; 0: it has none
 };
 
 struct ReferencePlan {
@@ -126,11 +128,11 @@ struct Plan {
   std::vector<std::string> buses;  ///< BusIndex → interface name, without repetition
   std::vector<GyroPlan> gyros;     ///< exactly two, once resolved
   std::optional<ReferencePlan> reference;
-  std::optional<AccelerometerPlan>
-      accelerometer;  ///< resolved and checked; the pipeline reads neither
+  std::optional<AccelerometerPlan> accelerometer;
   std::optional<SpeedPlan> speed;
   CalibrationPlan calibration;
   CorrectorPlan corrector;
+  std::optional<model::Model> model;  ///< effects that are known and taken back
   OutputPlan output;
 
   /// Every frame that the pipeline wants to receive: the kernel filters.

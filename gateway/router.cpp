@@ -6,6 +6,8 @@ Router::Router(const Plan& plan) : standard_(plan.buses.size()) {
   add(plan.gyros[0].match, kGyro1);
   add(plan.gyros[1].match, kGyro2);
   if (plan.reference) add(plan.reference->match, kReference);
+  if (plan.accelerometer) add(plan.accelerometer->match, kAccelerometer);
+  if (plan.speed) add(plan.speed->match, kSpeed);
 }
 
 void Router::add(const FrameMatch& match, std::uint8_t role) {

@@ -13,7 +13,13 @@
 namespace vgyro::gateway {
 
 /// Bit mask: a frame may be a gyro's and the reference's at once.
-enum Role : std::uint8_t { kGyro1 = 1U << 0U, kGyro2 = 1U << 1U, kReference = 1U << 2U };
+enum Role : std::uint8_t {
+  kGyro1 = 1U << 0U,
+  kGyro2 = 1U << 1U,
+  kReference = 1U << 2U,
+  kAccelerometer = 1U << 3U,
+  kSpeed = 1U << 4U
+};
 
 class Router {
  public:

@@ -16,8 +16,21 @@ namespace {
 
 constexpr std::size_t kInterfaceNameMax = 15;  // IFNAMSIZ less the closing zero
 constexpr std::size_t kDiagnosticsShown = 5;
-// No gyro turns faster; what lies beyond is a bit pattern, not a rate.
-constexpr double kRateLimit_dps = 100'000.0;
+// What lies beyond is a bit pattern, not a measurement: no gyro turns faster, no part that measures
+// gets hotter, no vehicle goes on after such a knock.
+double widest_of(Dimension dimension) {
+  switch (dimension) {
+    case Dimension::kRate:
+      return 100'000.0;
+    case Dimension::kTemperature:
+      return 1'000.0;
+    case Dimension::kAcceleration:
+      return 10'000.0;
+    case Dimension::kSpeed:
+      break;
+  }
+  return 1'000.0;
+}
 
 std::string layout_of(const dbc::Signal& signal) {
   const char* type = "unsigned";
@@ -150,13 +163,16 @@ std::optional<Quantity> SignalResolver::quantity(const dbc::Signal& signal, std:
                      remedy);
   }
   if (!bits || !presence || !conversion) return std::nullopt;
+  const bool is_integer =
+      signal.type == dbc::ValueType::kSigned || signal.type == dbc::ValueType::kUnsigned;
   Quantity quantity{.name = signal.name,
                     .unit = spelling,
                     .codec = *bits,
                     .presence = *presence,
                     .scale = conversion->scale,
                     .shift = conversion->shift,
-                    .layout = layout_of(signal)};
+                    .layout = layout_of(signal),
+                    .step = is_integer ? std::abs(signal.factor) * conversion->scale : 0.0};
   set_limits(quantity, signal, dimension);
   return quantity;
 }
@@ -165,8 +181,7 @@ std::optional<Quantity> SignalResolver::quantity(const dbc::Signal& signal, std:
 // that contradict their own scale, and believing those would throw good samples away.
 void SignalResolver::set_limits(Quantity& quantity, const dbc::Signal& signal,
                                 Dimension dimension) {
-  const double widest = dimension == Dimension::kRate ? kRateLimit_dps / quantity.scale
-                                                      : std::numeric_limits<double>::max();
+  const double widest = widest_of(dimension) / quantity.scale;
   quantity.minimum = -widest;
   quantity.maximum = widest;
   if (signal.minimum == signal.maximum) return;

@@ -83,6 +83,8 @@ struct GyroStatus {
   double last_rate_dps = 0.0;
   double bias_dps = 0.0;       ///< NaN until calibrated, and for `mean`, which has none
   double temperature_c = 0.0;  ///< NaN when there is none
+  /// Inputs of the model (model::Need) not heard yet: their effects are not taken back so far.
+  std::uint8_t waits_for = 0;
 };
 
 struct Status {
@@ -90,6 +92,10 @@ struct Status {
   std::array<GyroStatus, 2> gyros;
   std::uint64_t reference_frames = 0;
   std::uint64_t reference_rejected = 0;
+  std::uint64_t accelerometer_frames = 0;
+  std::uint64_t accelerometer_rejected = 0;
+  std::uint64_t speed_frames = 0;
+  std::uint64_t speed_rejected = 0;
   std::uint64_t pairs = 0;
   std::uint64_t clock_steps = 0;  ///< times the stamps were set back
   std::uint64_t rates_out = 0;

@@ -213,6 +213,13 @@ double added_dps(const Effect& effect, double rate_dps, const Surroundings& surr
   return std::isnan(added) ? 0.0 : added;
 }
 
+double slope(const Effect& effect, double rate_dps, const Surroundings& surroundings) {
+  const KindInfo& row = info(effect.kind);
+  assert(row.slope != nullptr);
+  const double slope = row.slope(effect.parameters, rate_dps, surroundings);
+  return std::isnan(slope) ? 0.0 : slope;
+}
+
 double clipped_dps(const Effect& effect, double reading_dps) {
   const double limit_dps = effect.parameters[0];
   switch (effect.kind) {

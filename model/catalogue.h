@@ -71,6 +71,9 @@ std::vector<std::string> kind_names();
 /// not known.
 double added_dps(const Effect& effect, double rate_dps, const Surroundings& surroundings);
 
+/// Of responses: d added_dps / d rate_dps.
+double slope(const Effect& effect, double rate_dps, const Surroundings& surroundings);
+
 /// What the kinds of Nature::kClip make of a reading.
 double clipped_dps(const Effect& effect, double reading_dps);
 

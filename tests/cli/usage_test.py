@@ -7,10 +7,10 @@ import unittest
 import bench
 
 COMMANDS = {
-    "check": {"CONFIG", "--method"},
+    "check": {"CONFIG", "--method", "--model"},
     "decode": {"--dbc", "--text", "LOG"},
     "allan": {"--config", "--json", "--plot", "LOG"},
-    "replay": {"--config", "--method", "-o", "--output", "--json", "--plot", "--map", "-q", "--quiet", "LOG"},
+    "replay": {"--config", "--method", "--model", "-o", "--output", "--json", "--plot", "--map", "-q", "--quiet", "LOG"},
 }
 
 

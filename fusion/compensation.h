@@ -1,0 +1,48 @@
+#pragma once
+
+// Takes off one gyro's readings what the model file knows of it. Offsets are subtracted; the
+// response is inverted: the result is the rate at which model and reading agree. An effect whose
+// input is not known adds nothing, which is the same as an input at its reference.
+// Noise, clipping and lost frames cannot be taken back; `delay` is a matter of time, not of rates,
+// and only told here.
+
+#include <span>
+#include <vector>
+
+#include "base/time.h"
+#include "model/effect.h"
+
+namespace vgyro::fusion {
+
+/// Newton's steps at most; a response that is nearly straight needs two or three.
+inline constexpr int kInversionStepsMax = 12;
+
+class Compensation {
+ public:
+  /// Takes readings as they are.
+  Compensation() = default;
+  /// `effects` of one gyro, of any kind.
+  explicit Compensation(std::span<const model::Effect> effects);
+
+  [[nodiscard]] bool takes_any() const { return !offsets_.empty() || !responses_.empty(); }
+
+  /// Where the response has no inverse (a model far outside the rates it was made for), the reading
+  /// less its offsets.
+  [[nodiscard]] double correct(double reading_dps, const model::Surroundings& surroundings) const;
+
+  /// The part that is the gyro's zero offset, for people and for VG_Bias: all offsets but lines,
+  /// which are over before anybody has read them.
+  [[nodiscard]] double zero_offset_dps(const model::Surroundings& surroundings) const;
+
+  /// A sample stamped t is of the rate at t − lag.
+  [[nodiscard]] Duration lag() const { return lag_; }
+
+ private:
+  [[nodiscard]] double invert(double reading_dps, const model::Surroundings& surroundings) const;
+
+  std::vector<model::Effect> offsets_;
+  std::vector<model::Effect> responses_;
+  Duration lag_{0};
+};
+
+}  // namespace vgyro::fusion

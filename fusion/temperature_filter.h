@@ -1,0 +1,45 @@
+#pragma once
+
+// A temperature and its slope from a sensor that reports in steps. A fading-memory parabola follows
+// the values: no lag while the temperature changes evenly or its slope does, and one step of the
+// sensor moves the slope by no more than 0.8 steps per memory. The memory is chosen by the sensor's
+// step: a coarse sensor needs a longer one. During the first few memories the slope is being
+// learned.
+
+#include "base/time.h"
+
+namespace vgyro::fusion {
+
+class TemperatureFilter {
+ public:
+  static constexpr double kMemoryMin_s = 3.0;
+  static constexpr double kMemoryMax_s = 20.0;
+  /// Memory for a sensor with steps of 1 K; it grows with the root of the step.
+  static constexpr double kMemoryPerRootStep_s = 18.0;
+  /// After a longer silence, in memories, it begins anew.
+  static constexpr double kForgetAfter = 5.0;
+
+  /// `step_c` is 0 for a sensor without steps.
+  explicit TemperatureFilter(double step_c = 0.0);
+
+  /// A value at or before the last one's time is passed over.
+  void add(TimePoint t, double temperature_c);
+
+  /// NaN before the first value.
+  [[nodiscard]] double temperature_c() const { return temperature_c_; }
+  [[nodiscard]] double slope_c_s() const { return slope_c_s_; }
+  [[nodiscard]] bool known() const { return known_; }
+  [[nodiscard]] double memory_s() const { return memory_s_; }
+
+ private:
+  void begin(double temperature_c);
+
+  double memory_s_;
+  bool known_ = false;
+  TimePoint last_;
+  double temperature_c_;
+  double slope_c_s_;
+  double curvature_c_s2_ = 0.0;
+};
+
+}  // namespace vgyro::fusion

@@ -1,0 +1,121 @@
+#include "gateway/model_plan.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/core.h>
+
+namespace vgyro::gateway {
+
+namespace {
+
+// Independent noises add in squares.
+void add_density(std::optional<double>& density, double more) {
+  density = std::hypot(density.value_or(0.0), more);
+}
+
+void add_noise(const model::Effect& effect, fusion::GyroParameters& parameters) {
+  const model::Parameters& p = effect.parameters;
+  switch (effect.kind) {
+    case model::Kind::kWhiteNoise:
+      add_density(parameters.white_dps_rthz, p[0]);
+      break;
+    case model::Kind::kRateRandomWalk:
+      add_density(parameters.walk_dps_rts, p[0]);
+      break;
+    case model::Kind::kRateNoise:
+      parameters.rate_noise_rthz = std::hypot(parameters.rate_noise_rthz, p[0]);
+      break;
+    case model::Kind::kGaussMarkov:
+      if (parameters.gauss_markov_count == parameters.gauss_markov.size()) break;
+      parameters.gauss_markov[parameters.gauss_markov_count++] = {p[0], p[1]};
+      break;
+    case model::Kind::kQuantization:
+      parameters.resolution_dps = std::max(parameters.resolution_dps, p[0]);
+      break;
+    default:
+      break;
+  }
+}
+
+void add_limit(const model::Effect& effect, GyroPlan& gyro) {
+  const double value_dps = effect.parameters[0];
+  if (effect.kind == model::Kind::kSaturation) {
+    gyro.saturation_dps = std::min(gyro.saturation_dps.value_or(value_dps), value_dps);
+  }
+  if (effect.kind == model::Kind::kDeadBand) {
+    gyro.dead_band_dps = std::max(gyro.dead_band_dps, value_dps);
+  }
+}
+
+void check_inputs(const model::Effect& effect, const Plan& plan, const std::string& place,
+                  std::vector<Error>& errors) {
+  const model::KindInfo& kind = model::info(effect.kind);
+  const std::string& gyro = plan.gyros[effect.gyro].name;
+  if ((kind.needs & model::kNeedsTemperature) != 0 && !plan.gyros[effect.gyro].temperature) {
+    errors.push_back({place,
+                      fmt::format("{} needs the temperature of gyro {}, which the configuration "
+                                  "does not name",
+                                  kind.name, gyro),
+                      "temperature = \"SIGNAL\" in its [[gyro]] table"});
+  }
+  if ((kind.needs & model::kNeedsAcceleration) != 0 && !plan.accelerometer) {
+    errors.push_back({place, fmt::format("{} needs an [accelerometer]", kind.name),
+                      "an [accelerometer] table in the configuration"});
+  }
+}
+
+}  // namespace
+
+void apply_model(const model::Model& model, Plan& plan, std::vector<Error>& errors) {
+  std::array<double, 2> lag_s{};
+  for (const model::Effect& effect : model.effects) {
+    const std::string place = at_line(model.file, effect.line);
+    check_inputs(effect, plan, place, errors);
+    add_noise(effect, plan.corrector.gyros[effect.gyro]);
+    add_limit(effect, plan.gyros[effect.gyro]);
+    if (model::info(effect.kind).nature != model::Nature::kLag) continue;
+    double& sum_s = lag_s[effect.gyro];
+    sum_s += model::lag_s(effect);
+    if (std::abs(sum_s) <= kLagMax_s) continue;
+    errors.push_back({place,
+                      fmt::format("the readings of gyro {} come {:g} s late in all",
+                                  plan.gyros[effect.gyro].name, sum_s),
+                      fmt::format("up to {:g} s can be taken back", kLagMax_s)});
+  }
+  plan.model = model;
+}
+
+std::vector<model::Effect> effects_of(const Plan& plan, std::size_t gyro) {
+  std::vector<model::Effect> own;
+  if (!plan.model) return own;
+  std::copy_if(plan.model->effects.begin(), plan.model->effects.end(), std::back_inserter(own),
+               [gyro](const model::Effect& effect) { return effect.gyro == gyro; });
+  return own;
+}
+
+std::vector<std::string_view> inputs_text(std::uint8_t needs) {
+  std::vector<std::string_view> words;
+  if ((needs & model::kNeedsTemperature) != 0) words.emplace_back("temperature");
+  if ((needs & model::kNeedsAcceleration) != 0) words.emplace_back("acceleration");
+  return words;
+}
+
+std::string_view treatment(model::Kind kind) {
+  switch (model::info(kind).nature) {
+    case model::Nature::kOffset:
+    case model::Nature::kResponse:
+      return "takes back";
+    case model::Nature::kLag:
+      return "dates back";
+    case model::Nature::kClip:
+      return kind == model::Kind::kQuantization ? "as resolution" : "as limit";
+    case model::Nature::kNoise:
+      return "as noise";
+    case model::Nature::kDisturbance:
+      break;
+  }
+  return "cannot undo";
+}
+
+}  // namespace vgyro::gateway

@@ -1,0 +1,73 @@
+#pragma once
+
+// What the gyros' errors depend on besides the rate, gathered from the frames that tell it:
+// temperatures, acceleration, the angle turned so far, and time since the first frame. Also what
+// the wheels do. Values that were never heard are unknown; acceleration and temperature that fall
+// silent are held, because gravity and heat go on, speed is not.
+
+#include <array>
+#include <optional>
+
+#include "base/time.h"
+#include "can/frame.h"
+#include "fusion/corrector.h"
+#include "fusion/moving_variance.h"
+#include "fusion/stamp_guard.h"
+#include "fusion/temperature_filter.h"
+#include "gateway/plan.h"
+#include "model/effect.h"
+
+namespace vgyro::gateway {
+
+class Surroundings {
+ public:
+  /// A speed older than this is no speed.
+  static constexpr Duration kSpeedStale = std::chrono::seconds(1);
+  static constexpr double kStandingBelow_m_s = 0.05;
+  /// After the last known rate the angle is carried on for no longer than this.
+  static constexpr Duration kAngleAhead = std::chrono::seconds(1);
+  /// A longer leap of time is a clock that was set, not a gyro that went on warming up.
+  static constexpr Duration kLeap = std::chrono::hours(24);
+  static constexpr std::size_t kAccelerometerStream = 3;
+  static constexpr std::size_t kSpeedStream = 4;
+
+  explicit Surroundings(const Plan& plan);
+
+  /// The first frame that has a role: zero of the model's time.
+  void begin(TimePoint t) {
+    if (!begun_) set_zero(t);
+  }
+  /// A sample was accepted: its time is believed.
+  void reach(TimePoint t);
+
+  /// NaN is passed over.
+  void add_temperature(std::size_t gyro, TimePoint t, double temperature_c);
+  /// False when the frame cannot be used.
+  bool receive_acceleration(const can::Frame& frame, TimePoint raw, fusion::StampGuard& guard);
+  bool receive_speed(const can::Frame& frame, TimePoint raw, fusion::StampGuard& guard);
+  /// The true rate, as well as it is known; times may come out of order.
+  void add_rate(TimePoint t, double rate_dps);
+
+  [[nodiscard]] model::Surroundings at(std::size_t gyro, TimePoint t) const;
+  [[nodiscard]] fusion::Wheels wheels(TimePoint t) const;
+  /// Of the inputs in `needs` (model::Need) those that were never heard.
+  [[nodiscard]] std::uint8_t missing(std::size_t gyro, std::uint8_t needs) const;
+
+ private:
+  void set_zero(TimePoint t);
+
+  const Plan& plan_;
+  bool begun_ = false;
+  TimePoint zero_;
+  TimePoint newest_;
+  std::array<fusion::TemperatureFilter, 2> temperatures_;
+  std::array<double, 3> acceleration_g_;
+  fusion::MovingVariance vibration_;
+  TimePoint angle_at_;
+  double angle_rad_ = 0.0;
+  double rate_dps_;
+  std::optional<TimePoint> speed_at_;
+  double speed_m_s_ = 0.0;
+};
+
+}  // namespace vgyro::gateway
