@@ -183,7 +183,8 @@ def sensed_rate(effects, truth, t):
             keep = math.exp(-2 * math.pi * effect["cutoff_hz"] * dt)
             out = np.empty_like(rate)
             state = rate[0]
-            for i, value in enumerate(rate):
+            # The mean of both ends of a step: its own lag is of second order.
+            for i, value in enumerate(0.5 * (rate + np.concatenate([rate[:1], rate[:-1]]))):
                 state = keep * state + (1.0 - keep) * value
                 out[i] = state
             rate = out

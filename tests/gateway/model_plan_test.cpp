@@ -1,0 +1,92 @@
+#include "gateway/model_plan.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/gateway/rig.h"
+
+namespace vgyro::gateway {
+namespace {
+
+using model::Kind;
+
+model::Model model_of(std::initializer_list<model::Effect> effects) {
+  return {.file = "known.toml", .effects = effects};
+}
+
+std::vector<Error> apply(const model::Model& model, Plan& plan) {
+  std::vector<Error> errors;
+  apply_model(model, plan, errors);
+  return errors;
+}
+
+TEST(ModelPlan, GivesNoiseToTheCorrector) {
+  Plan plan = rig::two_gyros();
+  plan.corrector.gyros[1].resolution_dps = 1e-3;
+  const auto errors = apply(model_of({{0, Kind::kWhiteNoise, {3e-4}, 3},
+                                      {0, Kind::kWhiteNoise, {4e-4}, 6},
+                                      {0, Kind::kGaussMarkov, {1e-3, 100.0}, 9},
+                                      {0, Kind::kGaussMarkov, {2e-3, 10.0}, 12},
+                                      {1, Kind::kRateRandomWalk, {5e-6}, 15},
+                                      {1, Kind::kRateNoise, {1e-5}, 18},
+                                      {1, Kind::kQuantization, {1e-2}, 21}}),
+                            plan);
+  EXPECT_TRUE(errors.empty());
+  const auto& [a, b] = plan.corrector.gyros;
+  ASSERT_TRUE(a.white_dps_rthz);
+  EXPECT_DOUBLE_EQ(*a.white_dps_rthz, 5e-4) << "in squares";
+  EXPECT_FALSE(a.walk_dps_rts) << "what is not given is not zero";
+  ASSERT_EQ(a.gauss_markov_count, 2U);
+  EXPECT_EQ(a.gauss_markov[1].sigma_dps, 2e-3);
+  EXPECT_EQ(a.gauss_markov[1].tau_s, 10.0);
+  EXPECT_FALSE(b.white_dps_rthz);
+  EXPECT_EQ(b.walk_dps_rts, 5e-6);
+  EXPECT_EQ(b.rate_noise_rthz, 1e-5);
+  EXPECT_EQ(b.resolution_dps, 1e-2);
+}
+
+TEST(ModelPlan, GivesLimitsToTheGyros) {
+  Plan plan = rig::two_gyros();
+  EXPECT_TRUE(apply(model_of({{0, Kind::kSaturation, {300.0}, 3},
+                              {0, Kind::kSaturation, {250.0}, 6},
+                              {1, Kind::kDeadBand, {0.1}, 9}}),
+                    plan)
+                  .empty());
+  EXPECT_EQ(plan.gyros[0].saturation_dps, 250.0);
+  EXPECT_FALSE(plan.gyros[0].dead_band_dps);
+  EXPECT_EQ(plan.gyros[1].dead_band_dps, 0.1);
+}
+
+TEST(ModelPlan, ComplainsAtTheModelsLineOfAnInputThatIsNotConfigured) {
+  Plan plan = rig::two_gyros();
+  plan.gyros[0].temperature = rig::quantity_of(rig::signal_of(32, 16));
+  const auto errors = apply(model_of({{0, Kind::kTemperatureBias, {1e-3, 25.0}, 3},
+                                      {1, Kind::kTemperatureBias, {1e-3, 25.0}, 8},
+                                      {0, Kind::kGSensitivity, {0.0, 1e-3}, 13}}),
+                            plan);
+  ASSERT_EQ(errors.size(), 2U);
+  EXPECT_EQ(errors[0].where, "known.toml:8");
+  EXPECT_NE(errors[0].message().find("gyro b"), std::string::npos);
+  EXPECT_NE(errors[0].remedy.find("temperature = "), std::string::npos);
+  EXPECT_EQ(errors[1].where, "known.toml:13");
+  EXPECT_NE(errors[1].remedy.find("[accelerometer]"), std::string::npos);
+}
+
+TEST(ModelPlan, RefusesMoreLagThanTheBuffersHold) {
+  Plan plan = rig::two_gyros();
+  EXPECT_TRUE(apply(model_of({{0, Kind::kDelay, {0.2}, 3}}), plan).empty());
+  const auto errors =
+      apply(model_of({{0, Kind::kDelay, {0.2}, 3}, {0, Kind::kBandwidth, {1.0}, 7}}), plan);
+  ASSERT_EQ(errors.size(), 1U);
+  EXPECT_EQ(errors[0].where, "known.toml:7");
+}
+
+TEST(ModelPlan, SortsEffectsByGyro) {
+  Plan plan = rig::two_gyros();
+  EXPECT_TRUE(effects_of(plan, 0).empty());
+  apply(model_of({{1, Kind::kBias, {0.1}, 3}, {0, Kind::kBias, {0.2}, 7}}), plan);
+  ASSERT_EQ(effects_of(plan, 1).size(), 1U);
+  EXPECT_EQ(effects_of(plan, 1)[0].parameters[0], 0.1);
+}
+
+}  // namespace
+}  // namespace vgyro::gateway

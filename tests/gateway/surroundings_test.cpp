@@ -1,0 +1,259 @@
+#include "gateway/surroundings.h"
+
+#include <bit>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include <gtest/gtest.h>
+
+#include "model/catalogue.h"
+#include "tests/gateway/counting_new.h"
+#include "tests/gateway/rig.h"
+
+namespace vgyro::gateway {
+namespace {
+
+using rig::at_ms;
+using rig::ms;
+
+constexpr std::uint32_t kIdAccelerometer = 0x210;
+constexpr std::uint32_t kIdSpeed = 0x220;
+
+Quantity float_at(std::uint16_t start, double limit) {
+  return rig::quantity_of(rig::signal_of(start, 32, 1.0, 0.0, dbc::ValueType::kFloat32), limit, 12);
+}
+
+/// Accelerations and speed as floats, so that a frame can hold any of them.
+Plan with_everything() {
+  Plan plan = rig::two_gyros();
+  plan.gyros[0].temperature = rig::quantity_of(rig::signal_of(32, 16, 0.01));
+  plan.accelerometer = AccelerometerPlan{"can0",
+                                         "ACCEL",
+                                         {0, kIdAccelerometer, can::kStandardIdMax, false},
+                                         {float_at(0, 1e4), float_at(32, 1e4), float_at(64, 1e4)}};
+  plan.speed =
+      SpeedPlan{"can0", "WHEEL", {0, kIdSpeed, can::kStandardIdMax, false}, float_at(0, 100.0)};
+  return plan;
+}
+
+std::vector<std::uint8_t> bytes_of(std::initializer_list<float> values) {
+  std::vector<std::uint8_t> bytes;
+  for (const float value : values) {
+    const auto raw = std::bit_cast<std::uint32_t>(value);
+    for (unsigned shift = 0; shift < 32; shift += 8)
+      bytes.push_back(static_cast<std::uint8_t>(raw >> shift));
+  }
+  return bytes;
+}
+
+can::Frame accelerometer_frame(float x, float y, float z) {
+  return rig::frame_of(kIdAccelerometer, bytes_of({x, y, z}), can::kFd);
+}
+can::Frame speed_frame(float speed) {
+  return rig::frame_of(kIdSpeed, bytes_of({speed, 0.0F, 0.0F}), can::kFd);
+}
+
+constexpr float kInfinity = std::numeric_limits<float>::infinity();
+constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+
+class SurroundingsTest : public testing::Test {
+ protected:
+  bool accelerate(std::int64_t at, float x, float y, float z) {
+    return surroundings_.receive_acceleration(accelerometer_frame(x, y, z), at_ms(at), guard_);
+  }
+  bool roll(std::int64_t at, float speed) {
+    return surroundings_.receive_speed(speed_frame(speed), at_ms(at), guard_);
+  }
+  Plan plan_ = with_everything();
+  fusion::StampGuard guard_;
+  Surroundings surroundings_{plan_};
+};
+
+TEST_F(SurroundingsTest, AreUnknownAtFirst) {
+  surroundings_.begin(at_ms(0));
+  const model::Surroundings s = surroundings_.at(0, at_ms(0));
+  EXPECT_TRUE(std::isnan(s.temperature_c));
+  EXPECT_TRUE(std::isnan(s.acceleration_g[2]));
+  EXPECT_EQ(surroundings_.wheels(at_ms(0)), fusion::Wheels::kUnknown);
+  const auto all = static_cast<std::uint8_t>(model::kNeedsTemperature | model::kNeedsAcceleration);
+  EXPECT_EQ(surroundings_.missing(0, all), all);
+  EXPECT_EQ(surroundings_.missing(0, model::kNeedsNothing), 0U);
+}
+
+TEST_F(SurroundingsTest, TakeTheNewestAcceleration) {
+  EXPECT_TRUE(accelerate(0, 0.1F, 0.2F, 1.0F));
+  EXPECT_TRUE(accelerate(10, 0.3F, 0.2F, 0.5F));
+  EXPECT_FLOAT_EQ(static_cast<float>(surroundings_.at(1, at_ms(10)).acceleration_g[0]), 0.3F);
+  EXPECT_EQ(surroundings_.missing(1, model::kNeedsAcceleration), 0U);
+}
+
+// One frame with a hole in it must not become part of every rate from then on.
+TEST_F(SurroundingsTest, RefuseAccelerationsThatCannotBe) {
+  ASSERT_TRUE(accelerate(0, 0.0F, 0.0F, 1.0F));
+  EXPECT_FALSE(accelerate(10, kNan, 0.0F, 1.0F));
+  EXPECT_FALSE(accelerate(20, 0.0F, kInfinity, 1.0F));
+  EXPECT_FALSE(accelerate(30, 0.0F, 0.0F, -3e38F));
+  can::Frame cut = accelerometer_frame(1.0F, 1.0F, 1.0F);
+  cut.length = 8;
+  EXPECT_FALSE(surroundings_.receive_acceleration(cut, at_ms(40), guard_));
+  const model::Surroundings s = surroundings_.at(0, at_ms(50));
+  EXPECT_EQ(s.acceleration_g[2], 1.0);
+  EXPECT_EQ(s.vibration_g2, 0.0);
+}
+
+TEST_F(SurroundingsTest, TellStandingFromRolling) {
+  EXPECT_TRUE(roll(0, 0.04F));
+  EXPECT_EQ(surroundings_.wheels(at_ms(0)), fusion::Wheels::kStanding);
+  EXPECT_TRUE(roll(100, -0.06F));
+  EXPECT_EQ(surroundings_.wheels(at_ms(100)), fusion::Wheels::kRolling);
+}
+
+// A dead sensor is not a parked car.
+TEST_F(SurroundingsTest, KnowNothingOfASpeedThatFellSilent) {
+  ASSERT_TRUE(roll(0, 0.0F));
+  EXPECT_EQ(surroundings_.wheels(at_ms(1000)), fusion::Wheels::kStanding);
+  EXPECT_EQ(surroundings_.wheels(at_ms(1001)), fusion::Wheels::kUnknown);
+}
+
+TEST_F(SurroundingsTest, KnowNothingOfASpeedThatSaysItIsInvalid) {
+  for (const float bad : {kNan, kInfinity, 101.0F}) {
+    Surroundings surroundings(plan_);
+    fusion::StampGuard guard;
+    ASSERT_TRUE(surroundings.receive_speed(speed_frame(0.0F), at_ms(0), guard));
+    EXPECT_FALSE(surroundings.receive_speed(speed_frame(bad), at_ms(10), guard));
+    EXPECT_EQ(surroundings.wheels(at_ms(10)), fusion::Wheels::kUnknown) << bad;
+    EXPECT_TRUE(surroundings.receive_speed(speed_frame(0.0F), at_ms(20), guard));
+    EXPECT_EQ(surroundings.wheels(at_ms(20)), fusion::Wheels::kStanding);
+  }
+}
+
+TEST_F(SurroundingsTest, RefuseAStampFarAhead) {
+  ASSERT_TRUE(roll(0, 0.0F));
+  EXPECT_FALSE(roll(3'600'000, 5.0F));
+  EXPECT_EQ(surroundings_.wheels(at_ms(100)), fusion::Wheels::kStanding);
+}
+
+TEST_F(SurroundingsTest, TurnByTheRate) {
+  surroundings_.begin(at_ms(0));
+  for (int i = 1; i <= 300; ++i)
+    surroundings_.add_rate(at_ms(10 * i), 90.0);
+  // The first interval begins with the calibration's rate, here 0.
+  const double turned = 90.0 * 3.0 - 0.45;
+  EXPECT_NEAR(
+      std::remainder(surroundings_.at(0, at_ms(3000)).angle_rad - turned * std::numbers::pi / 180.0,
+                     2.0 * std::numbers::pi),
+      0.0, 1e-9);
+  EXPECT_NEAR(
+      surroundings_.at(0, at_ms(3010)).angle_rad - surroundings_.at(0, at_ms(3000)).angle_rad,
+      0.9 * std::numbers::pi / 180.0, 1e-9)
+      << "carried on to the sample that asks";
+}
+
+TEST_F(SurroundingsTest, CountTimeFromTheFirstFrame) {
+  surroundings_.begin(at_ms(500));
+  surroundings_.begin(at_ms(700));
+  surroundings_.reach(at_ms(1500));
+  EXPECT_DOUBLE_EQ(surroundings_.at(0, at_ms(1500)).t_s, 1.0);
+}
+
+// A host without a clock wakes in 1970, and is set right a minute later.
+TEST_F(SurroundingsTest, DoNotCountALeapOfTheClock) {
+  surroundings_.begin(at_ms(0));
+  surroundings_.reach(at_ms(60'000));
+  const TimePoint set_right = at_ms(60'000) + std::chrono::hours(24 * 365 * 50);
+  surroundings_.reach(set_right);
+  EXPECT_DOUBLE_EQ(surroundings_.at(0, set_right).t_s, 60.0);
+  surroundings_.reach(set_right + ms(1000));
+  EXPECT_DOUBLE_EQ(surroundings_.at(0, set_right + ms(1000)).t_s, 61.0);
+}
+
+class Quiet final : public FrameSink {
+ public:
+  void put(const can::Frame& /*frame*/, TimePoint /*stamp*/) override {}
+};
+
+Plan with_model() {
+  Plan plan = with_everything();
+  plan.model.emplace();
+  const auto add = [&](std::size_t gyro, model::Kind kind, model::Parameters parameters) {
+    plan.model->effects.push_back({.gyro = gyro, .kind = kind, .parameters = parameters});
+  };
+  add(0, model::Kind::kTemperatureRateBias, {0.5});
+  add(0, model::Kind::kVibrationRectification, {1e-3});
+  add(1, model::Kind::kGSensitivity, {0.0, 1e-4});
+  add(1, model::Kind::kScaleFactorCubic, {1e-7});
+  add(1, model::Kind::kAngleHarmonic, {4.0, 0.01, 0.0});
+  add(0, model::Kind::kDelay, {0.004});
+  return plan;
+}
+
+// Whatever the accelerometer and the wheels say, rates stay finite, every frame is counted, nothing
+// is allocated.
+TEST(SurroundingsInThePipeline, SurviveHostileFramesWithoutAllocating) {
+  Plan plan = with_model();
+  for (Quantity& axis : plan.accelerometer->axes) {
+    axis.minimum = -3.0;
+    axis.maximum = 3.0;
+  }
+  Pipeline pipeline(plan);
+  Quiet sink;
+  constexpr std::uint32_t kSeed = 8;
+  SCOPED_TRACE(kSeed);
+  rig::Dice dice(kSeed);
+  std::vector<rig::Event> events =
+      rig::merge({rig::stream_a(ms(0), ms(20'000), rig::constant(0.1)),
+                  rig::stream_b(ms(0), ms(20'000), rig::constant(0.2))});
+  std::vector<rig::Event> hostile;
+  for (const rig::Event& event : events) {
+    can::Frame frame = accelerometer_frame(0, 0, 0);
+    if (dice.one_in(2)) frame.id = kIdSpeed;
+    for (std::size_t i = 0; i < 12; ++i)
+      frame.data[i] = static_cast<std::uint8_t>(dice.bits());
+    if (dice.one_in(5)) frame.length = static_cast<std::uint8_t>(dice.below(13));
+    hostile.push_back({0, frame, event.stamp + ms(1)});
+  }
+  events = rig::merge({events, hostile});
+  const std::size_t before = allocations_so_far();
+  rig::play(pipeline, events, sink);
+  EXPECT_EQ(allocations_so_far(), before);
+  const Status& status = pipeline.status();
+  EXPECT_EQ(status.accelerometer_frames + status.speed_frames, hostile.size());
+  EXPECT_GT(status.accelerometer_rejected, status.accelerometer_frames / 2);
+  EXPECT_GT(status.rates_out_valid, 1500U);
+  EXPECT_TRUE(std::isfinite(status.rate_dps));
+  EXPECT_LT(std::abs(status.rate_dps), 1.0);
+  EXPECT_EQ(status.gyros[0].samples, 2000U);
+}
+
+TEST(SurroundingsInThePipeline, TellWhatTheModelWaitsFor) {
+  Pipeline pipeline(with_model());
+  Quiet sink;
+  EXPECT_EQ(pipeline.status().gyros[0].waits_for,
+            model::kNeedsTemperature | model::kNeedsAcceleration);
+  EXPECT_EQ(pipeline.status().gyros[1].waits_for, model::kNeedsAcceleration);
+  pipeline.receive(0, rig::rate_frame(rig::kIdA, 0.1), at_ms(0), sink);
+  pipeline.receive(0, accelerometer_frame(0, 0, 1), at_ms(1), sink);
+  EXPECT_EQ(pipeline.status().gyros[0].waits_for, model::kNeedsNothing);
+  EXPECT_EQ(pipeline.status().gyros[1].waits_for, model::kNeedsNothing);
+}
+
+// The bias that the model knows is part of what VG_Bias says, wherever it was taken off.
+TEST(SurroundingsInThePipeline, BiasIsToldAsAWhole) {
+  Plan plan = rig::two_gyros();
+  plan.corrector.method = Method::kMutual;
+  plan.model.emplace();
+  plan.model->effects.push_back({.gyro = 0, .kind = model::Kind::kBias, .parameters = {0.03}});
+  Pipeline pipeline(plan);
+  Quiet sink;
+  rig::play(pipeline,
+            rig::merge({rig::stream_a(ms(0), ms(5000), rig::constant(0.05)),
+                        rig::stream_b(ms(0), ms(5000), rig::constant(-0.01))}),
+            sink);
+  EXPECT_NEAR(pipeline.status().gyros[0].bias_dps, 0.05, 1e-6);
+  EXPECT_NEAR(pipeline.status().gyros[1].bias_dps, -0.01, 1e-6);
+  EXPECT_NEAR(pipeline.status().rate_dps, 0.0, 1e-6);
+}
+
+}  // namespace
+}  // namespace vgyro::gateway
