@@ -52,7 +52,7 @@ TEST(ModelPlan, GivesLimitsToTheGyros) {
                     plan)
                   .empty());
   EXPECT_EQ(plan.gyros[0].saturation_dps, 250.0);
-  EXPECT_FALSE(plan.gyros[0].dead_band_dps);
+  EXPECT_EQ(plan.gyros[0].dead_band_dps, 0.0);
   EXPECT_EQ(plan.gyros[1].dead_band_dps, 0.1);
 }
 
