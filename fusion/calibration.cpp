@@ -47,11 +47,12 @@ bool Calibrator::close_block() {
   return still;
 }
 
-bool Calibrator::finish(const Sums& sums, double t_s) {
+bool Calibrator::finish(const Sums& sums, double t_s, double used_until_s) {
   const auto sum = moved_ ? sums.level.fit() : sums.sum.fit();
   const auto difference = sums.difference.fit();
   if (!sum || !difference) return false;
   result_ = {.end_s = t_s,
+             .used_until_s = used_until_s,
              .sum = sum->polynomial,
              .difference = difference->polynomial,
              .in_motion = moved_};
@@ -67,12 +68,12 @@ bool Calibrator::add(double t_s, const std::array<double, 2>& rate_dps, double t
     moved_ = moved_ || (!still && when_moving_ == WhenMoving::kAccept);
     if (!still && when_moving_ == WhenMoving::kWait) {
       const bool enough = calm_until_s_ - from_s_ >= kEnoughShare * rest_s_;
-      if (enough && finish(calm_, t_s)) return false;
+      if (enough && finish(calm_, t_s, calm_until_s_)) return false;
       ++restarts_;
       begin(t_s);
     } else if (complete) {
       covered_s_ = rest_s_;
-      if (finish(sums_, from_s_ + rest_s_)) return false;
+      if (finish(sums_, from_s_ + rest_s_, from_s_ + rest_s_)) return false;
       ++restarts_;
       begin(t_s);
     } else {

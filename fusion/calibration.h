@@ -14,10 +14,11 @@
 namespace vgyro::fusion {
 
 struct Calibration {
-  double end_s = 0.0;      ///< the first window starts here
-  Polynomial sum;          ///< P₁⁰ + P₂⁰, deg/s
-  Polynomial difference;   ///< P₁⁰ − P₂⁰, deg/s
-  bool in_motion = false;  ///< the platform moved, and that was accepted
+  double end_s = 0.0;         ///< the first window starts here
+  double used_until_s = 0.0;  ///< what came later was not used: motion
+  Polynomial sum;             ///< P₁⁰ + P₂⁰, deg/s
+  Polynomial difference;      ///< P₁⁰ − P₂⁰, deg/s
+  bool in_motion = false;     ///< the platform moved, and that was accepted
 
   [[nodiscard]] double bias_dps(std::size_t gyro, double t_s) const {
     return 0.5 * (sum.at(t_s) + (gyro == 0 ? difference.at(t_s) : -difference.at(t_s)));
@@ -77,7 +78,7 @@ class Calibrator {
   [[nodiscard]] Sums empty_sums(double from_s) const;
   /// Judges the block that ends; false when it holds motion.
   bool close_block();
-  bool finish(const Sums& sums, double t_s);
+  bool finish(const Sums& sums, double t_s, double used_until_s);
 
   int order_;
   double rest_s_;

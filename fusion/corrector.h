@@ -46,12 +46,12 @@ enum class Wheels : std::uint8_t { kUnknown, kStanding, kRolling };
 
 /// What the method does at present, for people and for VG_Bias.
 struct Condition {
-  bool stopped = false;              ///< standing still: the common drift is being learned
-  bool disagree = false;             ///< the gyros contradict each other; which is wrong is open
-  std::array<bool, 2> noisy{};       ///< the noise of this gyro is far above what it was
-  std::uint64_t stops = 0;           ///< stops learned from
-  std::uint64_t stops_refused = 0;   ///< steady, but both gyros had moved together
-  std::uint64_t disagreements = 0;   ///< times that `disagree` began
+  bool stopped = false;             ///< standing still: the common drift is being learned
+  bool disagree = false;            ///< the gyros contradict each other; which is wrong is open
+  std::array<bool, 2> noisy{};      ///< the noise of this gyro is far above what it was
+  std::uint64_t stops = 0;          ///< stops learned from
+  std::uint64_t stops_refused = 0;  ///< steady, but both gyros had moved together
+  std::uint64_t disagreements = 0;  ///< times that `disagree` began
 };
 
 class Corrector {

@@ -10,17 +10,18 @@ namespace vgyro::fusion {
 
 /// Values of K over N that the optimal corrector weighs against each other where K is not given,
 /// 1/s.
-inline constexpr std::array<double, 7> kWalkRatios_per_s{1e-5, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2, 1e-1};
+inline constexpr std::array<double, 11> kWalkRatios_per_s{
+    1e-5, 3.2e-4, 1e-3, 1.8e-3, 3.2e-3, 5.6e-3, 1e-2, 1.8e-2, 3.2e-2, 5.6e-2, 1e-1};
 inline constexpr std::size_t kWalkPairs = kWalkRatios_per_s.size() * kWalkRatios_per_s.size();
 
 struct DriftMemory {
   std::array<double, 2> bias_dps{};
-  std::array<double, 3> bias_covariance{};     ///< of gyro 1, of both, of gyro 2; (deg/s)²
-  std::array<double, 3> white_density{};       ///< N₁², N₁N₂ρ, N₂²; (deg/s)²/Hz
-  std::array<double, 2> sample_variance{};     ///< of one raw sample about the rate; (deg/s)²
+  std::array<double, 3> bias_covariance{};       ///< of gyro 1, of both, of gyro 2; (deg/s)²
+  std::array<double, 3> white_density{};         ///< N₁², N₁N₂ρ, N₂²; (deg/s)²/Hz
+  std::array<double, 2> sample_variance{};       ///< of one raw sample about the rate; (deg/s)²
   std::array<double, kWalkPairs> walk_weight{};  ///< probability of each pair of ratios, gyro 2
                                                  ///< running faster; sums to 1
-  double scale_difference = 0.0;               ///< gyro 1 less gyro 2, relative
+  double scale_difference = 0.0;                 ///< gyro 1 less gyro 2, relative
   double scale_difference_sigma = 0.0;
   double skew_s = 0.0;  ///< gyro 2 is later than gyro 1
   double skew_sigma_s = 0.0;

@@ -1,0 +1,145 @@
+#include "fusion/noise_tracker.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace vgyro::fusion {
+
+namespace {
+
+// Older measurements count half when so many cells are there: noise changes with age and heat.
+constexpr double kCellsMax = 12000.0;
+
+// A correlation below this many of its own standard deviations is none.
+constexpr double kRealCorrelation = 4.0;
+
+// How fast a rise is followed, per block, and how sure it must be.
+constexpr double kRiseGain = 0.3;
+constexpr double kSureSigma = 3.0;
+constexpr double kNoLongerNoisy = 0.5;
+constexpr double kOneBlockMax = 22.0;
+
+// A sensor that says nothing of its resolution still has some noise, (deg/s)²/Hz.
+constexpr double kDensityMin = 1e-14;
+
+}  // namespace
+
+void NoiseTracker::measure(const Block& block, bool moving) {
+  shared_is_motion_ = shared_is_motion_ || moving;
+  for (std::size_t i = 0; i < block.count; ++i) {
+    const Cell& cell = block.cells[i];
+    for (std::size_t k = 0; k < 3; ++k)
+      sample_squares_[k] += cell.scatter[k];
+    const double freedom = cell.count - 1.0;
+    samples_ += freedom;
+    gain_[0] += freedom * cell.noise_gain[0];
+    gain_[1] += freedom * cell.noise_gain[1];
+    if (i == 0) continue;
+    const Cell& before = block.cells[i - 1];
+    const double first = cell.mean_dps[0] - before.mean_dps[0];
+    const double second = cell.mean_dps[1] - before.mean_dps[1];
+    const double length = 0.25 * (cell.length_s + before.length_s);
+    cell_squares_[0] += first * first * length;
+    cell_squares_[1] += first * second * length;
+    cell_squares_[2] += second * second * length;
+    cells_ += 1.0;
+  }
+  if (cells_ < kCellsMax) return;
+  for (std::size_t k = 0; k < 3; ++k) {
+    cell_squares_[k] *= 0.5;
+    sample_squares_[k] *= 0.5;
+  }
+  cells_ *= 0.5;
+  samples_ *= 0.5;
+  gain_[0] *= 0.5;
+  gain_[1] *= 0.5;
+}
+
+void NoiseTracker::settle(double interval_s) {
+  if (cells_ == 0.0) return;
+  const auto shared = [&](const Symmetric& squares, double count) {
+    const double significant =
+        kRealCorrelation * std::sqrt(squares[0] * squares[2] / std::max(count, 1.0));
+    return std::abs(squares[1]) > significant ? squares[1] : 0.0;
+  };
+  const double cell_shared = shared(cell_squares_, cells_);
+  const double sample_shared = shared(sample_squares_, samples_);
+  const double motion = shared_is_motion_ ? 1.0 : 0.0;
+  for (std::size_t gyro = 0; gyro < 2; ++gyro) {
+    const std::size_t k = 2 * gyro;
+    const GyroParameters& given = gyros_[gyro];
+    const double rounding = given.resolution_dps * given.resolution_dps / 12.0;
+    const double measured = (cell_squares_[k] - motion * cell_shared) / cells_;
+    density_[k] = given.white_dps_rthz ? *given.white_dps_rthz * *given.white_dps_rthz : measured;
+    density_[k] = std::max({density_[k], rounding * interval_s, kDensityMin});
+    // Gyros slower than a cell have one sample in each.
+    sample_[k] = samples_ > cells_ ? (sample_squares_[k] - motion * sample_shared) / gain_[gyro]
+                                   : density_[k] / interval_s;
+    sample_[k] = std::max({sample_[k], rounding, kDensityMin});
+  }
+  const bool given = gyros_[0].white_dps_rthz || gyros_[1].white_dps_rthz;
+  density_[1] = shared_is_motion_ || given ? 0.0 : cell_shared / cells_;
+  sample_[1] = shared_is_motion_ || samples_ <= cells_
+                   ? 0.0
+                   : sample_shared / std::sqrt(gain_[0] * gain_[1]);
+  apply_rise();
+}
+
+void NoiseTracker::resume(const Symmetric& density, const std::array<double, 2>& sample_variance) {
+  density_ = density;
+  for (std::size_t gyro = 0; gyro < 2; ++gyro) {
+    if (!gyros_[gyro].white_dps_rthz) continue;
+    density_[2 * gyro] = *gyros_[gyro].white_dps_rthz * *gyros_[gyro].white_dps_rthz;
+    density_[1] = 0.0;
+  }
+  sample_ = {sample_variance[0], 0.0, sample_variance[1]};
+  apply_rise();
+}
+
+void NoiseTracker::watch(const Block& block) {
+  if (block.present != Present::kBoth) return;
+  Symmetric squares{};
+  double freedom = 0.0;
+  std::array<double, 2> gain{};
+  for (std::size_t i = 0; i < block.count; ++i) {
+    const Cell& cell = block.cells[i];
+    for (std::size_t k = 0; k < 3; ++k)
+      squares[k] += cell.scatter[k];
+    freedom += cell.count - 1.0;
+    gain[0] += (cell.count - 1.0) * cell.noise_gain[0];
+    gain[1] += (cell.count - 1.0) * cell.noise_gain[1];
+  }
+  if (freedom < 8.0) return;
+  const std::array<double, 2> expected{(sample_[0] - sample_[1]) * gain[0],
+                                       (sample_[2] - sample_[1]) * gain[1]};
+  if (expected[0] <= 0.0 || expected[1] <= 0.0) return;
+  // What the gyros share is motion. It does not fall out of one gyro's sum of squares exactly: the
+  // doubt grows with the motion, and with the other gyro's noise.
+  const std::array<double, 2> own{squares[0] - squares[1], squares[2] - squares[1]};
+  const double both = own[0] + own[1];
+  const double both_expected = expected[0] + expected[1];
+  std::array<double, 2> rise{};
+  for (std::size_t gyro = 0; gyro < 2; ++gyro) {
+    const double spread = std::sqrt(squares[2 * gyro] * both / freedom);
+    rise[gyro] = std::max((own[gyro] - kSureSigma * spread) / expected[gyro], 1.0);
+  }
+  const double explained = rise[0] * expected[0] + rise[1] * expected[1];
+  const double sure = both - kSureSigma * both_expected * std::sqrt(2.0 / freedom);
+  const double missing = std::max(sure / explained, 1.0);
+  for (std::size_t gyro = 0; gyro < 2; ++gyro) {
+    // One wild block is not noise; several are, however wild.
+    const double followed = std::min(rise[gyro] * missing, 3.0 * rise_[gyro] + kOneBlockMax);
+    rise_[gyro] += kRiseGain * (followed - rise_[gyro]);
+    if (rise_[gyro] > kNoisyFactor && missing < 2.0) noisy_[gyro] = true;
+    if (rise_[gyro] < kNoLongerNoisy * kNoisyFactor) noisy_[gyro] = false;
+  }
+  apply_rise();
+}
+
+void NoiseTracker::apply_rise() {
+  const double both = std::sqrt(rise_[0] * rise_[1]);
+  present_density_ = {density_[0] * rise_[0], density_[1] * both, density_[2] * rise_[1]};
+  present_sample_ = {sample_[0] * rise_[0], sample_[1] * both, sample_[2] * rise_[1]};
+}
+
+}  // namespace vgyro::fusion

@@ -1,0 +1,63 @@
+#pragma once
+
+// The white noise of two gyros: N at the time scale of cells (what drift and heading feel), and the
+// variance of single samples (what σ of a published rate is made of). Known from the model file,
+// or measured where the true rate is known; between such times only a rise is followed, from what
+// the two gyros do not have in common.
+
+#include <array>
+
+#include "fusion/cells.h"
+#include "fusion/gyro_parameters.h"
+
+namespace vgyro::fusion {
+
+/// Symmetric 2×2: of gyro 1, of both, of gyro 2.
+using Symmetric = std::array<double, 3>;
+
+class NoiseTracker {
+ public:
+  /// A gyro with this much more noise variance than it had is reported.
+  static constexpr double kNoisyFactor = 9.0;
+
+  explicit NoiseTracker(const std::array<GyroParameters, 2>& gyros) : gyros_(gyros) {}
+
+  void clear() { *this = NoiseTracker(gyros_); }
+  /// A block whose true rate is constant: its cells differ by noise alone. With `moving` only what
+  /// the gyros do not share counts as noise.
+  void measure(const Block& block, bool moving);
+  /// A block of which nothing is known.
+  void watch(const Block& block);
+  /// Make density() and sample_variance() of what was measured.
+  void settle(double interval_s);
+  void resume(const Symmetric& density, const std::array<double, 2>& sample_variance);
+
+  /// N₁², ρN₁N₂, N₂², (deg/s)²/Hz, with the present rise.
+  [[nodiscard]] const Symmetric& density() const { return present_density_; }
+  /// Of one raw sample, (deg/s)², with the present rise.
+  [[nodiscard]] const Symmetric& sample_variance() const { return present_sample_; }
+  [[nodiscard]] bool noisy(std::size_t gyro) const { return noisy_[gyro]; }
+
+  /// Without the present rise.
+  [[nodiscard]] const Symmetric& usual_density() const { return density_; }
+  [[nodiscard]] const Symmetric& usual_sample_variance() const { return sample_; }
+
+ private:
+  void apply_rise();
+
+  std::array<GyroParameters, 2> gyros_;
+  Symmetric cell_squares_{};  ///< Σ ½Δ²·length of neighbouring cells
+  double cells_ = 0.0;
+  Symmetric sample_squares_{};    ///< Σ of squares about the cells' means
+  double samples_ = 0.0;          ///< degrees of freedom of these
+  std::array<double, 2> gain_{};  ///< Σ samples · RatePair::noise_gain
+  bool shared_is_motion_ = false;
+  Symmetric density_{};
+  Symmetric sample_{};
+  std::array<double, 2> rise_{1.0, 1.0};
+  std::array<bool, 2> noisy_{};
+  Symmetric present_density_{};
+  Symmetric present_sample_{};
+};
+
+}  // namespace vgyro::fusion
