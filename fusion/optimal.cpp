@@ -44,6 +44,8 @@ constexpr double kJumpSigma = 6.0;
 constexpr double kTurnTolerance = 0.02;
 constexpr double kTurnTolerance_s = 0.02;  ///< the same of its derivative
 constexpr double kTurning_dps = 1.0;
+// Within a cell the two gyros need not have met an acceleration at quite the same time.
+constexpr double kTimingDoubt_s = 0.0005;
 // Who jumped cannot be seen; neither gyro is above suspicion.
 constexpr double kShareMin = 0.1;
 
@@ -520,7 +522,8 @@ void OptimalCorrector::add_difference(const Block& block) {
       const bool accelerates = squared(slope * span_s) > squared(kExcited) * 2.0 * rate_variance;
       const Vector3 regressor{1.0, turns ? rate : 0.0, accelerates ? slope : 0.0};
       const double noise =
-          (difference_density + rate_density(0, rate) + rate_density(1, rate)) / cell.length_s;
+          (difference_density + rate_density(0, rate) + rate_density(1, rate)) / cell.length_s +
+          squared(kTimingDoubt_s * slope);
       window_.normal += regressor * regressor.transpose() / noise;
       window_.right += regressor * ((cell.mean_dps[0] - cell.mean_dps[1]) / noise);
     }
