@@ -9,6 +9,8 @@ namespace vgyro::gateway {
 
 namespace {
 
+constexpr std::string_view kTakesBack = "takes back";
+
 // Independent noises add in squares.
 void add_density(std::optional<double>& density, double more) {
   density = std::hypot(density.value_or(0.0), more);
@@ -48,6 +50,22 @@ void add_limit(const model::Effect& effect, GyroPlan& gyro) {
   }
 }
 
+// FNV-1a: the same effects give the same eight digits on every machine.
+std::string digest_of(const std::vector<model::Effect>& effects) {
+  std::uint32_t hash = 2166136261U;
+  bool any = false;
+  for (const model::Effect& effect : effects) {
+    if (treatment(effect.kind) != kTakesBack) continue;
+    any = true;
+    std::string text(model::info(effect.kind).name);
+    for (const double parameter : effect.parameters)
+      text += fmt::format(" {}", parameter);
+    for (const char c : text)
+      hash = (hash ^ static_cast<unsigned char>(c)) * 16777619U;
+  }
+  return any ? fmt::format("{:08x}", hash) : std::string();
+}
+
 void check_inputs(const model::Effect& effect, const Plan& plan, const std::string& place,
                   std::vector<Error>& errors) {
   const model::KindInfo& kind = model::info(effect.kind);
@@ -84,6 +102,8 @@ void apply_model(const model::Model& model, Plan& plan, std::vector<Error>& erro
                       fmt::format("up to {:g} s can be taken back", kLagMax_s)});
   }
   plan.model = model;
+  for (std::size_t gyro = 0; gyro < 2; ++gyro)
+    plan.gyros[gyro].taken_back = digest_of(effects_of(plan, gyro));
 }
 
 std::vector<model::Effect> effects_of(const Plan& plan, std::size_t gyro) {
@@ -105,7 +125,7 @@ std::string_view treatment(model::Kind kind) {
   switch (model::info(kind).nature) {
     case model::Nature::kOffset:
     case model::Nature::kResponse:
-      return "takes back";
+      return kTakesBack;
     case model::Nature::kLag:
       return "dates back";
     case model::Nature::kClip:

@@ -78,6 +78,7 @@ struct GyroPlan {
   std::optional<Condition> valid;
   std::optional<double> saturation_dps = {};  ///< from the model file: it clips at ± this
   double dead_band_dps = 0.0;                 ///< likewise: it reads 0 below; 0: it has none
+  std::string taken_back = {};                ///< digest of what is taken back; empty: nothing
 };
 
 struct ReferencePlan {

@@ -185,10 +185,11 @@ Expected<std::string_view> unsealed(std::string_view text, const std::string& wh
 }  // namespace
 
 std::string device_of(const GyroPlan& gyro) {
-  const std::string device = fmt::format(
-      "{}: {} {:#x}{} {} {}{}, {}, scale {}{:+}", gyro.name, gyro.bus, gyro.match.id,
-      gyro.match.extended ? "x" : "", gyro.message, gyro.rate.name,
-      gyro.sign ? " with a sign signal" : "", gyro.rate.layout, gyro.rate.scale, gyro.rate.shift);
+  std::string device = fmt::format("{}: {} {:#x}{} {} {}{}, {}, scale {}{:+}", gyro.name, gyro.bus,
+                                   gyro.match.id, gyro.match.extended ? "x" : "", gyro.message,
+                                   gyro.rate.name, gyro.sign ? " with a sign signal" : "",
+                                   gyro.rate.layout, gyro.rate.scale, gyro.rate.shift);
+  if (!gyro.taken_back.empty()) device += ", less model " + gyro.taken_back;
   std::string plain;
   for (const char c : device) {
     plain +=

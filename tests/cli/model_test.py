@@ -1,6 +1,7 @@
 #!/usr/bin/python3
 """`vgyro model list` and the model file on the command line."""
 
+import json
 import unittest
 
 import bench
@@ -21,6 +22,70 @@ class ModelList(bench.Bench):
 
     def test_model_alone_is_wrong_usage(self):
         self.bad("model", code=2)
+
+
+MODEL = """\
+format = 1
+
+[[effect]]
+gyro = 1
+kind = "bias"
+value_dps = 0.5
+
+[[effect]]
+gyro = 2
+kind = "white_noise"
+density_dps_rthz = 1e-3
+
+[[effect]]
+gyro = 2
+kind = "stuck"
+from_s = 5
+to_s = 6
+"""
+
+
+class ModelOfAConfig(bench.Bench):
+    def test_check_says_what_becomes_of_each_effect(self):
+        # Before it is trusted.
+        self.write("known.toml", MODEL)
+        text = self.good("check", "--model", "known.toml", "vgyro.toml").stdout.decode()
+        for pattern in (r"known.toml, 3 effects", r"takes back +bias +value_dps 0.5",
+                        r"as noise +white_noise +density_dps_rthz 0.001", r"cannot undo +stuck"):
+            self.assertRegex(text, pattern)
+
+    def test_config_names_it_relative_to_itself(self):
+        (self.folder / "sub").mkdir()
+        self.write("sub/known.toml", MODEL)
+        self.write("vgyro.toml", bench.CONFIG.replace("[corrector]", '[corrector]\nmodel = "sub/known.toml"'))
+        self.assertIn("sub/known.toml", self.good("check", "vgyro.toml").stdout.decode())
+
+    def test_file_that_is_not_there_is_a_mistake_of_the_line_that_names_it(self):
+        text = bench.CONFIG.replace("[corrector]", '[corrector]\nmodel = "known.toml"')
+        self.write("vgyro.toml", text)
+        line = text.splitlines().index('model = "known.toml"') + 1
+        self.assertIn(f"vgyro.toml:{line}: ", self.bad("check", "vgyro.toml"))
+
+    def test_input_that_the_config_lacks_is_named_at_the_models_line(self):
+        self.write("known.toml", MODEL + '\n[[effect]]\ngyro = 2\nkind = "temperature_bias"\ncoefficient_dps_k = 1e-3\n')
+        said = self.bad("check", "--model", "known.toml", "vgyro.toml")
+        self.assertIn("known.toml:19: ", said)
+        self.assertIn("temperature of gyro right", said)
+
+    def test_replay_takes_it_off_and_says_so(self):
+        # The bias of gyro a is 0.5: with the model the plain mean is off by the other's alone.
+        self.write("known.toml", MODEL)
+        self.write("in.log", "".join(bench.two_gyros(5)))
+        summaries = []
+        for extra in ((), ("--model", "known.toml")):
+            done = self.good("replay", "--config", "vgyro.toml", "--method", "mean", "-q", *extra, "--json", "-", "in.log")
+            summaries.append(json.loads(done.stdout))
+        self.assertIsNone(summaries[0]["model"])
+        self.assertEqual(summaries[1]["model"]["file"], "known.toml")
+        self.assertEqual([e["treatment"] for e in summaries[1]["model"]["effects"]],
+                         ["takes back", "as noise", "cannot undo"])
+        change = summaries[0]["out"]["mean_rate_dps"] - summaries[1]["out"]["mean_rate_dps"]
+        self.assertAlmostEqual(change, 0.25, delta=1e-4)
 
 
 if __name__ == "__main__":

@@ -80,6 +80,21 @@ TEST(ModelPlan, RefusesMoreLagThanTheBuffersHold) {
   EXPECT_EQ(errors[0].where, "known.toml:7");
 }
 
+// Biases learned under one model mean nothing under another.
+TEST(ModelPlan, MarksWhatIsTakenOffEachGyro) {
+  const auto mark = [](std::initializer_list<model::Effect> effects) {
+    Plan plan = rig::two_gyros();
+    EXPECT_TRUE(apply(model_of(effects), plan).empty());
+    return plan.gyros[0].taken_back;
+  };
+  const std::string bias = mark({{0, Kind::kBias, {0.1}, 3}});
+  EXPECT_EQ(bias.size(), 8U);
+  EXPECT_EQ(mark({{0, Kind::kBias, {0.1}, 30}}), bias) << "wherever it stands";
+  EXPECT_NE(mark({{0, Kind::kBias, {0.1000001}, 3}}), bias);
+  EXPECT_NE(mark({{0, Kind::kBiasRamp, {0.1}, 3}}), bias);
+  EXPECT_EQ(mark({{0, Kind::kWhiteNoise, {0.1}, 3}, {1, Kind::kBias, {0.1}, 7}}), "");
+}
+
 TEST(ModelPlan, SortsEffectsByGyro) {
   Plan plan = rig::two_gyros();
   EXPECT_TRUE(effects_of(plan, 0).empty());

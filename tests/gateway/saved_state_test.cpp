@@ -260,6 +260,7 @@ TEST(SavedState, DevicesAreToldApartByAllThatChangesTheBias) {
   const Change changes[] = {
       [](Plan& p) { p.gyros[0].name = "c"; },
       [](Plan& p) { p.gyros[0].bus = "can5"; },
+      [](Plan& p) { p.gyros[0].taken_back = "0123abcd"; },
       [](Plan& p) { p.gyros[1].match.id = 0x105; },
       [](Plan& p) { p.gyros[1].match.extended = true; },
       [](Plan& p) { p.gyros[1].message = "OTHER"; },
