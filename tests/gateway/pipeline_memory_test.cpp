@@ -4,6 +4,7 @@
 #include <cmath>
 #include <memory>
 #include <optional>
+#include <random>
 
 #include <gtest/gtest.h>
 
@@ -250,6 +251,51 @@ TEST_F(PipelineMemory, StampFollowsAClockThatWasSetBack) {
   const std::optional<SavedState> state = pipeline.memory();
   ASSERT_TRUE(state);
   EXPECT_NEAR(to_seconds(state->rate_stamp - TimePoint{}), 503.0, 0.05);
+}
+
+// The product's own corrector from end to end: calibrated, kept as text, taken up after an hour.
+TEST_F(PipelineMemory, OptimalGoesOnWithASigmaThatHasGrown) {
+  constexpr std::uint32_t kSeed = 11;
+  SCOPED_TRACE(kSeed);
+  constexpr double kNoise_dps = 0.01;
+  std::mt19937 rng(kSeed);
+  std::normal_distribution<double> noise(0.0, kNoise_dps);
+  const auto noisy = [&](double bias_dps) {
+    return [&, bias_dps](double) { return bias_dps + noise(rng); };
+  };
+  const auto recording = [&](std::int64_t from_s, std::int64_t to_s) {
+    return rig::merge({rig::stream_a(ms(from_s * 1000), ms(to_s * 1000), noisy(0.3)),
+                       rig::stream_b(ms(from_s * 1000), ms(to_s * 1000), noisy(-0.1))});
+  };
+  plan.calibration.rest_s = 20.0;
+  Pipeline before(plan);
+  rig::play(before, recording(0, 30), out);
+  const std::optional<SavedState> kept = before.memory();
+  ASSERT_TRUE(kept);
+  const auto read = saved_state_from(to_text(*kept), "state.toml");
+  ASSERT_TRUE(read) << read.error().message();
+
+  std::array<double, 2> sigma_dps{};
+  const std::array<std::int64_t, 2> from_s{60, 30 + 30 * 86400};
+  for (std::size_t i = 0; i < 2; ++i) {
+    Pipeline after(plan);
+    ASSERT_TRUE(after.resume(*read));
+    rig::Collector seen_after;
+    rig::play(after, recording(from_s[i], from_s[i] + 1), seen_after);
+    const std::vector<rig::RateSeen> rates = rig::rates_seen(seen_after);
+    ASSERT_FALSE(rates.empty());
+    EXPECT_TRUE(rates.front().valid);
+    EXPECT_EQ(rates.front().quality, 12U);
+    sigma_dps[i] = after.status().restored_bias_sigma_dps;
+    double mean_dps = 0.0;
+    for (const rig::RateSeen& rate : rates)
+      mean_dps += rate.rate_dps / static_cast<double>(rates.size());
+    EXPECT_NEAR(mean_dps, 0.0, 5.0 * (kNoise_dps / std::sqrt(100.0) + sigma_dps[i]));
+  }
+  const auto& p = read->drift.bias_covariance;
+  const double least_dps = std::sqrt((p[0] * p[2] - p[1] * p[1]) / (p[0] + p[2] - 2.0 * p[1]));
+  EXPECT_GT(sigma_dps[0], least_dps);
+  EXPECT_GT(sigma_dps[1], 1.5 * sigma_dps[0]);
 }
 
 }  // namespace

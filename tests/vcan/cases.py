@@ -9,6 +9,7 @@ import re
 import subprocess
 import sys
 import tomllib
+import zlib
 from pathlib import Path
 
 import numpy as np
@@ -111,12 +112,12 @@ class Run:
     def of(self, can_id):
         return [line for line in self.outputs if int(line.name, 16) == can_id]
 
-    def replay(self):
+    def replay(self, *options):
         """What `vgyro replay` makes of the captured input frames."""
         log, out = self.folder / "inputs.log", self.folder / "replayed.log"
         log.write_text("".join(line.text for line in self.inputs), encoding="ascii")
-        done = subprocess.run([str(BIN / "vgyro"), "replay", "--config", str(self.folder / "vgyro.toml"), "-o",
-                               str(out), "--json", str(self.folder / "replay.json"), str(log)],
+        done = subprocess.run([str(BIN / "vgyro"), "replay", "--config", str(self.folder / "vgyro.toml"), *options,
+                               "-o", str(out), "--json", str(self.folder / "replay.json"), str(log)],
                               capture_output=True, text=True, check=False)
         require(done.returncode == 0, f"replay failed: {done.stderr.strip()}")
         return verdicts.read_log(out)
@@ -155,9 +156,9 @@ def check_played(run):
         require(sent == seen, f"{bus}: {len(sent)} frames played, {len(seen)} captured, or changed on the way")
 
 
-def check_against_replay(run):
+def check_against_replay(run, *options):
     rate_id = run.ids[0]
-    replayed = run.replay()
+    replayed = run.replay(*options)
     replayed_rates = [line for line in replayed if int(line.name, 16) == rate_id]
     require(len(replayed_rates) > 0, "the replay sends no rates")
     verdicts.check_same_rates(run.of(rate_id), replayed_rates)
@@ -306,6 +307,56 @@ class LinkFaultsCase:
         return f"rates in the four plays: {per_play}, {stale} dropped as stale, {describe(run)}"
 
 
+class RestartCase:
+    """Killed without warning after it has calibrated, and started again: it goes on where it was."""
+
+    name = "restart"
+    says = "killed and started again with its state file: valid from the first pair, as the replay with that file"
+    more = ["--method", "optimal"]
+
+    def prepare(self, folder):
+        twin = Twin(run_s=2.0)
+        twin.prepare(folder)
+        state, kept = folder / "state.toml", folder / "kept.toml"
+        log = ["play", str(folder / "played.log")]
+        steps = [log, ["wait", 1.5], ["kill_and_restart", None], ["run", ["cp", str(state), str(kept)]], log]
+        return {"links": twin.links(), "steps": steps,
+                "command": [str(BIN / "vgyrod"), "--config", str(folder / "vgyro.toml"), *self.more, "--state", str(state)]}
+
+    def judge(self, folder, result):
+        run = read_run(folder, result)
+        check_service(run)
+        kept = self.check_file(folder / "kept.toml")
+        since = result["restarts_us"][0]
+        run.inputs = [line for line in run.inputs if line.us >= since]
+        run.outputs = [line for line in run.outputs if line.us >= since]
+        require("took up the biases of" in run.said, f"taking up was not logged\n{run.said}")
+        rates = check_against_replay(run, *self.more, "--state", str(folder / "kept.toml"))
+        oracle = verdicts.Oracle(SOURCE / "dbc/vgyro.dbc")
+        t, rate, state = verdicts.rates_of(run.of(0x610), oracle)
+        require(np.isfinite(rate).all() and set(state) == {2}, "a rate that is not valid after the restart")
+        resting = t - run.inputs[0].us * 1e-6 < REST_S
+        error = rate[resting] - make_twin.EARTH_DPS
+        # The bias of the first three seconds of rest, and the noise of the better gyro at 500 Hz.
+        require(abs(error.mean()) < 1e-3, f"mean error {error.mean():.5f} deg/s after the restart")
+        self.check_file(folder / "state.toml")
+        require(not (folder / "state.toml.new").exists(), "the writer left something behind")
+        return (f"{rates} rates as in the replay, all valid, biases {kept['drift']['bias_dps']} deg/s kept, "
+                f"mean error {error.mean() * 3600:+.1f} deg/h, {describe(run)}")
+
+    def check_file(self, path):
+        """Its checksum and its form, by Python's own readers."""
+        data = path.read_bytes()
+        content, _, _ = data.rpartition(b"\n[checksum]\n")
+        read = tomllib.loads(data.decode("ascii"))
+        require(read["checksum"]["crc32"] == f"{zlib.crc32(content):08x}", f"{path.name}: another checksum")
+        require(path.stat().st_mode & 0o777 == 0o600, f"{path.name}: mode {path.stat().st_mode:o}")
+        # Six standard errors of the noisier gyro's mean over the calibration.
+        truth = [gyro.bias_dps for gyro in make_twin.GYROS]
+        require(np.allclose(read["drift"]["bias_dps"], truth, rtol=0, atol=1e-3), f"biases {read['drift']['bias_dps']}")
+        return read
+
+
 class IdleCase:
     """No gyro is there: heartbeat, status, and a clean end."""
 
@@ -401,6 +452,7 @@ def all_cases(recordings):
         TwinCase("fd", "CAN FD in and out", Twin(fd=True), dbc="dbc/vgyro_fd.dbc", check_more=check_fd),
         SlowBusCase(),
         LinkFaultsCase(),
+        RestartCase(),
         IdleCase(),
         CommandCase("missing_interface", "an interface that is not there: exit 1 and what to do",
                     [vgyrod, "--config", "{folder}/vgyro.toml"], 1,

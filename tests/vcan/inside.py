@@ -26,9 +26,23 @@ class Daemon:
         self.listener = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
         self.listener.bind(self.address.replace("@", "\0"))
         self.begin = time.monotonic()
-        with open(os.path.join(folder, "vgyrod.err"), "wb") as stderr:
+        self.command = command
+        self.stderr_path = os.path.join(folder, "vgyrod.err")
+        self.restarts_us = []  # on the clock of the frames
+        self.start()
+
+    def start(self):
+        with open(self.stderr_path, "ab") as stderr:
             environment = dict(os.environ, NOTIFY_SOCKET=self.address)
-            self.process = subprocess.Popen(command, stderr=stderr, env=environment)
+            self.process = subprocess.Popen(self.command, stderr=stderr, env=environment)
+
+    def kill_and_restart(self):
+        self.process.kill()
+        self.process.wait(STOP_WITHIN_S)
+        self.restarts_us.append(time.time_ns() // 1000)
+        self.start()
+        if not self.listen(READY_WITHIN_S, "READY=1"):
+            raise OSError("not READY after it was killed and started again")
 
     def listen(self, seconds, until=None):
         """Collects notices for some time, or until one of them starts with `until`."""
@@ -120,6 +134,8 @@ def take_steps(steps, daemon, folder):
             play(what, daemon, folder)
         elif verb == "wait":
             daemon.listen(what)
+        elif verb == "kill_and_restart":
+            daemon.kill_and_restart()
         else:
             subprocess.run(what, check=True)
 
@@ -141,6 +157,7 @@ def run_case(case, folder, memory):
                     result["resources"] = daemon.resources()
             result["exit"] = daemon.stop(getattr(signal, case.get("signal", "SIGTERM")))
             result["notices"] = daemon.notices
+            result["restarts_us"] = daemon.restarts_us
             wait_until_still(capture_path)
             stop_quietly(dump)
         with open(capture_path, "rb") as capture, open(os.path.join(folder, "capture.log"), "wb") as out:
