@@ -130,7 +130,9 @@ void NoiseTracker::watch(const Block& block) {
     // One wild block is not noise; several are, however wild.
     const double followed = std::min(rise[gyro] * missing, 3.0 * rise_[gyro] + kOneBlockMax);
     rise_[gyro] += kRiseGain * (followed - rise_[gyro]);
-    if (rise_[gyro] > kNoisyFactor && missing < 2.0) noisy_[gyro] = true;
+    // Whose noise it is must be plain: nothing is missing, or what is sure is enough by itself.
+    const bool plain = missing < 2.0 || rise[gyro] > kNoisyFactor;
+    if (rise_[gyro] > kNoisyFactor && plain) noisy_[gyro] = true;
     if (rise_[gyro] < kNoLongerNoisy * kNoisyFactor) noisy_[gyro] = false;
   }
   apply_rise();
