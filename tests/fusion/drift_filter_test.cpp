@@ -1,0 +1,351 @@
+// The drift filter against plain mathematics: the covariance of a walk's means written down, a
+// differential equation integrated step by step, and a filter at full rate.
+
+#include "fusion/drift_filter.h"
+
+#include <array>
+#include <cmath>
+#include <vector>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Dense>
+#include <gtest/gtest.h>
+
+#include "tests/fusion/random.h"
+#include "tests/fusion/world.h"
+
+namespace vgyro::fusion {
+namespace {
+
+using Observables = DriftFilter::Observables;
+using Covariance = DriftFilter::Covariance;
+
+constexpr double kHour_s = 3600.0;
+
+Covariance prior(double bias_sigma) {
+  Covariance covariance = Covariance::Zero();
+  covariance(kBias1, kBias1) = covariance(kBias2, kBias2) = bias_sigma * bias_sigma;
+  covariance(kScale, kScale) = 1e-4;
+  covariance(kSkew, kSkew) = 4e-4;
+  return covariance;
+}
+
+DriftMeasurement stop(const std::array<double, 2>& white, double length_s, Random& random) {
+  DriftMeasurement measurement(2);
+  measurement.rows(0, kBias1) = measurement.rows(1, kBias2) = 1.0;
+  for (int gyro = 0; gyro < 2; ++gyro) {
+    const double sigma = white[static_cast<std::size_t>(gyro)] / std::sqrt(length_s);
+    measurement.noise(gyro, gyro) = sigma * sigma;
+    measurement.values(gyro) = random.normal(sigma);
+  }
+  return measurement;
+}
+
+/// `rows` of y₁ − y₂, at as many rates and derivatives.
+DriftMeasurement difference(int rows, const std::array<double, 2>& white, double length_s,
+                            Random& random) {
+  DriftMeasurement measurement(rows);
+  const double variance = (white[0] * white[0] + white[1] * white[1]) / length_s;
+  for (int row = 0; row < rows; ++row) {
+    measurement.rows(row, kBias1) = 1.0;
+    measurement.rows(row, kBias2) = -1.0;
+    if (row > 0) measurement.rows(row, kScale) = random.uniform(-300.0, 300.0);
+    if (row > 1) measurement.rows(row, kSkew) = random.uniform(-100.0, 100.0);
+    measurement.noise(row, row) = variance;
+    measurement.values(row) = random.normal(std::sqrt(variance));
+  }
+  return measurement;
+}
+
+struct Sensors {
+  const char* name;
+  std::array<double, 2> white;
+  std::array<double, 2> walk;
+  std::vector<std::pair<std::size_t, GaussMarkov>> terms;
+};
+
+DriftModel model_of(const Sensors& sensors) {
+  DriftModel model;
+  model.walk_dps_rts = sensors.walk;
+  for (const auto& [gyro, term] : sensors.terms)
+    model.gauss_markov[gyro][model.gauss_markov_count[gyro]++] = term;
+  return model;
+}
+
+// A hundred hours of everything that can come: the covariance never loses what makes it one.
+TEST(DriftFilter, KeepsASoundCovarianceForAHundredHours) {
+  const std::vector<Sensors> all{
+      {"two MEMS", {3e-3, 4e-3}, {2e-5, 3e-5}, {}},
+      {"the best beside the worst", {1e-6, 1e-1}, {1e-10, 1e-3}, {}},
+      {"no drift", {1e-6, 1e-1}, {0.0, 0.0}, {}},
+      {"one drifts", {1e-4, 1e-4}, {0.0, 1e-3}, {}},
+      {"drifts more than noise", {1e-6, 1e-6}, {1e-2, 1e-2}, {}},
+      {"Gauss–Markov",
+       {1e-3, 2e-3},
+       {1e-6, 0.0},
+       {{0, {3e-3, 100.0}}, {0, {1e-3, 1e4}}, {1, {5e-3, 30.0}}, {1, {1e-2, 1e6}}}},
+  };
+  for (const Sensors& sensors : all) {
+    constexpr std::uint64_t kSeed = 11;
+    SCOPED_TRACE(::testing::Message() << sensors.name << ", seed " << kSeed);
+    Random random(kSeed);
+    DriftFilter filter(model_of(sensors), Observables::Zero(), prior(1.0));
+    double hours = 0.0;
+    while (hours < 100.0) {
+      const double length = random.below(20) == 0 ? 0.01 : random.uniform(1.0, 60.0);
+      double likelihood = 0.0;
+      switch (random.below(8)) {
+        case 0: {
+          const double gap = random.below(10) == 0 ? kHour_s : 30.0;
+          filter.predict(gap);
+          hours += gap / kHour_s;
+          break;
+        }
+        case 1:
+        case 2:
+          likelihood = filter.update(length, stop(sensors.white, length, random));
+          break;
+        case 3:
+          if (random.below(50) == 0) filter.widen(1e-2, 1e-2, 1e-2);
+          break;
+        default: {
+          const int rows = 1 + static_cast<int>(random.below(3));
+          likelihood = filter.update(length, difference(rows, sensors.white, length, random));
+        }
+      }
+      hours += length / kHour_s;
+      const Covariance p = filter.covariance();
+      ASSERT_TRUE(p.allFinite() && filter.mean().allFinite() && std::isfinite(likelihood)) << hours;
+      ASSERT_TRUE((p.diagonal().array() > 0.0).all()) << hours << " h\n" << p;
+      const Observables unit = p.diagonal().cwiseSqrt().cwiseInverse();
+      const Covariance correlation = unit.asDiagonal() * p * unit.asDiagonal();
+      ASSERT_LT((correlation - correlation.transpose()).norm(), 1e-12) << hours << " h\n" << p;
+      ASSERT_EQ(Eigen::LLT<Covariance>(correlation).info(), Eigen::Success) << hours << " h\n" << p;
+    }
+  }
+}
+
+// The means of a random walk over windows have a covariance that can be written down; the filter's
+// likelihoods multiply to the density of all of them together.
+TEST(DriftFilter, FindsTheLikelihoodThatAllWindowsHaveTogether) {
+  constexpr int kWindows = 40;
+  constexpr double kWalk = 2e-3;
+  constexpr double kStart = 0.3;
+  constexpr std::uint64_t kSeed = 5;
+  Random random(kSeed);
+  DriftModel model;
+  model.walk_dps_rts = {kWalk, 0.0};
+  DriftFilter filter(model, Observables::Zero(), prior(kStart));
+
+  Eigen::VectorXd values(kWindows);
+  Eigen::VectorXd middle(kWindows);
+  Eigen::MatrixXd joint(kWindows, kWindows);
+  Eigen::VectorXd with_end(kWindows);
+  double t = 0.0;
+  double sum = 0.0;
+  for (int i = 0; i < kWindows; ++i) {
+    const double length = random.uniform(0.5, 20.0);
+    DriftMeasurement measurement(1);
+    measurement.rows(0, kBias1) = 1.0;
+    measurement.noise(0, 0) = 1e-4 / length;
+    values(i) = measurement.values(0) = random.normal(0.1);
+    sum += filter.update(length, measurement);
+    // Cov(mean over i, anything later) = P₀ + K² · middle of i; within a window K²·T/3, not T/2.
+    middle(i) = t + 0.5 * length;
+    for (int j = 0; j < i; ++j)
+      joint(i, j) = joint(j, i) = kStart * kStart + kWalk * kWalk * middle(j);
+    joint(i, i) = kStart * kStart + kWalk * kWalk * (t + length / 3.0) + 1e-4 / length;
+    with_end(i) = kStart * kStart + kWalk * kWalk * middle(i);
+    t += length;
+    if (i % 7 != 3) continue;
+    filter.predict(50.0);
+    t += 50.0;
+  }
+  const Eigen::LLT<Eigen::MatrixXd> factor(joint);
+  const double log_determinant = 2.0 * factor.matrixLLT().diagonal().array().log().sum();
+  const double expected = -0.5 * values.dot(factor.solve(values)) - 0.5 * log_determinant;
+  EXPECT_NEAR(sum, expected, 1e-9 * std::abs(expected));
+  // The estimate at the end is the regression on all of them.
+  EXPECT_NEAR(filter.mean()(kBias1), with_end.dot(factor.solve(values)), 1e-9 * kStart);
+  const double variance =
+      kStart * kStart + kWalk * kWalk * t - with_end.dot(factor.solve(with_end));
+  EXPECT_NEAR(filter.covariance()(kBias1, kBias1), variance, 1e-9 * variance);
+}
+
+/// The same model as a differential equation: the states and the integral of what gyro k's drift
+/// has been since the window began, integrated by Runge and Kutta's method.
+class PlainFilter {
+ public:
+  static constexpr int kStates = 6;  // walk 1, walk 2, term 1, term 2, ∫B₁, ∫B₂
+  using Matrix = Eigen::Matrix<double, kStates, kStates>;
+  using Vector = Eigen::Matrix<double, kStates, 1>;
+
+  PlainFilter(const std::array<double, 2>& walk, const std::array<GaussMarkov, 2>& terms,
+              double bias_sigma) {
+    for (int k = 0; k < 2; ++k) {
+      const auto gyro = static_cast<std::size_t>(k);
+      const GaussMarkov& term = terms[gyro];
+      flow_(2 + k, 2 + k) = -1.0 / term.tau_s;
+      flow_(4 + k, k) = flow_(4 + k, 2 + k) = 1.0;
+      drive_(k, k) = walk[gyro] * walk[gyro];
+      drive_(2 + k, 2 + k) = 2.0 * term.sigma_dps * term.sigma_dps / term.tau_s;
+      // The whole drift was seen: the walk holds what the term does not.
+      const double square = term.sigma_dps * term.sigma_dps;
+      p_(k, k) = bias_sigma * bias_sigma + square;
+      p_(2 + k, 2 + k) = square;
+      p_(k, 2 + k) = p_(2 + k, k) = -square;
+    }
+  }
+  void pass(double length_s) {
+    p_.bottomRows<2>().setZero();
+    p_.rightCols<2>().setZero();
+    x_.tail<2>().setZero();
+    constexpr int kSteps = 400;
+    const double h = length_s / kSteps;
+    const auto slope = [this](const Matrix& p) -> Matrix {
+      return flow_ * p + p * flow_.transpose() + drive_;
+    };
+    for (int i = 0; i < kSteps; ++i) {
+      const Matrix a = slope(p_);
+      const Matrix b = slope(p_ + 0.5 * h * a);
+      const Matrix c = slope(p_ + 0.5 * h * b);
+      const Matrix d = slope(p_ + h * c);
+      p_ += h / 6.0 * (a + 2.0 * b + 2.0 * c + d);
+      const Vector e = flow_ * x_;
+      const Vector f = flow_ * (x_ + 0.5 * h * e);
+      const Vector g = flow_ * (x_ + 0.5 * h * f);
+      const Vector j = flow_ * (x_ + h * g);
+      x_ += h / 6.0 * (e + 2.0 * f + 2.0 * g + j);
+    }
+  }
+  /// h₁·mean of B₁ + h₂·mean of B₂ was `value`.
+  void learn(double length_s, double h1, double h2, double value, double noise) {
+    Vector h = Vector::Zero();
+    h(4) = h1 / length_s;
+    h(5) = h2 / length_s;
+    const Vector cross = p_ * h;
+    const double square = h.dot(cross) + noise;
+    x_ += cross * ((value - h.dot(x_)) / square);
+    p_ -= cross * cross.transpose() / square;
+  }
+  [[nodiscard]] double bias(int k) const { return x_(k) + x_(2 + k); }
+  [[nodiscard]] double covariance(int i, int k) const {
+    return p_(i, k) + p_(i, 2 + k) + p_(2 + i, k) + p_(2 + i, 2 + k);
+  }
+
+ private:
+  Matrix flow_ = Matrix::Zero();
+  Matrix drive_ = Matrix::Zero();
+  Matrix p_ = Matrix::Zero();
+  Vector x_ = Vector::Zero();
+};
+
+// Walks and Gauss–Markov terms, windows short and long against their correlation time. Where a
+// window is below a thousandth of it the term is taken for a walk: hence 1e-5.
+TEST(DriftFilter, TreatsTheMeanOverAWindowExactly) {
+  constexpr std::array<double, 2> kWalk{2e-4, 5e-5};
+  constexpr std::array<GaussMarkov, 2> kTerms{GaussMarkov{4e-3, 40.0}, GaussMarkov{1e-3, 900.0}};
+  constexpr double kBiasSigma = 0.05;
+  constexpr std::uint64_t kSeed = 8;
+  Random random(kSeed);
+  DriftModel model;
+  model.walk_dps_rts = kWalk;
+  for (std::size_t k = 0; k < 2; ++k) {
+    model.gauss_markov[k][0] = kTerms[k];
+    model.gauss_markov_count[k] = 1;
+  }
+  DriftFilter filter(model, Observables::Zero(), prior(kBiasSigma));
+  PlainFilter plain(kWalk, kTerms, kBiasSigma);
+  constexpr std::array<double, 2> kWhite{1e-3, 2e-3};
+  for (int i = 0; i < 120; ++i) {
+    const double length = i % 10 == 0 ? 200.0 : random.uniform(0.5, 20.0);
+    plain.pass(length);
+    if (i % 5 == 0) {
+      filter.predict(length);
+    } else if (i % 3 == 0) {
+      const DriftMeasurement measurement = stop(kWhite, length, random);
+      filter.update(length, measurement);
+      plain.learn(length, 1.0, 0.0, measurement.values(0), measurement.noise(0, 0));
+      plain.learn(length, 0.0, 1.0, measurement.values(1), measurement.noise(1, 1));
+    } else {
+      const DriftMeasurement measurement = difference(1, kWhite, length, random);
+      filter.update(length, measurement);
+      plain.learn(length, 1.0, -1.0, measurement.values(0), measurement.noise(0, 0));
+    }
+    const Covariance p = filter.covariance();
+    for (int gyro = 0; gyro < 2; ++gyro) {
+      const double sigma = std::sqrt(plain.covariance(gyro, gyro));
+      ASSERT_NEAR(filter.mean()(gyro), plain.bias(gyro), 1e-5 * sigma) << "window " << i;
+      for (int other = 0; other < 2; ++other) {
+        const double scale = sigma * std::sqrt(plain.covariance(other, other));
+        ASSERT_NEAR(p(gyro, other), plain.covariance(gyro, other), 1e-5 * scale) << "window " << i;
+      }
+    }
+  }
+}
+
+struct Comparison {
+  double mean_in_sigmas = 0.0;  ///< greatest difference of the two filters' biases
+  double variance = 0.0;        ///< greatest relative difference
+};
+
+/// Means over 10 s against 50 samples a second: ten windows of stop, then the difference alone.
+Comparison against_full_rate(const std::array<double, 2>& walk, std::uint64_t seed) {
+  constexpr std::array<double, 2> kWhite{1e-3, 2e-3};
+  constexpr double kWindow_s = 10.0;
+  constexpr int kSamples = 500;
+  const std::array<world::Gyro, 2> gyros{world::Gyro{kWhite[0], walk[0], 0.05},
+                                         world::Gyro{kWhite[1], walk[1], -0.08}};
+  world::World world(gyros, kSamples / kWindow_s, seed);
+  world::Bound bound(gyros, world.step_s());
+  DriftModel model;
+  model.walk_dps_rts = walk;
+  DriftFilter filter(model, Observables::Zero(), prior(1.0));
+  Random unused(seed);
+  Comparison worst;
+  for (int window = 0; window < 60; ++window) {
+    const bool stopped = window < 10;
+    std::array<double, 2> mean{};
+    for (int i = 0; i < kSamples; ++i) {
+      const world::Instant now = world.next([](double /*t_s*/) { return 0.0; }, stopped);
+      bound.update(now, 0.0);
+      for (std::size_t k = 0; k < 2; ++k)
+        mean[k] += now.reading_dps[k] / kSamples;
+    }
+    DriftMeasurement measurement =
+        stopped ? stop(kWhite, kWindow_s, unused) : difference(1, kWhite, kWindow_s, unused);
+    measurement.values(0) = stopped ? mean[0] : mean[0] - mean[1];
+    if (stopped) measurement.values(1) = mean[1];
+    filter.update(kWindow_s, measurement);
+    for (std::size_t k = 0; k < 2; ++k) {
+      const auto row = static_cast<int>(k);
+      const double variance = bound.p_[2 * k];
+      const double away = filter.mean()(row) - bound.b_[k];
+      worst.mean_in_sigmas = std::max(worst.mean_in_sigmas, std::abs(away) / std::sqrt(variance));
+      worst.variance =
+          std::max(worst.variance, std::abs(filter.covariance()(row, row) / variance - 1.0));
+    }
+  }
+  return worst;
+}
+
+// Where nothing drifts a mean says all that its samples do: the two filters are one.
+TEST(DriftFilter, IsTheFilterAtFullRateWhereNothingDrifts) {
+  for (const std::uint64_t seed : {1U, 2U, 3U}) {
+    const Comparison worst = against_full_rate({0.0, 0.0}, seed);
+    EXPECT_LT(worst.mean_in_sigmas, 1e-9) << "seed " << seed;
+    EXPECT_LT(worst.variance, 1e-9) << "seed " << seed;
+  }
+}
+
+// Drift of the size that a window of 10 s is made for: the mean loses next to nothing.
+TEST(DriftFilter, LosesLittleToTheFilterAtFullRate) {
+  for (const std::uint64_t seed : {1U, 2U, 3U}) {
+    const Comparison worst = against_full_rate({1e-5, 2e-5}, seed);
+    EXPECT_LT(worst.mean_in_sigmas, 0.1) << "seed " << seed;
+    EXPECT_LT(worst.variance, 0.01) << "seed " << seed;
+  }
+}
+
+}  // namespace
+}  // namespace vgyro::fusion

@@ -1,0 +1,184 @@
+// The noise of a pair, from samples whose noise is known.
+
+#include "fusion/noise_tracker.h"
+
+#include <array>
+#include <cmath>
+#include <functional>
+
+#include <gtest/gtest.h>
+
+#include "tests/fusion/random.h"
+
+namespace vgyro::fusion {
+namespace {
+
+constexpr double kRate_hz = 50.0;
+
+/// Two gyros of a platform, sample by sample, and what a tracker is given of them.
+class Pair {
+ public:
+  Pair(const std::array<double, 2>& white_dps_rthz, std::uint64_t seed, double rate_hz = kRate_hz)
+      : white(white_dps_rthz), rate_hz_(rate_hz), random_(seed) {}
+
+  /// The true rate at a time, deg/s.
+  std::function<double(double)> rate = [](double /*t_s*/) { return 0.0; };
+  std::array<double, 2> white;
+  double shared_white = 0.0;  ///< noise that both have
+  std::array<double, 2> noise_gain{1.0, 1.0};
+
+  template <class Use>
+  void run(double seconds, Use&& use) {
+    for (const double until = t_s_ + seconds; t_s_ < until; t_s_ = ++count_ / rate_hz_) {
+      const double shared = random_.normal(shared_white * std::sqrt(rate_hz_));
+      std::array<double, 2> y{};
+      for (std::size_t k = 0; k < 2; ++k)
+        y[k] = rate(t_s_) + shared + random_.normal(white[k] * std::sqrt(rate_hz_ * noise_gain[k]));
+      if (cells_.add(t_s_, y, noise_gain, Present::kBoth)) use(cells_.last());
+    }
+  }
+  void measure(NoiseTracker& tracker, double seconds, bool moving = false) {
+    run(seconds, [&](const Block& block) { tracker.measure(block, moving); });
+    tracker.settle(cells_.interval_s());
+  }
+  void watch(NoiseTracker& tracker, double seconds) {
+    run(seconds, [&](const Block& block) { tracker.watch(block); });
+  }
+
+ private:
+  double rate_hz_;
+  Random random_;
+  CellBuilder cells_;
+  double t_s_ = 0.0;
+  double count_ = 0.0;
+};
+
+// Relative standard errors: of N² from neighbouring cells' differences √(3/cells), four of five
+// cells having one; of samples √(2/samples), four of five being free at 5 a cell.
+double density_error(double seconds) {
+  return std::sqrt(3.0 / (8.0 * seconds));
+}
+double sample_error(double seconds) {
+  return std::sqrt(2.0 / (0.8 * kRate_hz * seconds));
+}
+
+TEST(NoiseTracker, MeasuresBothGyrosAtRest) {
+  for (const std::uint64_t seed : {1U, 2U, 3U, 4U}) {
+    SCOPED_TRACE(seed);
+    const std::array<double, 2> white{1e-3, 3e-3};
+    Pair pair(white, seed);
+    NoiseTracker tracker({});
+    pair.measure(tracker, 300.0);
+    for (std::size_t k = 0; k < 2; ++k) {
+      const double square = white[k] * white[k];
+      EXPECT_NEAR(tracker.density()[2 * k] / square, 1.0, kSigmas * density_error(300.0));
+      EXPECT_NEAR(tracker.sample_variance()[2 * k] / (square * kRate_hz), 1.0,
+                  kSigmas * sample_error(300.0));
+    }
+    EXPECT_EQ(tracker.density()[1], 0.0) << "chance is no correlation";
+    EXPECT_FALSE(tracker.noisy(0) || tracker.noisy(1));
+  }
+}
+
+// Noise that both gyros have (vibration, supply) shows in the covariance.
+TEST(NoiseTracker, MeasuresWhatTheGyrosShareAtRest) {
+  constexpr std::uint64_t kSeed = 6;
+  Pair pair({1e-3, 2e-3}, kSeed);
+  pair.shared_white = 1e-3;
+  NoiseTracker tracker({});
+  pair.measure(tracker, 600.0);
+  // Var of a product's mean: (Σ₁₁Σ₂₂ + Σ₁₂²), against Σ₁₂: √11 times a variance's √2 standard.
+  const double error = std::sqrt(11.0 / 2.0) * density_error(600.0);
+  EXPECT_NEAR(tracker.density()[1] / 1e-6, 1.0, kSigmas * error) << "seed " << kSeed;
+  EXPECT_NEAR(tracker.density()[0] / 2e-6, 1.0, kSigmas * density_error(600.0));
+  EXPECT_NEAR(tracker.density()[2] / 5e-6, 1.0, kSigmas * density_error(600.0));
+}
+
+// In motion what both share is the motion, not noise.
+TEST(NoiseTracker, TakesNoMotionForNoise) {
+  constexpr std::uint64_t kSeed = 7;
+  Pair pair({1e-3, 3e-3}, kSeed);
+  pair.rate = [](double t_s) { return 0.05 * std::sin(8.0 * t_s); };
+  NoiseTracker moving({});
+  pair.measure(moving, 600.0, true);
+  EXPECT_NEAR(moving.density()[2] / 9e-6, 1.0, 0.15) << "seed " << kSeed;
+  EXPECT_LT(moving.density()[0], 3e-6) << "the motion alone has " << 1.25e-3 * 0.1;
+}
+
+TEST(NoiseTracker, BelievesTheModelFile) {
+  Pair pair({1e-3, 3e-3}, 8);
+  std::array<GyroParameters, 2> gyros;
+  gyros[0].white_dps_rthz = 5e-4;
+  NoiseTracker tracker(gyros);
+  pair.measure(tracker, 60.0);
+  EXPECT_DOUBLE_EQ(tracker.density()[0], 25e-8);
+  EXPECT_NEAR(tracker.density()[2] / 9e-6, 1.0, kSigmas * density_error(60.0));
+}
+
+// A pair's noise_gain tells how much of a raw sample's noise is left; the raw sample's is kept.
+TEST(NoiseTracker, KnowsAveragedSamplesFromRawOnes) {
+  constexpr std::uint64_t kSeed = 9;
+  Pair pair({1e-3, 3e-3}, kSeed);
+  pair.noise_gain = {0.5, 0.2};
+  NoiseTracker tracker({});
+  pair.measure(tracker, 300.0);
+  EXPECT_NEAR(tracker.sample_variance()[0] / (1e-6 * kRate_hz), 1.0, kSigmas * sample_error(300.0));
+  EXPECT_NEAR(tracker.sample_variance()[2] / (9e-6 * kRate_hz), 1.0, kSigmas * sample_error(300.0));
+}
+
+// A sensor that repeats one value has at least the noise of its step.
+TEST(NoiseTracker, GivesAStandingValueTheNoiseOfItsStep) {
+  constexpr double kStep_dps = 0.1;
+  std::array<GyroParameters, 2> gyros;
+  gyros[0].resolution_dps = kStep_dps;
+  Pair pair({0.0, 0.0}, 10);
+  NoiseTracker tracker(gyros);
+  pair.measure(tracker, 60.0);
+  EXPECT_NEAR(tracker.sample_variance()[0], kStep_dps * kStep_dps / 12.0, 1e-12);
+  EXPECT_NEAR(tracker.density()[0], kStep_dps * kStep_dps / 12.0 / kRate_hz, 1e-9);
+  EXPECT_GT(tracker.density()[2], 0.0) << "no gyro is without noise";
+}
+
+// Ten times the noise, while the platform turns: the right gyro is named, its variance is found,
+// and it is forgiven afterwards.
+TEST(NoiseTracker, FollowsARiseOfOneGyroInMotion) {
+  for (std::size_t bad = 0; bad < 2; ++bad) {
+    constexpr std::uint64_t kSeed = 12;
+    SCOPED_TRACE(::testing::Message() << "gyro " << bad + 1 << ", seed " << kSeed);
+    const std::array<double, 2> usual{1e-3, 2e-3};
+    Pair pair(usual, kSeed);
+    NoiseTracker tracker({});
+    pair.measure(tracker, 300.0);
+    pair.rate = [](double t_s) { return 2.0 * std::sin(0.3 * t_s); };
+    pair.white[bad] *= 10.0;
+    pair.watch(tracker, 20.0);
+    EXPECT_TRUE(tracker.noisy(bad));
+    EXPECT_FALSE(tracker.noisy(1 - bad));
+    const double now = pair.white[bad] * pair.white[bad];
+    EXPECT_GT(tracker.density()[2 * bad], 0.5 * now);
+    EXPECT_LT(tracker.density()[2 * bad], 2.0 * now);
+    EXPECT_NEAR(tracker.usual_density()[2 * bad] * 100.0 / now, 1.0, 0.3) << "kept";
+    pair.white = usual;
+    pair.watch(tracker, 20.0);
+    EXPECT_FALSE(tracker.noisy(bad));
+    EXPECT_NEAR(tracker.density()[2 * bad] * 100.0 / now, 1.0, 0.5);
+  }
+}
+
+// Turning is no noise, however hard.
+TEST(NoiseTracker, FindsNoRiseWhereThePlatformOnlyTurns) {
+  constexpr std::uint64_t kSeed = 13;
+  Pair pair({1e-3, 2e-3}, kSeed);
+  NoiseTracker tracker({});
+  pair.measure(tracker, 300.0);
+  const double usual = tracker.density()[0];
+  pair.rate = [](double t_s) { return 60.0 * std::sin(2.0 * t_s); };
+  pair.run(120.0, [&](const Block& block) {
+    tracker.watch(block);
+    EXPECT_FALSE(tracker.noisy(0) || tracker.noisy(1)) << block.from_s << " s, seed " << kSeed;
+    EXPECT_LT(tracker.density()[0], 4.0 * usual) << block.from_s << " s, seed " << kSeed;
+  });
+}
+
+}  // namespace
+}  // namespace vgyro::fusion
