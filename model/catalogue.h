@@ -51,11 +51,11 @@ struct KindInfo {
   using Equation = double (*)(const Parameters& p, double rate_dps, const Surroundings& s);
 
   Kind kind;
+  Nature nature;
+  std::uint8_t needs = kNeedsNothing;
   std::string_view name;
   std::string_view meaning;  ///< for people: what the gyro reads in addition
-  Nature nature;
   std::span<const Parameter> parameters;
-  std::uint8_t needs = kNeedsNothing;
   Equation added = nullptr;  ///< deg/s; of offsets and responses
   Equation slope = nullptr;  ///< d added / d rate; of responses
 };
