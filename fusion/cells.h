@@ -58,7 +58,9 @@ class CellBuilder {
     bool closed = false;
     if (count_ > 0.0) {
       const double step = t_s - newest_s_;
-      const bool gap = step > kGap_s && step > 4.0 * interval_s_;
+      const bool gap = intervals_ > 0.0 && step > kGap_s && step > kGapIntervals * interval_s_;
+      // What passed for the first intervals was a gap.
+      if (intervals_ < kGapIntervals && kGapIntervals * step < interval_s_) intervals_ = 0.0;
       if (gap || present != block_.present) {
         close_cell(newest_s_ + interval_s_);
         closed = close_block();
@@ -105,6 +107,7 @@ class CellBuilder {
 
  private:
   static constexpr double kIntervals = 256.0;
+  static constexpr double kGapIntervals = 4.0;
 
   void begin_block(double t_s, Present present) {
     block_.present = present;
