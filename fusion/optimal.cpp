@@ -70,6 +70,31 @@ Symmetric biases_of(const DriftFilter::Covariance& covariance) {
   return {covariance(kBias1, kBias1), covariance(kBias1, kBias2), covariance(kBias2, kBias2)};
 }
 
+bool is_finite(double value) {
+  return std::isfinite(value);
+}
+
+bool is_covariance(const Symmetric& matrix) {
+  return std::all_of(matrix.begin(), matrix.end(), is_finite) && matrix[0] > 0.0 &&
+         matrix[2] > 0.0 && matrix[0] * matrix[2] > matrix[1] * matrix[1];
+}
+
+bool is_variance(double value) {
+  return std::isfinite(value) && value > 0.0;
+}
+
+/// Whatever kept it may have spoilt it.
+bool is_sound(const DriftMemory& memory) {
+  const auto& weights = memory.walk_weight;
+  return is_covariance(memory.bias_covariance) && is_covariance(memory.white_density) &&
+         is_variance(memory.sample_variance[0]) && is_variance(memory.sample_variance[1]) &&
+         is_finite(memory.bias_dps[0]) && is_finite(memory.bias_dps[1]) &&
+         is_finite(memory.scale_difference) && is_variance(memory.scale_difference_sigma) &&
+         is_finite(memory.skew_s) && is_variance(memory.skew_sigma_s) &&
+         std::all_of(weights.begin(), weights.end(),
+                     [](double weight) { return std::isfinite(weight) && weight >= 0.0; });
+}
+
 /// Means of the calibration, each over some seconds.
 class CalibrationBlocks {
  public:
@@ -319,13 +344,8 @@ void OptimalCorrector::start(const Calibration& calibration) {
 }
 
 bool OptimalCorrector::resume(const DriftMemory& memory, double age_s, double t_s) {
-  const Symmetric& p = memory.bias_covariance;
-  const Symmetric& n = memory.white_density;
-  const bool sound = p[0] > 0.0 && p[2] > 0.0 && p[0] * p[2] > p[1] * p[1] && n[0] > 0.0 &&
-                     n[2] > 0.0 && n[0] * n[2] > n[1] * n[1] && memory.sample_variance[0] > 0.0 &&
-                     memory.sample_variance[1] > 0.0 && age_s >= 0.0;
-  if (!sound) return false;
-  noise_.resume(n, memory.sample_variance);
+  if (!is_sound(memory) || !(age_s >= 0.0) || !std::isfinite(age_s)) return false;
+  noise_.resume(memory.white_density, memory.sample_variance);
   bank_.resume(memory, age_s);
   run(t_s);
   return true;
