@@ -197,5 +197,39 @@ TEST(Allocation, IsNotDoneByCalibratorAndCorrector) {
   }
 }
 
+// 121 filters are made in start(), in memory that the construction set aside; then windows, stops,
+// one gyro alone, gaps and a jump.
+TEST(Allocation, IsNotDoneByTheOptimalCorrector) {
+  Calibrator calibrator(0, 20.0);
+  const auto corrector = make_optimal_corrector({});
+  Random random(1);
+  EXPECT_EQ(allocations_of([&] {
+              bool started = false;
+              for (int i = 0; i < 2 * kSamples; ++i) {
+                const bool moving = i / 1000 % 2 == 1;
+                const double rate = moving ? 20.0 * std::sin(0.02 * i) : 0.0;
+                const double jump = i > kSamples ? 1.0 : 0.0;
+                const double gap_s = i > 5500 ? 30.0 : 0.0;
+                const RatePair pair{
+                    0.02 * i + gap_s,
+                    {rate + jump + random.normal(0.01), rate + random.normal(0.01)}};
+                if (started && i % 3000 < 200) {
+                  corrector->update_alone(i % 2000 < 1000 ? 0 : 1, pair);
+                } else if (started) {
+                  corrector->update(pair);
+                } else if (calibrator.add(pair.t_s, pair.rate_dps, 0.0)) {
+                  corrector->calibrate(pair, 0.0);
+                } else {
+                  corrector->start(calibrator.result());
+                  started = true;
+                }
+              }
+            }),
+            0U);
+  EXPECT_GE(corrector->windows().completed, 30U);
+  EXPECT_GE(corrector->condition().stops, 2U);
+  EXPECT_GE(corrector->condition().disagreements, 1U);
+}
+
 }  // namespace
 }  // namespace vgyro::fusion
