@@ -78,9 +78,11 @@ void print_plan(const gateway::Plan& plan) {
                waits ? " of rest" : ", taken for rest whatever moves", plan.calibration.rate_dps);
   }
   fmt::print("  {:<14}{}", "corrector", gateway::to_string(plan.corrector.method));
-  if (plan.corrector.method != gateway::Method::kMean) {
+  if (plan.corrector.method == gateway::Method::kMutual) {
     fmt::print(", window {:g} s, drift polynomial of order {}", plan.corrector.window_s,
                plan.corrector.order);
+  } else if (plan.corrector.method == gateway::Method::kOptimal) {
+    fmt::print(", windows of at most {:g} s", plan.corrector.window_s);
   }
   fmt::print("\n");
   print_model(plan);
