@@ -165,7 +165,8 @@ DriftEstimate DriftBank::estimate() const {
     // difference says scale factors are off at all.
     const double s = origin(kScale) + away(kScale);
     const double variance = covariance(kScale, kScale);
-    const double common = share * (1.0 - share) * std::max(s * s - variance, 0.0);
+    // A mismatch usually sits in one of the two: half.
+    const double common = 0.5 * share * (1.0 - share) * std::max(s * s - variance, 0.0);
     const double rest = 1.0 - share;
     scale[0] += weight * share * s;
     scale[1] -= weight * rest * s;

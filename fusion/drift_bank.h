@@ -49,6 +49,7 @@ class DriftBank {
   void widen(double variance_1, double covariance_12, double variance_2);
 
   [[nodiscard]] DriftEstimate estimate() const;
+  [[nodiscard]] bool single() const { return hypotheses_.size() == 1; }
   [[nodiscard]] bool empty() const { return hypotheses_.empty(); }
   void save(DriftMemory& memory) const;
 

@@ -99,41 +99,80 @@ void DriftFilter::predict(double length_s) {
   covariance_.diagonal() += m.end_variance;
 }
 
+// Without Gauss–Markov terms, as always where the parameters are estimated, all sizes are known to
+// the compiler: several times faster.
 double DriftFilter::update(double length_s, const DriftMeasurement& measurement) {
-  using Map = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, DriftMeasurement::kRowsMax,
-                            kStatesMax>;
-  using Gain = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kStatesMax,
-                             DriftMeasurement::kRowsMax>;
-  const Motion m = motion(length_s);
-  const Map h = measurement.rows * observe_;
-  const Map h_mean = h * m.carry_mean.asDiagonal();
-  const Map h_lead = h * m.lead.asDiagonal();
+  const bool small = state_.size() == kObservables;
+  switch (measurement.values.size()) {
+    case 1:
+      return small ? update_sized<kObservables, 1>(length_s, measurement)
+                   : update_sized<Eigen::Dynamic, 1>(length_s, measurement);
+    case 2:
+      return small ? update_sized<kObservables, 2>(length_s, measurement)
+                   : update_sized<Eigen::Dynamic, 2>(length_s, measurement);
+    default:
+      return small ? update_sized<kObservables, 3>(length_s, measurement)
+                   : update_sized<Eigen::Dynamic, 3>(length_s, measurement);
+  }
+}
 
-  const Gain cross = m.carry.asDiagonal() * covariance_ * h_mean.transpose() +
-                     m.end_variance.asDiagonal() * h_lead.transpose();
-  DriftMeasurement::Square noise = measurement.noise;
-  noise += h * m.mean_variance.asDiagonal() * h.transpose();
-  DriftMeasurement::Square innovation_covariance = noise;
-  innovation_covariance += h_mean * covariance_ * h_mean.transpose();
-  innovation_covariance += h_lead * m.end_variance.asDiagonal() * h_lead.transpose();
+template <int States, int Rows>
+double DriftFilter::update_sized(double length_s, const DriftMeasurement& measurement) {
+  constexpr int kMax = States == Eigen::Dynamic ? kStatesMax : States;
+  using StateVector = Eigen::Matrix<double, States, 1, 0, kMax, 1>;
+  using StateSquare = Eigen::Matrix<double, States, States, 0, kMax, kMax>;
+  using Map = Eigen::Matrix<double, Rows, States, (Rows == 1 ? Eigen::RowMajor : 0), Rows, kMax>;
+  using Gain = Eigen::Matrix<double, States, Rows, 0, kMax, Rows>;
+  using RowSquare = Eigen::Matrix<double, Rows, Rows>;
+  using RowVector = Eigen::Matrix<double, Rows, 1>;
 
-  const Eigen::LLT<DriftMeasurement::Square> factor(innovation_covariance);
+  const Motion motion_of_all = motion(length_s);
+  const StateVector carry = motion_of_all.carry;
+  const StateVector carry_mean = motion_of_all.carry_mean;
+  const StateVector end_variance = motion_of_all.end_variance;
+  const StateVector lead = motion_of_all.lead;
+  const StateVector mean_variance = motion_of_all.mean_variance;
+  const StateSquare before = covariance_;
+  const StateVector state = state_;
+
+  Map h;
+  if constexpr (States == kObservables) {
+    h = measurement.rows;
+  } else {
+    h = measurement.rows * observe_;
+  }
+  const Map h_mean = h * carry_mean.asDiagonal();
+  const Map h_lead = h * lead.asDiagonal();
+
+  const Gain spread = before * h_mean.transpose();
+  const Gain led = end_variance.asDiagonal() * h_lead.transpose();
+  const Gain cross = carry.asDiagonal() * spread + led;
+  const Gain wandered = mean_variance.asDiagonal() * h.transpose();
+  RowSquare noise = measurement.noise;
+  noise.noalias() += h * wandered;
+  RowSquare innovation_covariance = noise;
+  innovation_covariance.noalias() += h_mean * spread;
+  innovation_covariance.noalias() += h_lead * led;
+
+  const Eigen::LLT<RowSquare> factor(innovation_covariance);
   const Gain gain = factor.solve(cross.transpose()).transpose();
-  const DriftMeasurement::Values innovation = measurement.values - h_mean * state_;
-
-  state_ = m.carry.cwiseProduct(state_) + gain * innovation;
+  const RowVector innovation = measurement.values - h_mean * state;
+  state_ = carry.cwiseProduct(state) + gain * innovation;
 
   // x₁ − x̂₁ = (F − G·H_mean)(x₀ − x̂₀) + (I − G·H_lead)·w − G·(H·r + n): independent parts.
-  Square start = -gain * h_mean;
-  start.diagonal() += m.carry;
-  Square walked = -gain * h_lead;
+  StateSquare start = -gain * h_mean;
+  start.diagonal() += carry;
+  StateSquare walked = -gain * h_lead;
   walked.diagonal().array() += 1.0;
-  Square next = start * covariance_ * start.transpose();
-  next += walked * m.end_variance.asDiagonal() * walked.transpose();
-  next += gain * noise * gain.transpose();
+  const StateSquare started = start * before;
+  StateSquare next = started * start.transpose();
+  const StateSquare scaled = walked * end_variance.asDiagonal();
+  next.noalias() += scaled * walked.transpose();
+  const Gain noisy = gain * noise;
+  next.noalias() += noisy * gain.transpose();
   covariance_ = 0.5 * (next + next.transpose());
 
-  const DriftMeasurement::Values white = factor.matrixL().solve(innovation);
+  const RowVector white = factor.matrixL().solve(innovation);
   return -0.5 * white.squaredNorm() - factor.matrixLLT().diagonal().array().log().sum();
 }
 

@@ -85,6 +85,8 @@ class DriftFilter {
     State mean_variance;  ///< of r
   };
   [[nodiscard]] Motion motion(double length_s) const;
+  template <int States, int Rows>
+  double update_sized(double length_s, const DriftMeasurement& measurement);
 
   DriftModel model_;
   Observe observe_;

@@ -21,8 +21,14 @@ namespace {
 
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
+constexpr double kSmooth_s = 0.05;
+
 // Calibration keeps at most so many means; when they are full, neighbours are merged.
 constexpr std::size_t kCalibrationBlocks = 64;
+
+// Windows at a stop: white noise read there is heading until it is learned. Twice as long where
+// every window costs many filters.
+constexpr double kStopWindow_s = 2.0;
 
 // Blocks of a stop until it is sure, and one more.
 constexpr std::size_t kHeldMax = 8;
@@ -216,6 +222,7 @@ class OptimalCorrector final : public Corrector {
   void learn_from(const Block& block, bool stop);
   void open_window(const Block& block, Kind kind);
   void add_difference(const Block& block);
+  void regress();
   void add_stop(const Block& block);
   bool has_jumped(const Block& block);
   void close_window();
@@ -232,6 +239,7 @@ class OptimalCorrector final : public Corrector {
     return doubt_ + doubt_growth_ * std::max(t_s - learned_until_s_, 0.0);
   }
   void set_weights(Present present);
+  double acceleration_square(double rate_dps, double t_s);
 
   OptimalSettings settings_;
   double window_s_;
@@ -249,6 +257,14 @@ class OptimalCorrector final : public Corrector {
   /// blocks so far.
   std::array<Block, kHeldMax> held_;
   std::size_t held_count_ = 0;
+  struct RecentCell {
+    double rate_dps = 0.0;
+    double difference_dps = 0.0;
+    double length_s = 0.0;
+  };
+  std::array<RecentCell, 5> recent_;  ///< of the difference, without a gap
+  std::size_t recent_count_ = 0;
+  double recent_until_s_ = 0.0;
   bool held_steady_ = false;
   bool held_begins_ = false;  ///< the first of them begins a run of steady ones
   bool refused_ = false;
@@ -261,10 +277,14 @@ class OptimalCorrector final : public Corrector {
   std::array<double, 2> gain_{1.0, 1.0};  ///< 1/(1 + scale)
   Present weights_for_ = Present::kBoth;
   std::array<double, 2> weight_{0.5, 0.5};
-  double doubt_ = 0.0;         ///< variance of the weighted drift
-  double doubt_growth_ = 0.0;  ///< per second
-  double scale_doubt_ = 0.0;   ///< variance per (deg/s)² of rate
-  double fast_noise_ = 0.0;    ///< of the smoothed difference
+  double doubt_ = 0.0;          ///< variance of the weighted drift
+  double doubt_growth_ = 0.0;   ///< per second
+  double scale_doubt_ = 0.0;    ///< variance per (deg/s)² of rate
+  double timing_doubt_ = 0.0;   ///< variance per (deg/s²)² of acceleration
+  double smooth_rate_ = 0.0;    ///< of the virtual rate, over kSmooth_s
+  double smoother_rate_ = 0.0;  ///< the same once more
+  double smooth_until_s_ = 0.0;
+  double fast_noise_ = 0.0;  ///< of the smoothed difference
   double fast_difference_ = 0.0;
   double blame_ = 0.0;  ///< variance of the virtual rate per squared excess difference
 
@@ -390,6 +410,7 @@ VirtualRate OptimalCorrector::update(const RatePair& pair) {
   const double noise_12 = sample[1] * std::sqrt(pair.noise_gain[0] * pair.noise_gain[1]);
   double variance = weighted(weight_, {noise_1, noise_12, noise_2}) + drift_variance(pair.t_s) +
                     scale_doubt_ * rate * rate;
+  if (timing_doubt_ > 0.0) variance += timing_doubt_ * acceleration_square(rate, pair.t_s);
 
   // The gyros contradict each other: until it is known who is wrong, each may be.
   fast_difference_ += kFastGain * (first - second - fast_difference_);
@@ -399,6 +420,18 @@ VirtualRate OptimalCorrector::update(const RatePair& pair) {
       (fast_noise_ + kFastNoise * (rate_density(0, rate) + rate_density(1, rate)) / interval);
   if (contradiction > allowed) variance += blame_ * (contradiction - allowed);
   return {rate, std::sqrt(variance), {first, second}};
+}
+
+// Squared dΩ/dt as far as it rises above the noise of the smoothed rate.
+double OptimalCorrector::acceleration_square(double rate_dps, double t_s) {
+  const double step_s = std::clamp(t_s - smooth_until_s_, 0.0, kSmooth_s);
+  smooth_until_s_ = t_s;
+  smooth_rate_ += step_s / kSmooth_s * (rate_dps - smooth_rate_);
+  // rate − smooth lags by kSmooth_s · dΩ/dt; a cell's noise is about that of its mean.
+  const double slope = (smooth_rate_ - smoother_rate_) / kSmooth_s;
+  smoother_rate_ += step_s / kSmooth_s * (smooth_rate_ - smoother_rate_);
+  const double noise = weighted(weight_, noise_.density()) / (4.0 * kSmooth_s) / squared(kSmooth_s);
+  return std::max(squared(slope) - noise, 0.0);
 }
 
 VirtualRate OptimalCorrector::update_alone(std::size_t gyro, const RatePair& pair) {
@@ -521,37 +554,49 @@ void OptimalCorrector::open_window(const Block& block, Kind kind) {
 }
 
 void OptimalCorrector::add_difference(const Block& block) {
+  constexpr double kRounding_s = 1e-6;
   stop_length_s_ = 0.0;
+  if (block.from_s > recent_until_s_ + kRounding_s || block.present != Present::kBoth)
+    recent_count_ = 0;
   open_window(block, Kind::kDifference);
   if (block.present == Present::kBoth) {
-    const Symmetric& density = noise_.density();
-    const double difference_density = of_difference(density);
-    const double rate_noise = weighted(weight_, density);
     for (std::size_t i = 0; i < block.count; ++i) {
+      if (recent_count_ == recent_.size()) {
+        std::move(recent_.begin() + 1, recent_.end(), recent_.begin());
+        --recent_count_;
+      }
       const Cell& cell = block.cells[i];
-      const Cell& before = block.cells[i == 0 ? 0 : i - 1];
-      const Cell& after = block.cells[i + 1 == block.count ? i : i + 1];
-      const double rate = cell_rate(cell, block.present);
-      const double span_s = after.middle_s - before.middle_s;
-      const double slope =
-          span_s > 0.0
-              ? (cell_rate(after, block.present) - cell_rate(before, block.present)) / span_s
-              : 0.0;
-      const double rate_variance = rate_noise / cell.length_s;
-      const bool turns = squared(rate) > squared(kExcited) * rate_variance;
-      const bool accelerates = squared(slope * span_s) > squared(kExcited) * 2.0 * rate_variance;
-      const Vector3 regressor{1.0, turns ? rate : 0.0, accelerates ? slope : 0.0};
-      const double noise =
-          (difference_density + rate_density(0, rate) + rate_density(1, rate)) / cell.length_s +
-          squared(kTimingDoubt_s * slope);
-      window_.normal += regressor * regressor.transpose() / noise;
-      window_.right += regressor * ((cell.mean_dps[0] - cell.mean_dps[1]) / noise);
+      recent_[recent_count_++] = {cell_rate(cell, block.present),
+                                  cell.mean_dps[0] - cell.mean_dps[1], cell.length_s};
+      if (recent_count_ == recent_.size()) regress();
     }
   }
+  recent_until_s_ = block.to_s;
   // A turn that tells much about scale factor or skew is used at once.
   const bool tells = window_.normal(1, 1) * estimate_.covariance(kScale, kScale) > 1.0 ||
                      window_.normal(2, 2) * estimate_.covariance(kSkew, kSkew) > 1.0;
   if (tells || window_.to_s - window_.from_s >= window_s_) close_window();
+}
+
+// The middle one of the recent cells; its neighbours give the mean of dΩ/dt over it, to fourth
+// order: a skew of milliseconds shows in the smallest accelerations, and so would their error.
+void OptimalCorrector::regress() {
+  const auto& [first, before, cell, after, last] = recent_;
+  const Symmetric& density = noise_.density();
+  const double span_s = 12.0 * cell.length_s;
+  const double slope =
+      (8.0 * (after.rate_dps - before.rate_dps) - (last.rate_dps - first.rate_dps)) / span_s;
+  const double rate_variance = weighted(weight_, density) / cell.length_s;
+  const double slope_variance = 130.0 * rate_variance / squared(span_s);
+  const bool turns = squared(cell.rate_dps) > squared(kExcited) * rate_variance;
+  const bool accelerates = squared(slope) > squared(kExcited) * slope_variance;
+  const Vector3 regressor{1.0, turns ? cell.rate_dps : 0.0, accelerates ? slope : 0.0};
+  const double noise =
+      (of_difference(density) + rate_density(0, cell.rate_dps) + rate_density(1, cell.rate_dps)) /
+          cell.length_s +
+      squared(kTimingDoubt_s * slope);
+  window_.normal += regressor * regressor.transpose() / noise;
+  window_.right += regressor * (cell.difference_dps / noise);
 }
 
 void OptimalCorrector::add_stop(const Block& block) {
@@ -563,7 +608,8 @@ void OptimalCorrector::add_stop(const Block& block) {
   window_.covered_s += length;
   window_.sway_s += detector_.sway_variance() * length;
   // At the beginning of a stop every second counts; later the windows grow.
-  if (window_.to_s - window_.from_s >= std::min(stop_length_s_, window_s_)) {
+  if (window_.to_s - window_.from_s >=
+      std::min({stop_length_s_, window_s_, kStopWindow_s * (bank_.single() ? 1.0 : 2.0)})) {
     stop_length_s_ = std::max(1.0, 2.0 * stop_length_s_);
     close_window();
     condition_.disagree = false;
@@ -740,6 +786,9 @@ void OptimalCorrector::set_weights(Present present) {
   fast_noise_ = kFastNoise * of_difference(noise_.sample_variance()) + of_difference(doubt);
   const double first_share = std::clamp(estimate_.drift_share[0], kShareMin, 1.0 - kShareMin);
   blame_ = first_share * squared(weight_[0]) + (1.0 - first_share) * squared(weight_[1]);
+  // Which gyro is late, or early, the skew does not tell; the worse one is likelier.
+  const double skew_square = squared(estimate_.mean(kSkew)) - estimate_.covariance(kSkew, kSkew);
+  timing_doubt_ = present != Present::kBoth || skew_square <= 0.0 ? 0.0 : skew_square * blame_;
 }
 
 }  // namespace
