@@ -161,13 +161,15 @@ DriftEstimate DriftBank::estimate() const {
     const double share = one.scale_share;
     all.growth[0] += weight * growth[0];
     all.growth[1] += weight * growth[1];
-    // s₁ = share·s, s₂ = −(1 − share)·s; what both have in common stays open by as much as the
-    // difference says scale factors are off at all.
+    // s₁ = share·s, s₂ = −(1 − share)·s. What both have in common stays open: had one gyro been off
+    // by all of s, the other's share of it would be wrong.
     const double s = origin(kScale) + away(kScale);
     const double variance = covariance(kScale, kScale);
-    // A mismatch usually sits in one of the two: half.
-    const double common = 0.5 * share * (1.0 - share) * std::max(s * s - variance, 0.0);
     const double rest = 1.0 - share;
+    const double blamed = share * share / (share * share + rest * rest);
+    all.blame[0] += weight * blamed;
+    const double common =
+        (blamed * rest * rest + (1.0 - blamed) * share * share) * std::max(s * s - variance, 0.0);
     scale[0] += weight * share * s;
     scale[1] -= weight * rest * s;
     scale_square[0] += weight * (share * share * (s * s + variance) + common);
@@ -175,6 +177,7 @@ DriftEstimate DriftBank::estimate() const {
     scale_square[2] += weight * (rest * rest * (s * s + variance) + common);
   }
   all.drift_share[1] = 1.0 - all.drift_share[0];
+  all.blame[1] = 1.0 - all.blame[0];
   all.mean = origin + first;
   all.covariance = second - first * first.transpose();
   all.scale = scale;

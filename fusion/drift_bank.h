@@ -24,6 +24,8 @@ struct DriftEstimate {
   std::array<double, 2> scale{};   ///< share of each gyro in the scale-factor difference
   /// Of both gyros' scale factors, as far as their difference tells: variances and covariance.
   std::array<double, 3> scale_covariance{};
+  /// Which gyro is likely the cause where the two differ about a turn: (N·K)² over the sum.
+  std::array<double, 2> blame{};
   std::array<double, 2> drift_share{};  ///< K_k² over K₁² + K₂²
 };
 

@@ -115,8 +115,10 @@ void NoiseTracker::watch(const Block& block) {
   if (expected[0] <= 0.0 || expected[1] <= 0.0) return;
   // What the gyros share is motion. It does not fall out of one gyro's sum of squares exactly: the
   // doubt grows with the motion, and with the other gyro's noise.
-  const std::array<double, 2> own{squares[0] - squares[1], squares[2] - squares[1]};
-  const double both = own[0] + own[1];
+  // What is late shows with opposite signs, and is no more noise than both have together.
+  const double both = squares[0] - 2.0 * squares[1] + squares[2];
+  const std::array<double, 2> own{std::clamp(squares[0] - squares[1], 0.0, both),
+                                  std::clamp(squares[2] - squares[1], 0.0, both)};
   const double both_expected = expected[0] + expected[1];
   std::array<double, 2> rise{};
   for (std::size_t gyro = 0; gyro < 2; ++gyro) {

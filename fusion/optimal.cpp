@@ -740,12 +740,16 @@ void OptimalCorrector::doubt_contradiction(DriftMeasurement& measurement, double
 void OptimalCorrector::close_window() {
   if (window_.kind == Kind::kNothing) return;
   const double length = window_.to_s - window_.from_s;
-  if (window_.kind == Kind::kDifference && window_.present != Present::kBoth) {
+  DriftMeasurement measurement(0);
+  if (window_.kind == Kind::kStop) {
+    measurement = measure_stop();
+  } else if (window_.present == Present::kBoth) {
+    measurement = measure_difference();
+  }
+  if (measurement.values.size() == 0) {
     bank_.predict(length);
     ++windows_.skipped;
-  } else if (length > 0.0) {
-    DriftMeasurement measurement =
-        window_.kind == Kind::kStop ? measure_stop() : measure_difference();
+  } else {
     if (window_.kind == Kind::kDifference) doubt_contradiction(measurement, length);
     bank_.learn(length, measurement);
     ++windows_.completed;
@@ -788,7 +792,10 @@ void OptimalCorrector::set_weights(Present present) {
   blame_ = first_share * squared(weight_[0]) + (1.0 - first_share) * squared(weight_[1]);
   // Which gyro is late, or early, the skew does not tell; the worse one is likelier.
   const double skew_square = squared(estimate_.mean(kSkew)) - estimate_.covariance(kSkew, kSkew);
-  timing_doubt_ = present != Present::kBoth || skew_square <= 0.0 ? 0.0 : skew_square * blame_;
+  timing_doubt_ = present != Present::kBoth || skew_square <= 0.0
+                      ? 0.0
+                      : skew_square * (estimate_.blame[0] * squared(weight_[0]) +
+                                       estimate_.blame[1] * squared(weight_[1]));
 }
 
 }  // namespace
