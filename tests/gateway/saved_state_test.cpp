@@ -192,7 +192,7 @@ TEST(SavedState, WhatCannotBeIsRefusedBehindARightChecksum) {
       {"[4e-08, -1e-09, 9e-08]", "[4e-08, -6.1e-08, 9e-08]", "positive definite"},
       {"white_density = [6.4e-09, 0.0", "white_density = [6.4e-09, 1.0", "no covariance"},
       {"sample_variance = [1e-06", "sample_variance = [-1e-06", "sample_variance"},
-      {"walk_ratio_per_s = [1e-05", "walk_ratio_per_s = [2e-05", "another version"},
+      {"walk_ratio_per_s = [0.0003", "walk_ratio_per_s = [0.0004", "another version"},
       {"walk_ratio_per_s = [0.0003, ", "walk_ratio_per_s = [", "no list of"},
       {"walk_weight = [", "walk_weight = [0.5, ", "walk_weight is no list of "},
       {"walk_weight = [0.0", "walk_weight = [0.1", "add up to 1"},
