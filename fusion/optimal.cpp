@@ -424,13 +424,14 @@ VirtualRate OptimalCorrector::update(const RatePair& pair) {
 
 // Squared dΩ/dt as far as it rises above the noise of the smoothed rate.
 double OptimalCorrector::acceleration_square(double rate_dps, double t_s) {
-  const double step_s = std::clamp(t_s - smooth_until_s_, 0.0, kSmooth_s);
+  const double tau_s = std::max(kSmooth_s, 2.0 * cells_.interval_s());
+  const double share = std::clamp((t_s - smooth_until_s_) / tau_s, 0.0, 1.0);
   smooth_until_s_ = t_s;
-  smooth_rate_ += step_s / kSmooth_s * (rate_dps - smooth_rate_);
-  // rate − smooth lags by kSmooth_s · dΩ/dt; a cell's noise is about that of its mean.
-  const double slope = (smooth_rate_ - smoother_rate_) / kSmooth_s;
-  smoother_rate_ += step_s / kSmooth_s * (smooth_rate_ - smoother_rate_);
-  const double noise = weighted(weight_, noise_.density()) / (4.0 * kSmooth_s) / squared(kSmooth_s);
+  smooth_rate_ += share * (rate_dps - smooth_rate_);
+  // Smoothed once more it lags by tau_s · dΩ/dt.
+  const double slope = (smooth_rate_ - smoother_rate_) / tau_s;
+  smoother_rate_ += share * (smooth_rate_ - smoother_rate_);
+  const double noise = weighted(weight_, noise_.density()) / (4.0 * tau_s) / squared(tau_s);
   return std::max(squared(slope) - noise, 0.0);
 }
 

@@ -206,11 +206,12 @@ std::vector<Case> cases() {
 }
 
 void expect_honest(const Case& which, const Sureness& found) {
-  // What two gyros' scale factors have in common does not show in their difference. What is said of
-  // it is right on average over gyros, for the single pair it cannot be.
+  // What two gyros' scale factors have in common does not show in their difference; σ holds the
+  // gyro that is noisier and drifts more for the likely culprit. Here both are equally bad, and
+  // what is said of them is short of that on average over pairs, by less than √2.
   const bool on_average = which.scale_sigma > 0.0;
   EXPECT_GT(on_average ? found.rate_squares : found.rate, which.least);
-  EXPECT_LT(on_average ? found.rate_squares : found.rate, on_average ? 1.4 : 1.2);
+  EXPECT_LT(on_average ? found.rate_squares : found.rate, on_average ? 2.0 : 1.2);
 }
 
 // Both N and K told, and drift that soon exceeds the noise of a sample, so that σ must know it.
