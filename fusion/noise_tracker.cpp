@@ -13,6 +13,9 @@ constexpr double kCellsMax = 12000.0;
 // A correlation below this many of its own standard deviations is none.
 constexpr double kRealCorrelation = 4.0;
 
+// A greater correlation than this is motion.
+constexpr double kSwayCorrelation = 0.8;
+
 // How fast a rise is followed, per block, and how sure it must be.
 constexpr double kRiseGain = 0.3;
 constexpr double kSureSigma = 3.0;
@@ -21,6 +24,10 @@ constexpr double kOneBlockMax = 22.0;
 
 // A sensor that says nothing of its resolution still has some noise, (deg/s)²/Hz.
 constexpr double kDensityMin = 1e-14;
+
+double squared(double value) {
+  return value * value;
+}
 
 }  // namespace
 
@@ -64,24 +71,28 @@ void NoiseTracker::settle(double interval_s) {
   };
   const double cell_shared = shared(cell_squares_, cells_);
   const double sample_shared = shared(sample_squares_, samples_);
-  const double motion = shared_is_motion_ ? 1.0 : 0.0;
+  // Sensors' noises are never that alike: the platform sways.
+  const bool sways =
+      shared_is_motion_ ||
+      squared(cell_shared) > squared(kSwayCorrelation) * cell_squares_[0] * cell_squares_[2];
+  const bool shakes = sways || squared(sample_shared) > squared(kSwayCorrelation) *
+                                                            sample_squares_[0] * sample_squares_[2];
   for (std::size_t gyro = 0; gyro < 2; ++gyro) {
     const std::size_t k = 2 * gyro;
     const GyroParameters& given = gyros_[gyro];
     const double rounding = given.resolution_dps * given.resolution_dps / 12.0;
-    const double measured = (cell_squares_[k] - motion * cell_shared) / cells_;
+    const double measured = (cell_squares_[k] - (sways ? cell_shared : 0.0)) / cells_;
     density_[k] = given.white_dps_rthz ? *given.white_dps_rthz * *given.white_dps_rthz : measured;
     density_[k] = std::max({density_[k], rounding * interval_s, kDensityMin});
     // Gyros slower than a cell have one sample in each.
-    sample_[k] = samples_ > cells_ ? (sample_squares_[k] - motion * sample_shared) / gain_[gyro]
-                                   : density_[k] / interval_s;
+    sample_[k] = samples_ > cells_
+                     ? (sample_squares_[k] - (shakes ? sample_shared : 0.0)) / gain_[gyro]
+                     : density_[k] / interval_s;
     sample_[k] = std::max({sample_[k], rounding, kDensityMin});
   }
   const bool given = gyros_[0].white_dps_rthz || gyros_[1].white_dps_rthz;
-  density_[1] = shared_is_motion_ || given ? 0.0 : cell_shared / cells_;
-  sample_[1] = shared_is_motion_ || samples_ <= cells_
-                   ? 0.0
-                   : sample_shared / std::sqrt(gain_[0] * gain_[1]);
+  density_[1] = sways || given ? 0.0 : cell_shared / cells_;
+  sample_[1] = shakes || samples_ <= cells_ ? 0.0 : sample_shared / std::sqrt(gain_[0] * gain_[1]);
   apply_rise();
 }
 

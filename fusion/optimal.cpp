@@ -217,6 +217,7 @@ class OptimalCorrector final : public Corrector {
   };
 
   void take_calibration();
+  void begin_in_motion(const std::array<double, 2>& white, const Symmetric& density);
   void run(double t_s);
   void close_block(const Block& block);
   void learn_from(const Block& block, bool stop);
@@ -329,15 +330,12 @@ void OptimalCorrector::start(const Calibration& calibration) {
   noise_.settle(cells_.interval_s());
   const Symmetric& density = noise_.usual_density();
   const std::array<double, 2> white{std::sqrt(density[0]), std::sqrt(density[2])};
-  double common_square = 0.0;
-  double common = 0.0;
-  double length = 0.0;
+  if (calibration.in_motion) {
+    begin_in_motion(white, density);
+    return;
+  }
   for (std::size_t i = 0; i < calibration_.count(); ++i) {
     const CalibrationBlocks::Mean& mean = calibration_[i];
-    const double both = 0.5 * (mean.excess_dps[0] + mean.excess_dps[1]);
-    common_square += mean.length_s * both * both;
-    common += mean.length_s * both;
-    length += mean.length_s;
     if (i == 0) {
       bank_.begin(
           white, mean.excess_dps,
@@ -355,11 +353,30 @@ void OptimalCorrector::start(const Calibration& calibration) {
     bank_.learn(mean.to_s - std::max(mean.from_s, learned_until_s_), measurement);
     learned_until_s_ = mean.to_s;
   }
-  if (calibration.in_motion) {
-    // How far the mean of a motion is from rest is anyone's guess: as far as it swung.
-    const double swing = common_square / length - squared(common / length);
-    bank_.widen(swing, swing, swing);
+  run(learned_until_s_);
+}
+
+// The motion was accepted as rest: its mean is all there is, and how far that is from rest is
+// anyone's guess: as far as it swung.
+void OptimalCorrector::begin_in_motion(const std::array<double, 2>& white,
+                                       const Symmetric& density) {
+  std::array<double, 2> mean{};
+  double square = 0.0;
+  double length = 0.0;
+  for (std::size_t i = 0; i < calibration_.count(); ++i) {
+    const CalibrationBlocks::Mean& one = calibration_[i];
+    for (std::size_t gyro = 0; gyro < 2; ++gyro)
+      mean[gyro] += one.length_s * one.excess_dps[gyro];
+    square += one.length_s * squared(0.5 * (one.excess_dps[0] + one.excess_dps[1]));
+    length += one.length_s;
+    learned_until_s_ = one.to_s;
   }
+  mean[0] /= length;
+  mean[1] /= length;
+  const double swing = std::max(square / length - squared(0.5 * (mean[0] + mean[1])), 0.0);
+  bank_.begin(
+      white, mean,
+      {density[0] / length + swing, density[1] / length + swing, density[2] / length + swing});
   run(learned_until_s_);
 }
 
