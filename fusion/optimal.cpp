@@ -26,9 +26,10 @@ constexpr double kSmooth_s = 0.05;
 // Calibration keeps at most so many means; when they are full, neighbours are merged.
 constexpr std::size_t kCalibrationBlocks = 64;
 
-// Windows at a stop: white noise read there is heading until it is learned. Twice as long where
-// every window costs many filters.
-constexpr double kStopWindow_s = 2.0;
+// Windows at a stop: white noise read there is heading until it is learned. Longer where every
+// window costs many filters.
+constexpr double kStopWindow_s = 0.5;
+constexpr double kStopWindowOfMany_s = 4.0;
 
 // Blocks of a stop until it is sure, and one more.
 constexpr std::size_t kHeldMax = 8;
@@ -627,7 +628,7 @@ void OptimalCorrector::add_stop(const Block& block) {
   window_.sway_s += detector_.sway_variance() * length;
   // At the beginning of a stop every second counts; later the windows grow.
   if (window_.to_s - window_.from_s >=
-      std::min({stop_length_s_, window_s_, kStopWindow_s * (bank_.single() ? 1.0 : 2.0)})) {
+      std::min({stop_length_s_, window_s_, bank_.single() ? kStopWindow_s : kStopWindowOfMany_s})) {
     stop_length_s_ = std::max(1.0, 2.0 * stop_length_s_);
     close_window();
     condition_.disagree = false;
