@@ -28,7 +28,7 @@ constexpr std::size_t kCalibrationBlocks = 64;
 
 // Windows at a stop: white noise read there is heading until it is learned. Longer where every
 // window costs many filters.
-constexpr double kStopWindow_s = 0.5;
+constexpr double kStopWindow_s = 2.0;
 constexpr double kStopWindowOfMany_s = 4.0;
 
 // Blocks of a stop until it is sure, and one more.
