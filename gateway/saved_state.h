@@ -29,7 +29,8 @@ struct SavedState {
 };
 
 /// What must be the same for the biases of a gyro to mean the same: bus, identifier, signal, scale,
-/// sign, its name and what the model file takes off it. For people too; what is not printable ASCII stands there as %C3%B6.
+/// sign, its name and what the model file takes off it. For people too; what is not printable ASCII
+/// stands there as %C3%B6.
 std::string device_of(const GyroPlan& gyro);
 
 /// Error when the state is of other gyros than the plan's.
