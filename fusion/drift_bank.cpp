@@ -7,10 +7,10 @@ namespace vgyro::fusion {
 
 namespace {
 
-// Where nothing says otherwise K is N times 1e-2 per second, give or take a factor of six: the
+// Where nothing says otherwise K is N times 2e-2 per second, give or take a factor of five: the
 // span from good fibre-optic gyros to cheap MEMS.
-constexpr double kUsualRatioLog10 = -2.0;
-constexpr double kRatioSpreadLog10 = 0.8;
+constexpr double kUsualRatioLog10 = -1.7;
+constexpr double kRatioSpreadLog10 = 0.7;
 
 // Drift that a sensor takes on between two runs, in units of N over √(1 s), and how long it must
 // have been off for that.

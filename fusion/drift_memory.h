@@ -10,8 +10,8 @@ namespace vgyro::fusion {
 
 /// Values of K over N that the optimal corrector weighs against each other where K is not given,
 /// 1/s.
-inline constexpr std::array<double, 9> kWalkRatios_per_s{3e-4,   1.8e-3, 3.2e-3, 5.6e-3, 1e-2,
-                                                         1.8e-2, 3.2e-2, 5.6e-2, 1e-1};
+inline constexpr std::array<double, 9> kWalkRatios_per_s{1e-3,   3.2e-3, 5.6e-3, 1e-2, 1.8e-2,
+                                                         3.2e-2, 5.6e-2, 1e-1,   2e-1};
 inline constexpr std::size_t kWalkPairs = kWalkRatios_per_s.size() * kWalkRatios_per_s.size();
 
 struct DriftMemory {
