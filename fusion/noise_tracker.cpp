@@ -151,6 +151,12 @@ void NoiseTracker::watch(const Block& block) {
   apply_rise();
 }
 
+void NoiseTracker::forget_rise() {
+  rise_ = {1.0, 1.0};
+  noisy_ = {};
+  apply_rise();
+}
+
 void NoiseTracker::apply_rise() {
   const double both = std::sqrt(rise_[0] * rise_[1]);
   present_density_ = {density_[0] * rise_[0], density_[1] * both, density_[2] * rise_[1]};

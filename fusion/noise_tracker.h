@@ -28,6 +28,8 @@ class NoiseTracker {
   void measure(const Block& block, bool moving);
   /// A block of which nothing is known.
   void watch(const Block& block);
+  /// The present rise was none, or is of no use any more.
+  void forget_rise();
   /// Make density() and sample_variance() of what was measured.
   void settle(double interval_s);
   void resume(const Symmetric& density, const std::array<double, 2>& sample_variance);

@@ -459,7 +459,11 @@ VirtualRate OptimalCorrector::update_alone(std::size_t gyro, const RatePair& pai
   RatePair alone = pair;
   alone.rate_dps[1 - gyro] = 0.0;
   if (cells_.add(alone.t_s, alone.rate_dps, alone.noise_gain, present)) close_block(cells_.last());
-  if (weights_for_ != present) set_weights(present);
+  if (weights_for_ != present) {
+    // A rise was told by comparison: a gyro that falls out may have made the other one look noisy.
+    noise_.forget_rise();
+    set_weights(present);
+  }
   fast_difference_ = 0.0;
 
   VirtualRate out{(pair.rate_dps[gyro] - bias_[gyro]) * gain_[gyro], kNone, {kNone, kNone}};
