@@ -1,0 +1,187 @@
+#include "model/edit.h"
+
+#include <random>
+
+#include <gtest/gtest.h>
+
+#include "model/catalogue.h"
+
+namespace vgyro::model {
+namespace {
+
+constexpr unsigned kSeed = 7;
+
+// Any value within the limits, of any magnitude.
+double any_value(const Parameter& parameter, std::mt19937_64& random) {
+  const auto uniform = [&] { return static_cast<double>(random() >> 11U) * 0x1p-53; };
+  if (parameter.form == Parameter::Form::kAxis) return static_cast<double>(random() % 3);
+  if (parameter.form == Parameter::Form::kWhole) return static_cast<double>(1 + random() % 100);
+  const double magnitude = std::pow(10.0, -12.0 * uniform());
+  return random() % 2 == 0 || parameter.minimum >= 0.0 ? parameter.maximum * magnitude
+                                                       : parameter.minimum * magnitude;
+}
+
+Effect any_effect(Kind kind, std::mt19937_64& random) {
+  Effect effect{.gyro = random() % 2, .kind = kind};
+  const auto parameters = info(kind).parameters;
+  for (std::size_t i = 0; i < parameters.size(); ++i)
+    effect.parameters[i] = any_value(parameters[i], random);
+  if (kind == Kind::kStuck && effect.parameters[0] >= effect.parameters[1])
+    effect.parameters = {-1.0, 1.0};
+  return effect;
+}
+
+void expect_same(const Effect& read, const Effect& written) {
+  EXPECT_EQ(read.gyro, written.gyro);
+  EXPECT_EQ(read.kind, written.kind);
+  EXPECT_EQ(read.parameters, written.parameters) << info(written.kind).name;
+}
+
+constexpr const char* kUsersFiles[] = {
+    "format = 1\n",
+    "format = 1",
+    "format = 1 # ends in a comment",
+    "\xEF\xBB\xBF"
+    "format = 1\n",
+    "\n\n",
+    "",
+    "# Motor 3, ö µ\r\nformat = 1\r\n\r\n[[effect]] # first\r\n  gyro=1\r\n\tkind = 'bias'\r\n"
+    "value_dps = 3.1E-2 # measured in May\r\n\r\n\r\n# end",
+    "format = 1\n[[effect]]\nkind = \"scale_factor_temperature\"   # odd order\n\n# between\n"
+    "coefficient_per_k = +1_000e-9\ngyro = 2",
+};
+
+TEST(ModelEdit, AppendsEveryKindToEveryFormOfFileAndKeepsWhatWasThere) {
+  std::mt19937_64 random(kSeed);
+  RecordProperty("seed", kSeed);
+  for (const char* users : kUsersFiles) {
+    const auto before = parse_model(users, "m");
+    for (int round = 0; round < 20; ++round) {
+      for (const KindInfo& kind : catalogue()) {
+        const Effect effect = any_effect(kind.kind, random);
+        const auto text = append_effect(users, effect, "found: 3.4 ± 0.1\nagain\x01");
+        ASSERT_TRUE(text) << text.error().message();
+        EXPECT_TRUE(text->starts_with(users)) << "every byte of the user's survives";
+        const auto after = parse_model(*text, "m");
+        ASSERT_TRUE(after) << *text;
+        const std::size_t count = before ? before->effects.size() : 0;
+        ASSERT_EQ(after->effects.size(), count + 1);
+        for (std::size_t i = 0; i < count; ++i)
+          expect_same(after->effects[i], before->effects[i]);
+        expect_same(after->effects.back(), effect);
+        EXPECT_NE(text->find("# found: 3.4 ± 0.1"), std::string::npos);
+        EXPECT_NE(text->find("# again"), std::string::npos);
+      }
+    }
+  }
+}
+
+TEST(ModelEdit, AppendsOneAfterTheOther) {
+  std::mt19937_64 random(kSeed);
+  std::string text = "format = 1\n";
+  Model whole;
+  for (const KindInfo& kind : catalogue()) {
+    whole.effects.push_back(any_effect(kind.kind, random));
+    const auto longer = append_effect(text, whole.effects.back(), "");
+    ASSERT_TRUE(longer);
+    text = *longer;
+  }
+  EXPECT_EQ(text, to_toml(whole));
+  const auto read = parse_model(text, "m");
+  ASSERT_TRUE(read);
+  ASSERT_EQ(read->effects.size(), kKindCount);
+  for (std::size_t i = 0; i < kKindCount; ++i)
+    expect_same(read->effects[i], whole.effects[i]);
+}
+
+TEST(ModelEdit, WritesTheFewestDigitsThatReadBack) {
+  const auto text =
+      append_effect("", {.gyro = 1, .kind = Kind::kScaleFactor, .parameters = {-4.2e-4}}, "why");
+  ASSERT_TRUE(text);
+  EXPECT_EQ(
+      *text,
+      "format = 1\n\n# why\n[[effect]]\ngyro = 2\nkind = \"scale_factor\"\nerror = -0.00042\n");
+}
+
+TEST(ModelEdit, KeepsTheLineEndsOfTheUser) {
+  const auto text = append_effect("format = 1\r\n", {.kind = Kind::kBias}, "one\ntwo");
+  ASSERT_TRUE(text);
+  for (std::size_t i = 0; i < text->size(); ++i) {
+    if ((*text)[i] != '\n') continue;
+    EXPECT_EQ((*text)[i - 1], '\r') << "byte " << i;
+  }
+}
+
+TEST(ModelEdit, RefusesWhatItCannotDoRight) {
+  const Effect bias{.kind = Kind::kBias};
+  const auto refusal = [](const Expected<std::string>& result) {
+    return result ? std::string("done") : result.error().message();
+  };
+  EXPECT_NE(refusal(append_effect(
+                        "format = 1\neffect = [ { gyro = 1, kind = \"bias\", value_dps = 1 } ]\n",
+                        bias, ""))
+                .find(":2: effects in an array"),
+            std::string::npos);
+  EXPECT_NE(refusal(append_effect("format = 1\neffect = []\n", bias, "")).find("[[effect]]"),
+            std::string::npos);
+  EXPECT_NE(refusal(append_effect("format = \n", bias, "")).find(":1: "), std::string::npos);
+  EXPECT_NE(refusal(append_effect("# nothing\n", bias, "")).find("format is missing"),
+            std::string::npos);
+  Effect wrong = bias;
+  wrong.parameters[0] = std::nan("");
+  EXPECT_NE(refusal(append_effect("", wrong, "")).find("value_dps is nan"), std::string::npos);
+  wrong = {.kind = Kind::kGSensitivity, .parameters = {7.0, 1.0}};
+  EXPECT_NE(refusal(append_effect("", wrong, "")).find("axis"), std::string::npos);
+}
+
+constexpr const char* kThree =
+    "# µ in front\nformat = 1\n[[effect]] # one\ngyro = 1\nkind = \"white_noise\"\n"
+    "density_dps_rthz = 2.0e-4  # N, in May\n\n"
+    "[[effect]]\nkind = \"temperature_bias\"\ncoefficient_dps_k=1e-3# close\ngyro = 2\n"
+    "[[effect]]\n\"gyro\" = 1\nkind = \"gauss_markov\" # ä\n  'sigma_dps' =\t3e-4\t\ntau_s = "
+    "1_00\n";
+
+TEST(ModelEdit, ChangesOneNumberAndNothingElse) {
+  const std::string text = kThree;
+  const auto expect = [&](unsigned line, const char* name, double value, const std::string& from,
+                          const std::string& to) {
+    std::string wanted = text;
+    wanted.replace(wanted.find(from), from.size(), to);
+    const auto edited = replace_parameter(text, line, name, value);
+    ASSERT_TRUE(edited) << edited.error().message();
+    EXPECT_EQ(*edited, wanted);
+  };
+  expect(3, "density_dps_rthz", 2.13e-4, "2.0e-4", "0.000213");
+  expect(8, "coefficient_dps_k", -0.5, "1e-3", "-0.5");
+  expect(12, "sigma_dps", 1e-7, "3e-4", "1e-07");
+  expect(12, "tau_s", 250.0, "1_00", "250");
+  expect(8, "reference_c", 20.0, "[[effect]]\nkind", "[[effect]]\nreference_c = 20\nkind");
+}
+
+TEST(ModelEdit, ChangesANumberBehindLettersOfSeveralBytes) {
+  const std::string text =
+      "format = 1\neffect = [{gyro=1,\"kind\"=\"bias\",value_dps=1.5} # ö\n]\n";
+  const auto edited = replace_parameter(text, 2, "value_dps", 2.5);
+  ASSERT_TRUE(edited) << edited.error().message();
+  EXPECT_EQ(*edited, "format = 1\neffect = [{gyro=1,\"kind\"=\"bias\",value_dps=2.5} # ö\n]\n");
+}
+
+TEST(ModelEdit, ChangesNothingThatIsNotThere) {
+  const auto refusal = [](const Expected<std::string>& result) {
+    return result ? std::string("done") : result.error().message();
+  };
+  EXPECT_NE(refusal(replace_parameter(kThree, 4, "tau_s", 1.0)).find(":4: no effect begins here"),
+            std::string::npos);
+  EXPECT_NE(refusal(replace_parameter(kThree, 3, "tau_s", 1.0)).find("has no parameter tau_s"),
+            std::string::npos);
+  EXPECT_NE(refusal(replace_parameter(kThree, 12, "tau_s", -1.0)).find("above 0"),
+            std::string::npos);
+  const char* two =
+      "format = 1\neffect = [{gyro=1,kind=\"bias\",value_dps=1}, "
+      "{gyro=2,kind=\"bias\",value_dps=1}]\n";
+  EXPECT_NE(refusal(replace_parameter(two, 2, "value_dps", 3.0)).find("several effects"),
+            std::string::npos);
+}
+
+}  // namespace
+}  // namespace vgyro::model
