@@ -1,0 +1,45 @@
+#pragma once
+
+// One gyro, sample by sample: what it reads of the rate that reaches its sensing element,
+//   frozen(rounded(dead band(clipped(rate + responses + offsets + noise + spikes)))).
+// Delay and low-pass come before it (readings.h), lost frames and wrong stamps after it
+// (simulator.h).
+
+#include <span>
+#include <vector>
+
+#include "model/effect.h"
+#include "simulation/noise_source.h"
+
+namespace vgyro::simulation {
+
+class GyroChain {
+ public:
+  /// `effects` of one gyro, of any kind. `interval_s` is the usual time between samples: of a
+  /// density it makes a variance of samples.
+  GyroChain(std::span<const model::Effect> effects, double interval_s, std::uint64_t seed);
+
+  /// Precondition: surroundings.t_s grows.
+  double next(double sensed_dps, const model::Surroundings& surroundings);
+
+ private:
+  /// A random effect, its stream, and where its walk stands.
+  struct Random {
+    model::Effect effect;
+    NoiseSource source;
+    double state_dps = 0.0;
+  };
+  double noise_dps(Random& random, double sensed_dps, double since_s);
+  double clip(double reading_dps) const;
+
+  std::vector<model::Effect> added_;
+  std::vector<model::Effect> clips_;  ///< in the order in which they act
+  std::vector<model::Effect> stuck_;
+  std::vector<Random> randoms_;
+  double interval_s_;
+  bool begun_ = false;
+  double last_s_ = 0.0;
+  double last_reading_dps_ = 0.0;
+};
+
+}  // namespace vgyro::simulation

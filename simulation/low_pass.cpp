@@ -1,0 +1,82 @@
+#include "simulation/low_pass.h"
+
+#include <algorithm>
+#include <array>
+#include <cassert>
+#include <cmath>
+#include <numbers>
+
+namespace vgyro::simulation {
+
+namespace {
+
+// Equal stages are moved apart by this, for the partial fractions' sake.
+constexpr double kApart = 1e-3;
+// What lies further back has decayed to nothing in double precision.
+constexpr double kMemory = 40.0;
+
+struct Node {
+  double x;  ///< in [-1, 1]
+  double weight;
+};
+// Gauss and Legendre, eight points: exact for polynomials of degree 15.
+constexpr std::array<Node, 4> kHalfRule{{{0.1834346424956498, 0.3626837833783620},
+                                         {0.5255324099163290, 0.3137066458778873},
+                                         {0.7966664774136267, 0.2223810344533745},
+                                         {0.9602898564975363, 0.1012285362903763}}};
+
+}  // namespace
+
+// A cascade is a weighted sum of its stages side by side.
+LowPass::LowPass(const Curve& input, std::span<const double> cutoffs_hz) : input_(&input) {
+  assert(cutoffs_hz.size() <= kStagesMax);
+  std::vector<double> rates;
+  for (const double cutoff_hz : cutoffs_hz)
+    rates.push_back(2.0 * std::numbers::pi * cutoff_hz);
+  std::sort(rates.begin(), rates.end());
+  for (std::size_t i = 1; i < rates.size(); ++i)
+    rates[i] = std::max(rates[i], rates[i - 1] * (1.0 + kApart));
+  if (!input.times_s().empty()) at_s_ = input.times_s().front();
+  for (const double rate : rates) {
+    double weight = 1.0;
+    for (const double other : rates)
+      weight *= other == rate ? 1.0 : other / (other - rate);
+    stages_.push_back({rate, weight, input.value(at_s_)});
+  }
+}
+
+// The input is smooth between two points of the curve.
+void LowPass::advance(Stage& stage, double from_s, double to_s) const {
+  const double begin_s = std::max(from_s, to_s - kMemory / stage.rate_rad_s);
+  const auto times_s = input_->times_s();
+  auto next = std::upper_bound(times_s.begin(), times_s.end(), begin_s);
+  for (double t_s = begin_s; t_s < to_s;) {
+    double end_s = std::min(to_s, t_s + 1.0 / stage.rate_rad_s);
+    if (next != times_s.end() && *next <= end_s) end_s = *next++;
+    const double half_s = 0.5 * (end_s - t_s);
+    const double middle_s = t_s + half_s;
+    double sum = 0.0;
+    for (const Node& node : kHalfRule) {
+      for (const double x : {-node.x, node.x}) {
+        sum += node.weight * std::exp(-stage.rate_rad_s * half_s * (1.0 - x)) *
+               input_->value(middle_s + half_s * x);
+      }
+    }
+    stage.output =
+        stage.output * std::exp(-2.0 * stage.rate_rad_s * half_s) + stage.rate_rad_s * half_s * sum;
+    t_s = end_s;
+  }
+}
+
+double LowPass::at(double t_s) {
+  if (stages_.empty()) return input_->value(t_s);
+  double value = 0.0;
+  for (Stage& stage : stages_) {
+    if (t_s > at_s_) advance(stage, at_s_, t_s);
+    value += stage.weight * stage.output;
+  }
+  at_s_ = std::max(at_s_, t_s);
+  return value;
+}
+
+}  // namespace vgyro::simulation

@@ -1,0 +1,34 @@
+#pragma once
+
+// A motion as a table: time, true rate, and, where they are known, temperature and acceleration.
+// Its text is CSV with a header line; docs/simulate.md describes it.
+
+#include <array>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "base/error.h"
+#include "simulation/curve.h"
+
+namespace vgyro::simulation {
+
+/// Rows; a longer profile is refused.
+inline constexpr std::size_t kProfileRowsMax = 2'000'000;
+
+/// Seconds count from the first row.
+struct Profile {
+  std::string file;
+  double length_s = 0.0;
+  Curve rate_dps;
+  std::optional<Curve> temperature_c;
+  std::array<std::optional<Curve>, 3> acceleration_g;
+
+  [[nodiscard]] bool has_acceleration() const;
+};
+
+Expected<Profile> load_profile(const std::string& path);
+/// `file` names the text in complaints.
+Expected<Profile> parse_profile(std::string_view text, const std::string& file);
+
+}  // namespace vgyro::simulation

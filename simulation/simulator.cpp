@@ -1,0 +1,253 @@
+#include "simulation/simulator.h"
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <numbers>
+
+#include <fmt/core.h>
+
+#include "model/catalogue.h"
+#include "simulation/gyro_chain.h"
+#include "simulation/low_pass.h"
+#include "simulation/noise_source.h"
+#include "simulation/readings.h"
+
+namespace vgyro::simulation {
+
+namespace {
+
+using model::Effect;
+using model::Kind;
+
+constexpr double kRadPerDeg = std::numbers::pi / 180.0;
+constexpr double kVibrationWindow_s = 1.0;
+// A bus keeps the order of a sender's frames; a log tells them apart by a microsecond.
+constexpr double kStampStep_s = 1e-6;
+// Streams of random numbers beside those of the kinds.
+constexpr auto kJitterOfAll = static_cast<std::uint32_t>(model::kKindCount);
+constexpr std::uint32_t kReferenceStream = 2;
+constexpr std::uint32_t kAccelerometerStream = 3;
+
+// A sample at the very end of the motion still belongs to it.
+std::size_t sample_count(const Timing& timing, double length_s) {
+  const double intervals = (length_s - timing.offset_s) * timing.rate_hz;
+  return intervals < 0.0 ? 0 : static_cast<std::size_t>(std::floor(intervals + 1e-6)) + 1;
+}
+
+double sample_time_s(const Timing& timing, std::size_t n) {
+  return timing.offset_s + static_cast<double>(n) / timing.rate_hz;
+}
+
+// When the log says that a frame came: the sender's clock, then what held it up.
+class Stamps {
+ public:
+  Stamps(std::span<const Effect> effects, const Settings& settings, std::uint32_t stream)
+      : jitters_{{settings.jitter_s, NoiseSource(settings.seed, stream, kJitterOfAll, 0)}} {
+    for (const Effect& effect : effects) {
+      if (effect.kind == Kind::kClockSkew) pace_ += effect.parameters[0] * 1e-6;
+      if (effect.kind != Kind::kTimestampJitter) continue;
+      const auto ordinal = static_cast<std::uint32_t>(jitters_.size());
+      const auto kind = static_cast<std::uint32_t>(effect.kind);
+      jitters_.push_back({effect.parameters[0], NoiseSource(settings.seed, stream, kind, ordinal)});
+    }
+  }
+
+  double next(double t_s) {
+    double stamp_s = t_s * pace_;
+    for (Jitter& jitter : jitters_)
+      stamp_s += std::abs(jitter.sigma_s * jitter.source.normal());
+    last_s_ = std::max(stamp_s, last_s_ + kStampStep_s);
+    return last_s_;
+  }
+
+ private:
+  struct Jitter {
+    double sigma_s;
+    NoiseSource source;
+  };
+  std::vector<Jitter> jitters_;
+  double pace_ = 1.0;
+  double last_s_ = -1.0;
+};
+
+// Each dropped_frames loses its own share.
+class Losses {
+ public:
+  Losses(std::span<const Effect> effects, std::uint64_t seed) {
+    for (const Effect& effect : effects) {
+      if (effect.kind != Kind::kDroppedFrames) continue;
+      losses_.push_back(
+          {effect.parameters[0], NoiseSource(seed, static_cast<std::uint32_t>(effect.gyro),
+                                             static_cast<std::uint32_t>(effect.kind),
+                                             static_cast<std::uint32_t>(losses_.size()))});
+    }
+  }
+
+  bool next() {
+    bool lost = false;
+    for (Loss& loss : losses_)
+      lost = loss.source.uniform() < loss.fraction || lost;
+    return lost;
+  }
+
+ private:
+  struct Loss {
+    double fraction;
+    NoiseSource source;
+  };
+  std::vector<Loss> losses_;
+};
+
+std::vector<Effect> effects_of(const model::Model& model, std::size_t gyro) {
+  std::vector<Effect> effects;
+  std::copy_if(model.effects.begin(), model.effects.end(), std::back_inserter(effects),
+               [&](const Effect& effect) { return effect.gyro == gyro; });
+  return effects;
+}
+
+// Nothing where it is there.
+std::string missing_column(const Effect& effect, const Profile& profile) {
+  const std::uint8_t needs = model::info(effect.kind).needs;
+  if ((needs & model::kNeedsTemperature) != 0 && !profile.temperature_c) return "temperature_c";
+  if ((needs & model::kNeedsAcceleration) == 0) return {};
+  if (effect.kind != Kind::kGSensitivity)
+    return profile.has_acceleration() ? "" : "acc_x_g, acc_y_g, acc_z_g";
+  const auto axis = static_cast<std::size_t>(effect.parameters[0]);
+  return profile.acceleration_g[axis] ? "" : fmt::format("acc_{}_g", "xyz"[axis]);
+}
+
+Expected<void> check_columns(const model::Model& model, const Profile& profile) {
+  for (const Effect& effect : model.effects) {
+    const std::string column = missing_column(effect, profile);
+    if (column.empty()) continue;
+    return fail(
+        at_line(model.file, effect.line),
+        fmt::format("{} needs what {} does not tell", model::info(effect.kind).name, profile.file),
+        "a profile with the column " + column);
+  }
+  return {};
+}
+
+}  // namespace
+
+Expected<Simulator> Simulator::make(model::Model model, Profile profile, const Settings& settings) {
+  if (const auto good = check_columns(model, profile); !good) return tl::unexpected(good.error());
+  for (std::size_t gyro = 0; gyro < 2; ++gyro) {
+    const auto lags = lags_of(effects_of(model, gyro));
+    if (!lags) return fail(model.file, lags.error().what, lags.error().remedy);
+  }
+  for (const Timing& timing :
+       {settings.gyros[0], settings.gyros[1], settings.reference, settings.accelerometer}) {
+    assert(timing.rate_hz > 0.0 && timing.offset_s >= 0.0);
+    if (profile.length_s * timing.rate_hz <= kSamplesMax) continue;
+    return fail(profile.file,
+                fmt::format("{:g} s at {:g} Hz are more samples than are simulated at once",
+                            profile.length_s, timing.rate_hz),
+                fmt::format("at most {:g}", kSamplesMax));
+  }
+  Simulator simulator(std::move(model), std::move(profile), settings);
+  simulator.measure_vibration();
+  return simulator;
+}
+
+Simulator::Simulator(model::Model model, Profile profile, const Settings& settings)
+    : model_(std::move(model)), profile_(std::move(profile)), settings_(settings) {}
+
+std::array<double, 3> Simulator::acceleration_at(double t_s) const {
+  std::array<double, 3> acceleration_g{};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const auto& curve = profile_.acceleration_g[axis];
+    if (curve) acceleration_g[axis] = curve->value(t_s);
+  }
+  return acceleration_g;
+}
+
+// As the gateway sees it: the variance of the accelerometer's samples in the second that ends with
+// the newest. Sums begin at a middling value and so keep their digits.
+void Simulator::measure_vibration() {
+  if (!profile_.has_acceleration()) return;
+  const Timing& timing = settings_.accelerometer;
+  const std::size_t count = sample_count(timing, profile_.length_s);
+  const auto window =
+      static_cast<std::size_t>(std::max(1.0, std::round(kVibrationWindow_s * timing.rate_hz)));
+  std::vector<double> sums(count + 1, 0.0);
+  std::vector<double> squares(count + 1, 0.0);
+  double pivot_g = 0.0;
+  for (std::size_t n = 0; n < count; ++n) {
+    const auto a = acceleration_at(sample_time_s(timing, n));
+    const double size_g = std::hypot(a[0], a[1], a[2]);
+    if (n == 0) pivot_g = size_g;
+    sums[n + 1] = sums[n] + (size_g - pivot_g);
+    squares[n + 1] = squares[n] + (size_g - pivot_g) * (size_g - pivot_g);
+  }
+  for (std::size_t n = 1; n <= count; ++n) {
+    const std::size_t first = n > window ? n - window : 0;
+    const auto size = static_cast<double>(n - first);
+    const double mean = (sums[n] - sums[first]) / size;
+    vibration_g2_.push_back(std::max(0.0, (squares[n] - squares[first]) / size - mean * mean));
+  }
+}
+
+double Simulator::temperature_c(double t_s) const {
+  return profile_.temperature_c ? profile_.temperature_c->value(t_s) : kTemperature_c;
+}
+
+model::Surroundings Simulator::surroundings(double t_s) const {
+  model::Surroundings s{.t_s = t_s, .angle_rad = profile_.rate_dps.integral(t_s) * kRadPerDeg};
+  if (profile_.temperature_c) {
+    s.temperature_c = profile_.temperature_c->value(t_s);
+    s.temperature_slope_c_s = profile_.temperature_c->slope(t_s);
+  }
+  if (!profile_.has_acceleration()) return s;
+  s.acceleration_g = acceleration_at(t_s);
+  const Timing& timing = settings_.accelerometer;
+  const double sample = std::floor((t_s - timing.offset_s) * timing.rate_hz + 1e-6);
+  s.vibration_g2 =
+      sample < 0.0 || vibration_g2_.empty()
+          ? 0.0
+          : vibration_g2_[std::min(static_cast<std::size_t>(sample), vibration_g2_.size() - 1)];
+  return s;
+}
+
+std::vector<GyroSample> Simulator::gyro(std::size_t index) const {
+  const std::vector<Effect> effects = effects_of(model_, index);
+  const Timing& timing = settings_.gyros[index];
+  const Lags lags = lags_of(effects).value();
+  LowPass low_pass(profile_.rate_dps, lags.cutoffs_hz);
+  GyroChain chain(effects, 1.0 / timing.rate_hz, settings_.seed);
+  Stamps stamps(effects, settings_, static_cast<std::uint32_t>(index));
+  Losses losses(effects, settings_.seed);
+  std::vector<GyroSample> samples(sample_count(timing, profile_.length_s));
+  for (std::size_t n = 0; n < samples.size(); ++n) {
+    const double t_s = sample_time_s(timing, n);
+    const double sensed_dps = low_pass.at(t_s - lags.delay_s);
+    samples[n] = {.t_s = t_s,
+                  .stamp_s = stamps.next(t_s),
+                  .reading_dps = chain.next(sensed_dps, surroundings(t_s)),
+                  .lost = losses.next()};
+  }
+  return samples;
+}
+
+std::vector<RateSample> Simulator::reference() const {
+  Stamps stamps({}, settings_, kReferenceStream);
+  std::vector<RateSample> samples(sample_count(settings_.reference, profile_.length_s));
+  for (std::size_t n = 0; n < samples.size(); ++n) {
+    const double t_s = sample_time_s(settings_.reference, n);
+    samples[n] = {stamps.next(t_s), profile_.rate_dps.value(t_s)};
+  }
+  return samples;
+}
+
+std::vector<AccelerationSample> Simulator::acceleration() const {
+  Stamps stamps({}, settings_, kAccelerometerStream);
+  std::vector<AccelerationSample> samples(sample_count(settings_.accelerometer, profile_.length_s));
+  for (std::size_t n = 0; n < samples.size(); ++n) {
+    const double t_s = sample_time_s(settings_.accelerometer, n);
+    samples[n] = {stamps.next(t_s), acceleration_at(t_s)};
+  }
+  return samples;
+}
+
+}  // namespace vgyro::simulation
