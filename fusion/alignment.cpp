@@ -107,7 +107,7 @@ void Aligner::choose_pace() {
   if (std::min(rings_[0].back().t, rings_[1].back().t) < until) return;
   for (std::size_t gyro = 0; gyro < 2; ++gyro) {
     const Ring& ring = rings_[gyro];
-    interval_[gyro] = ring.usual_interval(until);
+    interval_[gyro] = std::min(ring.usual_interval(until), kIntervalMax);
     gap_[gyro] = from_seconds(to_seconds(interval_[gyro]) * kGapIntervals);
     const std::size_t last = ring.count_until(until) - 1;
     const TimePoint reached = ring[ring[last].t == until ? last : last + 1].t;

@@ -36,6 +36,8 @@ class Aligner {
   /// it.
   static constexpr double kGapIntervals = 4.0;
   static constexpr double kAverageRatio = 1.5;
+  /// Longer, it is no interval: the clock was set among the samples judged.
+  static constexpr Duration kIntervalMax = std::chrono::hours(1);
 
   /// `lag`: a sample stamped t is of the rate at t − lag.
   explicit Aligner(std::array<Duration, 2> lag = {}) : lag_(lag) {}

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -18,6 +19,8 @@ namespace vgyro::fusion {
 namespace {
 
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+// A count beyond this tells no more, and a double beyond 64 bits none at all.
+constexpr double kSkippedMost = 1e15;
 
 class MutualCorrector final : public Corrector {
  public:
@@ -75,7 +78,7 @@ class MutualCorrector final : public Corrector {
     }
     // After a gap of any length the windows stay on their grid.
     const double behind = std::floor((t_s - window_end_s_) / window_s_);
-    counts_.skipped += static_cast<std::uint64_t>(behind);
+    counts_.skipped += static_cast<std::uint64_t>(std::min(behind, kSkippedMost));
     open_window(window_end_s_ + behind * window_s_);
   }
 

@@ -84,7 +84,7 @@ bool Surroundings::receive_speed(const can::Frame& frame, TimePoint raw,
 }
 
 void Surroundings::add_rate(TimePoint t, double rate_dps) {
-  if (!std::isfinite(rate_dps) || t <= angle_at_) return;
+  if (!std::isfinite(rate_dps) || t <= angle_at_ || t - newest_ > kLeap) return;
   const double turned_deg = 0.5 * (rate_dps_ + rate_dps) * to_seconds(t - angle_at_);
   angle_rad_ = std::remainder(angle_rad_ + turned_deg * kRadPerDeg, kTurn_rad);
   angle_at_ = t;

@@ -45,7 +45,8 @@ class Surroundings {
   /// False when the frame cannot be used.
   bool receive_acceleration(const can::Frame& frame, TimePoint raw, fusion::StampGuard& guard);
   bool receive_speed(const can::Frame& frame, TimePoint raw, fusion::StampGuard& guard);
-  /// The true rate, as well as it is known; times may come out of order.
+  /// The true rate, as well as it is known; times may come out of order. A leap ahead of the gyros
+  /// is passed over: only they move time.
   void add_rate(TimePoint t, double rate_dps);
 
   [[nodiscard]] model::Surroundings at(std::size_t gyro, TimePoint t) const;

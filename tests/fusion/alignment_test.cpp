@@ -430,6 +430,24 @@ TEST(Aligner, ChoosesRightlyWhenTheFirstGyroWasAwayAtTheStart) {
   expect_on_lines(result);
 }
 
+// Clocks that are set again and again, up to the end of time: intervals of decades are no
+// intervals.
+TEST(Aligner, TakesNoLeapOfTheClockForAnInterval) {
+  constexpr Duration kLeap{1'120'000'000'000'000'000};
+  Aligner aligner;
+  for (int i = 0; i <= 8; ++i) {
+    aligner.push(0, time_from_ns(0) + i * kLeap, 1.0);
+    aligner.push(1, time_from_ns(0) + i * kLeap, 1.0);
+    aligner.push(1, time_from_ns(0) + i * kLeap + (i < 8 ? kLeap : Duration{1}) / 2, 1.0);
+  }
+  AlignedPair pair;
+  while (aligner.pop(pair)) {
+  }
+  ASSERT_TRUE(aligner.chosen());
+  for (const std::size_t gyro : {0U, 1U})
+    EXPECT_LE(aligner.interval(gyro), Aligner::kIntervalMax);
+}
+
 // Latency is bounded and is what `complete` says: one interval of the other gyro when
 // interpolating, half an interval of the pace more when averaging.
 TEST(Aligner, CompletesEveryPairWithinItsLatencyBound) {

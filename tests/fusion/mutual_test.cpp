@@ -298,6 +298,14 @@ TEST(MutualCorrector, SkipsTheWindowsOfAGapAndKeepsTheGrid) {
   EXPECT_EQ(corrector->windows().completed, 2U);
 }
 
+// More windows than any integer counts.
+TEST(MutualCorrector, PassesOverASilenceInWindowsOfNoLength) {
+  const auto corrector = started(1, 1e-30, calibration_of(constant(0.5), constant(0.25)));
+  corrector->update({kStart_s, {1.0, 1.0}});
+  EXPECT_EQ(corrector->update({kStart_s + 1e9, {1.0, 1.0}}).rate_dps, 0.75);
+  EXPECT_GE(static_cast<double>(corrector->windows().skipped), 1e15);
+}
+
 // A bus that was silent for thirty years in windows of a millisecond: the next pair costs no more
 // than any other. A loop over the windows would run for hours here.
 TEST(MutualCorrector, PassesOverASilenceOfAnyLengthInOneStep) {

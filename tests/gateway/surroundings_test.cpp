@@ -168,6 +168,23 @@ TEST_F(SurroundingsTest, DoNotCountALeapOfTheClock) {
   EXPECT_DOUBLE_EQ(surroundings_.at(0, set_right + ms(1000)).t_s, 61.0);
 }
 
+// Frames of a reference are not samples: garbage among their stamps moves nothing, and where the
+// clock really was set they wait for the gyros.
+TEST_F(SurroundingsTest, PassOverRatesThatLeapAheadOfTheGyros) {
+  const TimePoint leap = at_ms(0) + std::chrono::hours(24 * 365 * 160);
+  surroundings_.begin(at_ms(0));
+  surroundings_.add_rate(leap, 10.0);
+  surroundings_.reach(at_ms(1000));
+  surroundings_.add_rate(at_ms(1000), 10.0);
+  // From the calibration's rate, here 0, to 10 deg/s.
+  EXPECT_NEAR(surroundings_.at(0, at_ms(1000)).angle_rad, 5.0 * std::numbers::pi / 180.0, 1e-12);
+  surroundings_.reach(leap);
+  surroundings_.add_rate(leap + ms(1000), 10.0);
+  const model::Surroundings after = surroundings_.at(0, leap + ms(1000));
+  EXPECT_DOUBLE_EQ(after.t_s, 2.0);
+  EXPECT_NEAR(after.angle_rad, 15.0 * std::numbers::pi / 180.0, 1e-12);
+}
+
 class Quiet final : public FrameSink {
  public:
   void put(const can::Frame& /*frame*/, TimePoint /*stamp*/) override {}
