@@ -1,0 +1,144 @@
+"""What hides in a recording: a group, a seed and what the group needs give one case, always the same.
+
+Groups: clean, single, pair, triple, outside, decoy. Development seeds are below 1000, evaluation seeds
+from 1000 on."""
+
+import dataclasses
+
+import numpy as np
+
+import effects as kinds
+import motion
+import strangers
+import surroundings
+from world import Gyro, World
+
+# Two of one set in one recording hide each other; who injects both asks for the impossible.
+RIVALS = [
+    {"saturation", "dead_band", "quantization", "stuck"},
+    {"delay", "bandwidth", "clock_skew", "timestamp_jitter"},
+]
+DECOYS = ["shuffled", "reversed", "flat", "common"]
+
+
+@dataclasses.dataclass(frozen=True)
+class Case:
+    group: str
+    seed: int
+    kind: str = ""  # of a single; what an outside or a decoy is
+    strength: float | None = None  # wanted |t|; None: as a bench meets it
+    reference: bool = True
+    short: bool = False  # 240 s and 100 Hz, for tests
+
+    @property
+    def name(self):
+        size = "plain" if self.strength is None else f"t{self.strength:g}"
+        parts = [
+            self.group,
+            self.kind,
+            "" if self.group == "clean" else size,
+            "" if self.reference else "noref",
+        ]
+        return "-".join([part for part in parts if part] + [str(self.seed)])
+
+
+def world_for(case, rng, motion_rng):
+    """The gyros come from `rng`, alike for both recordings of a case; all else from `motion_rng`."""
+    strong = case.group == "clean" and rng.random() < 0.5
+    markov = strong and rng.random() < 0.5
+    gyros = []
+    quiet = rng.uniform(1e-4, 4e-4), rng.uniform(2e-6, 8e-6)
+    loud = rng.uniform(3e-4, 1e-3), rng.uniform(4e-6, 1.5e-5)
+    for density, walk in (quiet, loud):
+        gyros.append(
+            Gyro(
+                bias=round(float(rng.uniform(0.01, 0.05) * rng.choice([-1, 1])), 4),
+                density=float(f"{density:.2g}"),
+                walk=float(f"{walk * (15.0 if strong and not markov else 1.0):.2g}"),
+                markov_sigma=float(f"{rng.uniform(2e-4, 1e-3):.2g}") if markov else 0.0,
+                markov_tau=float(round(rng.uniform(20.0, 100.0))),
+            )
+        )
+    rates = [100.0, 100.0]
+    if not case.short and rng.random() < 0.25:
+        rates = [[100.0, 50.0], [200.0, 100.0], [125.0, 100.0], [50.0, 100.0]][rng.integers(4)]
+    duration_s = 240.0 if case.short else float(rng.choice([240, 300, 420, 480, 480, 600]))
+    offset_s = round(float(rng.uniform(0.0005, 0.0045)), 4)
+    shaken = case.kind == "vibration_rectification" or rng.random() < 0.3
+    rest_s = 45.0 if duration_s < 300 else 62.0
+    swing_k = motion_rng.uniform(6.0, 16.0)
+    return World(
+        motion=motion.Motion(duration_s, rest_s, motion_rng),
+        temperatures=[
+            surroundings.Temperature(duration_s, motion_rng, swing_k * motion_rng.uniform(0.6, 1.0))
+            for _ in range(2)
+        ],
+        acceleration=surroundings.Acceleration(duration_s, motion_rng, shaken),
+        gyros=gyros,
+        rates_hz=rates,
+        offset_s=offset_s,
+        reference=case.reference,
+    )
+
+
+def _chosen_kinds(case, rng):
+    if case.group == "single":
+        return [case.kind]
+    count = {"pair": 2, "triple": 3}.get(case.group, 0)
+    while True:
+        chosen = [str(k) for k in rng.choice(kinds.KINDS, count, replace=False)]
+        if all(len(group & set(chosen)) < 2 for group in RIVALS):
+            return chosen
+
+
+def shake(world, rng):
+    """Gives the platform the vibration without which its effect would be nothing."""
+    world.acceleration = surroundings.Acceleration(world.motion.duration_s, rng, vibration=True)
+
+
+def hidden_in(case, world, rng):
+    """(effects of the catalogue, functions outside it, name and gyro of what is outside)."""
+    found, odd, label = [], [], None
+    chosen = _chosen_kinds(case, rng)
+    gyro = int(rng.integers(1, 3))
+    for kind in chosen:
+        if kind == "vibration_rectification":
+            shake(world, rng)
+        found.append(kinds.draw(kind, gyro, case.strength, world, rng))
+        gyro = int(rng.integers(1, 3))
+    if case.group == "outside":
+        sigma, _ = world.noise_seen(gyro)
+        size = sigma * rng.uniform(0.6, 1.5)
+        odd, label = [strangers.MAKERS[case.kind](gyro, size, rng)], {"name": case.kind, "gyro": gyro}
+    if case.group == "decoy" and case.kind == "common":
+        error = float(f"{rng.uniform(5e-4, 2e-3):.3g}")
+        found = [
+            {"kind": "scale_factor", "gyro": k, "parameters": {"error": error}, "t": 0.0} for k in (1, 2)
+        ]
+    if case.group == "decoy" and case.kind == "flat":
+        hidden = kinds.draw("temperature_bias", gyro, None, world, rng)
+        p, drift = hidden["parameters"], world.temperatures[gyro - 1]
+
+        def add(_, which, t, __):
+            on = p["coefficient_dps_k"] * (drift.value(t) - p["reference_c"])
+            return on if which == gyro else np.zeros(len(t))
+
+        odd, label = [add], {"name": "hidden temperature", "gyro": gyro}
+    return found, odd, label
+
+
+def recorded_temperatures(case, world, rng):
+    """What the temperature signals say; a decoy's have nothing to do with the gyros."""
+    end_s = world.motion.duration_s
+    if case.group == "decoy" and case.kind == "flat":
+        return [surroundings.Flat(26.0).value] * 2
+    if case.group == "decoy" and case.kind == "reversed":
+        return [lambda t, T=T: T.value(end_s - t) for T in world.temperatures]
+    if case.group == "decoy" and case.kind == "shuffled":
+        order, part_s = rng.permutation(8), end_s / 8
+
+        def moved(t):
+            return order[np.minimum((t / part_s).astype(int), 7)] * part_s + t % part_s
+
+        return [lambda t, T=T: T.value(moved(t)) for T in world.temperatures]
+    return [T.value for T in world.temperatures]

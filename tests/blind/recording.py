@@ -1,0 +1,127 @@
+"""A world as files: vgyro.toml, bench.dbc, model.toml and candump logs."""
+
+import lzma
+import sys
+from pathlib import Path
+
+import numpy as np
+
+sys.path.append(str(Path(__file__).resolve().parents[1] / "twin"))
+import canlog  # noqa: E402
+
+import motion  # noqa: E402
+import world as truth  # noqa: E402
+
+START_US = 1_700_000_000_000_000
+LEFT_ID, RIGHT_ID, TABLE_ID, CUBE_ID = 0x121, 0x122, 0x1A0, 0x1B0
+RATE_STEP_DPS, TEMPERATURE_STEP_C, ACCELERATION_STEP_G = 1e-6, 0.01, 5e-4
+
+DBC = """\
+VERSION "blind"
+
+NS_ :
+
+BS_:
+
+BU_: STAND
+
+BO_ 289 LEFT_GYRO: 8 STAND
+ SG_ YawRate : 0|32@1- (1E-06,0) [-2000|2000] "deg/s" STAND
+ SG_ Celsius : 32|16@1- (0.01,0) [-60|150] "degC" STAND
+ SG_ Alive : 48|8@1+ (1,0) [0|255] "" STAND
+
+BO_ 290 RIGHT_GYRO: 8 STAND
+ SG_ YawRate : 7|32@0- (1E-06,0) [-2000|2000] "deg/s" STAND
+ SG_ Celsius : 39|16@0- (0.01,0) [-60|150] "degC" STAND
+ SG_ Alive : 48|8@1+ (1,0) [0|255] "" STAND
+
+BO_ 416 RATE_TABLE: 8 STAND
+ SG_ Speed : 0|32@1- (1E-06,0) [-2000|2000] "deg/s" STAND
+
+BO_ 432 CUBE: 8 STAND
+ SG_ Ax : 0|16@1- (0.0005,0) [-16|16] "g" STAND
+ SG_ Ay : 16|16@1- (0.0005,0) [-16|16] "g" STAND
+ SG_ Az : 32|16@1- (0.0005,0) [-16|16] "g" STAND
+"""
+
+
+def config_text(world):
+    gyro = '[[gyro]]\nname = "{0}"\nbus = "{1}"\ndbc = "bench.dbc"\nmessage = "{2}_GYRO"\nrate = "YawRate"\n'
+    gyro += 'temperature = "Celsius"\ncounter = "Alive"\n\n'
+    reference = '[reference]\nbus = "can0"\ndbc = "bench.dbc"\nmessage = "RATE_TABLE"\nrate = "Speed"\n\n'
+    return (
+        gyro.format("left", "can0", "LEFT")
+        + gyro.format("right", "can1", "RIGHT")
+        + (reference if world.reference else "")
+        + '[accelerometer]\nbus = "can0"\ndbc = "bench.dbc"\nmessage = "CUBE"\nx = "Ax"\ny = "Ay"\nz = "Az"\n\n'
+        + f"[calibration]\nrest_s = {world.motion.rest_s - 2.0:.1f}\nrate_dps = {motion.EARTH_DPS}\n\n"
+        + '[corrector]\nmethod = "optimal"\nwindow_s = 10.0\norder = 1\n\n[output]\nbus = "can0"\n'
+    )
+
+
+def effect_text(gyro, kind, parameters):
+    quoted = lambda v: f'"{v}"' if isinstance(v, str) else repr(v)
+    lines = "".join(f"{name} = {quoted(value)}\n" for name, value in parameters.items())
+    return f'\n[[effect]]\ngyro = {gyro}\nkind = "{kind}"\n{lines}'
+
+
+def model_text(world):
+    """The model before: what the gyros were known to be."""
+    text = "format = 1\n"
+    for number, g in enumerate(world.gyros, 1):
+        text += effect_text(number, "bias", {"value_dps": g.bias})
+        text += effect_text(number, "white_noise", {"density_dps_rthz": g.density})
+        text += effect_text(number, "rate_random_walk", {"density_dps_rts": g.walk})
+        if g.markov_sigma > 0:
+            text += effect_text(number, "gauss_markov", {"sigma_dps": g.markov_sigma, "tau_s": g.markov_tau})
+    return text
+
+
+def _integers(values, step, kind):
+    limits = np.iinfo(np.dtype(kind))
+    return np.clip(np.round(values / step), limits.min, limits.max).astype(kind)
+
+
+def _payloads(*columns):
+    """Eight bytes a frame out of integer columns in their own byte order."""
+    count = len(columns[0])
+    whole = np.zeros((count, 8), dtype=np.uint8)
+    used = 0
+    for column in columns:
+        width = column.dtype.itemsize
+        whole[:, used : used + width] = column.view(np.uint8).reshape(count, width)
+        used += width
+    return whole
+
+
+def _stream(bus, can_id, seconds, payloads):
+    return canlog.Stream(bus, can_id, START_US + np.round(seconds * 1e6).astype(np.int64), payloads)
+
+
+def streams(world, effects, strangers, recorded_temperatures, rng):
+    out = []
+    for gyro, can_id, order in ((1, LEFT_ID, "<"), (2, RIGHT_ID, ">")):
+        t, stamps, counter, rate = truth.reading(world, gyro, effects, strangers, rng)
+        payloads = _payloads(
+            _integers(rate, RATE_STEP_DPS, order + "i4"),
+            _integers(recorded_temperatures[gyro - 1](t), TEMPERATURE_STEP_C, order + "i2"),
+            (counter % 256).astype(np.uint8),
+        )
+        out.append(_stream(f"can{gyro - 1}", can_id, stamps, payloads))
+    if world.reference:
+        t = np.arange(int(world.motion.duration_s * truth.REFERENCE_HZ)) / truth.REFERENCE_HZ
+        rate = world.motion.rate(t) + rng.standard_normal(len(t)) * truth.REFERENCE_SIGMA_DPS
+        out.append(_stream("can0", TABLE_ID, t, _payloads(_integers(rate, RATE_STEP_DPS, "<i4"))))
+    t = (
+        2e-4
+        + np.arange(int((world.motion.duration_s - 0.01) * truth.ACCELEROMETER_HZ)) / truth.ACCELEROMETER_HZ
+    )
+    a = world.acceleration.value(t) + rng.standard_normal((len(t), 3)) * truth.ACCELEROMETER_SIGMA_G
+    axes = [np.ascontiguousarray(_integers(a[:, i], ACCELERATION_STEP_G, "<i2")) for i in range(3)]
+    out.append(_stream("can0", CUBE_ID, t, _payloads(*axes)))
+    return out
+
+
+def write_log(path, recorded):
+    with lzma.open(path, "wb", preset=1) as file:
+        canlog.write(file, recorded)

@@ -1,0 +1,57 @@
+"""Runs `vgyro gap` and `vgyro compare` on a case and reads what they wrote."""
+
+import json
+import os
+import subprocess
+import time
+from pathlib import Path
+
+SOURCE = Path(os.environ.get("VGYRO_SOURCE", Path(__file__).resolve().parents[2]))
+VGYRO = Path(os.environ.get("VGYRO_BIN", SOURCE / "build/release/bin")) / "vgyro"
+
+
+class Failed(Exception):
+    pass
+
+
+def _run(command):
+    """Seconds and peak memory in MB; Failed with its last words when it ends badly."""
+    begun = time.monotonic()
+    process = subprocess.Popen([str(c) for c in command], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
+    words = process.stderr.read()
+    _, status, usage = os.wait4(process.pid, 0)
+    process.returncode = os.waitstatus_to_exitcode(status)
+    if process.returncode != 0:
+        last = words.decode(errors="replace").strip().splitlines()[-3:]
+        raise Failed(f"exit {process.returncode}: {' / '.join(last)}")
+    return time.monotonic() - begun, usage.ru_maxrss / 1024.0
+
+
+def gap(folder, out, vgyro=VGYRO):
+    """(gap.json, seconds, MB) of the workflow on FOLDER's measured recording."""
+    folder = Path(folder)
+    cost = _run(
+        [vgyro, "gap", "--config", folder / "vgyro.toml", "--model", folder / "model.toml"]
+        + ["--measured", folder / "measured.log.xz", "--out", out]
+    )  # fmt: skip
+    return json.loads((Path(out) / "gap.json").read_text()), *cost
+
+
+def compare(folder, model, log, result, vgyro=VGYRO):
+    """`compare --json` of a model on one of FOLDER's recordings."""
+    folder = Path(folder)
+    _run(
+        [
+            vgyro,
+            "compare",
+            "--config",
+            folder / "vgyro.toml",
+            "--model",
+            model,
+            "--measured",
+            folder / log,
+            "--json",
+            result,
+        ]
+    )
+    return json.loads(Path(result).read_text())

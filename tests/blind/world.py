@@ -1,0 +1,133 @@
+"""Everything that is true in one recording before a frame is made of it, and what each gyro reads."""
+
+import dataclasses
+
+import numpy as np
+
+import effects as kinds
+import motion
+import surroundings
+
+REFERENCE_HZ, REFERENCE_SIGMA_DPS = 200.0, 2e-4
+ACCELEROMETER_HZ, ACCELEROMETER_SIGMA_G = 100.0, 2e-3
+
+
+@dataclasses.dataclass(frozen=True)
+class Gyro:
+    """What the model file knows of one gyro."""
+
+    bias: float
+    density: float  # deg/s/√Hz
+    walk: float  # deg/s/√s
+    markov_sigma: float = 0.0
+    markov_tau: float = 1.0
+
+
+@dataclasses.dataclass
+class World:
+    motion: motion.Motion
+    temperatures: list
+    acceleration: surroundings.Acceleration
+    gyros: list
+    rates_hz: list
+    offset_s: float  # of the second gyro's stamps
+    reference: bool
+
+    def times(self, gyro):
+        """True instants of a gyro's samples."""
+        rate_hz = self.rates_hz[gyro - 1]
+        first = self.offset_s if gyro == 2 else 0.0
+        return first + np.arange(int((self.motion.duration_s - 0.01) * rate_hz)) / rate_hz
+
+    def noise_seen(self, gyro):
+        """White noise a sample and random walk a step in which an effect of this gyro must be seen:
+        beside a reference its own, else both gyros'."""
+        seen = [self.gyros[gyro - 1]] if self.reference else self.gyros
+        rate_hz = self.rates_hz[gyro - 1]
+        return (
+            float(np.sqrt(sum(g.density**2 for g in seen) * rate_hz)),
+            float(np.sqrt(sum(g.walk**2 for g in seen) / rate_hz)),
+        )
+
+    def peak_dps(self):
+        t = np.arange(0, self.motion.duration_s, 0.02)
+        return float(np.abs(self.motion.rate(t)).max())
+
+
+def correlated(count, interval_s, sigma, tau_s, rng):
+    """First-order autoregression, exact at any interval."""
+    keep = np.exp(-interval_s / tau_s)
+    steps = rng.standard_normal(count) * sigma * np.sqrt(1 - keep**2)
+    value, out = rng.standard_normal() * sigma, []
+    for step in steps.tolist():
+        value = keep * value + step
+        out.append(value)
+    return np.array(out)
+
+
+def _noise(world, gyro, t, effects, rng):
+    g, rate_hz = world.gyros[gyro - 1], world.rates_hz[gyro - 1]
+    total = np.zeros(len(t))
+    for density in [g.density, *(e["density_dps_rthz"] for e in _of(effects, "white_noise"))]:
+        total += rng.standard_normal(len(t)) * density * np.sqrt(rate_hz)
+    for walk in [g.walk, *(e["density_dps_rts"] for e in _of(effects, "rate_random_walk"))]:
+        total += np.cumsum(rng.standard_normal(len(t))) * walk / np.sqrt(rate_hz)
+    markov = [(e["sigma_dps"], e["tau_s"]) for e in _of(effects, "gauss_markov")]
+    if g.markov_sigma > 0:
+        markov.append((g.markov_sigma, g.markov_tau))
+    for sigma, tau_s in markov:
+        total += correlated(len(t), 1.0 / rate_hz, sigma, tau_s, rng)
+    for e in _of(effects, "rate_noise"):
+        total += (
+            rng.standard_normal(len(t)) * e["ratio_rthz"] * np.abs(world.motion.rate(t)) * np.sqrt(rate_hz)
+        )
+    return total
+
+
+def _of(effects, kind):
+    return [e["parameters"] for e in effects if e["kind"] == kind]
+
+
+def reading(world, gyro, effects, strangers, rng):
+    """The stream of one gyro: stamps in seconds, counter, rate. `strangers` are functions
+    (world, gyro, t, rng) → deg/s outside the catalogue."""
+    effects = [e for e in effects if e["gyro"] == gyro]
+    t = world.times(gyro)
+    delay_s = sum(p["seconds"] for p in _of(effects, "delay"))
+    cutoffs = _of(effects, "bandwidth")
+    assert len(cutoffs) <= 1
+    y = (
+        world.motion.low_passed(t - delay_s, cutoffs[0]["cutoff_hz"])
+        if cutoffs
+        else world.motion.rate(t - delay_s)
+    )
+    y += world.gyros[gyro - 1].bias
+    for e in effects:
+        if e["kind"] in kinds.OFFSETS + kinds.RESPONSES:
+            p = e["parameters"]
+            y += p[kinds.SIZE[e["kind"]][0]] * kinds.shape(e["kind"], p, gyro, t, world)
+    y += _noise(world, gyro, t, effects, rng)
+    for stranger in strangers:
+        y += stranger(world, gyro, t, rng)
+    for p in _of(effects, "spikes"):
+        hit = rng.random(len(t)) < p["rate_hz"] / world.rates_hz[gyro - 1]
+        y[hit] += p["size_dps"] * rng.choice([-1.0, 1.0], hit.sum())
+    for p in _of(effects, "saturation"):
+        y = np.clip(y, -p["limit_dps"], p["limit_dps"])
+    for p in _of(effects, "dead_band"):
+        y[np.abs(y) < p["width_dps"]] = 0.0
+    for p in _of(effects, "quantization"):
+        y = np.round(y / p["step_dps"]) * p["step_dps"]
+    for p in _of(effects, "stuck"):
+        held = np.flatnonzero((t >= p["from_s"]) & (t < p["to_s"]))
+        y[held] = y[held[0]]
+    stamps = t.copy()
+    for p in _of(effects, "clock_skew"):
+        stamps *= 1.0 + p["ppm"] * 1e-6
+    for p in _of(effects, "timestamp_jitter"):
+        stamps += np.abs(rng.standard_normal(len(t))) * p["sigma_s"]
+    kept = np.ones(len(t), dtype=bool)
+    for p in _of(effects, "dropped_frames"):
+        kept &= rng.random(len(t)) >= p["fraction"]
+    kept[0] = True
+    return t[kept], stamps[kept], np.arange(len(t))[kept], y[kept]
