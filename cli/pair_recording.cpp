@@ -5,67 +5,32 @@
 
 #include <fmt/core.h>
 
-#include "can/candump.h"
-#include "can/log_source.h"
-#include "cli/progress.h"
+#include "cli/role_frames.h"
 #include "fusion/alignment.h"
 #include "fusion/stamp_guard.h"
 #include "gateway/gyro_input.h"
-#include "gateway/router.h"
 #include "gateway/status.h"
 
 namespace vgyro::cli {
 
 namespace {
 
-constexpr std::uint64_t kFramesPerProgress = 1U << 16U;
-
 class Gatherer {
  public:
   explicit Gatherer(const gateway::Plan& plan)
       : plan_(plan),
-        router_(plan),
+        frames_(plan),
         inputs_{gateway::GyroInput(plan.gyros[0]), gateway::GyroInput(plan.gyros[1])} {}
 
   Expected<void> read(const std::string& log) {
-    auto source = can::open_log(log);
-    if (!source) return tl::unexpected(source.error());
-    const can::LogSource* bytes = source->get();
-    can::LogReader reader(std::move(*source));
-    Progress progress("allan " + log);
-    can::LogRecord record;
-    std::uint64_t until_progress = kFramesPerProgress;
-    while (reader.next(record)) {
-      if (record.is_xl) continue;
-      take(record, reader.interfaces());
-      if (--until_progress > 0) continue;
-      until_progress = kFramesPerProgress;
-      progress.update(bytes->bytes_read(), bytes->bytes_total(), reader.counts().frames);
-    }
-    if (reader.error()) return tl::unexpected(*reader.error());
-    interfaces_ = reader.interfaces().names();
-    return {};
+    return frames_.read(log, "allan", [this](std::uint8_t roles, const can::LogRecord& record) {
+      if ((roles & gateway::kGyro1) != 0) take_gyro(0, record);
+      if ((roles & gateway::kGyro2) != 0) take_gyro(1, record);
+    });
   }
 
   [[nodiscard]] std::optional<Error> complaint(const std::string& log) const {
-    for (std::size_t i = 0; i < 2; ++i) {
-      if (samples_[i] > 0) continue;
-      const gateway::GyroPlan& gyro = plan_.gyros[i];
-      if (frames_[i] > 0) {
-        return Error{
-            log,
-            fmt::format("none of the {} frames of gyro {} could be used", frames_[i], gyro.name),
-            "`vgyro replay` tells the causes, `vgyro check` which bits are read"};
-      }
-      std::string names;
-      for (const std::string& name : interfaces_)
-        names += (names.empty() ? "" : ", ") + name;
-      return Error{
-          log,
-          fmt::format("no frame of gyro {} ({} {:X} on {})", gyro.name, gyro.message, gyro.match.id,
-                      gyro.bus),
-          names.empty() ? "the log holds no CAN frame" : "the log's interfaces are: " + names};
-    }
+    if (const auto missing = frames_.missing_gyro(log, samples_)) return missing;
     if (pairs_ > 0) return std::nullopt;
     return Error{log,
                  fmt::format("the gyros {} and {} never spoke at the same time, or too shortly",
@@ -90,19 +55,7 @@ class Gatherer {
   }
 
  private:
-  void take(const can::LogRecord& record, const can::InterfaceTable& interfaces) {
-    while (buses_.size() <= record.bus) {
-      const std::string& name = interfaces.name(static_cast<can::BusIndex>(buses_.size()));
-      const auto found = std::find(plan_.buses.begin(), plan_.buses.end(), name);
-      buses_.push_back(static_cast<can::BusIndex>(found - plan_.buses.begin()));
-    }
-    const std::uint8_t roles = router_.roles(buses_[record.bus], record.frame);
-    if ((roles & gateway::kGyro1) != 0) take_gyro(0, record);
-    if ((roles & gateway::kGyro2) != 0) take_gyro(1, record);
-  }
-
   void take_gyro(std::size_t gyro, const can::LogRecord& record) {
-    ++frames_[gyro];
     const gateway::GyroInput::Result input = inputs_[gyro].decode(record.frame);
     if (input.reject) return;
     TimePoint t;
@@ -129,15 +82,12 @@ class Gatherer {
   }
 
   const gateway::Plan& plan_;
-  gateway::Router router_;
+  RoleFrames frames_;
   std::array<gateway::GyroInput, 2> inputs_;
   fusion::StampGuard guard_;
   fusion::Aligner aligner_;
   std::array<analysis::SeriesBuilder, 2> own_;
   analysis::SeriesBuilder paired_;
-  std::vector<can::BusIndex> buses_;  ///< by the log's own index; beyond the plan's: foreign
-  std::vector<std::string> interfaces_;
-  std::array<std::uint64_t, 2> frames_{};
   std::array<std::uint64_t, 2> samples_{};
   std::uint64_t pairs_ = 0;
   double noise_gain_sum_ = 0.0;

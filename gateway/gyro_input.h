@@ -27,6 +27,9 @@ class GyroInput {
   /// After a silence the counter says nothing about how many frames are missing.
   void forget_counter() { counter_known_ = false; }
 
+  /// As the newest frame that was used carried it.
+  [[nodiscard]] std::uint32_t counter() const { return counter_; }
+
   /// Of the newest frame that was used or told nothing else; NaN when there is none. Decoded when
   /// asked for.
   [[nodiscard]] double temperature_c() const;

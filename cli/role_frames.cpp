@@ -1,0 +1,74 @@
+#include "cli/role_frames.h"
+
+#include <algorithm>
+
+#include <fmt/core.h>
+
+#include "can/log_source.h"
+#include "cli/progress.h"
+
+namespace vgyro::cli {
+
+namespace {
+constexpr std::uint64_t kFramesPerProgress = 1U << 16U;
+}
+
+Expected<void> RoleFrames::read(const std::string& log, const std::string& doing,
+                                const Take& take) {
+  auto source = can::open_log(log);
+  if (!source) return tl::unexpected(source.error());
+  const can::LogSource* bytes = source->get();
+  can::LogReader reader(std::move(*source));
+  Progress progress(doing + " " + log);
+  can::LogRecord record;
+  std::uint64_t until_progress = kFramesPerProgress;
+  while (reader.next(record)) {
+    if (record.is_xl) continue;
+    if (const std::uint8_t found = roles(record, reader.interfaces()); found != 0) {
+      take(found, record);
+    }
+    if (--until_progress > 0) continue;
+    until_progress = kFramesPerProgress;
+    progress.update(bytes->bytes_read(), bytes->bytes_total(), reader.counts().frames);
+  }
+  if (reader.error()) return tl::unexpected(*reader.error());
+  interfaces_ = reader.interfaces().names();
+  return {};
+}
+
+std::uint8_t RoleFrames::roles(const can::LogRecord& record,
+                               const can::InterfaceTable& interfaces) {
+  while (buses_.size() <= record.bus) {
+    const std::string& name = interfaces.name(static_cast<can::BusIndex>(buses_.size()));
+    const auto found = std::find(plan_.buses.begin(), plan_.buses.end(), name);
+    buses_.push_back(static_cast<can::BusIndex>(found - plan_.buses.begin()));
+  }
+  const std::uint8_t found = router_.roles(buses_[record.bus], record.frame);
+  if ((found & gateway::kGyro1) != 0) ++frames_[0];
+  if ((found & gateway::kGyro2) != 0) ++frames_[1];
+  return found;
+}
+
+std::optional<Error> RoleFrames::missing_gyro(const std::string& log,
+                                              const std::array<std::uint64_t, 2>& used) const {
+  for (std::size_t i = 0; i < 2; ++i) {
+    if (used[i] > 0) continue;
+    const gateway::GyroPlan& gyro = plan_.gyros[i];
+    if (frames_[i] > 0) {
+      return Error{
+          log, fmt::format("none of the {} frames of gyro {} could be used", frames_[i], gyro.name),
+          "`vgyro replay` tells the causes, `vgyro check` which bits are read"};
+    }
+    std::string names;
+    for (const std::string& name : interfaces_)
+      names += (names.empty() ? "" : ", ") + name;
+    return Error{
+        log,
+        fmt::format("no frame of gyro {} ({} {:X} on {})", gyro.name, gyro.message, gyro.match.id,
+                    gyro.bus),
+        names.empty() ? "the log holds no CAN frame" : "the log's interfaces are: " + names};
+  }
+  return std::nullopt;
+}
+
+}  // namespace vgyro::cli

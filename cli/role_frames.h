@@ -1,0 +1,45 @@
+#pragma once
+
+// A log's frames that play a role in the plan, one after the other, in the log's order. Judges no
+// bits and no stamps.
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "base/error.h"
+#include "can/candump.h"
+#include "gateway/plan.h"
+#include "gateway/router.h"
+
+namespace vgyro::cli {
+
+class RoleFrames {
+ public:
+  /// `roles`: a mask of gateway::Role.
+  using Take = std::function<void(std::uint8_t roles, const can::LogRecord& record)>;
+
+  explicit RoleFrames(const gateway::Plan& plan) : plan_(plan), router_(plan) {}
+
+  /// `doing` stands on the terminal's line of progress, before the log's name.
+  Expected<void> read(const std::string& log, const std::string& doing, const Take& take);
+
+  /// After read(): what is wrong with a log of which so many samples of each gyro could be used.
+  [[nodiscard]] std::optional<Error> missing_gyro(const std::string& log,
+                                                  const std::array<std::uint64_t, 2>& used) const;
+
+ private:
+  [[nodiscard]] std::uint8_t roles(const can::LogRecord& record,
+                                   const can::InterfaceTable& interfaces);
+
+  const gateway::Plan& plan_;
+  gateway::Router router_;
+  std::vector<can::BusIndex> buses_;  ///< by the log's own index; beyond the plan's: foreign
+  std::vector<std::string> interfaces_;
+  std::array<std::uint64_t, 2> frames_{};
+};
+
+}  // namespace vgyro::cli
