@@ -3,6 +3,7 @@
 // The subcommands of `vgyro`, each in a file of its own. They return the exit code: 0 done, 1 bad
 // input (told on stderr). Wrong usage, 2, is main()'s business.
 
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
@@ -54,6 +55,26 @@ struct AllanOptions {
   std::string log;
 };
 int run_allan(const AllanOptions& options);
+
+struct CompareOptions {
+  std::string config;
+  std::string model;
+  std::string measured;  ///< log
+  std::string json;      ///< "-": standard output; empty: nowhere
+  std::uint64_t seed = 1;
+  bool quiet = false;
+};
+int run_compare(const CompareOptions& options);
+
+struct GapOptions {
+  std::string config;
+  std::optional<std::string> model;  ///< path, instead of the configured one
+  std::string measured;              ///< log
+  std::string out;                   ///< folder
+  std::uint64_t seed = 1;
+  bool quiet = false;
+};
+int run_gap(const GapOptions& options);
 
 /// "error: where: what; remedy" on stderr; returns kBadInput.
 int report(const Error& error);

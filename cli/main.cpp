@@ -15,6 +15,8 @@ struct Options {
   DecodeOptions decode;
   ReplayOptions replay;
   AllanOptions allan;
+  CompareOptions compare;
+  GapOptions gap;
   std::string method;
 };
 
@@ -89,6 +91,43 @@ CLI::App* add_allan(CLI::App& app, AllanOptions& options) {
   return command;
 }
 
+void add_recording(CLI::App& command, std::string& config, std::string& measured) {
+  command.add_option("--config", config, "configuration, e.g. vgyro.toml")->required();
+  command.add_option("--measured", measured, "candump log, .xz too; - is standard input")
+      ->required();
+}
+
+CLI::App* add_compare(CLI::App& app, CompareOptions& options) {
+  CLI::App* command = app.add_subcommand(
+      "compare", "Say how far a model's simulation and a recording disagree, and where");
+  add_recording(*command, options.config, options.measured);
+  command->add_option("--model", options.model, "model file")->required();
+  command->add_option("--json", options.json, "the same as JSON; - is standard output");
+  command->add_option("--seed", options.seed, "of the simulations; default: 1");
+  command->add_flag("-q,--quiet", options.quiet, "no table");
+  command->footer(
+      "Changes nothing. What the gap means is in docs/gap.md.\n"
+      "Example: vgyro compare --config vgyro.toml --model model.toml --measured drive.log.xz");
+  return command;
+}
+
+CLI::App* add_gap(CLI::App& app, GapOptions& options) {
+  CLI::App* command = app.add_subcommand(
+      "gap", "Find what the model lacks, name it, add it, show the gap to the recording shrink");
+  add_recording(*command, options.config, options.measured);
+  command->add_option("--model", options.model,
+                      "model file to begin with; default: the configured one, or none");
+  command->add_option("--out", options.out, "folder for report.html, gap.json and model.toml")
+      ->required();
+  command->add_option("--seed", options.seed, "of the simulations; default: 1");
+  command->add_flag("-q,--quiet", options.quiet, "no summary");
+  command->footer(
+      "The folder is written whole or not at all; an earlier result in it is replaced.\n"
+      "How to read the result is in docs/gap.md.\n"
+      "Example: vgyro gap --config vgyro.toml --measured drive.log.xz --out found");
+  return command;
+}
+
 // CLI11 would only say that a subcommand is missing.
 std::optional<vgyro::Error> unknown_command(const CLI::App& app, int argc, char** argv) {
   if (argc < 2 || argv[1][0] == '-') return std::nullopt;
@@ -114,6 +153,8 @@ int main(int argc, char** argv) {
   CLI::App* replay = add_replay(app, options.replay, options.method);
   CLI::App* model = add_model(app);
   CLI::App* allan = add_allan(app, options.allan);
+  CLI::App* compare = add_compare(app, options.compare);
+  CLI::App* gap = add_gap(app, options.gap);
   if (const auto unknown = unknown_command(app, argc, argv)) {
     report(*unknown);
     return kWrongUsage;
@@ -130,6 +171,8 @@ int main(int argc, char** argv) {
   if (decode->parsed()) return run_decode(options.decode);
   if (model->parsed()) return run_model_list();
   if (allan->parsed()) return run_allan(options.allan);
+  if (compare->parsed()) return run_compare(options.compare);
+  if (gap->parsed()) return run_gap(options.gap);
   // Frames are the main result; they give way only to a summary that wants the same place.
   const bool output_given = replay->count("--output") > 0;
   if (!output_given && options.replay.json != "-") options.replay.output = "-";

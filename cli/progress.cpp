@@ -19,12 +19,24 @@ Progress::Progress(std::string what)
       begin_(std::chrono::steady_clock::now()),
       last_(begin_) {}
 
-void Progress::update(std::uint64_t done, std::uint64_t total, std::uint64_t frames) {
-  if (!enabled_) return;
+bool Progress::due() {
+  if (!enabled_) return false;
   const auto now = std::chrono::steady_clock::now();
-  if (now - last_ < std::chrono::milliseconds(100)) return;
+  if (now - last_ < std::chrono::milliseconds(100)) return false;
   last_ = now;
-  const double elapsed_s = std::chrono::duration<double>(now - begin_).count();
+  return true;
+}
+
+void Progress::update(std::string_view doing, double share) {
+  if (!due()) return;
+  fmt::print(stderr, "\r\x1b[K{} {:3.0f} %  {}", what_, 100.0 * share, doing);
+  std::fflush(stderr);
+  drawn_ = true;
+}
+
+void Progress::update(std::uint64_t done, std::uint64_t total, std::uint64_t frames) {
+  if (!due()) return;
+  const double elapsed_s = std::chrono::duration<double>(last_ - begin_).count();
   const std::string share = total == 0
                                 ? std::string()
                                 : fmt::format(" {:3.0f} %", 100.0 * static_cast<double>(done) /

@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cstdint>
 #include <string>
+#include <string_view>
 
 namespace vgyro::cli {
 
@@ -17,9 +18,14 @@ class Progress {
 
   /// Draws at most ten times a second. `total` 0: unknown.
   void update(std::uint64_t done, std::uint64_t total, std::uint64_t frames);
+  /// Of work that knows its share, 0 to 1; `doing` says what is done now.
+  void update(std::string_view doing, double share);
   void clear();
 
  private:
+  /// False when the last line is too young.
+  bool due();
+
   std::string what_;
   bool enabled_;
   bool drawn_ = false;

@@ -30,8 +30,7 @@ double limit_of(const gateway::Quantity& rate) {
 class Recorder {
  public:
   explicit Recorder(const gateway::Plan& plan)
-      : plan_(plan),
-        inputs_{gateway::GyroInput(plan.gyros[0]), gateway::GyroInput(plan.gyros[1])} {
+      : plan_(plan), inputs_{gateway::GyroInput(plan.gyros[0]), gateway::GyroInput(plan.gyros[1])} {
     for (std::size_t i = 0; i < 2; ++i) {
       const gateway::GyroPlan& gyro = plan.gyros[i];
       gap::GyroSeries& series = recording_.gyros[i];
@@ -164,10 +163,9 @@ Expected<gap::Recording> read_recording(const std::string& log, const gateway::P
                                         const std::string& doing) {
   RoleFrames frames(plan);
   Recorder recorder(plan);
-  const auto done =
-      frames.read(log, doing, [&](std::uint8_t roles, const can::LogRecord& record) {
-        recorder.take(roles, record);
-      });
+  const auto done = frames.read(log, doing, [&](std::uint8_t roles, const can::LogRecord& record) {
+    recorder.take(roles, record);
+  });
   if (!done) return tl::unexpected(done.error());
   if (const auto missing = frames.missing_gyro(log, recorder.used())) {
     return tl::unexpected(*missing);

@@ -1,0 +1,55 @@
+#include <cstdio>
+
+#include <fmt/core.h>
+#include <nlohmann/json.hpp>
+
+#include "cli/commands.h"
+#include "cli/gap_inputs.h"
+#include "cli/gap_report.h"
+#include "cli/output_file.h"
+#include "cli/progress.h"
+#include "gap/workflow.h"
+
+namespace vgyro::cli {
+
+namespace {
+
+Expected<gap::Comparison> judge(const GapInputs& inputs, const CompareOptions& options) {
+  Progress progress("compare");
+  gap::Settings settings;
+  settings.seed = options.seed;
+  settings.progress = [&](std::string_view what, double share) { progress.update(what, share); };
+  auto comparison = gap::compare(inputs.recording, inputs.model, settings);
+  if (!comparison) return tl::unexpected(at_log(comparison.error(), inputs.subject.log));
+  return comparison;
+}
+
+Expected<void> write_json(const std::string& path, const gap::Comparison& comparison) {
+  auto file = OutputFile::open(path);
+  if (!file) return tl::unexpected(file.error());
+  constexpr auto kReplace = nlohmann::ordered_json::error_handler_t::replace;
+  file->write(comparison_json(comparison).dump(2, ' ', false, kReplace) + "\n");
+  return file->close();
+}
+
+}  // namespace
+
+int run_compare(const CompareOptions& options) {
+  const auto inputs = load_gap_inputs(options.config, options.model, options.measured, "compare");
+  if (!inputs) return report(inputs.error());
+  const auto comparison = judge(*inputs, options);
+  if (!comparison) return report(comparison.error());
+  if (!options.json.empty()) {
+    if (const auto done = write_json(options.json, *comparison); !done) {
+      return report(done.error());
+    }
+  }
+  // JSON on standard output stands there alone.
+  if (!options.quiet) {
+    fmt::print(options.json == "-" ? stderr : stdout, "{}",
+               comparison_text(inputs->subject, *comparison));
+  }
+  return kDone;
+}
+
+}  // namespace vgyro::cli

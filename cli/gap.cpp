@@ -1,0 +1,124 @@
+#include <cstdio>
+
+#include <fmt/core.h>
+#include <nlohmann/json.hpp>
+
+#include "base/file.h"
+#include "cli/commands.h"
+#include "cli/gap_inputs.h"
+#include "cli/gap_report.h"
+#include "cli/progress.h"
+#include "cli/report_page.h"
+#include "cli/result_folder.h"
+#include "gap/workflow.h"
+#include "model/catalogue.h"
+#include "model/edit.h"
+
+namespace vgyro::cli {
+
+namespace {
+
+constexpr auto kReplaceBadText = nlohmann::ordered_json::error_handler_t::replace;
+
+std::string comment_of(const GapSubject& subject, const gap::NamedEffect& named) {
+  std::string text =
+      fmt::format("named by vgyro gap: {}; gap {:.4g} -> {:.4g} nats per sample, p {:.1g}",
+                  value_text(named), named.gap_before, named.gap_after, named.p_value);
+  if (!named.evidence.empty()) text += "\n" + named.evidence;
+  for (const gap::Reading& reading : named.ambiguous_with) {
+    text += fmt::format("\nmay also be: {} of gyro {} ({})", model::info(reading.kind).name,
+                        reading.gyro + 1, subject.gyros[reading.gyro]);
+  }
+  return text;
+}
+
+// Numbers of the given model that were estimated anew, in their place.
+Expected<std::string> with_new_numbers(std::string text, const model::Model& given,
+                                       const model::Model& found) {
+  for (std::size_t i = 0; i < given.effects.size() && i < found.effects.size(); ++i) {
+    const model::Effect& old_one = given.effects[i];
+    const model::Effect& new_one = found.effects[i];
+    if (new_one.kind != old_one.kind || new_one.gyro != old_one.gyro) continue;
+    const auto parameters = model::info(old_one.kind).parameters;
+    for (std::size_t p = 0; p < parameters.size(); ++p) {
+      if (new_one.parameters[p] == old_one.parameters[p]) continue;
+      // Tables above grow by a line when a preset becomes a number.
+      const auto now = model::parse_model(text, given.file);
+      if (!now) return tl::unexpected(now.error().front());
+      auto edited = model::replace_parameter(text, now->effects[i].line, parameters[p].name,
+                                             new_one.parameters[p]);
+      if (!edited) return edited;
+      text = std::move(*edited);
+    }
+  }
+  return text;
+}
+
+Expected<std::string> extended_model(const GapInputs& inputs, const std::string& given_text,
+                                     const gap::Result& result) {
+  auto text = with_new_numbers(given_text, inputs.model, result.model);
+  for (const gap::NamedEffect& named : result.effects) {
+    if (!text) return text;
+    text = model::append_effect(*text, named.effect, comment_of(inputs.subject, named));
+  }
+  if (text && text->empty()) return model::to_toml({});
+  return text;
+}
+
+// Before the work: a file that nothing can be added to is told at once.
+Expected<std::string> model_text(const model::Model& model) {
+  if (model.file.empty()) return std::string();
+  auto text = read_file(model.file);
+  if (!text) return text;
+  constexpr model::Effect kTrial{0, model::Kind::kBias, {0.0}, 0};
+  if (const auto trial = model::append_effect(*text, kTrial, {}); !trial) {
+    Error error = trial.error();
+    if (error.where.empty()) error.where = model.file;
+    return tl::unexpected(error);
+  }
+  return text;
+}
+
+Expected<gap::Result> work(const GapInputs& inputs, const GapOptions& options) {
+  Progress progress("gap");
+  gap::Settings settings;
+  settings.seed = options.seed;
+  settings.progress = [&](std::string_view what, double share) { progress.update(what, share); };
+  auto result = gap::find_gap(inputs.recording, inputs.model, settings);
+  if (!result) return tl::unexpected(at_log(result.error(), inputs.subject.log));
+  round_to_sigma(*result);
+  return result;
+}
+
+Expected<void> write(const std::string& folder, const GapInputs& inputs,
+                     const std::string& given_text, const gap::Result& result) {
+  auto model = extended_model(inputs, given_text, result);
+  if (!model) return tl::unexpected(model.error());
+  const nlohmann::ordered_json json = gap_json(result);
+  return write_result_folder(folder,
+                             {{"gap.json", json.dump(2, ' ', false, kReplaceBadText) + "\n"},
+                              {"model.toml", std::move(*model)},
+                              {"report.html", report_page(inputs.subject, result)}});
+}
+
+}  // namespace
+
+int run_gap(const GapOptions& options) {
+  const auto free = check_result_folder(options.out, {"gap.json", "model.toml", "report.html"});
+  if (!free) return report(free.error());
+  const auto inputs = load_gap_inputs(options.config, options.model, options.measured, "gap");
+  if (!inputs) return report(inputs.error());
+  const auto given_text = model_text(inputs->model);
+  if (!given_text) return report(given_text.error());
+  const auto result = work(*inputs, options);
+  if (!result) return report(result.error());
+  if (const auto done = write(options.out, *inputs, *given_text, *result); !done) {
+    return report(done.error());
+  }
+  if (options.quiet) return kDone;
+  fmt::print("{}written: {}: report.html, gap.json, model.toml\n",
+             gap_text(inputs->subject, *result), options.out);
+  return kDone;
+}
+
+}  // namespace vgyro::cli

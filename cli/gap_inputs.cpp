@@ -1,0 +1,32 @@
+#include "cli/gap_inputs.h"
+
+#include "cli/commands.h"
+#include "cli/recording.h"
+#include "gateway/config.h"
+
+namespace vgyro::cli {
+
+tl::expected<GapInputs, std::vector<Error>> load_gap_inputs(const std::string& config,
+                                                            const std::optional<std::string>& model,
+                                                            const std::string& log,
+                                                            const std::string& doing) {
+  auto loaded = gateway::load_config(config, {.model = model});
+  if (!loaded) return tl::unexpected(loaded.error());
+  for (const Error& warning : loaded->warnings)
+    warn(warning);
+  const gateway::Plan& plan = loaded->plan;
+  GapInputs inputs;
+  if (plan.model) inputs.model = *plan.model;
+  inputs.subject = {config, inputs.model.file, log, {plan.gyros[0].name, plan.gyros[1].name}};
+  auto recording = read_recording(log, plan, doing);
+  if (!recording) return tl::unexpected(std::vector<Error>{recording.error()});
+  inputs.recording = std::move(*recording);
+  return inputs;
+}
+
+Error at_log(Error error, const std::string& log) {
+  if (error.where.empty()) error.where = log;
+  return error;
+}
+
+}  // namespace vgyro::cli

@@ -1,0 +1,34 @@
+#pragma once
+
+// What `vgyro gap` and `vgyro compare` begin with: configuration, model file, recording.
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <tl/expected.hpp>
+
+#include "base/error.h"
+#include "cli/gap_report.h"
+#include "gap/recording.h"
+#include "gap/workflow.h"
+#include "model/file.h"
+
+namespace vgyro::cli {
+
+struct GapInputs {
+  GapSubject subject;
+  model::Model model;  ///< empty when there is none
+  gap::Recording recording;
+};
+
+/// `model` comes before the configuration's own; `doing` is for the line of progress.
+tl::expected<GapInputs, std::vector<Error>> load_gap_inputs(const std::string& config,
+                                                            const std::optional<std::string>& model,
+                                                            const std::string& log,
+                                                            const std::string& doing);
+
+/// An error of the workflow, which does not know the log's name.
+Error at_log(Error error, const std::string& log);
+
+}  // namespace vgyro::cli

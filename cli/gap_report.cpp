@@ -1,0 +1,386 @@
+#include "cli/gap_report.h"
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "model/catalogue.h"
+
+namespace vgyro::cli {
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+using model::Parameter;
+
+constexpr int kFormat = 1;
+constexpr std::string_view kUnit = "nats_per_sample";
+
+// Rounding then moves a value by less than a two-hundredth of its σ.
+constexpr int kDigitsOfSigma = 3;
+constexpr int kDigitsMost = 12;
+
+int decade(double value) {
+  return static_cast<int>(std::floor(std::log10(std::abs(value))));
+}
+
+int digits_for(double value, double sigma, int digits_of_sigma) {
+  if (value == 0.0 || !std::isfinite(value)) return digits_of_sigma;
+  return std::clamp(decade(value) - decade(sigma) + digits_of_sigma, digits_of_sigma, kDigitsMost);
+}
+
+bool estimated(double sigma) {
+  return std::isfinite(sigma) && sigma > 0.0;
+}
+
+// Through decimal digits: what is printed is what is meant.
+double with_digits(double value, int digits) {
+  return std::stod(fmt::format("{:.{}g}", value, digits));
+}
+
+double rounded(const Parameter& parameter, double value, double sigma) {
+  if (parameter.form != Parameter::Form::kNumber || !estimated(sigma)) return value;
+  const double result = with_digits(value, digits_for(value, sigma, kDigitsOfSigma));
+  return parameter.allows(result) ? result : value;
+}
+
+void round_effect(model::Effect& effect, const model::Parameters& sigma) {
+  const auto parameters = model::info(effect.kind).parameters;
+  for (std::size_t i = 0; i < parameters.size(); ++i)
+    effect.parameters[i] = rounded(parameters[i], effect.parameters[i], sigma[i]);
+}
+
+bool same(const model::Effect& a, const model::Effect& b) {
+  return a.gyro == b.gyro && a.kind == b.kind && a.parameters == b.parameters;
+}
+
+// --- JSON ----------------------------------------------------------------------------------------
+
+Json gyro_number(std::size_t gyro) {
+  return gyro + 1;
+}
+
+Json kind_name(model::Kind kind) {
+  return std::string(model::info(kind).name);
+}
+
+Json parameter_json(const Parameter& parameter, double value) {
+  if (parameter.form == Parameter::Form::kAxis) {
+    return std::string(1, "xyz"[static_cast<std::size_t>(value)]);
+  }
+  if (parameter.form == Parameter::Form::kWhole) return static_cast<std::int64_t>(value);
+  return value;
+}
+
+void add_where(Json& json, const gap::Where& where) {
+  json["from_s"] = where.from_s;
+  json["to_s"] = where.to_s;
+  json["band_hz"] = {where.low_hz, where.high_hz};
+}
+
+Json effect_json(const gap::NamedEffect& named) {
+  Json values = Json::object();
+  Json sigma = Json::object();
+  const auto parameters = model::info(named.effect.kind).parameters;
+  for (std::size_t i = 0; i < parameters.size(); ++i) {
+    const std::string name(parameters[i].name);
+    values[name] = parameter_json(parameters[i], named.effect.parameters[i]);
+    if (estimated(named.sigma[i])) sigma[name] = named.sigma[i];
+  }
+  Json where = Json::object();
+  add_where(where, named.where);
+  Json ambiguous = Json::array();
+  for (const gap::Reading& reading : named.ambiguous_with)
+    ambiguous.push_back({{"kind", kind_name(reading.kind)}, {"gyro", gyro_number(reading.gyro)}});
+  return {{"kind", kind_name(named.effect.kind)},
+          {"gyro", gyro_number(named.effect.gyro)},
+          {"parameters", values},
+          {"sigma", sigma},
+          {"p_value", named.p_value},
+          {"statistic", named.statistic},
+          {"gap_before", named.gap_before},
+          {"gap_after", named.gap_after},
+          {"where", where},
+          {"ambiguous_with", ambiguous},
+          {"evidence", named.evidence},
+          {"experiment", named.experiment}};
+}
+
+Json unexplained_json(const gap::Unexplained& rest) {
+  Json json{{"signature", rest.signature}, {"gyro", gyro_number(rest.gyro)}};
+  if (rest.frequency_hz) json["frequency_hz"] = *rest.frequency_hz;
+  if (rest.amplitude_dps) json["amplitude_dps"] = *rest.amplitude_dps;
+  json["from_s"] = rest.from_s;
+  json["to_s"] = rest.to_s;
+  json["text"] = rest.text;
+  return json;
+}
+
+Json recording_json(double seconds, const std::array<std::size_t, 2>& samples,
+                    bool with_reference) {
+  return {{"seconds", seconds},
+          {"samples", {samples[0], samples[1]}},
+          {"with_reference", with_reference}};
+}
+
+// --- text ----------------------------------------------------------------------------------------
+
+std::string rounded_text(double value, double sigma) {
+  return fmt::format("{:.{}g} ± {:.2g}", value, digits_for(value, sigma, 2), sigma);
+}
+
+std::string gap_number(double nats) {
+  return fmt::format("{:.4g}", std::abs(nats) < 5e-7 ? 0.0 : nats);
+}
+
+std::string reading_text(const GapSubject& subject, const gap::Reading& reading) {
+  return fmt::format("{} {}", subject.gyros[reading.gyro], model::info(reading.kind).name);
+}
+
+std::string subject_text(const GapSubject& subject, double seconds,
+                         const std::array<std::size_t, 2>& samples, bool with_reference) {
+  return fmt::format("{}: {:.1f} s, {} samples of {}, {} of {}, {} reference\n", subject.log,
+                     seconds, samples[0], subject.gyros[0], samples[1], subject.gyros[1],
+                     with_reference ? "with a" : "no");
+}
+
+std::string floor_text(const gap::Gap& gap) {
+  return fmt::format("floor {} (95 % of simulations: {} to {})", gap_number(gap.floor),
+                     gap_number(gap.band95[0]), gap_number(gap.band95[1]));
+}
+
+using Rows = std::vector<std::vector<std::string>>;
+
+std::size_t width_of(const std::string& text) {
+  return static_cast<std::size_t>(std::count_if(text.begin(), text.end(), [](char c) {
+    return (static_cast<unsigned char>(c) & 0xC0U) != 0x80U;
+  }));
+}
+
+// Columns as wide as they need, the last one as it is.
+std::string table(const Rows& rows) {
+  std::vector<std::size_t> widths;
+  for (const auto& row : rows) {
+    widths.resize(std::max(widths.size(), row.size()));
+    for (std::size_t i = 0; i < row.size(); ++i)
+      widths[i] = std::max(widths[i], width_of(row[i]));
+  }
+  std::string text;
+  for (const auto& row : rows) {
+    std::string line = "  ";
+    for (std::size_t i = 0; i < row.size(); ++i) {
+      line += row[i];
+      line.append(widths[i] - width_of(row[i]) + 2, ' ');
+    }
+    text += line.substr(0, line.find_last_not_of(' ') + 1) + '\n';
+  }
+  return text;
+}
+
+std::string drop_table(const GapSubject& subject, const gap::Result& result) {
+  Rows rows{{"round", "gap before", "after", "gyro", "effect", "value ± σ", "may also be"}};
+  for (std::size_t i = 0; i < result.effects.size(); ++i) {
+    const gap::NamedEffect& named = result.effects[i];
+    std::string also;
+    for (const gap::Reading& reading : named.ambiguous_with)
+      also += (also.empty() ? "" : ", ") + reading_text(subject, reading);
+    rows.push_back({std::to_string(i + 1), gap_number(named.gap_before),
+                    gap_number(named.gap_after), subject.gyros[named.effect.gyro],
+                    std::string(model::info(named.effect.kind).name), value_text(named),
+                    also.empty() ? "-" : also});
+  }
+  return table(rows);
+}
+
+std::string experiments(const gap::Result& result) {
+  std::string text;
+  for (std::size_t i = 0; i < result.effects.size(); ++i) {
+    const gap::NamedEffect& named = result.effects[i];
+    if (named.ambiguous_with.empty() || named.experiment.empty()) continue;
+    fmt::format_to(std::back_inserter(text), "  to tell what round {} is: {}\n", i + 1,
+                   named.experiment);
+  }
+  return text;
+}
+
+std::string where_text(const gap::Where& where) {
+  return fmt::format("{:.0f} to {:.0f} s", where.from_s, where.to_s);
+}
+
+std::string notes_text(const std::vector<std::string>& notes) {
+  std::string text;
+  for (const std::string& note : notes)
+    text += "note: " + note + "\n";
+  return text;
+}
+
+void add_once(std::vector<std::string>& list, const std::string& text) {
+  if (std::find(list.begin(), list.end(), text) == list.end()) list.push_back(text);
+}
+
+}  // namespace
+
+void round_to_sigma(gap::Result& result) {
+  for (gap::NamedEffect& named : result.effects) {
+    const model::Effect exact = named.effect;
+    round_effect(named.effect, named.sigma);
+    for (model::Effect& effect : result.model.effects) {
+      if (same(effect, exact)) effect.parameters = named.effect.parameters;
+    }
+  }
+}
+
+Json gap_json(const gap::Result& result) {
+  Json json{{"format", kFormat}, {"verdict", std::string(gap::verdict_name(result.verdict))}};
+  json["gap"] = {{"unit", kUnit},
+                 {"before", result.gap.before},
+                 {"after", result.gap.after},
+                 {"floor", result.gap.floor},
+                 {"band95", {result.gap.band95[0], result.gap.band95[1]}}};
+  json["effects"] = Json::array();
+  for (const gap::NamedEffect& named : result.effects)
+    json["effects"].push_back(effect_json(named));
+  json["unexplained"] = Json::array();
+  for (const gap::Unexplained& rest : result.unexplained)
+    json["unexplained"].push_back(unexplained_json(rest));
+  json["not_identifiable"] = Json::array();
+  for (const gap::NotIdentifiable& kind : result.not_identifiable) {
+    json["not_identifiable"].push_back({{"kind", kind_name(kind.kind)},
+                                        {"gyro", gyro_number(kind.gyro)},
+                                        {"why", kind.why},
+                                        {"experiment", kind.experiment}});
+  }
+  json["recording"] = recording_json(result.seconds, result.samples, result.with_reference);
+  json["recording"]["held_out"] = result.held_out;
+  json["notes"] = result.notes;
+  json["model"] = "model.toml";
+  json["report"] = "report.html";
+  return json;
+}
+
+Json comparison_json(const gap::Comparison& comparison) {
+  Json json{{"format", kFormat}};
+  json["gap"] = {{"unit", kUnit},
+                 {"value", comparison.gap.before},
+                 {"floor", comparison.gap.floor},
+                 {"band95", {comparison.gap.band95[0], comparison.gap.band95[1]}}};
+  json["where"] = Json::array();
+  for (const gap::Difference& difference : comparison.differences) {
+    Json where{{"gyro", gyro_number(difference.gyro)}};
+    add_where(where, difference.where);
+    where["against"] = difference.against;
+    where["nats"] = difference.nats;
+    where["text"] = difference.text;
+    json["where"].push_back(where);
+  }
+  json["recording"] =
+      recording_json(comparison.seconds, comparison.samples, comparison.with_reference);
+  json["notes"] = comparison.notes;
+  return json;
+}
+
+std::string value_text(const gap::NamedEffect& named) {
+  const auto parameters = model::info(named.effect.kind).parameters;
+  std::string text;
+  for (std::size_t i = 0; i < parameters.size(); ++i) {
+    const double value = named.effect.parameters[i];
+    text += fmt::format("{}{} ", text.empty() ? "" : ", ", parameters[i].name);
+    if (parameters[i].form == Parameter::Form::kAxis) {
+      text += "xyz"[static_cast<std::size_t>(value)];
+    } else if (estimated(named.sigma[i])) {
+      text += rounded_text(value, named.sigma[i]);
+    } else {
+      text += fmt::format("{:g}", value);
+    }
+  }
+  return text;
+}
+
+std::vector<NotTold> not_told(const GapSubject& subject, const gap::Result& result) {
+  struct Group {
+    std::vector<std::string> gyros;
+    std::vector<std::string> kinds;
+    std::string why;
+    std::string experiment;
+  };
+  std::vector<Group> groups;
+  for (const gap::NotIdentifiable& kind : result.not_identifiable) {
+    auto group = std::find_if(groups.begin(), groups.end(), [&](const Group& other) {
+      return other.why == kind.why && other.experiment == kind.experiment;
+    });
+    if (group == groups.end()) {
+      group = groups.insert(groups.end(), Group{{}, {}, kind.why, kind.experiment});
+    }
+    add_once(group->gyros, subject.gyros[kind.gyro]);
+    add_once(group->kinds, std::string(model::info(kind.kind).name));
+  }
+  std::vector<NotTold> result_lines;
+  for (const Group& group : groups) {
+    result_lines.push_back(
+        {fmt::format("{}: {}", fmt::join(group.gyros, ", "), fmt::join(group.kinds, ", ")),
+         group.why, group.experiment});
+  }
+  return result_lines;
+}
+
+std::string verdict_text(const gap::Result& result) {
+  const std::size_t count = result.effects.size();
+  const std::string effects = count == 1 ? "one effect" : fmt::format("{} effects", count);
+  switch (result.verdict) {
+    case gap::Verdict::kNoGap:
+      return "No gap: the model predicts this recording as well as it predicts its own simulations";
+    case gap::Verdict::kExplained:
+      return fmt::format(
+          "Explained: with {} more, the model predicts this recording as well as "
+          "its own simulations",
+          effects);
+    case gap::Verdict::kPartlyExplained:
+      return fmt::format("Partly explained: {} named and added; something remains", effects);
+    case gap::Verdict::kUnexplained:
+      break;
+  }
+  return "Unexplained: simulation and measurement differ, and no known effect accounts for it";
+}
+
+std::string gap_text(const GapSubject& subject, const gap::Result& result) {
+  std::string text = subject_text(subject, result.seconds, result.samples, result.with_reference);
+  text += verdict_text(result) + ".\n";
+  text += fmt::format("gap {} -> {} nats per sample on {} samples that took no part; {}\n",
+                      gap_number(result.gap.before), gap_number(result.gap.after), result.held_out,
+                      floor_text(result.gap));
+  if (!result.effects.empty()) text += drop_table(subject, result) + experiments(result);
+  for (const gap::Unexplained& rest : result.unexplained)
+    text += fmt::format("unexplained: {}: {}\n", subject.gyros[rest.gyro], rest.text);
+  for (const NotTold& line : not_told(subject, result)) {
+    text += fmt::format("not identifiable: {}: {}{}{}\n", line.who, line.why,
+                        line.experiment.empty() ? "" : "; ", line.experiment);
+  }
+  return text + notes_text(result.notes);
+}
+
+std::string comparison_text(const GapSubject& subject, const gap::Comparison& comparison) {
+  const gap::Gap& gap = comparison.gap;
+  std::string text =
+      subject_text(subject, comparison.seconds, comparison.samples, comparison.with_reference);
+  const bool inside = gap.before <= gap.band95[1];
+  text += fmt::format("gap {} nats per sample, {} what the model's own simulations score; {}\n",
+                      gap_number(gap.before), inside ? "within" : "above", floor_text(gap));
+  if (comparison.differences.empty()) {
+    text += "They differ nowhere by more than chance.\n";
+  } else {
+    Rows rows{{"gyro", "against", "when", "band, Hz", "nats", "what"}};
+    for (const gap::Difference& difference : comparison.differences) {
+      rows.push_back(
+          {subject.gyros[difference.gyro], difference.against, where_text(difference.where),
+           fmt::format("{:.3g} to {:.3g}", difference.where.low_hz, difference.where.high_hz),
+           fmt::format("{:.4g}", difference.nats), difference.text});
+    }
+    text += table(rows);
+  }
+  return text + notes_text(comparison.notes);
+}
+
+}  // namespace vgyro::cli

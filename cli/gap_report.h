@@ -1,0 +1,49 @@
+#pragma once
+
+// What the gap workflow found, for programs (gap.json, compare --json) and for people (the
+// terminal). The fields of the JSON are an interface: they change only with a new `format`.
+
+#include <array>
+#include <string>
+#include <vector>
+
+#include <nlohmann/json_fwd.hpp>
+
+#include "gap/result.h"
+
+namespace vgyro::cli {
+
+/// What was judged, by the names that the user gave.
+struct GapSubject {
+  std::string config;
+  std::string model;  ///< empty: none was given
+  std::string log;
+  std::array<std::string, 2> gyros;  ///< their names
+};
+
+/// Parameters of the named effects with no more digits than their σ justifies: the rest would look
+/// like knowledge. Files and tables then say the same number.
+void round_to_sigma(gap::Result& result);
+
+nlohmann::ordered_json gap_json(const gap::Result& result);
+nlohmann::ordered_json comparison_json(const gap::Comparison& comparison);
+
+/// Some twenty lines.
+std::string gap_text(const GapSubject& subject, const gap::Result& result);
+std::string comparison_text(const GapSubject& subject, const gap::Comparison& comparison);
+
+/// "error -4.2e-04 ± 3e-06"
+std::string value_text(const gap::NamedEffect& named);
+
+/// Kinds that cannot be told for the same reason, together.
+struct NotTold {
+  std::string who;  ///< "a, b: temperature_bias, temperature_rate_bias"
+  std::string why;
+  std::string experiment;
+};
+std::vector<NotTold> not_told(const GapSubject& subject, const gap::Result& result);
+
+/// One sentence.
+std::string verdict_text(const gap::Result& result);
+
+}  // namespace vgyro::cli
