@@ -38,11 +38,11 @@ struct Recording {
   std::array<GyroSeries, 2> gyros;
   ScalarSeries reference_dps;  ///< empty: there is none
   AccelerationSeries acceleration;
-  bool has_reference = false;      ///< configured
-  bool has_acceleration = false;   ///< configured
-  double seconds = 0.0;            ///< from the first frame to the last
-  double rest_s = 0.0;             ///< at least this long at rest in the beginning; 0: not known
-  double rest_rate_dps = 0.0;      ///< the true rate at rest
+  bool has_reference = false;     ///< configured
+  bool has_acceleration = false;  ///< configured
+  double seconds = 0.0;           ///< from the first frame to the last
+  double rest_s = 0.0;            ///< at least this long at rest in the beginning; 0: not known
+  double rest_rate_dps = 0.0;     ///< the true rate at rest
 };
 
 }  // namespace vgyro::gap

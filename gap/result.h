@@ -67,7 +67,7 @@ struct NamedEffect {
   double gap_after = 0.0;
   Where where;
   std::vector<Reading> ambiguous_with;
-  std::string evidence;  ///< one sentence for people: what gave it away
+  std::string evidence;    ///< one sentence for people: what gave it away
   std::string experiment;  ///< what would tell the ambiguous readings apart; empty: nothing to tell
   Figure figure;           ///< that shows it: before and after
 };
@@ -121,7 +121,7 @@ struct Difference {
 };
 
 struct Comparison {
-  Gap gap;  ///< before and after are both the value
+  Gap gap;                              ///< before and after are both the value
   std::vector<Difference> differences;  ///< largest first
   std::array<GyroFigures, 2> figures;
   double seconds = 0.0;

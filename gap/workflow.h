@@ -20,7 +20,8 @@ struct Settings {
   std::function<void(std::string_view what, double share)> progress;
 };
 
-/// Error: the recording cannot be judged (too short, a gyro is missing, no rest and no reference …).
+/// Error: the recording cannot be judged (too short, a gyro is missing, no rest and no reference
+/// …).
 Expected<Result> find_gap(const Recording& recording, const model::Model& model,
                           const Settings& settings);
 

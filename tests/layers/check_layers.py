@@ -18,16 +18,17 @@ ARROWS = {
     "simulation": {"base", "model", "simulation"},
     "fusion": {"base", "model", "fusion"},
     "analysis": {"base", "analysis"},
+    "gap": {"base", "model", "gap"},
     "gateway": {"base", "can", "dbc", "model", "fusion", "gateway"},
     "daemon": {"base", "can", "dbc", "gateway", "daemon"},
-    "cli": {"base", "can", "dbc", "model", "fusion", "analysis", "gateway", "simulation", "cli"},
+    "cli": {"base", "can", "dbc", "model", "fusion", "analysis", "gap", "gateway", "simulation", "cli"},
 }
 
 # What, as a pattern of an included header → the files that may include it.
 SYSTEM_HEADERS = (
     (r"linux/can.*|sys/socket\.h|net/if\.h", r"can/socket\.(h|cpp)"),
     (r"systemd/.*", r"daemon/.*"),
-    (r"Eigen/.*|unsupported/Eigen/.*", r"(fusion|gateway|model|analysis)/.*"),
+    (r"Eigen/.*|unsupported/Eigen/.*", r"(fusion|gateway|model|analysis|gap)/.*"),
     (r"iostream|istream|ostream|fstream|sstream|iomanip", r"(base|daemon|cli)/.*"),
 )
 

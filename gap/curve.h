@@ -1,0 +1,44 @@
+#pragma once
+
+// A sampled quantity between its samples: local polynomials through the nearest samples, so that a
+// sine of a tenth of the sampling rate is met to a hundred-thousandth of its amplitude.
+
+#include <span>
+#include <vector>
+
+namespace vgyro::gap {
+
+class SampledCurve {
+ public:
+  SampledCurve() = default;
+  /// Times that do not increase are passed over. Memory: a copy.
+  SampledCurve(std::span<const double> t_s, std::span<const double> value);
+
+  [[nodiscard]] bool empty() const { return t_s_.size() < 2; }
+  [[nodiscard]] double from_s() const { return t_s_.front(); }
+  [[nodiscard]] double to_s() const { return t_s_.back(); }
+  [[nodiscard]] double interval_s() const { return interval_s_; }
+  [[nodiscard]] std::span<const double> times_s() const { return t_s_; }
+  [[nodiscard]] std::span<const double> values() const { return value_; }
+
+  struct Point {
+    double value = 0.0;
+    double slope = 0.0;  ///< per second
+    double gain = 1.0;   ///< noise variance of `value` over that of a sample
+  };
+  /// Beyond the ends the outermost value, slope 0.
+  [[nodiscard]] Point at(double t_s) const;
+  /// Straight between neighbours: for what steps.
+  [[nodiscard]] double linear(double t_s) const;
+  /// No sample within `reach_s` on both sides.
+  [[nodiscard]] bool hole_at(double t_s, double reach_s) const;
+
+ private:
+  [[nodiscard]] std::size_t index_before(double t_s) const;
+
+  std::vector<double> t_s_;
+  std::vector<double> value_;
+  double interval_s_ = 0.0;  ///< median
+};
+
+}  // namespace vgyro::gap

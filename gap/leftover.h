@@ -1,0 +1,18 @@
+#pragma once
+
+// What is still not white when the search has ended: said, not named. Also takes names back that
+// the leftovers show to be wrong.
+
+#include <vector>
+
+#include "gap/result.h"
+#include "gap/search.h"
+#include "gap/study.h"
+
+namespace vgyro::gap {
+
+/// `found` may lose effects.
+std::vector<Unexplained> leftovers(const Study& study, const Search& search,
+                                   std::vector<Found>& found);
+
+}  // namespace vgyro::gap

@@ -1,0 +1,128 @@
+#pragma once
+
+// The random part of two gyros, and the likelihood of what was observed under it. Observations are
+// cut into short blocks. Inside a block drift stands still: what is left of white noise there is
+// judged by its sum of squares. The means of the blocks go through a Kalman filter of the drifts,
+// random walk and up to four exponentially correlated terms for each gyro.
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "model/effect.h"
+
+namespace vgyro::gap {
+
+using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+struct MarkovTerm {
+  double sigma_dps = 0.0;
+  double tau_s = 1.0;
+};
+
+/// One gyro's.
+struct NoiseTerms {
+  double white_dps_rthz = 0.0;
+  double ratio_rthz = 0.0;  ///< white noise of this times the rate
+  double walk_dps_rts = 0.0;
+  std::vector<MarkovTerm> markov;
+  double step_dps = 0.0;  ///< rounding: variance step²/12 in each sample
+
+  /// Variance of one sample.
+  [[nodiscard]] double variance(double rate_square, double interval_s) const {
+    return (white_dps_rthz * white_dps_rthz + ratio_rthz * ratio_rthz * rate_square) / interval_s +
+           step_dps * step_dps / 12.0;
+  }
+};
+using PairNoise = std::array<NoiseTerms, 2>;
+inline constexpr std::size_t kMarkovMax = 4;
+
+/// What a model's effects of nature kNoise say, densities adding in squares.
+PairNoise noise_of(const std::vector<model::Effect>& effects);
+
+/// What an observation is of.
+enum class Channel : std::uint8_t { kGyro1, kGyro2, kDifference };
+constexpr double share_of(Channel channel, std::size_t gyro) {
+  if (channel == Channel::kDifference) return gyro == 0 ? 1.0 : -1.0;
+  return static_cast<std::size_t>(channel) == gyro ? 1.0 : 0.0;
+}
+
+/// Samples of one channel that follow each other within kBlock_s.
+struct Block {
+  double t_s = 0.0;  ///< mean of its instants
+  Channel channel = Channel::kGyro1;
+  std::uint32_t first = 0;  ///< of the samples
+  std::uint32_t count = 0;
+  double rate_square = 0.0;      ///< mean, (deg/s)²
+  std::array<double, 2> gain{};  ///< variance of this sample over that of one of gyro 1, 2
+  bool held_out = false;
+};
+inline constexpr double kBlock_s = 0.25;
+
+struct Layout {
+  std::vector<Block> blocks;  ///< in the order of time
+  std::array<double, 2> interval_s{};
+  double reference_variance = 0.0;  ///< of the rate that the readings are compared with, (deg/s)²
+  std::size_t samples = 0;
+};
+
+double sample_variance(const Block& block, const PairNoise& noise, const Layout& layout);
+
+/// Which blocks count.
+enum class Part : std::uint8_t { kFit, kHeldOut, kAll };
+inline bool counts(const Block& block, Part part) {
+  return part == Part::kAll || block.held_out == (part == Part::kHeldOut);
+}
+
+/// Columns over all samples → means of blocks.
+Matrix block_means(const Matrix& columns, const Layout& layout);
+
+/// Block means → normalised innovations, in place; rows of blocks that do not count are zeroed.
+/// Returns −½ Σ log of the innovations' variances over the blocks that count.
+double whiten_means(Matrix& means, const Layout& layout, const PairNoise& noise, Part part);
+
+/// Samples → deviations from their block's mean in units of the noise, in place; likewise.
+double whiten_within(Matrix& columns, const Layout& layout, const PairNoise& noise, Part part);
+
+/// What is needed of a residual to fit white noise: sums of squares within blocks, by channel and
+/// rate.
+struct WithinBin {
+  Channel channel = Channel::kGyro1;
+  double rate_square = 0.0;
+  std::array<double, 2> gain{};
+  double freedom = 0.0;
+  double squares = 0.0;
+};
+std::vector<WithinBin> within_bins(const Eigen::VectorXd& residual, const Layout& layout,
+                                   Part part);
+double within_log_likelihood(const std::vector<WithinBin>& bins, const PairNoise& noise,
+                             const Layout& layout);
+double means_log_likelihood(const Eigen::VectorXd& means, const Layout& layout,
+                            const PairNoise& noise, Part part);
+
+/// Which terms of a gyro are free in a fit.
+struct Freedom {
+  bool white = true;
+  bool ratio = true;
+  bool walk = true;
+  bool markov = false;  ///< one further exponentially correlated term
+};
+
+struct NoiseFitResult {
+  PairNoise noise;
+  double log_likelihood = 0.0;  ///< of both parts; constants left out
+};
+
+/// Maximum likelihood over the free terms; `start` is where the search begins and what the others
+/// stay at. `used[gyro]`: the layout holds observations of it.
+NoiseFitResult fit_pair_noise(const Eigen::VectorXd& residual, const Layout& layout,
+                              const PairNoise& start, const std::array<Freedom, 2>& free,
+                              const std::array<bool, 2>& used, Part part);
+
+double log_likelihood(const Eigen::VectorXd& residual, const Layout& layout, const PairNoise& noise,
+                      Part part);
+
+}  // namespace vgyro::gap

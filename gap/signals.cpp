@@ -1,0 +1,226 @@
+#include "gap/signals.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "model/catalogue.h"
+
+namespace vgyro::gap {
+
+namespace {
+
+using model::Kind;
+using model::Nature;
+
+constexpr double kDegree = std::numbers::pi / 180.0;
+constexpr double kTemperatureReach_s = 2.0;
+constexpr double kGridStep_s = 0.25;
+
+// First-order low-pass with the rate straight between the curve's samples, each interval exactly;
+// the curve is refined first, so that straight is good enough.
+SampledCurve low_pass(const SampledCurve& curve, double cutoff_hz) {
+  constexpr int kRefine = 4;
+  const std::span<const double> times_s = curve.times_s();
+  const double pole = 2.0 * std::numbers::pi * cutoff_hz;
+  std::vector<double> t_s;
+  std::vector<double> value;
+  t_s.reserve(times_s.size());
+  value.reserve(times_s.size());
+  double state = curve.values().front();
+  double last = state;
+  t_s.push_back(times_s.front());
+  value.push_back(state);
+  for (std::size_t i = 0; i + 1 < times_s.size(); ++i) {
+    const double step_s = (times_s[i + 1] - times_s[i]) / kRefine;
+    const double x = pole * step_s;
+    const double decay = std::exp(-x);
+    const double share = x > 1e-4 ? (1.0 - decay) / x : 1.0 - 0.5 * x;
+    for (int part = 1; part <= kRefine; ++part) {
+      const double next = part == kRefine
+                              ? curve.values()[i + 1]
+                              : curve.at(times_s[i] + static_cast<double>(part) * step_s).value;
+      // Response to a straight line from `last` to `next`.
+      state = decay * state + (share - decay) * last + (1.0 - share) * next;
+      last = next;
+    }
+    t_s.push_back(times_s[i + 1]);
+    value.push_back(state);
+  }
+  return {t_s, value};
+}
+
+struct Parabola {
+  double value = 0.0;
+  double slope = 0.0;
+};
+
+Parabola fit_parabola(std::span<const double> t_s, std::span<const double> y, double at_s,
+                      double reach_s) {
+  const double from_s = at_s - reach_s;
+  const double to_s = at_s + reach_s;
+  const auto first = std::lower_bound(t_s.begin(), t_s.end(), from_s) - t_s.begin();
+  const auto last = std::upper_bound(t_s.begin(), t_s.end(), to_s) - t_s.begin();
+  double s[5] = {};
+  double b[3] = {};
+  for (auto i = first; i < last; ++i) {
+    const auto place = static_cast<std::size_t>(i);
+    if (std::isnan(y[place])) continue;
+    const double x = (t_s[place] - at_s) / reach_s;
+    double power = 1.0;
+    for (int k = 0; k < 5; ++k) {
+      s[k] += power;
+      if (k < 3) b[k] += power * y[place];
+      power *= x;
+    }
+  }
+  if (s[0] < 1.0) return {std::nan(""), std::nan("")};
+  const double a11 = s[0], a12 = s[1], a13 = s[2], a22 = s[2], a23 = s[3], a33 = s[4];
+  const double determinant =
+      a11 * (a22 * a33 - a23 * a23) - a12 * (a12 * a33 - a23 * a13) + a13 * (a12 * a23 - a22 * a13);
+  if (s[0] < 4.0 || determinant < 1e-9 * s[0] * s[0] * s[0]) return {b[0] / s[0], 0.0};
+  const double value = (b[0] * (a22 * a33 - a23 * a23) - a12 * (b[1] * a33 - a23 * b[2]) +
+                        a13 * (b[1] * a23 - a22 * b[2])) /
+                       determinant;
+  const double slope = (a11 * (b[1] * a33 - a23 * b[2]) - b[0] * (a12 * a33 - a23 * a13) +
+                        a13 * (a12 * b[2] - b[1] * a13)) /
+                       determinant;
+  return {value, slope / reach_s};
+}
+
+}  // namespace
+
+Motion::Motion(SampledCurve rate_dps) : rate_dps_(std::move(rate_dps)) {
+  const std::span<const double> t_s = rate_dps_.times_s();
+  const std::span<const double> rate = rate_dps_.values();
+  angle_deg_.resize(t_s.size());
+  if (t_s.empty()) return;
+  double angle_deg = rate[0] * t_s[0];
+  angle_deg_[0] = angle_deg;
+  for (std::size_t i = 1; i < t_s.size(); ++i) {
+    const double step_s = t_s[i] - t_s[i - 1];
+    const double middle = rate_dps_.at(t_s[i - 1] + 0.5 * step_s).value;
+    angle_deg += step_s * (rate[i - 1] + 4.0 * middle + rate[i]) / 6.0;
+    angle_deg_[i] = angle_deg;
+  }
+}
+
+double Motion::angle_rad(double t_s) const {
+  const std::span<const double> times_s = rate_dps_.times_s();
+  const auto after = std::upper_bound(times_s.begin(), times_s.end(), t_s);
+  if (after == times_s.begin()) {
+    return kDegree * (angle_deg_.front() + rate_dps_.values().front() * (t_s - times_s.front()));
+  }
+  const auto i = static_cast<std::size_t>(after - times_s.begin()) - 1;
+  const double step_s = t_s - times_s[i];
+  const SampledCurve::Point half = rate_dps_.at(times_s[i] + 0.5 * step_s);
+  return kDegree * (angle_deg_[i] + half.value * step_s);
+}
+
+SampledCurve Motion::low_passed(double cutoff_hz) const {
+  return low_pass(rate_dps_, cutoff_hz);
+}
+
+model::Surroundings Signals::at(double t_s) const {
+  model::Surroundings s;
+  s.t_s = t_s;
+  if (!temperature_c.empty()) {
+    s.temperature_c = temperature_c.linear(t_s);
+    s.temperature_slope_c_s = temperature_slope_c_s.linear(t_s);
+  }
+  if (!vibration_g2.empty()) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      s.acceleration_g[axis] = acceleration_g[axis].linear(t_s);
+    }
+    s.vibration_g2 = vibration_g2.linear(t_s);
+  }
+  s.angle_rad = motion.angle_rad(t_s);
+  return s;
+}
+
+void smooth_temperature(const GyroSeries& gyro, Signals& signals) {
+  if (gyro.temperature_c.empty()) return;
+  const double end_s = gyro.t_s.back();
+  std::vector<double> t_s;
+  std::vector<double> value;
+  std::vector<double> slope;
+  for (double t = gyro.t_s.front(); t <= end_s + kGridStep_s; t += kGridStep_s) {
+    const Parabola parabola =
+        fit_parabola(gyro.t_s, gyro.temperature_c, std::min(t, end_s), kTemperatureReach_s);
+    if (std::isnan(parabola.value)) continue;
+    t_s.push_back(t);
+    value.push_back(parabola.value);
+    slope.push_back(parabola.slope);
+  }
+  signals.temperature_c = SampledCurve(t_s, value);
+  signals.temperature_slope_c_s = SampledCurve(t_s, slope);
+}
+
+void set_acceleration(const AccelerationSeries& acceleration, Signals& signals) {
+  if (acceleration.t_s.size() < 2) return;
+  const std::size_t n = acceleration.t_s.size();
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    signals.acceleration_g[axis] = SampledCurve(acceleration.t_s, acceleration.g[axis]);
+  // Variance of |a| over the last second.
+  std::vector<double> size(n);
+  for (std::size_t i = 0; i < n; ++i) {
+    size[i] = std::sqrt(acceleration.g[0][i] * acceleration.g[0][i] +
+                        acceleration.g[1][i] * acceleration.g[1][i] +
+                        acceleration.g[2][i] * acceleration.g[2][i]);
+  }
+  std::vector<double> variance(n);
+  std::size_t first = 0;
+  double sum = 0.0;
+  double squares = 0.0;
+  const double pivot = size[0];
+  for (std::size_t i = 0; i < n; ++i) {
+    sum += size[i] - pivot;
+    squares += (size[i] - pivot) * (size[i] - pivot);
+    while (acceleration.t_s[i] - acceleration.t_s[first] >= 1.0) {
+      sum -= size[first] - pivot;
+      squares -= (size[first] - pivot) * (size[first] - pivot);
+      ++first;
+    }
+    const double count = static_cast<double>(i - first + 1);
+    variance[i] = std::max(0.0, squares / count - (sum / count) * (sum / count));
+  }
+  signals.vibration_g2 = SampledCurve(acceleration.t_s, variance);
+}
+
+Prediction::Prediction(std::span<const model::Effect> effects, const Signals& signals)
+    : signals_(signals) {
+  for (const model::Effect& effect : effects) {
+    switch (effect.kind) {
+      case Kind::kDelay:
+        lag_s_ += effect.parameters[0];
+        continue;
+      case Kind::kClockSkew:
+        skew_ += effect.parameters[0] * 1e-6;
+        continue;
+      case Kind::kBandwidth:
+        low_passed_.push_back(low_passed_.empty()
+                                  ? signals.motion.low_passed(effect.parameters[0])
+                                  : low_pass(low_passed_.back(), effect.parameters[0]));
+        continue;
+      default:
+        break;
+    }
+    const Nature nature = model::info(effect.kind).nature;
+    if (nature == Nature::kOffset || nature == Nature::kResponse) added_.push_back(effect);
+  }
+}
+
+double Prediction::at(double t_s) const {
+  const double true_s = t_s / (1.0 + skew_);
+  const double lagged_s = true_s - lag_s_;
+  double reading = low_passed_.empty() ? signals_.motion.rate(lagged_s).value
+                                       : low_passed_.back().at(lagged_s).value;
+  if (added_.empty()) return reading;
+  const double rate_dps = signals_.motion.rate(true_s).value;
+  const model::Surroundings s = signals_.at(true_s);
+  for (const model::Effect& effect : added_)
+    reading += model::added_dps(effect, rate_dps, s);
+  return reading;
+}
+
+}  // namespace vgyro::gap

@@ -1,0 +1,63 @@
+#pragma once
+
+// What a gyro's error may depend on, at any instant of a recording: the true rate with its slope
+// and angle, the gyro's temperature, acceleration, vibration. And from that, what a gyro should
+// read.
+
+#include <array>
+#include <span>
+#include <vector>
+
+#include "gap/curve.h"
+#include "gap/recording.h"
+#include "model/effect.h"
+
+namespace vgyro::gap {
+
+/// The motion as well as it is known.
+class Motion {
+ public:
+  Motion() = default;
+  explicit Motion(SampledCurve rate_dps);
+
+  [[nodiscard]] SampledCurve::Point rate(double t_s) const { return rate_dps_.at(t_s); }
+  [[nodiscard]] double angle_rad(double t_s) const;
+  /// The rate through a first-order low-pass.
+  [[nodiscard]] SampledCurve low_passed(double cutoff_hz) const;
+  [[nodiscard]] const SampledCurve& curve() const { return rate_dps_; }
+
+ private:
+  SampledCurve rate_dps_;
+  std::vector<double> angle_deg_;  ///< at the curve's samples, from time 0
+};
+
+struct Signals {
+  Motion motion;  ///< as this gyro is judged against
+  SampledCurve temperature_c;
+  SampledCurve temperature_slope_c_s;
+  std::array<SampledCurve, 3> acceleration_g;
+  SampledCurve vibration_g2;
+
+  [[nodiscard]] model::Surroundings at(double t_s) const;
+};
+
+/// Temperature smoothed by local parabolas over `reach_s` to both sides, with its slope.
+void smooth_temperature(const GyroSeries& gyro, Signals& signals);
+void set_acceleration(const AccelerationSeries& acceleration, Signals& signals);
+
+/// What one gyro's effects say it reads at `t_s`, deterministic kinds only, before clipping.
+class Prediction {
+ public:
+  /// `effects` of this gyro. The signals must live as long.
+  Prediction(std::span<const model::Effect> effects, const Signals& signals);
+  [[nodiscard]] double at(double t_s) const;
+
+ private:
+  std::vector<model::Effect> added_;
+  const Signals& signals_;
+  std::vector<SampledCurve> low_passed_;  ///< one after the other
+  double lag_s_ = 0.0;
+  double skew_ = 0.0;
+};
+
+}  // namespace vgyro::gap

@@ -1,0 +1,557 @@
+#include "gap/study.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include <fmt/core.h>
+
+#include "model/catalogue.h"
+
+namespace vgyro::gap {
+
+namespace {
+
+using model::Effect;
+using model::Kind;
+
+constexpr double kRecordingMin_s = 30.0;
+constexpr std::size_t kSamplesMin = 500;
+constexpr double kReferenceShareMin = 0.95;
+constexpr double kRestMin_s = 10.0;
+constexpr double kHeldOutCell_s = 1.0;
+constexpr unsigned kHeldOutOneIn = 4;
+constexpr double kSpikeSigmas = 8.0;
+constexpr std::size_t kSpikesMin = 3;
+constexpr double kRestBelow_dps = 0.15;
+constexpr double kRestSteady = 3.0;
+
+// A quarter of the seconds, scattered without a pattern that motion could have.
+bool held_out(double t_s) {
+  auto x = static_cast<std::uint64_t>(std::max(0.0, t_s / kHeldOutCell_s)) + 0x9e3779b97f4a7c15ULL;
+  x = (x ^ (x >> 30U)) * 0xbf58476d1ce4e5b9ULL;
+  x = (x ^ (x >> 27U)) * 0x94d049bb133111ebULL;
+  return ((x ^ (x >> 31U)) % kHeldOutOneIn) == 0;
+}
+
+double median_of(std::vector<double>& values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+std::vector<Effect> of_gyro(const std::vector<Effect>& effects, std::size_t gyro) {
+  std::vector<Effect> mine;
+  for (const Effect& effect : effects) {
+    if (effect.gyro == gyro) mine.push_back(effect);
+  }
+  return mine;
+}
+
+// White noise of a smooth quantity, from its fourth differences in the quieter half of the seconds.
+double noise_variance(const ScalarSeries& series) {
+  std::vector<double> seconds;
+  double sum = 0.0;
+  double count = 0.0;
+  double begin_s = series.t_s.empty() ? 0.0 : series.t_s.front();
+  for (std::size_t i = 4; i < series.value.size(); ++i) {
+    const double* v = &series.value[i - 4];
+    const double fourth = v[0] - 4.0 * v[1] + 6.0 * v[2] - 4.0 * v[3] + v[4];
+    sum += fourth * fourth / 70.0;
+    count += 1.0;
+    if (series.t_s[i] - begin_s < 1.0) continue;
+    seconds.push_back(sum / count);
+    begin_s = series.t_s[i];
+    sum = count = 0.0;
+  }
+  if (seconds.size() < 10) return 0.0;
+  std::sort(seconds.begin(), seconds.end());
+  return seconds[seconds.size() / 4];
+}
+
+struct Sample {
+  double t_s;
+  Channel channel;
+  double observed_dps;
+  double rate_dps;
+  std::array<double, 2> gain;
+};
+
+// Samples of any order → blocks, in which a sample's place is its place in the columns.
+Problem assemble(std::vector<Sample> samples, std::array<double, 2> interval_s) {
+  Problem problem;
+  problem.layout.interval_s = interval_s;
+  const double block_s = std::max(kBlock_s, 5.0 * std::max(interval_s[0], interval_s[1]));
+  std::stable_sort(samples.begin(), samples.end(), [&](const Sample& a, const Sample& b) {
+    const double cell_a = std::floor(a.t_s / block_s);
+    const double cell_b = std::floor(b.t_s / block_s);
+    if (cell_a != cell_b) return cell_a < cell_b;
+    if (a.channel != b.channel) return a.channel < b.channel;
+    return a.t_s < b.t_s;
+  });
+  const std::size_t n = samples.size();
+  problem.t_s.resize(n);
+  problem.channel.resize(n);
+  problem.observed_dps.resize(static_cast<Eigen::Index>(n));
+  problem.layout.samples = n;
+  double cell = -1.0;
+  for (std::size_t i = 0; i < n; ++i) {
+    const Sample& sample = samples[i];
+    problem.t_s[i] = sample.t_s;
+    problem.channel[i] = sample.channel;
+    problem.observed_dps[static_cast<Eigen::Index>(i)] = sample.observed_dps;
+    const double its_cell = std::floor(sample.t_s / block_s);
+    std::vector<Block>& blocks = problem.layout.blocks;
+    if (blocks.empty() || its_cell != cell || blocks.back().channel != sample.channel) {
+      cell = its_cell;
+      Block block;
+      block.channel = sample.channel;
+      block.first = static_cast<std::uint32_t>(i);
+      block.held_out = held_out((its_cell + 0.5) * block_s);
+      blocks.push_back(block);
+    }
+    Block& block = blocks.back();
+    ++block.count;
+    block.t_s += sample.t_s;
+    block.rate_square += sample.rate_dps * sample.rate_dps;
+    block.gain[0] += sample.gain[0];
+    block.gain[1] += sample.gain[1];
+  }
+  for (Block& block : problem.layout.blocks) {
+    block.t_s /= block.count;
+    block.rate_square /= block.count;
+    block.gain[0] /= block.count;
+    block.gain[1] /= block.count;
+  }
+  return problem;
+}
+
+}  // namespace
+
+Expected<void> Study::check() const {
+  for (const GyroSeries& gyro : recording_.gyros) {
+    if (gyro.t_s.size() < kSamplesMin || recording_.seconds < kRecordingMin_s) {
+      return fail(
+          "",
+          fmt::format("the recording is too short: {:.1f} s, {} samples of {}", recording_.seconds,
+                      gyro.t_s.size(), gyro.name),
+          fmt::format("at least {:.0f} s and {} samples of each gyro; ten minutes with rest "
+                      "and motion tell much more",
+                      kRecordingMin_s, kSamplesMin));
+    }
+  }
+  if (!recording_.has_reference) return {};
+  const std::vector<double>& t_s = recording_.reference_dps.t_s;
+  if (t_s.size() < kSamplesMin) {
+    return fail("",
+                fmt::format("the configuration names a reference, but the recording holds {} of "
+                            "its samples",
+                            t_s.size()),
+                "record it too, or remove [reference] from the configuration");
+  }
+  if (t_s.back() - t_s.front() < kReferenceShareMin * recording_.seconds) {
+    return fail("",
+                fmt::format("the reference is there from {:.1f} to {:.1f} s only, the recording "
+                            "lasts {:.1f} s",
+                            t_s.front(), t_s.back(), recording_.seconds),
+                "cut the recording to that part, or remove [reference] from the configuration");
+  }
+  return {};
+}
+
+Expected<std::unique_ptr<Study>> Study::begin(const Recording& recording,
+                                              const std::vector<Effect>& effects) {
+  std::unique_ptr<Study> study(new Study(recording));
+  if (auto good = study->check(); !good) return tl::unexpected(good.error());
+  for (std::size_t gyro = 0; gyro < 2; ++gyro) {
+    const GyroSeries& series = recording.gyros[gyro];
+    Transport transport = check_transport(series, gyro, of_gyro(effects, gyro));
+    study->findings_.insert(study->findings_.end(), transport.findings.begin(),
+                            transport.findings.end());
+    study->notes_.insert(study->notes_.end(), transport.notes.begin(), transport.notes.end());
+    study->transports_[gyro] = std::move(transport);
+    smooth_temperature(series, study->signals_[gyro]);
+    set_acceleration(recording.acceleration, study->signals_[gyro]);
+  }
+  study->find_spikes(effects);
+  for (std::size_t gyro = 0; gyro < 2; ++gyro) {
+    const GyroSeries& series = recording.gyros[gyro];
+    const Transport& transport = study->transports_[gyro];
+    std::vector<double> t_s;
+    std::vector<double> rate;
+    for (std::size_t i = 0; i < series.t_s.size(); ++i) {
+      if (transport.masked[i] != 0) continue;
+      t_s.push_back(transport.t_s[i]);
+      rate.push_back(series.rate_dps[i]);
+    }
+    if (t_s.size() < kSamplesMin) {
+      return fail("",
+                  fmt::format("{} samples of {} are left when what is stuck, clipped or in a dead "
+                              "band is set aside",
+                              t_s.size(), series.name),
+                  "record with a sensor that moves");
+    }
+    study->readings_[gyro] = SampledCurve(t_s, rate);
+  }
+  if (recording.has_reference) {
+    const SampledCurve rate(recording.reference_dps.t_s, recording.reference_dps.value);
+    for (Signals& signals : study->signals_)
+      signals.motion = Motion(rate);
+    study->build();
+  } else {
+    study->find_rest();
+    if (study->rest_s_ < kRestMin_s) {
+      return fail("", "the recording holds no rest, and there is no reference",
+                  "without either nothing tells which gyro is wrong: record a minute at rest, or "
+                  "name a [reference]");
+    }
+    study->learn_motion(effects);
+  }
+  return study;
+}
+
+std::size_t Study::problem_of(std::size_t gyro) const {
+  return problems_.size() == 2 ? gyro : 0;
+}
+
+// One sample that stands out from its four neighbours, seen against the reference or the other
+// gyro.
+void Study::find_spikes(const std::vector<Effect>& effects) {
+  std::array<std::vector<double>, 2> out;
+  std::array<std::vector<double>, 2> scale;
+  for (std::size_t gyro = 0; gyro < 2; ++gyro) {
+    const GyroSeries& series = recording_.gyros[gyro];
+    const std::vector<double>& t_s = transports_[gyro].t_s;
+    const std::size_t n = series.t_s.size();
+    const SampledCurve truth =
+        recording_.has_reference
+            ? SampledCurve(recording_.reference_dps.t_s, recording_.reference_dps.value)
+            : SampledCurve(transports_[1 - gyro].t_s, recording_.gyros[1 - gyro].rate_dps);
+    std::vector<double> error(n);
+    for (std::size_t i = 0; i < n; ++i)
+      error[i] = series.rate_dps[i] - truth.at(t_s[i]).value;
+    out[gyro].assign(n, 0.0);
+    scale[gyro].assign(n, 0.0);
+    for (std::size_t i = 2; i + 2 < n; ++i) {
+      std::array<double, 4> near{error[i - 2], error[i - 1], error[i + 1], error[i + 2]};
+      std::sort(near.begin(), near.end());
+      out[gyro][i] = error[i] - 0.5 * (near[1] + near[2]);
+    }
+    const std::size_t reach =
+        static_cast<std::size_t>(std::clamp(0.75 / transports_[gyro].interval_s, 20.0, 1000.0));
+    std::vector<double> window;
+    for (std::size_t from = 0; from < n; from += reach) {
+      window.clear();
+      for (std::size_t i = from > reach ? from - reach : 0; i < std::min(n, from + 2 * reach); ++i)
+        window.push_back(std::abs(out[gyro][i]));
+      const double sigma = 1.4826 * median_of(window);
+      for (std::size_t i = from; i < std::min(n, from + reach); ++i)
+        scale[gyro][i] = sigma;
+    }
+  }
+  for (std::size_t gyro = 0; gyro < 2; ++gyro) {
+    const GyroSeries& series = recording_.gyros[gyro];
+    Transport& transport = transports_[gyro];
+    std::vector<double> sizes;
+    Curve marks{"deviation from the neighbours", {}, {}, {}, true};
+    double last_s = -1.0;
+    for (std::size_t i = 2; i + 2 < series.t_s.size(); ++i) {
+      if (transport.masked[i] != 0 || scale[gyro][i] <= 0.0) continue;
+      const double size = std::abs(out[gyro][i]);
+      if (size < kSpikeSigmas * std::max(scale[gyro][i], 0.3 * series.step_dps)) continue;
+      if (size < std::abs(out[gyro][i - 1]) || size < std::abs(out[gyro][i + 1])) continue;
+      if (!recording_.has_reference) {
+        // Whose it is: interpolation spreads the other's.
+        const std::vector<double>& t_s = transports_[1 - gyro].t_s;
+        const auto near = std::lower_bound(t_s.begin(), t_s.end(), transport.t_s[i]) - t_s.begin();
+        bool others = false;
+        for (std::ptrdiff_t j = near - 2; j <= near + 1; ++j) {
+          if (j < 2 || j + 2 >= static_cast<std::ptrdiff_t>(t_s.size())) continue;
+          others = others || std::abs(out[1 - gyro][static_cast<std::size_t>(j)]) > size;
+        }
+        if (others) continue;
+      }
+      transport.masked[i] = 1;
+      sizes.push_back(size);
+      marks.x.push_back(series.t_s[i]);
+      marks.y.push_back(out[gyro][i]);
+      last_s = series.t_s[i];
+    }
+    bool known = false;
+    for (const Effect& effect : effects)
+      known = known || (effect.gyro == gyro && effect.kind == Kind::kSpikes);
+    if (known || sizes.size() < kSpikesMin) continue;
+    const double count = static_cast<double>(sizes.size());
+    const double typical = median_of(sizes);
+    double noise = 0.0;
+    for (const double sigma : scale[gyro])
+      noise += sigma;
+    noise /= static_cast<double>(scale[gyro].size());
+    Finding finding;
+    finding.effect = Effect{gyro, Kind::kSpikes, {count / recording_.seconds, typical}, 0};
+    finding.sigma = {std::sqrt(count) / recording_.seconds, 1.25 * noise / std::sqrt(count)};
+    finding.statistic = count * (typical / noise) * (typical / noise);
+    finding.p_value = 1e-6;
+    finding.where = {marks.x.front(), last_s, 0.0, 0.5 / transport.interval_s};
+    finding.evidence = fmt::format(
+        "{:.0f} single samples of {} stand out by about {:.3g} deg/s, {:.0f} "
+        "times the noise",
+        count, series.name, typical, typical / noise);
+    finding.figure = Figure{"Samples that stand out", "time / s", "deg/s", false, false, {marks}};
+    findings_.push_back(std::move(finding));
+  }
+}
+
+// Seconds in which both gyros are as steady as in their steadiest seconds and read what they read
+// in the beginning.
+void Study::find_rest() {
+  const auto cells = static_cast<std::size_t>(recording_.seconds) + 1;
+  resting_.assign(cells, 1);
+  for (std::size_t gyro = 0; gyro < 2; ++gyro) {
+    const std::span<const double> t_s = readings_[gyro].times_s();
+    const std::span<const double> rate = readings_[gyro].values();
+    std::vector<double> sum(cells, 0.0), squares(cells, 0.0), count(cells, 0.0);
+    for (std::size_t i = 0; i < t_s.size(); ++i) {
+      const std::size_t cell = std::min(cells - 1, static_cast<std::size_t>(std::max(0.0, t_s[i])));
+      sum[cell] += rate[i], squares[cell] += rate[i] * rate[i], count[cell] += 1.0;
+    }
+    std::vector<double> deviations;
+    std::vector<double> first;
+    std::vector<double> deviation(cells, 1e300);
+    for (std::size_t cell = 0; cell < cells; ++cell) {
+      if (count[cell] < 5.0) continue;
+      const double mean = sum[cell] / count[cell];
+      deviation[cell] = std::sqrt(std::max(0.0, squares[cell] / count[cell] - mean * mean));
+      deviations.push_back(deviation[cell]);
+      if (static_cast<double>(cell) < std::max(5.0, recording_.rest_s)) first.push_back(mean);
+    }
+    if (deviations.size() < 10 || first.empty()) {
+      resting_.assign(cells, 0);
+      return;
+    }
+    std::sort(deviations.begin(), deviations.end());
+    const double quiet =
+        std::max(deviations[deviations.size() / 10], recording_.gyros[gyro].step_dps);
+    const double level = median_of(first);
+    for (std::size_t cell = 0; cell < cells; ++cell) {
+      if (count[cell] < 5.0 || deviation[cell] > kRestSteady * quiet ||
+          std::abs(sum[cell] / count[cell] - level) > kRestBelow_dps + 3.0 * quiet) {
+        resting_[cell] = 0;
+      }
+    }
+  }
+  // Single seconds are turning points of a motion.
+  std::vector<std::uint8_t> kept(cells, 0);
+  for (std::size_t from = 0; from < cells;) {
+    std::size_t to = from;
+    while (to < cells && resting_[to] != 0)
+      ++to;
+    if (to - from >= 4) {
+      // Its first and last second may hold the end of a motion.
+      const std::size_t first = from == 0 ? 0 : from + 1;
+      const std::size_t last = to == cells ? to : to - 1;
+      for (std::size_t cell = first; cell < last; ++cell)
+        kept[cell] = 1, rest_s_ += 1.0;
+    }
+    from = std::max(to, from + 1);
+  }
+  resting_ = kept;
+}
+
+void Study::learn_motion(const std::vector<Effect>& effects) {
+  if (recording_.has_reference) return;
+  const PairNoise noise = noise_of(effects);
+  std::array<double, 2> weight{0.5, 0.5};
+  std::array<double, 2> density{};
+  for (std::size_t gyro = 0; gyro < 2; ++gyro) {
+    density[gyro] = noise[gyro].white_dps_rthz;
+  }
+  if (density[0] > 0.0 && density[1] > 0.0) {
+    const double first = 1.0 / (density[0] * density[0]);
+    const double second = 1.0 / (density[1] * density[1]);
+    weight = {first / (first + second), second / (first + second)};
+  }
+  const std::span<const double> t_s = readings_[0].times_s();
+  const auto resting = [&](double at_s) {
+    const auto cell = static_cast<std::size_t>(std::max(0.0, at_s));
+    return cell < resting_.size() && resting_[cell] != 0;
+  };
+  // The first guess knows no errors; each further one takes off what the effects say at the last.
+  for (int round = 0; round < 3; ++round) {
+    std::vector<double> rate(t_s.size());
+    std::array<std::vector<double>, 2> correct;
+    for (std::size_t gyro = 0; gyro < 2; ++gyro) {
+      correct[gyro].resize(t_s.size());
+      const bool first = round == 0;
+      std::unique_ptr<Prediction> prediction;
+      const std::vector<Effect> mine = of_gyro(effects, gyro);
+      if (!first) prediction = std::make_unique<Prediction>(mine, signals_[gyro]);
+      for (std::size_t i = 0; i < t_s.size(); ++i) {
+        double value = gyro == 0 ? readings_[0].values()[i] : readings_[1].at(t_s[i]).value;
+        if (prediction) value -= prediction->at(t_s[i]) - signals_[gyro].motion.rate(t_s[i]).value;
+        correct[gyro][i] = value;
+      }
+    }
+    for (std::size_t i = 0; i < t_s.size(); ++i) {
+      rate[i] = resting(t_s[i]) ? recording_.rest_rate_dps
+                                : weight[0] * correct[0][i] + weight[1] * correct[1][i];
+    }
+    const Motion motion{SampledCurve(t_s, rate)};
+    for (Signals& signals : signals_)
+      signals.motion = motion;
+  }
+  build();
+}
+
+Problem Study::build_against_reference(std::size_t gyro) {
+  const GyroSeries& series = recording_.gyros[gyro];
+  const Transport& transport = transports_[gyro];
+  const Motion& motion = signals_[gyro].motion;
+  std::vector<Sample> samples;
+  samples.reserve(series.t_s.size());
+  const double reach_s = 3.0 * motion.curve().interval_s();
+  for (std::size_t i = 0; i < series.t_s.size(); ++i) {
+    if (transport.masked[i] != 0 || motion.curve().hole_at(transport.t_s[i], reach_s)) continue;
+    const double rate_dps = motion.rate(transport.t_s[i]).value;
+    std::array<double, 2> gain{};
+    gain[gyro] = 1.0;
+    samples.push_back({transport.t_s[i], gyro == 0 ? Channel::kGyro1 : Channel::kGyro2,
+                       series.rate_dps[i] - rate_dps, rate_dps, gain});
+  }
+  Problem problem =
+      assemble(std::move(samples), {transports_[0].interval_s, transports_[1].interval_s});
+  problem.holds[gyro] = true;
+  problem.layout.reference_variance = noise_variance(recording_.reference_dps);
+  return problem;
+}
+
+Problem Study::build_pair() {
+  const Motion& motion = signals_[0].motion;
+  std::vector<Sample> samples;
+  const auto resting = [&](double at_s) {
+    const auto cell = static_cast<std::size_t>(std::max(0.0, at_s));
+    return cell < resting_.size() && resting_[cell] != 0;
+  };
+  for (std::size_t gyro = 0; gyro < 2; ++gyro) {
+    const std::span<const double> t_s = readings_[gyro].times_s();
+    for (std::size_t i = 0; i < t_s.size(); ++i) {
+      if (!resting(t_s[i])) continue;
+      std::array<double, 2> gain{};
+      gain[gyro] = 1.0;
+      samples.push_back({t_s[i], gyro == 0 ? Channel::kGyro1 : Channel::kGyro2,
+                         readings_[gyro].values()[i] - recording_.rest_rate_dps,
+                         recording_.rest_rate_dps, gain});
+    }
+  }
+  const std::span<const double> t_s = readings_[0].times_s();
+  const double reach_s = 1.5 * readings_[1].interval_s();
+  for (std::size_t i = 0; i < t_s.size(); ++i) {
+    if (resting(t_s[i]) || readings_[1].hole_at(t_s[i], reach_s)) continue;
+    const SampledCurve::Point other = readings_[1].at(t_s[i]);
+    samples.push_back({t_s[i],
+                       Channel::kDifference,
+                       readings_[0].values()[i] - other.value,
+                       motion.rate(t_s[i]).value,
+                       {1.0, other.gain}});
+  }
+  Problem problem =
+      assemble(std::move(samples), {transports_[0].interval_s, transports_[1].interval_s});
+  problem.holds = {true, true};
+  return problem;
+}
+
+void Study::build() {
+  problems_.clear();
+  if (recording_.has_reference) {
+    problems_.push_back(build_against_reference(0));
+    problems_.push_back(build_against_reference(1));
+  } else {
+    problems_.push_back(build_pair());
+  }
+  excitations_ = {};
+  for (Problem& problem : problems_)
+    cache(problem);
+}
+
+void Study::cache(Problem& problem) {
+  for (std::size_t gyro = 0; gyro < 2; ++gyro) {
+    if (!problem.holds[gyro]) continue;
+    const Signals& signals = signals_[gyro];
+    Excitation& excitation = excitations_[gyro];
+    excitation.knows_temperature = !signals.temperature_c.empty();
+    excitation.knows_acceleration = !signals.vibration_g2.empty();
+    const std::size_t n = problem.t_s.size();
+    problem.rate[gyro].resize(n);
+    problem.surroundings[gyro].resize(n);
+    std::array<std::array<double, 2>, 6> range;
+    range.fill({1e300, -1e300});
+    const auto extend = [](std::array<double, 2>& r, double value) {
+      if (std::isnan(value)) return;
+      r[0] = std::min(r[0], value);
+      r[1] = std::max(r[1], value);
+    };
+    for (std::size_t i = 0; i < n; ++i) {
+      problem.rate[gyro][i] = signals.motion.rate(problem.t_s[i]);
+      const model::Surroundings s = signals.at(problem.t_s[i]);
+      problem.surroundings[gyro][i] = s;
+      if (share_of(problem.channel[i], gyro) == 0.0) continue;
+      excitation.rate_max_dps =
+          std::max(excitation.rate_max_dps, std::abs(problem.rate[gyro][i].value));
+      extend(range[0], s.temperature_c);
+      extend(range[1], s.temperature_slope_c_s);
+      for (std::size_t axis = 0; axis < 3; ++axis)
+        extend(range[2 + axis], s.acceleration_g[axis]);
+      extend(range[5], s.vibration_g2);
+    }
+    const auto width = [](const std::array<double, 2>& r) { return std::max(0.0, r[1] - r[0]); };
+    excitation.temperature_range_c = width(range[0]);
+    excitation.temperature_slope_range_c_s = width(range[1]);
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      excitation.acceleration_range_g[axis] = width(range[2 + axis]);
+    excitation.vibration_range_g2 = width(range[5]);
+  }
+}
+
+Eigen::VectorXd Study::contribution(const Problem& problem, std::size_t gyro,
+                                    const std::vector<Effect>& effects) const {
+  Eigen::VectorXd sum = Eigen::VectorXd::Zero(problem.size());
+  if (!problem.holds[gyro]) return sum;
+  std::vector<Effect> moving;
+  std::vector<Effect> added;
+  for (const Effect& effect : effects) {
+    if (effect.gyro != gyro) continue;
+    const model::Nature nature = model::info(effect.kind).nature;
+    if (nature == model::Nature::kLag || effect.kind == Kind::kClockSkew) moving.push_back(effect);
+    if (nature == model::Nature::kOffset || nature == model::Nature::kResponse)
+      added.push_back(effect);
+  }
+  if (!moving.empty()) {
+    const Prediction prediction(moving, signals_[gyro]);
+    for (Eigen::Index i = 0; i < problem.size(); ++i) {
+      const auto place = static_cast<std::size_t>(i);
+      const double share = share_of(problem.channel[place], gyro);
+      if (share == 0.0) continue;
+      sum[i] += share * (prediction.at(problem.t_s[place]) - problem.rate[gyro][place].value);
+    }
+  }
+  for (const Effect& effect : added) {
+    for (Eigen::Index i = 0; i < problem.size(); ++i) {
+      const auto place = static_cast<std::size_t>(i);
+      const double share = share_of(problem.channel[place], gyro);
+      if (share == 0.0) continue;
+      sum[i] += share * model::added_dps(effect, problem.rate[gyro][place].value,
+                                         problem.surroundings[gyro][place]);
+    }
+  }
+  return sum;
+}
+
+Eigen::VectorXd Study::residual(const Problem& problem, const std::vector<Effect>& effects) const {
+  Eigen::VectorXd residual = problem.observed_dps;
+  for (std::size_t gyro = 0; gyro < 2; ++gyro) {
+    if (problem.holds[gyro]) residual -= contribution(problem, gyro, effects);
+  }
+  return residual;
+}
+
+}  // namespace vgyro::gap

@@ -1,0 +1,42 @@
+#pragma once
+
+// What goes wrong between the sensor and the log, found on raw frames before anything is regressed:
+// lost frames, late stamps, values that freeze, clip, vanish around zero or lie on a lattice. What
+// is found is masked or repaired, so that it cannot look like something else.
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "gap/recording.h"
+#include "gap/result.h"
+#include "model/effect.h"
+
+namespace vgyro::gap {
+
+/// An effect that the raw frames show by themselves.
+struct Finding {
+  model::Effect effect;
+  model::Parameters sigma{};
+  double p_value = 0.0;
+  double statistic = 0.0;
+  Where where;
+  std::string evidence;
+  Figure figure;
+};
+
+struct Transport {
+  std::vector<double> t_s;           ///< instants of the samples, lateness taken out where found
+  std::vector<std::uint8_t> masked;  ///< not to be used
+  std::vector<double> late_s;        ///< of each stamp behind the even clock
+  double interval_s = 0.0;           ///< of the even clock
+  double lost_share = 0.0;           ///< frames that never came
+  std::vector<Finding> findings;     ///< beyond what `known` says
+  std::vector<std::string> notes;
+};
+
+/// `known`: this gyro's effects in the model; what they explain is masked but not found again.
+Transport check_transport(const GyroSeries& series, std::size_t gyro,
+                          const std::vector<model::Effect>& known);
+
+}  // namespace vgyro::gap
