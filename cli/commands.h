@@ -76,6 +76,21 @@ struct GapOptions {
 };
 int run_gap(const GapOptions& options);
 
+struct SimulateOptions {
+  std::string config;
+  std::string model;
+  std::string profile;
+  std::string output = "-";                  ///< "-": standard output
+  std::vector<double> gyro_rates_hz{100.0};  ///< one for both, or one each
+  double reference_rate_hz = 200.0;
+  double accelerometer_rate_hz = 100.0;
+  double jitter_s = 0.0;
+  double start_s = 1'700'000'000.0;
+  std::uint64_t seed = 1;
+  bool quiet = false;
+};
+int run_simulate(const SimulateOptions& options);
+
 /// "error: where: what; remedy" on stderr; returns kBadInput.
 int report(const Error& error);
 int report(const std::vector<Error>& errors);

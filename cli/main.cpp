@@ -17,6 +17,7 @@ struct Options {
   AllanOptions allan;
   CompareOptions compare;
   GapOptions gap;
+  SimulateOptions simulate;
   std::string method;
 };
 
@@ -75,6 +76,46 @@ CLI::App* add_model(CLI::App& app) {
   CLI::App* command = app.add_subcommand("model", "What a model file may hold: model list");
   command->add_subcommand("list", "every kind of effect, its parameters and their limits");
   command->require_subcommand(1);
+  return command;
+}
+
+CLI::App* add_simulate(CLI::App& app, SimulateOptions& options) {
+  CLI::App* command = app.add_subcommand(
+      "simulate", "Play a motion through a model: what such gyros would have recorded");
+  command->add_option("--config", options.config, "configuration, e.g. vgyro.toml")->required();
+  command->add_option("--model", options.model, "model file: what the gyros' errors are")
+      ->required();
+  command
+      ->add_option("--profile", options.profile,
+                   "motion, CSV: t_s,rate_dps[,temperature_c][,acc_x_g,acc_y_g,acc_z_g]")
+      ->required();
+  command->add_option("--seed", options.seed, "of the noise; the same gives the same bytes")
+      ->capture_default_str();
+  command->add_option("-o,--output", options.output, "candump log; - is standard output")
+      ->capture_default_str();
+  const CLI::Range rates(0.1, 10'000.0);
+  command->add_option("--gyro-rate", options.gyro_rates_hz, "samples a second, of both or A,B")
+      ->delimiter(',')
+      ->expected(1, 2)
+      ->check(rates)
+      ->capture_default_str();
+  command->add_option("--reference-rate", options.reference_rate_hz, "samples a second")
+      ->check(rates)
+      ->capture_default_str();
+  command->add_option("--accelerometer-rate", options.accelerometer_rate_hz, "samples a second")
+      ->check(rates)
+      ->capture_default_str();
+  command->add_option("--jitter", options.jitter_s, "every frame is late by |N(0, jitter)| seconds")
+      ->check(CLI::Range(0.0, 1.0))
+      ->capture_default_str();
+  command->add_option("--start", options.start_s, "stamp of the motion's beginning, seconds")
+      ->check(CLI::Range(0.0, 4e9))
+      ->capture_default_str();
+  command->add_flag("-q,--quiet", options.quiet, "no summary on stderr");
+  command->footer(
+      "The forms of the files are in docs/simulate.md and docs/model-file.md.\n"
+      "Example: vgyro simulate --config vgyro.toml --model model.toml --profile turns.csv -o "
+      "out.log");
   return command;
 }
 
@@ -155,6 +196,7 @@ int main(int argc, char** argv) {
   CLI::App* allan = add_allan(app, options.allan);
   CLI::App* compare = add_compare(app, options.compare);
   CLI::App* gap = add_gap(app, options.gap);
+  CLI::App* simulate = add_simulate(app, options.simulate);
   if (const auto unknown = unknown_command(app, argc, argv)) {
     report(*unknown);
     return kWrongUsage;
@@ -173,6 +215,7 @@ int main(int argc, char** argv) {
   if (allan->parsed()) return run_allan(options.allan);
   if (compare->parsed()) return run_compare(options.compare);
   if (gap->parsed()) return run_gap(options.gap);
+  if (simulate->parsed()) return run_simulate(options.simulate);
   // Frames are the main result; they give way only to a summary that wants the same place.
   const bool output_given = replay->count("--output") > 0;
   if (!output_given && options.replay.json != "-") options.replay.output = "-";

@@ -90,6 +90,12 @@ bool Presence::holds(std::span<const std::uint8_t> payload) const {
   return true;
 }
 
+void Presence::arrange(std::span<std::uint8_t> payload) const {
+  for (const Step* step = last_.get(); step != nullptr; step = step->above.get()) {
+    if (!step->ranges.empty()) step->multiplexor.encode_raw(step->ranges.front().first, payload);
+  }
+}
+
 MessageCodec::MessageCodec(const Message& message, const std::string& path) : message_(&message) {
   PresenceBuilder presences(message);
   for (const Signal& signal : message.signals) {

@@ -30,6 +30,8 @@ class Presence {
                                  const std::string& where);
 
   [[nodiscard]] bool holds(std::span<const std::uint8_t> payload) const;
+  /// Writes the multiplexors so that holds(). Precondition: they fit.
+  void arrange(std::span<std::uint8_t> payload) const;
   [[nodiscard]] bool always() const { return last_ == nullptr; }
 
  private:

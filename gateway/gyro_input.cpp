@@ -19,6 +19,17 @@ std::size_t bytes_of(const GyroPlan& plan) {
   return bytes;
 }
 
+// Precondition: the signal is there and fits.
+std::optional<Reject> convert(const Quantity& quantity, std::span<const std::uint8_t> payload,
+                              double& value) {
+  const double raw = quantity.codec.decode(payload).value;
+  value = raw * quantity.scale + quantity.shift;
+  if (raw >= quantity.minimum && raw <= quantity.maximum) return std::nullopt;
+  return std::isfinite(raw) ? Reject::kOutOfRange : Reject::kNotFinite;
+}
+
+}  // namespace
+
 bool holds(const Condition& condition, double value) {
   switch (condition.comparison) {
     case Comparison::kEqual:
@@ -36,17 +47,6 @@ bool holds(const Condition& condition, double value) {
   }
   return false;
 }
-
-// Precondition: the signal is there and fits.
-std::optional<Reject> convert(const Quantity& quantity, std::span<const std::uint8_t> payload,
-                              double& value) {
-  const double raw = quantity.codec.decode(payload).value;
-  value = raw * quantity.scale + quantity.shift;
-  if (raw >= quantity.minimum && raw <= quantity.maximum) return std::nullopt;
-  return std::isfinite(raw) ? Reject::kOutOfRange : Reject::kNotFinite;
-}
-
-}  // namespace
 
 std::optional<Reject> decode_quantity(const Quantity& quantity, const can::Frame& frame,
                                       double& value) {

@@ -27,6 +27,7 @@ struct FrameMatch {
   std::uint32_t id = 0;
   std::uint32_t mask = 0;
   bool extended = false;
+  std::uint8_t bytes = can::kClassicBytesMax;  ///< of the payload, by the DBC file
 };
 
 /// A physical quantity in a frame.

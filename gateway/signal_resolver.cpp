@@ -109,7 +109,9 @@ void SignalResolver::find_message(std::string_view name, DatabaseCache& cache) {
 }
 
 FrameMatch SignalResolver::match() const {
-  return {bus_index_, message_->id, message_->id_mask(), message_->extended};
+  const auto bytes = std::min<std::size_t>(message_->size_bytes, can::kFdBytesMax);
+  return {bus_index_, message_->id, message_->id_mask(), message_->extended,
+          static_cast<std::uint8_t>(bytes)};
 }
 
 const dbc::Signal* SignalResolver::signal(std::string_view key, bool required) {

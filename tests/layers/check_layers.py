@@ -21,7 +21,7 @@ ARROWS = {
     "gap": {"base", "model", "gap"},
     "gateway": {"base", "can", "dbc", "model", "fusion", "gateway"},
     "daemon": {"base", "can", "dbc", "gateway", "daemon"},
-    "cli": {"base", "can", "dbc", "model", "fusion", "analysis", "gap", "gateway", "simulation", "cli"},
+    "cli": {"base", "can", "dbc", "model", "simulation", "fusion", "analysis", "gap", "gateway", "cli"},
 }
 
 # What, as a pattern of an included header → the files that may include it.

@@ -1,0 +1,318 @@
+// `vgyro simulate`: the simulator's samples as frames of the configured messages, in one log.
+// Quantities of one message share its frames and are taken at the same instants.
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <sys/stat.h>
+
+#include <fmt/core.h>
+
+#include "can/candump.h"
+#include "cli/commands.h"
+#include "cli/output_file.h"
+#include "cli/progress.h"
+#include "gateway/config.h"
+#include "gateway/input_frames.h"
+#include "simulation/simulator.h"
+
+namespace vgyro::cli {
+
+namespace {
+
+using gateway::FrameMatch;
+using gateway::Plan;
+
+// Of the first samples, in intervals of their own stream: nothing on a bus comes at once.
+constexpr std::array<double, 2> kGyroOffsets{0.0, 0.23};
+constexpr double kReferenceOffset = 0.22;
+constexpr double kAccelerometerOffset = 0.06;
+// A temperature on a page of its own goes out with every tenth sample, a little later.
+constexpr std::size_t kPageEvery = 10;
+constexpr double kPageAfter_s = 1e-4;
+constexpr double kMicro = 1e6;
+
+enum Part : std::uint8_t { kGyroA = 0, kGyroB = 1, kReference = 2, kAccelerometer = 3 };
+
+/// One message: its parts, and the next of its samples to be sent.
+struct Sender {
+  const FrameMatch* match = nullptr;
+  std::vector<Part> parts{};
+  bool temperature_page = false;
+  std::size_t next = 0;
+  double stamp_s = 0.0;
+};
+
+bool same_message(const FrameMatch& a, const FrameMatch& b) {
+  return a.bus == b.bus && a.id == b.id && a.extended == b.extended;
+}
+
+std::vector<Sender> senders_of(const Plan& plan, bool has_acceleration) {
+  std::vector<Sender> senders;
+  const auto add = [&](const FrameMatch& match, Part part) {
+    for (Sender& sender : senders) {
+      if (!same_message(*sender.match, match)) continue;
+      sender.parts.push_back(part);
+      return;
+    }
+    senders.push_back({.match = &match, .parts = {part}});
+  };
+  add(plan.gyros[0].match, kGyroA);
+  add(plan.gyros[1].match, kGyroB);
+  if (plan.reference) add(plan.reference->match, kReference);
+  if (plan.accelerometer && has_acceleration) add(plan.accelerometer->match, kAccelerometer);
+  return senders;
+}
+
+simulation::Timing& timing_of(simulation::Settings& settings, Part part) {
+  if (part == kReference) return settings.reference;
+  if (part == kAccelerometer) return settings.accelerometer;
+  return settings.gyros[part];
+}
+
+simulation::Settings settings_of(const SimulateOptions& options,
+                                 const std::vector<Sender>& senders) {
+  simulation::Settings settings{.jitter_s = options.jitter_s, .seed = options.seed};
+  for (std::size_t i = 0; i < 2; ++i) {
+    const double rate_hz = i == 0 ? options.gyro_rates_hz.front() : options.gyro_rates_hz.back();
+    settings.gyros[i] = {rate_hz, kGyroOffsets[i] / rate_hz};
+  }
+  settings.reference = {options.reference_rate_hz, kReferenceOffset / options.reference_rate_hz};
+  settings.accelerometer = {options.accelerometer_rate_hz,
+                            kAccelerometerOffset / options.accelerometer_rate_hz};
+  for (const Sender& sender : senders) {
+    for (const Part part : sender.parts)
+      timing_of(settings, part) = timing_of(settings, sender.parts.front());
+  }
+  return settings;
+}
+
+class Recording {
+ public:
+  Recording(const Plan& plan, const simulation::Simulator& simulator, std::vector<Sender> senders);
+
+  /// All frames in the order of their stamps.
+  void write(OutputFile& output, double start_s);
+  void tell(const SimulateOptions& options) const;
+  void warn_of_limits() const;
+
+ private:
+  [[nodiscard]] std::size_t count(Part part) const;
+  [[nodiscard]] double stamp_s(Part part, std::size_t n) const;
+  [[nodiscard]] bool lost(const Sender& sender) const;
+  [[nodiscard]] can::Frame frame(const Sender& sender);
+  void put(Part part, std::size_t n, can::Frame& frame);
+  void add_temperature_pages();
+  bool find_next(Sender& sender) const;
+
+  const Plan& plan_;
+  const simulation::Simulator& simulator_;
+  std::vector<Sender> senders_;
+  std::array<std::vector<simulation::GyroSample>, 2> gyros_;
+  std::vector<simulation::RateSample> reference_;
+  std::vector<simulation::AccelerationSample> acceleration_;
+  std::array<std::uint64_t, 2> beyond_{};  ///< readings that the signal cannot carry
+  std::uint64_t frames_ = 0;
+};
+
+Recording::Recording(const Plan& plan, const simulation::Simulator& simulator,
+                     std::vector<Sender> senders)
+    : plan_(plan),
+      simulator_(simulator),
+      senders_(std::move(senders)),
+      gyros_{simulator.gyro(0), simulator.gyro(1)} {
+  for (const Sender& sender : senders_) {
+    for (const Part part : sender.parts) {
+      if (part == kReference) reference_ = simulator.reference();
+      if (part == kAccelerometer) acceleration_ = simulator.acceleration();
+    }
+  }
+  add_temperature_pages();
+}
+
+void Recording::add_temperature_pages() {
+  for (const Part part : {kGyroA, kGyroB}) {
+    const gateway::GyroPlan& gyro = plan_.gyros[part];
+    if (!gyro.temperature) continue;
+    can::Frame frame = gateway::empty_frame(gyro.match);
+    gateway::put_gyro(gyro, 0.0, 0, frame);
+    if (gateway::carries_temperature(gyro, frame)) continue;
+    senders_.push_back({.match = &gyro.match, .parts = {part}, .temperature_page = true});
+  }
+}
+
+std::size_t Recording::count(Part part) const {
+  if (part == kReference) return reference_.size();
+  if (part == kAccelerometer) return acceleration_.size();
+  return gyros_[part].size();
+}
+
+double Recording::stamp_s(Part part, std::size_t n) const {
+  if (part == kReference) return reference_[n].stamp_s;
+  if (part == kAccelerometer) return acceleration_[n].stamp_s;
+  return gyros_[part][n].stamp_s;
+}
+
+bool Recording::lost(const Sender& sender) const {
+  return std::any_of(sender.parts.begin(), sender.parts.end(),
+                     [&](Part part) { return part <= kGyroB && gyros_[part][sender.next].lost; });
+}
+
+// From sender.next on; false where there is none.
+bool Recording::find_next(Sender& sender) const {
+  const Part leader = sender.parts.front();
+  const std::size_t step = sender.temperature_page ? kPageEvery : 1;
+  while (sender.next < count(leader) && lost(sender))
+    sender.next += step;
+  if (sender.next >= count(leader)) return false;
+  sender.stamp_s = stamp_s(leader, sender.next) + (sender.temperature_page ? kPageAfter_s : 0.0);
+  return true;
+}
+
+void Recording::put(Part part, std::size_t n, can::Frame& frame) {
+  if (part == kReference) {
+    gateway::put_quantity(plan_.reference->rate, reference_[n].rate_dps, frame);
+    return;
+  }
+  if (part == kAccelerometer) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      gateway::put_quantity(plan_.accelerometer->axes[axis], acceleration_[n].acceleration_g[axis],
+                            frame);
+    }
+    return;
+  }
+  const gateway::GyroPlan& gyro = plan_.gyros[part];
+  const simulation::GyroSample& sample = gyros_[part][n];
+  if (std::abs(sample.reading_dps) > gateway::carried_dps(gyro)) ++beyond_[part];
+  gateway::put_gyro(gyro, sample.reading_dps, n, frame);
+  if (gyro.temperature && gateway::carries_temperature(gyro, frame)) {
+    gateway::put_quantity(*gyro.temperature, simulator_.temperature_c(sample.t_s), frame);
+  }
+}
+
+can::Frame Recording::frame(const Sender& sender) {
+  can::Frame frame = gateway::empty_frame(*sender.match);
+  if (sender.temperature_page) {
+    const Part part = sender.parts.front();
+    const double t_s = gyros_[part][sender.next].t_s;
+    gateway::put_quantity(*plan_.gyros[part].temperature, simulator_.temperature_c(t_s), frame);
+    return frame;
+  }
+  for (const Part part : sender.parts)
+    put(part, sender.next, frame);
+  return frame;
+}
+
+void Recording::write(OutputFile& output, double start_s) {
+  std::vector<can::LineFormatter> formatters;
+  formatters.reserve(plan_.buses.size());
+  for (const std::string& bus : plan_.buses)
+    formatters.emplace_back(bus);
+  std::vector<Sender*> alive;
+  for (Sender& sender : senders_) {
+    if (find_next(sender)) alive.push_back(&sender);
+  }
+  const auto start_ns = static_cast<std::int64_t>(std::llround(start_s * kMicro)) * 1000;
+  Progress progress("simulate");
+  while (!alive.empty()) {
+    const auto first =
+        std::min_element(alive.begin(), alive.end(),
+                         [](const auto* a, const auto* b) { return a->stamp_s < b->stamp_s; });
+    Sender& sender = **first;
+    // A log's last digit is the microsecond.
+    const auto since_ns = static_cast<std::int64_t>(std::llround(sender.stamp_s * kMicro)) * 1000;
+    output.commit(formatters[sender.match->bus].format(
+        output.room(can::kLineBytesMax), time_from_ns(start_ns + since_ns), frame(sender), 6));
+    progress.update(static_cast<std::uint64_t>(sender.stamp_s * 1e3),
+                    static_cast<std::uint64_t>(simulator_.profile().length_s * 1e3), ++frames_);
+    sender.next += sender.temperature_page ? kPageEvery : 1;
+    if (!find_next(sender)) alive.erase(first);
+  }
+}
+
+void Recording::tell(const SimulateOptions& options) const {
+  fmt::print(stderr, "{:g} s of {}, {} frames, seed {}\n", simulator_.profile().length_s,
+             options.profile, frames_, options.seed);
+  for (const Part part : {kGyroA, kGyroB}) {
+    const auto& samples = gyros_[part];
+    const auto lost = std::count_if(samples.begin(), samples.end(),
+                                    [](const simulation::GyroSample& s) { return s.lost; });
+    fmt::print(stderr, "  gyro {}: {} samples{}\n", plan_.gyros[part].name, samples.size(),
+               lost == 0 ? "" : fmt::format(", {} of them lost", lost));
+  }
+  if (plan_.reference) fmt::print(stderr, "  reference: {} samples\n", reference_.size());
+  if (plan_.accelerometer) {
+    fmt::print(stderr, "  accelerometer: {}\n",
+               acceleration_.empty()
+                   ? "no frames; the profile has no column acc_x_g, acc_y_g, acc_z_g"
+                   : fmt::format("{} samples", acceleration_.size()));
+  }
+  const bool tells_temperature = plan_.gyros[0].temperature || plan_.gyros[1].temperature;
+  if (tells_temperature && !simulator_.profile().temperature_c) {
+    fmt::print(stderr,
+               "  temperature: {:g} degC throughout; the profile has no column temperature_c\n",
+               simulation::Simulator::kTemperature_c);
+  }
+}
+
+void Recording::warn_of_limits() const {
+  for (const Part part : {kGyroA, kGyroB}) {
+    if (beyond_[part] == 0) continue;
+    warn({"gyro " + plan_.gyros[part].name,
+          fmt::format("{} readings are beyond the {:g} deg/s that its signal {} can carry; they "
+                      "were sent as that",
+                      beyond_[part], gateway::carried_dps(plan_.gyros[part]),
+                      plan_.gyros[part].rate.name),
+          {}});
+  }
+}
+
+// Before a file is written over.
+Expected<void> check_output(const SimulateOptions& options) {
+  if (options.output.ends_with(".xz")) {
+    return fail(options.output, "is not compressed here", "write a .log, then `xz` compresses it");
+  }
+  struct stat output {};
+  if (options.output == "-" || ::stat(options.output.c_str(), &output) != 0) return {};
+  for (const std::string& path : {options.config, options.model, options.profile}) {
+    struct stat input {};
+    if (::stat(path.c_str(), &input) != 0) continue;
+    if (input.st_dev != output.st_dev || input.st_ino != output.st_ino) continue;
+    return fail(options.output, "is also an input and would be overwritten", "choose another name");
+  }
+  return {};
+}
+
+}  // namespace
+
+int run_simulate(const SimulateOptions& options) {
+  const auto loaded = gateway::load_config(options.config);
+  if (!loaded) return report(loaded.error());
+  const Plan& plan = loaded->plan;
+  for (const gateway::GyroPlan& gyro : plan.gyros) {
+    if (const auto good = gateway::check_valid(gyro); !good) return report(good.error());
+  }
+  auto model = model::load_model(options.model);
+  if (!model) return report(model.error());
+  auto profile = simulation::load_profile(options.profile);
+  if (!profile) return report(profile.error());
+  auto senders = senders_of(plan, profile->has_acceleration());
+  const simulation::Settings settings = settings_of(options, senders);
+  const auto simulator =
+      simulation::Simulator::make(*std::move(model), *std::move(profile), settings);
+  if (!simulator) return report(simulator.error());
+  if (const auto good = check_output(options); !good) return report(good.error());
+  auto output = OutputFile::open(options.output);
+  if (!output) return report(output.error());
+
+  Recording recording(plan, *simulator, std::move(senders));
+  recording.write(*output, options.start_s);
+  if (const auto closed = output->close(); !closed) return report(closed.error());
+  if (!options.quiet) recording.tell(options);
+  recording.warn_of_limits();
+  return kDone;
+}
+
+}  // namespace vgyro::cli

@@ -1,0 +1,86 @@
+#include "gateway/input_frames.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include <fmt/core.h>
+
+#include "gateway/gyro_input.h"
+
+namespace vgyro::gateway {
+
+namespace {
+
+std::span<std::uint8_t> payload_of(can::Frame& frame) {
+  return {frame.data.data(), frame.length};
+}
+
+double in_unit_of(const Quantity& quantity, double value) {
+  return (value - quantity.shift) / quantity.scale;
+}
+
+// What the bits are already, where that will do; otherwise the value compared with, one of its
+// neighbours, or an end of the signal's range.
+bool put_valid(const Condition& condition, std::span<std::uint8_t> payload) {
+  const dbc::SignalCodec& codec = condition.codec;
+  const auto fulfilled = [&] { return holds(condition, codec.decode(payload).value); };
+  for (const double value : {condition.value, condition.value + 1.0, condition.value - 1.0,
+                             codec.representable_max(), codec.representable_min()}) {
+    if (fulfilled()) return true;
+    codec.encode(value, payload);
+  }
+  return fulfilled();
+}
+
+}  // namespace
+
+can::Frame empty_frame(const FrameMatch& match) {
+  can::Frame frame;
+  frame.id = match.id;
+  if (match.extended) frame.flags |= can::kExtended;
+  if (match.bytes > can::kClassicBytesMax) frame.flags |= can::kFd;
+  frame.length = static_cast<std::uint8_t>(can::fd_padded_length(match.bytes));
+  return frame;
+}
+
+void put_quantity(const Quantity& quantity, double value, can::Frame& frame) {
+  quantity.presence.arrange(payload_of(frame));
+  quantity.codec.encode(in_unit_of(quantity, value), payload_of(frame));
+}
+
+void put_gyro(const GyroPlan& plan, double rate_dps, std::uint64_t count, can::Frame& frame) {
+  const auto payload = payload_of(frame);
+  if (plan.valid) put_valid(*plan.valid, payload);
+  if (plan.counter) plan.counter->codec.encode_raw(count % plan.counter->modulus, payload);
+  if (!plan.sign) {
+    put_quantity(plan.rate, rate_dps, frame);
+    return;
+  }
+  const bool negative = in_unit_of(plan.rate, rate_dps) < in_unit_of(plan.rate, 0.0);
+  put_quantity(plan.rate, negative ? -rate_dps : rate_dps, frame);
+  plan.sign->encode_raw(negative ? 1 : 0, payload);
+}
+
+bool carries_temperature(const GyroPlan& plan, const can::Frame& frame) {
+  const dbc::Presence& page = plan.temperature->presence;
+  return page.always() || plan.rate.presence.always() || page.holds(frame.payload());
+}
+
+double carried_dps(const GyroPlan& plan) {
+  const dbc::SignalCodec& codec = plan.rate.codec;
+  const double low = codec.representable_min() * plan.rate.scale + plan.rate.shift;
+  const double high = codec.representable_max() * plan.rate.scale + plan.rate.shift;
+  if (plan.sign) return std::max(std::abs(low), std::abs(high));
+  return std::min(std::abs(low), std::abs(high));
+}
+
+Expected<void> check_valid(const GyroPlan& plan) {
+  if (!plan.valid) return {};
+  can::Frame frame = empty_frame(plan.match);
+  if (put_valid(*plan.valid, payload_of(frame))) return {};
+  return fail("gyro " + plan.name,
+              fmt::format("no value of the signal fulfils valid = \"{}\"", plan.valid->text));
+}
+
+}  // namespace vgyro::gateway

@@ -1,0 +1,33 @@
+#pragma once
+
+// The frames that the gateway reads, made from values: the other direction of gyro_input.h. What a
+// signal cannot carry becomes the nearest that it can; bits that nobody asked for are 0.
+
+#include <cstdint>
+#include <optional>
+
+#include "base/error.h"
+#include "can/frame.h"
+#include "gateway/plan.h"
+
+namespace vgyro::gateway {
+
+/// All bits 0, of the length that the DBC file gives the message.
+can::Frame empty_frame(const FrameMatch& match);
+
+/// The message's page is turned to the quantity's, and its value written.
+void put_quantity(const Quantity& quantity, double value, can::Frame& frame);
+
+/// Rate with its sign, alive counter, validity. `count` is the number of the frame.
+void put_gyro(const GyroPlan& plan, double rate_dps, std::uint64_t count, can::Frame& frame);
+
+/// Does the frame that put_gyro() filled have room for the temperature, or has that its own page?
+bool carries_temperature(const GyroPlan& plan, const can::Frame& frame);
+
+/// The largest magnitude that the rate's signal can carry on both sides, deg/s.
+double carried_dps(const GyroPlan& plan);
+
+/// Error when no value of the signal fulfils the plan's `valid`.
+Expected<void> check_valid(const GyroPlan& plan);
+
+}  // namespace vgyro::gateway

@@ -1,0 +1,222 @@
+#!/usr/bin/python3
+"""Every kind of effect in the recordings of `vgyro simulate`, against its equation in closed form: readings
+without noise agree to the frame's last digit, noise has the variance it should, frames and stamps go wrong
+as often and as far as they should. The profile has 50 rows a second, the gyros take 100 samples between them.
+Statistical tolerances are in standard errors; seeds are printed."""
+
+import math
+import sys
+import tempfile
+import unittest
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+import rig  # noqa: E402
+from rig import effect  # noqa: E402
+
+SEED = 3
+SIGMAS = 4.0
+LENGTH_S = 20.0
+# Rounding to the step, and what the curve through the profile's points is off by.
+CLOSE_DPS = 0.75 * rig.RATE_STEP_DPS
+RATE_HZ = 100.0
+
+
+def vibration(t, accelerometer_t):
+    """Variance of |a| over the accelerometer's samples of the last second before each t."""
+    size = np.linalg.norm(rig.acceleration(accelerometer_t), axis=0)
+    result = np.zeros_like(t)
+    for i, now in enumerate(t):
+        newest = np.searchsorted(accelerometer_t, now, side="right")
+        result[i] = np.var(size[max(0, newest - 100):newest]) if newest else 0.0
+    return result
+
+
+class Equations(unittest.TestCase):
+    """Without noise."""
+
+    def readings(self, *effects):
+        with tempfile.TemporaryDirectory() as folder:
+            log = rig.simulate(folder, effects, rig.profile(LENGTH_S))
+        self.accelerometer = rig.Frames(log, 0x210)
+        self.table = rig.Frames(log, 0x200)
+        other = rig.Frames(log, 0x102)
+        inside = self.inside(other.t)
+        np.testing.assert_allclose(other.rate()[inside], rig.rate(other.t[inside]), atol=CLOSE_DPS, err_msg="gyro b")
+        return rig.Frames(log, 0x101)
+
+    def inside(self, t):
+        """Not so near the profile's ends that points are missing there, or that a low-pass remembers it."""
+        return (t > 0.6) & (t < LENGTH_S - 0.2)
+
+    def check(self, wanted, *effects, close=CLOSE_DPS):
+        frames = self.readings(*effects)
+        inside = self.inside(frames.t)
+        np.testing.assert_allclose(frames.rate()[inside], wanted(frames.t)[inside], rtol=0, atol=close, err_msg=str(effects))
+        return frames
+
+    def test_without_effects_all_say_the_truth(self):
+        frames = self.check(rig.rate)
+        np.testing.assert_allclose(frames.temperature(), rig.temperature(frames.t), atol=0.51 * rig.TEMPERATURE_STEP_C)
+        inside = self.inside(self.table.t)
+        np.testing.assert_allclose(self.table.rate()[inside], rig.rate(self.table.t[inside]), atol=CLOSE_DPS)
+        t = self.accelerometer.t
+        inside = self.inside(t)
+        np.testing.assert_allclose(self.accelerometer.acceleration()[:, inside], rig.acceleration(t[inside]),
+                                   atol=0.6 * rig.ACCELERATION_STEP_G)
+        self.assertEqual([len(frames.t), len(self.table.t), len(t)], [2001, 4000, 2000])
+        np.testing.assert_array_equal(frames.counter(), np.arange(2001) % 256)
+
+    def test_offsets(self):
+        def plus(added):
+            return lambda t: rig.rate(t) + added(t)
+        t_ref = 21.0
+        self.check(plus(lambda t: 0.25), effect("bias", value_dps=0.25))
+        self.check(plus(lambda t: -2e-3 * t), effect("bias_ramp", slope_dps_s=-2e-3))
+        self.check(plus(lambda t: 0.1 * (t >= 7.0)), effect("bias_step", size_dps=0.1, at_s=7.0))
+        self.check(plus(lambda t: 0.3 * np.exp(-t / 6.0)), effect("warm_up", amplitude_dps=0.3, tau_s=6.0))
+        self.check(plus(lambda t: 0.02 * (rig.temperature(t) - t_ref)),
+                   effect("temperature_bias", coefficient_dps_k=0.02, reference_c=t_ref))
+        self.check(plus(lambda t: 0.01 * (rig.temperature(t) - 25.0) ** 2),
+                   effect("temperature_bias_quadratic", coefficient_dps_k2=0.01))
+        self.check(plus(lambda t: 0.05 * rig.temperature_slope(t)), effect("temperature_rate_bias", coefficient_dps_s_k=0.05))
+        for axis in range(3):
+            self.check(plus(lambda t: 0.04 * rig.acceleration(t)[axis]),
+                       effect("g_sensitivity", axis="xyz"[axis], coefficient_dps_g=0.04))
+        # The angle keeps what the first rows' curve is off by.
+        self.check(plus(lambda t: 0.2 * np.cos(2 * rig.angle_rad(t) + 0.4)),
+                   effect("angle_harmonic", harmonic=2, amplitude_dps=0.2, phase_rad=0.4), close=2e-6)
+        self.check(plus(lambda t: 0.2 * np.sin(2 * np.pi * 33.3 * t + 1.0)),
+                   effect("line", frequency_hz=33.3, amplitude_dps=0.2, phase_rad=1.0))
+
+    def test_vibration(self):
+        self.check(lambda t: rig.rate(t) + 2.0 * vibration(t, self.accelerometer.t),
+                   effect("vibration_rectification", coefficient_dps_g2=2.0), close=3e-6)
+
+    def test_responses(self):
+        r = rig.rate
+        self.check(lambda t: r(t) * (1 + 4e-3), effect("scale_factor", error=4e-3))
+        self.check(lambda t: r(t) + 4e-3 * np.abs(r(t)), effect("scale_factor_asymmetry", error=4e-3))
+        self.check(lambda t: r(t) + 1e-3 * r(t) ** 2, effect("scale_factor_quadratic", coefficient_per_dps=1e-3))
+        self.check(lambda t: r(t) + 1e-5 * r(t) ** 3, effect("scale_factor_cubic", coefficient_per_dps2=1e-5))
+        self.check(lambda t: r(t) * (1 + 1e-3 * (rig.temperature(t) - 25.0)), effect("scale_factor_temperature", coefficient_per_k=1e-3))
+        self.check(lambda t: 1.004 * r(t) + 1e-3 * r(t) ** 2, effect("scale_factor", error=4e-3),
+                   effect("scale_factor_quadratic", coefficient_per_dps=1e-3))
+
+    def test_lags(self):
+        self.check(lambda t: rig.rate(t - 0.0137), effect("delay", seconds=0.0137))
+        self.check(lambda t: rig.rate(t + 0.004), effect("delay", seconds=-0.004))
+        self.check(lambda t: rig.low_passed(t, 5.0), effect("bandwidth", cutoff_hz=5.0))
+        self.check(lambda t: rig.low_passed(t, 60.0), effect("bandwidth", cutoff_hz=60.0))
+        self.check(lambda t: 1.01 * rig.low_passed(t - 0.005, 60.0), effect("bandwidth", cutoff_hz=60.0),
+                   effect("delay", seconds=0.005), effect("scale_factor", error=0.01))
+
+    def test_clips(self):
+        r = rig.rate
+        self.check(lambda t: np.clip(r(t), -12.5, 12.5), effect("saturation", limit_dps=12.5))
+        self.check(lambda t: np.where(np.abs(r(t)) < 5.0, 0.0, r(t)), effect("dead_band", width_dps=5.0))
+        frames = self.readings(effect("quantization", step_dps=0.25))
+        np.testing.assert_allclose(frames.rate() / 0.25, np.rint(frames.rate() / 0.25), atol=1e-5)
+        inside = self.inside(frames.t)
+        self.assertLess(np.max(np.abs(frames.rate() - r(frames.t))[inside]), 0.125 + 2e-6)
+
+    def test_stuck(self):
+        frames = self.readings(effect("stuck", from_s=5.005, to_s=6.005))
+        frozen = (frames.t >= 5.005) & (frames.t < 6.005)
+        self.assertEqual(np.count_nonzero(frozen), 100)
+        self.assertEqual(set(frames.rate()[frozen]), {frames.rate()[500]})
+        free = self.inside(frames.t) & ~frozen
+        np.testing.assert_allclose(frames.rate()[free], rig.rate(frames.t[free]), atol=CLOSE_DPS)
+
+
+class Chance(unittest.TestCase):
+    """What is random, at rest unless said."""
+
+    def frames(self, seconds, *effects, arguments=(), text=None):
+        with tempfile.TemporaryDirectory() as folder:
+            log = rig.simulate(folder, effects, text or rig.rest(seconds), "--seed", SEED, *arguments)
+        return rig.Frames(log, 0x101), rig.Frames(log, 0x102)
+
+    def expect_variance(self, values, wanted, degrees=None):
+        degrees = degrees or len(values)
+        self.assertAlmostEqual(np.mean(values**2) / wanted, 1.0, delta=SIGMAS * math.sqrt(2.0 / degrees))
+
+    def test_white_noise_of_both_gyros_at_their_own_rates(self):
+        a, b = self.frames(400, effect("white_noise", density_dps_rthz=2e-4), effect("white_noise", 2, density_dps_rthz=3e-4),
+                           arguments=("--gyro-rate", "50,200"))
+        self.assertEqual([len(a.t), len(b.t)], [20001, 80000])
+        step = rig.RATE_STEP_DPS**2 / 12
+        self.expect_variance(a.rate(), 2e-4**2 * 50 + step)
+        self.expect_variance(b.rate(), 3e-4**2 * 200 + step)
+        # The sum of white noise over seconds has nothing that their mean square does not say.
+        sums = b.rate()[:80000].reshape(-1, 200).mean(axis=1)
+        self.expect_variance(sums, 3e-4**2 + step / 200)
+
+    def test_random_walk(self):
+        a, _ = self.frames(600, effect("rate_random_walk", density_dps_rts=2e-3))
+        for samples in (1, 100):
+            increments = np.diff(a.rate()[::samples])
+            self.expect_variance(increments, 2e-3**2 * samples / RATE_HZ + 2 * rig.RATE_STEP_DPS**2 / 12)
+
+    def test_gauss_markov(self):
+        a, _ = self.frames(2000, effect("gauss_markov", sigma_dps=5e-3, tau_s=0.5))
+        y = a.rate()
+        independent = 2000 / 0.5
+        self.expect_variance(y, 5e-3**2, degrees=independent)
+        for lag in (10, 50, 100):
+            wanted = math.exp(-lag / RATE_HZ / 0.5)
+            self.assertAlmostEqual(np.mean(y[lag:] * y[:-lag]) / 5e-3**2, wanted, delta=SIGMAS * math.sqrt(2 / independent))
+
+    def test_rate_noise(self):
+        text = rig.profile(300)
+        a, b = self.frames(300, effect("rate_noise", ratio_rthz=1e-4), text=text)
+        inside = (a.t > 0.2) & (a.t < 299.8)
+        truth = rig.rate(a.t)[inside]
+        noise = a.rate()[inside] - truth
+        moving = np.abs(truth) > 0.5
+        self.expect_variance(noise[moving] / np.abs(truth[moving]), 1e-4**2 * RATE_HZ)
+
+    def test_spikes(self):
+        a, _ = self.frames(2000, effect("spikes", rate_hz=0.4, size_dps=3.0))
+        up, down = np.count_nonzero(np.isclose(a.rate(), 3.0)), np.count_nonzero(np.isclose(a.rate(), -3.0))
+        self.assertEqual(up + down, np.count_nonzero(a.rate()))
+        self.assertAlmostEqual(up + down, 800, delta=SIGMAS * math.sqrt(800))
+        self.assertAlmostEqual(up - down, 0, delta=SIGMAS * math.sqrt(800))
+
+    def test_dropped_frames_leave_gaps_in_stamps_and_counters(self):
+        a, b = self.frames(300, effect("dropped_frames", fraction=0.1))
+        sent = 30001
+        self.assertEqual(len(b.t), sent - 1)
+        self.assertAlmostEqual(len(a.t), 0.9 * sent, delta=SIGMAS * math.sqrt(sent * 0.09))
+        steps = np.diff(a.counter()) % 256
+        np.testing.assert_array_equal(steps, np.rint(np.diff(a.t) * RATE_HZ).astype(int))
+
+    def test_clock_skew_stretches_the_stamps_of_one_gyro(self):
+        a, b = self.frames(1000, effect("clock_skew", ppm=200.0))
+        np.testing.assert_allclose(a.t, np.arange(len(a.t)) / RATE_HZ * (1 + 200e-6), atol=1e-6)
+        np.testing.assert_allclose(np.diff(b.t), 1 / RATE_HZ, atol=1.1e-6)
+
+    def test_jitter_makes_stamps_late_and_keeps_their_order(self):
+        for effects, arguments in (([effect("timestamp_jitter", sigma_s=5e-4)], ()), ([], ("--jitter", "5e-4"))):
+            a, _ = self.frames(300, *effects, arguments=arguments)
+            late = a.t - np.arange(len(a.t)) / RATE_HZ
+            self.assertGreater(late.min(), -1e-6)
+            self.expect_variance(late, 5e-4**2)
+            self.assertAlmostEqual(late.mean(), 5e-4 * math.sqrt(2 / math.pi), delta=SIGMAS * 5e-4 / math.sqrt(len(late)))
+        a, _ = self.frames(100, effect("timestamp_jitter", sigma_s=0.05))
+        self.assertEqual(len(a.t), 10001)
+        self.assertTrue(np.all(np.diff(a.t) >= 0))
+        np.testing.assert_array_equal(np.diff(a.counter()) % 256, 1)
+
+    def test_one_more_effect_leaves_the_noise_as_it_is(self):
+        white = effect("white_noise", density_dps_rthz=2e-4)
+        alone, _ = self.frames(20, white)
+        both, _ = self.frames(20, effect("spikes", rate_hz=0.5, size_dps=1.0), white, effect("white_noise", 2, density_dps_rthz=1e-3))
+        np.testing.assert_allclose(np.mod(both.rate() + 0.5, 1.0) - 0.5, alone.rate(), atol=1.1e-6)
+
+
+if __name__ == "__main__":
+    print(f"seed {SEED}")
+    unittest.main(verbosity=1)
