@@ -153,8 +153,8 @@ CLI::App* add_compare(CLI::App& app, CompareOptions& options) {
 }
 
 CLI::App* add_gap(CLI::App& app, GapOptions& options) {
-  CLI::App* command = app.add_subcommand(
-      "gap", "Find what the model lacks, name it, add it, show the gap to the recording shrink");
+  CLI::App* command =
+      app.add_subcommand("gap", "Find what the model lacks, name it, add it, show the gap shrink");
   add_recording(*command, options.config, options.measured);
   command->add_option("--model", options.model,
                       "model file to begin with; default: the configured one, or none");
