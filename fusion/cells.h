@@ -8,18 +8,19 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "fusion/quadratic.h"
+
 namespace vgyro::fusion {
 
 /// Whose samples a block holds.
 enum class Present : std::uint8_t { kGyro1 = 0, kGyro2 = 1, kBoth = 2 };
 
 struct Cell {
-  double middle_s = 0.0;
   double length_s = 0.0;
   double count = 0.0;
   std::array<double, 2> mean_dps{};
   /// Sums of squares and product of both gyros' samples about the cell's mean.
-  std::array<double, 3> scatter{};
+  Symmetric scatter{};
   /// Mean of RatePair::noise_gain.
   std::array<double, 2> noise_gain{};
 };
@@ -124,7 +125,6 @@ class CellBuilder {
   }
   void close_cell(double to_s) {
     Cell& cell = block_.cells[block_.count++];
-    cell.middle_s = 0.5 * (cell_from_s_ + to_s);
     cell.length_s = to_s - cell_from_s_;
     cell.count = count_;
     for (std::size_t gyro = 0; gyro < 2; ++gyro) {
@@ -152,7 +152,7 @@ class CellBuilder {
   double count_ = 0.0;
   std::array<double, 2> origin_{};
   std::array<double, 2> sum_{};
-  std::array<double, 3> square_{};
+  Symmetric square_{};
   std::array<double, 2> gain_{};
 };
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace vgyro::fusion {
 
@@ -20,6 +21,16 @@ constexpr double kRunToRunAge_s = 60.0;
 double log_prior(double ratio_per_s) {
   const double away = (std::log10(ratio_per_s) - kUsualRatioLog10) / kRatioSpreadLog10;
   return -0.5 * away * away;
+}
+
+DriftFilter::Covariance doubt_of(const Symmetric& biases, double scale_sigma, double skew_sigma_s) {
+  DriftFilter::Covariance covariance = DriftFilter::Covariance::Zero();
+  covariance(kBias1, kBias1) = biases[0];
+  covariance(kBias1, kBias2) = covariance(kBias2, kBias1) = biases[1];
+  covariance(kBias2, kBias2) = biases[2];
+  covariance(kScale, kScale) = squared(scale_sigma);
+  covariance(kSkew, kSkew) = squared(skew_sigma_s);
+  return covariance;
 }
 
 struct WalkChoice {
@@ -56,31 +67,25 @@ void DriftBank::make(const std::array<double, 2>& white_dps_rthz,
       const WalkChoice second = choice(1, j);
       model.walk_dps_rts = {first.walk_dps_rts, second.walk_dps_rts};
       const double log_weight = first.log_weight + second.log_weight;
-      const auto growth = DriftFilter(model, mean, covariance).growth_per_s();
+      DriftFilter filter(model, mean, covariance);
+      const auto growth = filter.growth_per_s();
       const double quality_1 = white_dps_rthz[0] * std::sqrt(growth[0]);
       const double quality_2 = white_dps_rthz[1] * std::sqrt(growth[1]);
       const double scale_share =
           quality_1 + quality_2 > 0.0 ? quality_1 / (quality_1 + quality_2) : 0.5;
-      hypotheses_.push_back({DriftFilter(model, mean, covariance), scale_share, log_weight,
-                             log_weight, first.place * ratios + second.place});
+      hypotheses_.push_back({std::move(filter), scale_share, log_weight, log_weight,
+                             first.place * ratios + second.place});
     }
   }
   normalize();
 }
 
 void DriftBank::begin(const std::array<double, 2>& white_dps_rthz,
-                      const std::array<double, 2>& bias_dps,
-                      const std::array<double, 3>& covariance) {
+                      const std::array<double, 2>& bias_dps, const Symmetric& covariance) {
   DriftFilter::Observables mean = DriftFilter::Observables::Zero();
   mean(kBias1) = bias_dps[0];
   mean(kBias2) = bias_dps[1];
-  DriftFilter::Covariance start = DriftFilter::Covariance::Zero();
-  start(kBias1, kBias1) = covariance[0];
-  start(kBias1, kBias2) = start(kBias2, kBias1) = covariance[1];
-  start(kBias2, kBias2) = covariance[2];
-  start(kScale, kScale) = kScaleSigma * kScaleSigma;
-  start(kSkew, kSkew) = kSkewSigma_s * kSkewSigma_s;
-  make(white_dps_rthz, mean, start);
+  make(white_dps_rthz, mean, doubt_of(covariance, kScaleSigma, kSkewSigma_s));
 }
 
 void DriftBank::resume(const DriftMemory& memory, double age_s) {
@@ -88,13 +93,8 @@ void DriftBank::resume(const DriftMemory& memory, double age_s) {
                                     std::sqrt(memory.white_density[2])};
   DriftFilter::Observables mean = DriftFilter::Observables::Zero();
   mean << memory.bias_dps[0], memory.bias_dps[1], memory.scale_difference, memory.skew_s;
-  DriftFilter::Covariance start = DriftFilter::Covariance::Zero();
-  start(kBias1, kBias1) = memory.bias_covariance[0];
-  start(kBias1, kBias2) = start(kBias2, kBias1) = memory.bias_covariance[1];
-  start(kBias2, kBias2) = memory.bias_covariance[2];
-  start(kScale, kScale) = memory.scale_difference_sigma * memory.scale_difference_sigma;
-  start(kSkew, kSkew) = memory.skew_sigma_s * memory.skew_sigma_s;
-  make(white, mean, start);
+  make(white, mean,
+       doubt_of(memory.bias_covariance, memory.scale_difference_sigma, memory.skew_sigma_s));
   for (Hypothesis& one : hypotheses_) {
     if (hypotheses_.size() == kWalkPairs)
       one.log_weight = std::log(std::max(memory.walk_weight[one.place], 1e-12));
@@ -147,7 +147,7 @@ DriftEstimate DriftBank::estimate() const {
   DriftFilter::Observables first = DriftFilter::Observables::Zero();
   DriftFilter::Covariance second = DriftFilter::Covariance::Zero();
   std::array<double, 2> scale{};
-  std::array<double, 3> scale_square{};
+  Symmetric scale_square{};
   for (const Hypothesis& one : hypotheses_) {
     const double weight = std::exp(one.log_weight);
     if (weight < 1e-9) continue;

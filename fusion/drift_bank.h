@@ -14,6 +14,7 @@
 #include "fusion/drift_filter.h"
 #include "fusion/drift_memory.h"
 #include "fusion/gyro_parameters.h"
+#include "fusion/quadratic.h"
 
 namespace vgyro::fusion {
 
@@ -23,7 +24,7 @@ struct DriftEstimate {
   std::array<double, 2> growth{};  ///< of the biases' variances, (deg/s)²/s
   std::array<double, 2> scale{};   ///< share of each gyro in the scale-factor difference
   /// Of both gyros' scale factors, as far as their difference tells: variances and covariance.
-  std::array<double, 3> scale_covariance{};
+  Symmetric scale_covariance{};
   /// Which gyro is likely the cause where the two differ about a turn: (N·K)² over the sum.
   std::array<double, 2> blame{};
   std::array<double, 2> drift_share{};  ///< K_k² over K₁² + K₂²
@@ -42,7 +43,7 @@ class DriftBank {
   /// Both drifts measured for the first time. The white noise sets the scale of the K that are
   /// tried.
   void begin(const std::array<double, 2>& white_dps_rthz, const std::array<double, 2>& bias_dps,
-             const std::array<double, 3>& covariance);
+             const Symmetric& covariance);
   /// From a memory, aged.
   void resume(const DriftMemory& memory, double age_s);
 

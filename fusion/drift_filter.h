@@ -69,7 +69,6 @@ class DriftFilter {
   }
   /// How the variance of each bias grows, (deg/s)² per s.
   [[nodiscard]] std::array<double, 2> growth_per_s() const;
-  [[nodiscard]] const DriftModel& model() const { return model_; }
 
  private:
   using State = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kStatesMax, 1>;

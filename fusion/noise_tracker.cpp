@@ -25,10 +25,6 @@ constexpr double kOneBlockMax = 22.0;
 // A sensor that says nothing of its resolution still has some noise, (deg/s)²/Hz.
 constexpr double kDensityMin = 1e-14;
 
-double squared(double value) {
-  return value * value;
-}
-
 }  // namespace
 
 void NoiseTracker::measure(const Block& block, bool moving) {
@@ -127,7 +123,7 @@ void NoiseTracker::watch(const Block& block) {
   // What the gyros share is motion. It does not fall out of one gyro's sum of squares exactly: the
   // doubt grows with the motion, and with the other gyro's noise.
   // What is late shows with opposite signs, and is no more noise than both have together.
-  const double both = squares[0] - 2.0 * squares[1] + squares[2];
+  const double both = of_difference(squares);
   const std::array<double, 2> own{std::clamp(squares[0] - squares[1], 0.0, both),
                                   std::clamp(squares[2] - squares[1], 0.0, both)};
   const double both_expected = expected[0] + expected[1];

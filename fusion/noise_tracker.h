@@ -9,11 +9,9 @@
 
 #include "fusion/cells.h"
 #include "fusion/gyro_parameters.h"
+#include "fusion/quadratic.h"
 
 namespace vgyro::fusion {
-
-/// Symmetric 2×2: of gyro 1, of both, of gyro 2.
-using Symmetric = std::array<double, 3>;
 
 class NoiseTracker {
  public:

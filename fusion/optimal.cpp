@@ -8,9 +8,10 @@
 #include "fusion/corrector.h"
 #include "fusion/drift_bank.h"
 #include "fusion/noise_tracker.h"
+#include "fusion/quadratic.h"
 #include "fusion/stop_detector.h"
 
-// Samples → cells (0.1 s) → blocks (1 s) → windows → the bank of drift filters. A window holds
+// Samples → cells (0.1 s) → blocks (0.5 s) → windows → the bank of drift filters. A window holds
 // either the difference of the gyros, regressed on rate and its derivative, or, at a stop, both
 // gyros against the known rate. Between windows a sample costs two subtractions, two weights and
 // its share in a cell. docs/optimal.md derives weights and σ.
@@ -22,6 +23,9 @@ namespace {
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
 constexpr double kSmooth_s = 0.05;
+
+// Instants closer together than this are the same.
+constexpr double kRounding_s = 1e-6;
 
 // Calibration keeps at most so many means; when they are full, neighbours are merged.
 constexpr std::size_t kCalibrationBlocks = 64;
@@ -59,22 +63,20 @@ constexpr double kShareMin = 0.1;
 // A window that contradicts the filter by this much, per row, is believed less.
 constexpr double kContradiction = 9.0;
 
-double squared(double value) {
-  return value * value;
-}
-
-double weighted(const std::array<double, 2>& weight, const Symmetric& matrix) {
-  return weight[0] * weight[0] * matrix[0] + 2.0 * weight[0] * weight[1] * matrix[1] +
-         weight[1] * weight[1] * matrix[2];
-}
-
-/// Of y₁ − y₂.
-double of_difference(const Symmetric& matrix) {
-  return matrix[0] - 2.0 * matrix[1] + matrix[2];
-}
-
 Symmetric biases_of(const DriftFilter::Covariance& covariance) {
   return {covariance(kBias1, kBias1), covariance(kBias1, kBias2), covariance(kBias2, kBias2)};
+}
+
+/// Both gyros against the known rate, over `length_s` seconds.
+DriftMeasurement excess_of_both(const std::array<double, 2>& excess_dps, const Symmetric& density,
+                                double length_s) {
+  DriftMeasurement measurement(2);
+  measurement.rows(0, kBias1) = 1.0;
+  measurement.rows(1, kBias2) = 1.0;
+  measurement.values << excess_dps[0], excess_dps[1];
+  measurement.noise << density[0], density[1], density[1], density[2];
+  measurement.noise /= length_s;
+  return measurement;
 }
 
 bool is_finite(double value) {
@@ -240,6 +242,10 @@ class OptimalCorrector final : public Corrector {
   [[nodiscard]] double drift_variance(double t_s) const {
     return doubt_ + doubt_growth_ * std::max(t_s - learned_until_s_, 0.0);
   }
+  /// How likely it is gyro 1 where the two contradict each other and nothing tells which is wrong.
+  [[nodiscard]] double suspicion_of_first() const {
+    return std::clamp(estimate_.drift_share[0], kShareMin, 1.0 - kShareMin);
+  }
   void set_weights(Present present);
   double acceleration_square(double rate_dps, double t_s);
 
@@ -312,7 +318,6 @@ void OptimalCorrector::take_calibration() {
 }
 
 void OptimalCorrector::start(const Calibration& calibration) {
-  constexpr double kRounding_s = 1e-6;
   for (std::size_t i = 0; i < held_count_; ++i) {
     if (held_[i].to_s > calibration.used_until_s + kRounding_s) break;
     calibration_.add(held_[i]);
@@ -345,13 +350,8 @@ void OptimalCorrector::start(const Calibration& calibration) {
       continue;
     }
     if (mean.from_s > learned_until_s_) bank_.predict(mean.from_s - learned_until_s_);
-    DriftMeasurement measurement(2);
-    measurement.rows(0, kBias1) = 1.0;
-    measurement.rows(1, kBias2) = 1.0;
-    measurement.values << mean.excess_dps[0], mean.excess_dps[1];
-    measurement.noise << density[0], density[1], density[1], density[2];
-    measurement.noise /= mean.length_s;
-    bank_.learn(mean.to_s - std::max(mean.from_s, learned_until_s_), measurement);
+    bank_.learn(mean.to_s - std::max(mean.from_s, learned_until_s_),
+                excess_of_both(mean.excess_dps, density, mean.length_s));
     learned_until_s_ = mean.to_s;
   }
   run(learned_until_s_);
@@ -559,7 +559,6 @@ void OptimalCorrector::learn_from(const Block& block, bool stop) {
 }
 
 void OptimalCorrector::open_window(const Block& block, Kind kind) {
-  constexpr double kRounding_s = 1e-6;
   const bool goes_on = window_.kind == kind && window_.present == block.present &&
                        block.from_s <= window_.to_s + kRounding_s;
   if (!goes_on) {
@@ -577,7 +576,6 @@ void OptimalCorrector::open_window(const Block& block, Kind kind) {
 }
 
 void OptimalCorrector::add_difference(const Block& block) {
-  constexpr double kRounding_s = 1e-6;
   stop_length_s_ = 0.0;
   if (block.from_s > recent_until_s_ + kRounding_s || block.present != Present::kBoth)
     recent_count_ = 0;
@@ -674,7 +672,7 @@ bool OptimalCorrector::has_jumped(const Block& block) {
   if (!again) return true;
   jump_suspected_ = false;
   close_window();
-  const double first = std::clamp(estimate_.drift_share[0], kShareMin, 1.0 - kShareMin);
+  const double first = suspicion_of_first();
   bank_.widen(first * squared(away), 0.0, (1.0 - first) * squared(away));
   refresh();
   if (!condition_.disagree) ++condition_.disagreements;
@@ -725,24 +723,19 @@ DriftMeasurement OptimalCorrector::measure_difference() const {
 }
 
 DriftMeasurement OptimalCorrector::measure_stop() const {
-  const Symmetric& density = noise_.density();
-  const double sway = window_.sway_s / window_.covered_s;
-  if (window_.present != Present::kBoth) {
-    const std::size_t gyro = window_.present == Present::kGyro1 ? 0 : 1;
-    DriftMeasurement measurement(1);
-    measurement.rows(0, gyro == 0 ? kBias1 : kBias2) = 1.0;
-    measurement.values(0) = window_.excess_s[gyro] / window_.covered_s;
-    measurement.noise(0, 0) = density[2 * gyro] / window_.covered_s + sway;
+  const double length = window_.covered_s;
+  const double sway = window_.sway_s / length;
+  const std::array<double, 2> excess{window_.excess_s[0] / length, window_.excess_s[1] / length};
+  if (window_.present == Present::kBoth) {
+    DriftMeasurement measurement = excess_of_both(excess, noise_.density(), length);
+    measurement.noise.array() += sway;
     return measurement;
   }
-  DriftMeasurement measurement(2);
-  measurement.rows(0, kBias1) = 1.0;
-  measurement.rows(1, kBias2) = 1.0;
-  measurement.values << window_.excess_s[0], window_.excess_s[1];
-  measurement.values /= window_.covered_s;
-  measurement.noise << density[0], density[1], density[1], density[2];
-  measurement.noise /= window_.covered_s;
-  measurement.noise.array() += sway;
+  const std::size_t gyro = window_.present == Present::kGyro1 ? 0 : 1;
+  DriftMeasurement measurement(1);
+  measurement.rows(0, gyro == 0 ? kBias1 : kBias2) = 1.0;
+  measurement.values(0) = excess[gyro];
+  measurement.noise(0, 0) = noise_.density()[2 * gyro] / length + sway;
   return measurement;
 }
 
@@ -811,7 +804,7 @@ void OptimalCorrector::set_weights(Present present) {
   doubt_growth_ = weighted(weight_, {estimate_.growth[0], 0.0, estimate_.growth[1]});
   scale_doubt_ = std::max(weighted(weight_, estimate_.scale_covariance), 0.0);
   fast_noise_ = kFastNoise * of_difference(noise_.sample_variance()) + of_difference(doubt);
-  const double first_share = std::clamp(estimate_.drift_share[0], kShareMin, 1.0 - kShareMin);
+  const double first_share = suspicion_of_first();
   blame_ = first_share * squared(weight_[0]) + (1.0 - first_share) * squared(weight_[1]);
   // Which gyro is late, or early, the skew does not tell; the worse one is likelier.
   const double skew_square = squared(estimate_.mean(kSkew)) - estimate_.covariance(kSkew, kSkew);

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "fusion/quadratic.h"
+
 namespace vgyro::fusion {
 
 namespace {
@@ -17,10 +19,6 @@ constexpr double kNoStand_dps = 1.0;
 
 // Weight of a new block in the recent level.
 constexpr double kRecent = 0.25;
-
-double squared(double value) {
-  return value * value;
-}
 
 // Quantile of χ² over its degrees of freedom (Wilson and Hilferty), z standard deviations up.
 double scatter_limit(double degrees, double z) {
