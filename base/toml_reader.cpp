@@ -1,12 +1,22 @@
 #include "base/toml_reader.h"
 
 #include <algorithm>
+#include <utility>
 
 #include <fmt/core.h>
 
 #include "base/nearest.h"
 
 namespace vgyro {
+
+Expected<toml::table> parse_toml(std::string_view text, const std::string& file,
+                                 std::string remedy) {
+  toml::parse_result parsed = toml::parse(text, file);
+  if (parsed) return std::move(parsed).table();
+  const toml::parse_error& error = parsed.error();
+  return fail(at_line(file, static_cast<unsigned>(error.source().begin.line)),
+              std::string(error.description()), std::move(remedy));
+}
 
 TomlReader::TomlReader(const toml::table& table, std::string file, std::string title,
                        std::vector<Error>& errors)

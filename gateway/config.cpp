@@ -450,19 +450,14 @@ std::string_view to_string(Method method) {
 ConfigResult load_config(const std::string& path, const ConfigOverrides& overrides) {
   const auto text = read_file(path);
   if (!text) return tl::unexpected(std::vector<Error>{text.error()});
-  const toml::parse_result parsed = toml::parse(*text, path);
-  if (!parsed) {
-    const toml::parse_error& error = parsed.error();
-    return tl::unexpected(std::vector<Error>{
-        {at_line(path, static_cast<unsigned>(error.source().begin.line)),
-         std::string(error.description()), "strings stand in quotes, tables in [brackets]"}});
-  }
+  const auto parsed = parse_toml(*text, path, "strings stand in quotes, tables in [brackets]");
+  if (!parsed) return tl::unexpected(std::vector<Error>{parsed.error()});
   Context context{.file = path,
                   .folder = std::filesystem::path(path).parent_path().string(),
                   .errors = {},
                   .resolved = {}};
   Plan& plan = context.resolved.plan;
-  TomlReader root(parsed.table(), path, "the file", context.errors);
+  TomlReader root(*parsed, path, "the file", context.errors);
   read_gyros(root, context);
   read_optional(root, "reference", context, [&](TomlReader& reader, SignalResolver& resolver) {
     read_reference(reader, resolver, plan);

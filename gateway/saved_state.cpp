@@ -173,10 +173,7 @@ Expected<std::string_view> unsealed(std::string_view text, const std::string& wh
         kRemedy);
   }
   const std::string_view content = text.substr(0, text.size() - std::min(text.size(), kSealBytes));
-  // The parser is given nothing that to_text() does not write: it stumbles over some of Unicode.
-  const bool is_plain = std::all_of(content.begin(), content.end(),
-                                    [](char c) { return c == '\n' || is_printable(c); });
-  if (!is_plain || text.substr(content.size()) != seal(content)) {
+  if (text.substr(content.size()) != seal(content)) {
     return fail(where, "is damaged, cut, or no saved state: its checksum does not fit", kRemedy);
   }
   return content;
@@ -246,12 +243,9 @@ std::string to_text(const SavedState& state) {
 Expected<SavedState> saved_state_from(std::string_view text, const std::string& where) {
   const Expected<std::string_view> content = unsealed(text, where);
   if (!content) return tl::unexpected(content.error());
-  const toml::parse_result parsed = toml::parse(*content, where);
-  if (!parsed) {
-    return fail(at_line(where, static_cast<unsigned>(parsed.error().source().begin.line)),
-                std::string(parsed.error().description()), kRemedy);
-  }
-  const toml::table& root = parsed.table();
+  const Expected<toml::table> parsed = parse_toml(*content, where, kRemedy);
+  if (!parsed) return tl::unexpected(parsed.error());
+  const toml::table& root = *parsed;
   const toml::table* drift = root["drift"].as_table();
   const std::optional<std::int64_t> format = root["format"].value<std::int64_t>();
   if (drift == nullptr || format != kFormat) {

@@ -79,8 +79,9 @@ Expected<std::string> read_back(std::string text, const std::vector<Effect>& wan
 
 // A table can follow [[effect]] tables, or nothing; not a closed array.
 Expected<void> check_form(std::string_view text) {
-  const toml::parse_result parsed = toml::parse(text);
-  const toml::array* tables = parsed.table()["effect"].as_array();
+  const Expected<toml::table> parsed = parse_toml(text, kFile);
+  if (!parsed) return tl::unexpected(parsed.error());
+  const toml::array* tables = (*parsed)["effect"].as_array();
   if (tables == nullptr) return {};
   const bool closed = tables->empty() || tables->get(0)->as_table()->is_inline();
   if (!closed) return {};
@@ -116,8 +117,9 @@ const toml::table* table_on(const toml::table& root, unsigned line) {
 
 Expected<std::string> with_value(std::string_view text, unsigned line, std::string_view name,
                                  const std::string& value) {
-  const toml::parse_result parsed = toml::parse(text);
-  const toml::table* table = table_on(parsed.table(), line);
+  const Expected<toml::table> parsed = parse_toml(text, kFile);
+  if (!parsed) return tl::unexpected(parsed.error());
+  const toml::table* table = table_on(*parsed, line);
   std::string edited(text);
   if (table == nullptr)
     return fail(at_line(kFile, line), "holds several effects", "one table a line is needed");

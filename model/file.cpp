@@ -124,16 +124,11 @@ void check_count(TomlReader& root, Kind kind, std::size_t most, const Model& mod
 }  // namespace
 
 ModelResult parse_model(std::string_view text, const std::string& file) {
-  const toml::parse_result parsed = toml::parse(text, file);
-  if (!parsed) {
-    const toml::parse_error& error = parsed.error();
-    return tl::unexpected(std::vector<Error>{
-        {at_line(file, static_cast<unsigned>(error.source().begin.line)),
-         std::string(error.description()), "strings stand in quotes, effects in [[effect]]"}});
-  }
+  const auto parsed = parse_toml(text, file, "strings stand in quotes, effects in [[effect]]");
+  if (!parsed) return tl::unexpected(std::vector<Error>{parsed.error()});
   std::vector<Error> errors;
   Model model{.file = file, .effects = {}};
-  TomlReader root(parsed.table(), file, "the file", errors);
+  TomlReader root(*parsed, file, "the file", errors);
   read_format(root, file);
   const toml::array* tables = root.array("effect");
   const std::size_t count = tables == nullptr ? 0 : tables->size();

@@ -240,16 +240,6 @@ TEST(SavedState, AnyNameOfAGyroComesBack) {
   EXPECT_FALSE(check_devices(*back, plan));
 }
 
-TEST(SavedState, NothingButPlainTextIsParsed) {
-  const std::string content = content_of(to_text(plain_state()));
-  for (int byte = 0; byte < 256; ++byte) {
-    const std::string text = sealed(content + "\n# " + static_cast<char>(byte));
-    EXPECT_EQ(saved_state_from(text, kWhere).has_value(),
-              byte == '\n' || (byte >= 0x20 && byte < 0x7F))
-        << byte;
-  }
-}
-
 TEST(SavedState, DevicesAreToldApartByAllThatChangesTheBias) {
   const Plan plan = rig::two_gyros();
   SavedState state = plain_state();

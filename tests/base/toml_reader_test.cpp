@@ -1,0 +1,75 @@
+#include "base/toml_reader.h"
+
+#include <iterator>
+#include <random>
+
+#include <gtest/gtest.h>
+
+namespace vgyro {
+namespace {
+
+// People write °C and their own language beside the keys, and in names.
+TEST(ParseToml, TakesAnyLetterInCommentsAndStrings) {
+  const auto table = parse_toml(
+      "# Кут: °/s, Ω — 😀\n"
+      "name = \"лівий °\"  # °C\n"
+      "other = 'straße'\n"
+      "long = \"\"\"\nä\\\n  ö\"\"\"\n",
+      "a.toml");
+  ASSERT_TRUE(table) << table.error().message();
+  EXPECT_EQ((*table)["name"].value<std::string>(), "лівий °");
+  EXPECT_EQ((*table)["other"].value<std::string>(), "straße");
+  EXPECT_EQ((*table)["long"].value<std::string>(), "äö");
+  EXPECT_EQ((*table)["other"].node()->source().begin.line, 3U);
+}
+
+TEST(ParseToml, RefusesLettersWhereNoneCanStand) {
+  const std::string bad[] = {"a = 1\nb = 25 °C\n", "a = 1\nb = 25°\n",    "a = 1\nшвидкість = 2\n",
+                             "a = 1\nb = trueя\n", "a = 1\nb = [1, é]\n", "a = 1\n[é]\n"};
+  for (const std::string& text : bad) {
+    const auto table = parse_toml(text, "a.toml", "a remedy");
+    ASSERT_FALSE(table) << text;
+    EXPECT_EQ(table.error().where, "a.toml:2") << text;
+    EXPECT_FALSE(table.error().what.empty()) << text;
+    EXPECT_EQ(table.error().remedy, "a remedy");
+  }
+}
+
+std::string utf8(unsigned c) {
+  const auto tail = [](unsigned bits) { return static_cast<char>(0x80U | (bits & 0x3FU)); };
+  if (c < 0x800) return {static_cast<char>(0xC0U | c >> 6U), tail(c)};
+  return {static_cast<char>(0xE0U | c >> 12U), tail(c >> 6U), tail(c)};
+}
+
+// At every kind of place; the sanitizers see what the parser makes of it.
+TEST(ParseToml, MeetsEveryLetterEverywhere) {
+  for (unsigned c = 0x80; c < 0x10000; c += c < 0x500 ? 1 : 7) {
+    if (c >= 0xD800 && c < 0xE000) continue;  // surrogates are no characters
+    const std::string letter = utf8(c);
+    // These end a line for the parser, though not in TOML.
+    const bool ends_line = c == 0x85 || c == 0x2028 || c == 0x2029;
+    EXPECT_TRUE(ends_line || parse_toml("a = 1 # " + letter, "a.toml")) << std::hex << c;
+    EXPECT_TRUE(parse_toml("a = '" + letter + "'", "a.toml")) << std::hex << c;
+    for (const char* place : {"", "a", "a = ", "a = 1", "a = tru", "[", "a = [1,", "a = \"\"\"\\"})
+      (void)parse_toml(place + letter, "a.toml");
+  }
+}
+
+// Damaged UTF-8 and odd pieces side by side.
+TEST(ParseToml, SurvivesAnyText) {
+  const std::string pieces[] = {
+      "°",    "я", "\xFF", "\xC3",   "\n",   "\"",  "'", "\"\"\"",  "'''", "#",
+      "=",    "a", "1",    "[",      "]",    "{",   "}", ",",       "\\",  ".",
+      "true", "-", "\r\n", "\u2003", "x = ", "inf", "_", "\\u00e9", "\t",  "2020-01-01"};
+  for (std::uint32_t seed = 0; seed < 10'000; ++seed) {
+    std::mt19937 dice(seed);
+    std::string text;
+    for (auto left = 1 + dice() % 14; left > 0; --left)
+      text += pieces[dice() % std::size(pieces)];
+    const auto table = parse_toml(text, "a.toml");
+    EXPECT_TRUE(table || !table.error().what.empty()) << "seed " << seed;
+  }
+}
+
+}  // namespace
+}  // namespace vgyro
