@@ -18,7 +18,8 @@ def _run(command):
     """Seconds and peak memory in MB; Failed with its last words when it ends badly."""
     begun = time.monotonic()
     process = subprocess.Popen([str(c) for c in command], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
-    words = process.stderr.read()
+    with process.stderr as pipe:
+        words = pipe.read()
     _, status, usage = os.wait4(process.pid, 0)
     process.returncode = os.waitstatus_to_exitcode(status)
     if process.returncode != 0:
