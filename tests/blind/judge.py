@@ -7,8 +7,8 @@ recordings, decoys and effects outside the catalogue every name is wrong."""
 
 import math
 
-# Drawn at random by the product or the injector, or a convention: no truth to meet.
-WITHOUT_TRUTH = {"reference_c", "size_dps/spikes"}
+# Drawn at random, a convention, or (of a frozen value) a matter of words by one sample: no truth to meet.
+WITHOUT_TRUTH = {"reference_c", "size_dps/spikes", "from_s", "to_s"}
 EXACT = {"axis", "harmonic"}
 
 
