@@ -37,8 +37,8 @@ SIZE = {
     "scale_factor_quadratic": ("coefficient_per_dps", 1e-6, 1e-5),
     "scale_factor_cubic": ("coefficient_per_dps2", 1e-8, 1e-7),
     "scale_factor_temperature": ("coefficient_per_k", 2e-5, 2e-4),
-    "delay": ("seconds", 5e-4, 8e-3),
-    "bandwidth": ("cutoff_hz", 12.0, 60.0),
+    "delay": ("seconds", 5e-4, 2e-2),
+    "bandwidth": ("cutoff_hz", 4.0, 60.0),
     "white_noise": ("density_dps_rthz", 3e-4, 1.2e-3),
     "rate_random_walk": ("density_dps_rts", 3e-5, 2e-4),
     "gauss_markov": ("sigma_dps", 1e-3, 4e-3),
@@ -53,14 +53,20 @@ SIZE = {
     "timestamp_jitter": ("sigma_s", 3e-4, 2e-3),
 }
 SIGNED = set(OFFSETS + RESPONSES + ["clock_skew"]) - {"angle_harmonic", "line"}
+# What the catalogue's words leave open.
+MANNERS = {
+    "spikes": ["both ways", "one way"],
+    "timestamp_jitter": ["late", "about the due time"],
+    "dropped_frames": ["single", "in rows"],
+}
 REFERENCE_C = 25.0
 # Below these a stamp of whole microseconds and samples of finite rate decide, not the noise.
 LEAST_DELAY_S = 3e-5
 HIGHEST_CUTOFF_HZ = 250.0
 
 
-def companions(kind, world, rng):
-    """The parameters beside the size, drawn at random."""
+def companions(kind, world, rng, plain):
+    """The parameters beside the size, drawn at random; `plain` where no strength is asked for."""
     duration_s = world.motion.duration_s
     if kind == "bias_step":
         return {"at_s": round(float(rng.uniform(0.2, 0.8) * duration_s), 1)}
@@ -79,7 +85,7 @@ def companions(kind, world, rng):
         }
     if kind == "gauss_markov":
         # Longer ones cannot be told from a random walk in some minutes, however strong they are.
-        return {"tau_s": round(float(np.exp(rng.uniform(np.log(0.5), np.log(10.0)))), 2)}
+        return {"tau_s": round(float(np.exp(rng.uniform(np.log(0.5), np.log(60.0 if plain else 10.0)))), 2)}
     if kind == "spikes":
         return {"rate_hz": round(float(rng.uniform(0.05, 0.4)), 3)}
     if kind == "stuck":
@@ -167,7 +173,7 @@ def _without_strength(kind, level, p, gyro, world, rng):
     if kind == "spikes":
         return round(float(level * rng.uniform(10.0, 60.0) * sigma), 5)
     if kind == "quantization":
-        return round(float(level * rng.uniform(3.0, 8.0) * sigma), 5)
+        return round(float(level * np.exp(rng.uniform(np.log(0.3), np.log(8.0))) * sigma), 5)
     if kind == "saturation":
         return round(float(world.peak_dps() * rng.uniform(0.65, 0.92)), 2)
     if kind in ("dropped_frames", "clock_skew", "timestamp_jitter", "dead_band"):
@@ -177,7 +183,7 @@ def _without_strength(kind, level, p, gyro, world, rng):
 
 def draw(kind, gyro, wanted_t, world, rng):
     """An effect of this kind as {"kind", "gyro", "parameters", "t"}; `wanted_t` None: as a bench meets it."""
-    p = companions(kind, world, rng)
+    p = companions(kind, world, rng, wanted_t is None)
     name, low, high = SIZE[kind]
     size_of_t = None
     if kind in CLIPS or kind in DISTURBANCES:
@@ -208,4 +214,7 @@ def draw(kind, gyro, wanted_t, world, rng):
     if kind in SIGNED:
         size *= rng.choice([-1.0, 1.0])
     p[name] = float(f"{size:.6g}")
-    return {"kind": kind, "gyro": gyro, "parameters": p, "t": t}
+    effect = {"kind": kind, "gyro": gyro, "parameters": p, "t": t}
+    if kind in MANNERS:
+        effect["manner"] = str(rng.choice(MANNERS[kind]))
+    return effect

@@ -144,7 +144,7 @@ class Truth(unittest.TestCase):
 
     def test_low_pass_solves_its_differential_equation(self):
         m = small_world(SEED).motion
-        for cutoff_hz in (12.0, 60.0):
+        for cutoff_hz in (4.0, 60.0):
             h, begin, seconds = 1 / 8000, 45.0, 20.0
             t = begin + np.arange(int(seconds / h)) * h
             rates = m.rate(np.stack([t, t + h / 2, t + h])).T.tolist()

@@ -109,9 +109,11 @@ def reading(world, gyro, effects, strangers, rng):
     y += _noise(world, gyro, t, effects, rng)
     for stranger in strangers:
         y += stranger(world, gyro, t, rng)
+    manner = {e["kind"]: e.get("manner") for e in effects}
     for p in _of(effects, "spikes"):
         hit = rng.random(len(t)) < p["rate_hz"] / world.rates_hz[gyro - 1]
-        y[hit] += p["size_dps"] * rng.choice([-1.0, 1.0], hit.sum())
+        sides = [1.0] if manner["spikes"] == "one way" else [-1.0, 1.0]
+        y[hit] += p["size_dps"] * rng.choice(sides, hit.sum())
     for p in _of(effects, "saturation"):
         y = np.clip(y, -p["limit_dps"], p["limit_dps"])
     for p in _of(effects, "dead_band"):
@@ -125,9 +127,14 @@ def reading(world, gyro, effects, strangers, rng):
     for p in _of(effects, "clock_skew"):
         stamps *= 1.0 + p["ppm"] * 1e-6
     for p in _of(effects, "timestamp_jitter"):
-        stamps += np.abs(rng.standard_normal(len(t))) * p["sigma_s"]
+        lateness = rng.standard_normal(len(t)) * p["sigma_s"]
+        if manner["timestamp_jitter"] == "about the due time":
+            stamps = np.sort(np.maximum(stamps + lateness, 0.0))
+        else:
+            stamps += np.abs(lateness)
     kept = np.ones(len(t), dtype=bool)
     for p in _of(effects, "dropped_frames"):
-        kept &= rng.random(len(t)) >= p["fraction"]
+        row = 4 if manner["dropped_frames"] == "in rows" else 1
+        kept &= np.repeat(rng.random(len(t) // row + 1) >= p["fraction"], row)[: len(t)]
     kept[0] = True
     return t[kept], stamps[kept], np.arange(len(t))[kept], y[kept]
