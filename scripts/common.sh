@@ -1,7 +1,8 @@
 # What ./run and ./test share: installing what is missing, building, saying what goes on.
 
 BUILD_PACKAGES=(g++ cmake ninja-build pkg-config libeigen3-dev libfmt-dev libcli11-dev
-  libtomlplusplus-dev libexpected-dev nlohmann-json3-dev liblzma-dev libsystemd-dev libnlopt-cxx-dev)
+  libtomlplusplus-dev libexpected-dev nlohmann-json3-dev liblzma-dev libsystemd-dev libnlopt-cxx-dev
+  libjs-dygraphs)
 RUN_PACKAGES=(gnuplot-nox fonts-dejavu-core can-utils iproute2 util-linux xz-utils)
 TEST_PACKAGES=(libgtest-dev libbenchmark-dev clang-format git python3 python3-numpy python3-can
   python3-canmatrix user-mode-linux kmod)

@@ -1,0 +1,365 @@
+"use strict";
+// Draws the report from the data in the page. User's text goes through textContent only.
+
+const data = JSON.parse(document.getElementById("data").textContent);
+const SIGMAS = 2; // what bars and bands show
+
+// --- small helpers ------------------------------------------------------------------------------
+
+function make(tag, attributes, ...children) {
+  const node = document.createElement(tag);
+  for (const [name, value] of Object.entries(attributes || {})) node.setAttribute(name, value);
+  for (const child of children.flat()) node.append(child);
+  return node;
+}
+
+function drawing(tag, attributes, text) {
+  const node = document.createElementNS("http://www.w3.org/2000/svg", tag);
+  for (const [name, value] of Object.entries(attributes || {})) node.setAttribute(name, value);
+  if (text !== undefined) node.textContent = text;
+  return node;
+}
+
+function number(value, digits) {
+  if (!Number.isFinite(value)) return "–";
+  if (value === 0) return "0";
+  const size = Math.abs(value);
+  const text = size < 1e-3 || size >= 1e5 ? value.toExponential(digits - 1) : value.toPrecision(digits);
+  return text.replace(/(\.\d*?)0+(e|$)/, "$1$2").replace(/\.(e|$)/, "$1").replace(/^-/, "−").replace("e-", "e−").replace("e+", "e");
+}
+
+function escaped(text) {
+  const holder = document.createElement("span");
+  holder.textContent = text;
+  return holder.innerHTML;
+}
+
+function colour(name) {
+  return getComputedStyle(document.documentElement).getPropertyValue("--" + name).trim();
+}
+
+function table(head, rows) {
+  const cell = (tag, content, numeric) => make(tag, numeric ? { class: "number" } : {}, content);
+  return make("div", { class: "scroll" }, make("table", {},
+    make("thead", {}, make("tr", {}, head.map((text) => cell("th", text)))),
+    make("tbody", {}, rows.map((row) => make("tr", {}, row.map((part) =>
+      typeof part === "object" ? cell("td", part.number, true) : cell("td", part)))))));
+}
+
+const gyroName = (gyro) => data.gyros[gyro - 1];
+const effectName = (effect) => `${effect.kind}, gyro ${gyroName(effect.gyro)}`;
+const readings = (effect) => effect.ambiguous_with.map(effectName).join("; ");
+const stretch = (from, to) => `${number(from, 4)} to ${number(to, 4)} s`;
+
+// --- the gap at a glance ------------------------------------------------------------------------
+
+function gapRows() {
+  const rows = [{ label: data.model ? "model as given" : "no model", value: data.gap.before }];
+  for (const effect of data.effects) rows.push({ label: "+ " + effectName(effect), value: effect.gap_after });
+  const last = rows[rows.length - 1].value;
+  if (data.effects.length > 0 && Math.abs(last - data.gap.after) > 1e-9) {
+    rows.push({ label: "final model", value: data.gap.after });
+  }
+  return rows;
+}
+
+// Linear inside the floor's band, logarithmic beyond: both ends of the story stay visible.
+function gapScale(rows, left, right) {
+  const [low, high] = data.gap.band95;
+  const half = Math.max(data.gap.floor - low, high - data.gap.floor, 1e-9);
+  const squeeze = (value) => Math.asinh((value - data.gap.floor) / half);
+  const all = rows.map((row) => squeeze(row.value)).concat([squeeze(low), squeeze(high)]);
+  const least = Math.min(...all) - 0.8, most = Math.max(...all) + 0.5;
+  return (value) => left + ((squeeze(value) - least) / (most - least)) * (right - left);
+}
+
+function gapTicks(at, left, right) {
+  const ticks = [{ value: data.gap.floor, x: at(data.gap.floor) }];
+  for (let decade = 6; decade >= -9; --decade) {
+    const value = data.gap.floor + 10 ** decade;
+    const x = at(value);
+    if (x <= right && x >= left && ticks.every((tick) => Math.abs(tick.x - x) > 45)) ticks.push({ value, x });
+  }
+  return ticks;
+}
+
+function gapFigure() {
+  const rows = gapRows();
+  const wide = 900, left = 270, right = 850, top = 30, step = 34;
+  const bottom = top + step * rows.length;
+  const svg = drawing("svg", { viewBox: `0 0 ${wide} ${bottom + 46}`, role: "img",
+    "aria-label": `gap ${number(data.gap.before, 3)} before, ${number(data.gap.after, 3)} after` });
+  const at = gapScale(rows, left, right);
+  const [low, high] = data.gap.band95.map(at);
+  svg.append(drawing("rect", { x: low, y: top - 14, width: Math.max(high - low, 1), height: bottom - top + 14, style: "fill: var(--band)" }));
+  svg.append(drawing("text", { x: (low + high) / 2, y: top - 18, "text-anchor": "middle", class: "soft" }, "as good as it gets"));
+  for (const tick of gapTicks(at, left, right)) {
+    svg.append(drawing("line", { x1: tick.x, x2: tick.x, y1: top - 14, y2: bottom, style: "stroke: var(--line)" }));
+    svg.append(drawing("text", { x: tick.x, y: bottom + 16, "text-anchor": "middle", class: "soft" }, number(tick.value, 2)));
+  }
+  rows.forEach((row, i) => {
+    const y = top + step * i + 8, x = at(row.value);
+    const tone = row.value <= data.gap.band95[1] ? "after" : "before";
+    if (i > 0) {
+      const from = at(rows[i - 1].value);
+      svg.append(drawing("path", { d: `M${from} ${y - step + 7} V${y} H${x}`, style: "fill: none; stroke: var(--soft); stroke-dasharray: 3 3" }));
+    }
+    svg.append(drawing("circle", { cx: x, cy: y, r: 7, style: `fill: var(--${tone})` }));
+    const fromRight = i > 0 && rows[i - 1].value > row.value; // the dashed line comes from there
+    svg.append(drawing("text", { x: fromRight ? x - 13 : x + 13, y: y + 4.5, "text-anchor": fromRight ? "end" : "start", style: "font-weight: 600" }, number(row.value, 3)));
+    svg.append(drawing("text", { x: left - 16, y: y + 4.5, "text-anchor": "end" }, row.label));
+  });
+  svg.append(drawing("text", { x: (left + right) / 2, y: bottom + 38, "text-anchor": "middle", class: "soft" },
+    "gap, nats per sample on samples that took no part; logarithmic beyond the band"));
+  return make("figure", { id: "gap" }, make("figcaption", {}, "The gap, round by round"), svg);
+}
+
+// --- plots --------------------------------------------------------------------------------------
+
+const ROLES = ["simulated", "before", "other", "effect", "after"]; // drawn in this order
+
+function roleOf(label) {
+  if (/simul|floor/i.test(label)) return "simulated";
+  if (/before|given/i.test(label)) return "before";
+  if (/after|final/i.test(label)) return "after";
+  if (/effect|named|fit/i.test(label)) return "effect";
+  return "other";
+}
+
+// Curves of their own x → rows for dygraphs: one x, then one [low, mid, high] for each curve.
+function rowsOf(curves, logY) {
+  const marks = [];
+  curves.forEach((curve, column) => curve.x.forEach((x, i) => {
+    let y = curve.y[i] === null ? NaN : curve.y[i];
+    if (logY && !(y > 0)) y = NaN;
+    const half = curve.y_sigma ? SIGMAS * curve.y_sigma[i] : 0;
+    const low = logY ? Math.max(y - half, y / 30) : y - half;
+    marks.push({ x, column, bar: [low, y, y + half] });
+  }));
+  marks.sort((a, b) => a.x - b.x || a.column - b.column);
+  const rows = [];
+  for (const mark of marks) {
+    let row = rows[rows.length - 1];
+    if (!row || row[0] !== mark.x || row[mark.column + 1][1] !== null) {
+      row = [mark.x, ...curves.map(() => [null, null, null])];
+      rows.push(row);
+    }
+    row[mark.column + 1] = mark.bar;
+  }
+  return rows;
+}
+
+function pointPlotter(event) {
+  const ctx = event.drawingContext;
+  ctx.save();
+  ctx.strokeStyle = ctx.fillStyle = event.color;
+  for (const point of event.points) {
+    if (!Number.isFinite(point.canvasy)) continue;
+    ctx.globalAlpha = 0.45;
+    ctx.beginPath();
+    ctx.moveTo(point.canvasx, event.dygraph.toDomYCoord(point.yval_minus));
+    ctx.lineTo(point.canvasx, event.dygraph.toDomYCoord(point.yval_plus));
+    ctx.stroke();
+    ctx.globalAlpha = 0.9;
+    ctx.beginPath();
+    ctx.arc(point.canvasx, point.canvasy, 2.2, 0, 2 * Math.PI);
+    ctx.fill();
+  }
+  ctx.restore();
+}
+
+function logTicks(from, to) {
+  const ticks = [];
+  const few = Math.log10(to / from) > 4;
+  for (let decade = Math.floor(Math.log10(from)); decade <= Math.log10(to); ++decade) {
+    for (const part of Math.log10(to / from) < 1.5 ? [1, 2, 3, 5, 7] : [1, 2, 5]) {
+      const v = part * 10 ** decade;
+      if (v >= from * 0.999 && v <= to * 1.001) ticks.push({ v, label: few && part !== 1 ? "" : number(v, 2) });
+    }
+  }
+  return ticks;
+}
+
+function axisOptions(log) {
+  const options = { axisLabelFormatter: (value) => number(value, 3), valueFormatter: (value) => number(value, 4) };
+  return log ? { ...options, logscale: true, ticker: (from, to) => logTicks(from, to) } : options;
+}
+
+function legendText(chart) {
+  return chart.series.map((series) => {
+    const value = series.yHTML === undefined || !series.isVisible ? "" : ": " + series.yHTML;
+    return `<span><i class="swatch" style="background:${series.color}"></i>${series.labelHTML}${value}</span>`;
+  }).join("") + (chart.xHTML ? `<span>at ${chart.xHTML}</span>` : "");
+}
+
+function paint(curves) {
+  return { colors: curves.map((curve) => colour(roleOf(curve.label))), gridLineColor: colour("line"), axisLineColor: colour("soft") };
+}
+
+const plots = [];
+
+function zoom(chart, factor, shift, log) {
+  const scale = log ? Math.log : (v) => v, back = log ? Math.exp : (v) => v;
+  const [from, to] = chart.xAxisRange().map(scale);
+  const middle = (from + to) / 2 + shift * (to - from), half = ((to - from) / 2) * factor;
+  chart.updateOptions({ dateWindow: [back(middle - half), back(middle + half)] });
+}
+
+function listenToKeys(host, chart, log) {
+  const act = {
+    "+": () => zoom(chart, 0.5, 0, log), "-": () => zoom(chart, 2, 0, log),
+    ArrowLeft: () => zoom(chart, 1, -0.2, log), ArrowRight: () => zoom(chart, 1, 0.2, log),
+    Escape: () => chart.resetZoom(), 0: () => chart.resetZoom(),
+  };
+  host.addEventListener("keydown", (event) => {
+    if (!act[event.key] || event.ctrlKey || event.metaKey || event.altKey) return;
+    event.preventDefault();
+    act[event.key]();
+  });
+}
+
+function plot(figure) {
+  const legend = make("div", { class: "legend" });
+  const host = make("div", { class: "chart", tabindex: "0", role: "img", "aria-label": figure.title });
+  const node = make("figure", { class: "plot" }, make("figcaption", {}, figure.title), legend, host);
+  const curves = figure.curves.filter((curve) => curve.x.length > 0)
+    .map((curve, i) => ({ ...curve, i }))
+    .sort((a, b) => ROLES.indexOf(roleOf(a.label)) - ROLES.indexOf(roleOf(b.label)) || a.i - b.i);
+  if (curves.length === 0) {
+    host.replaceWith(make("p", { class: "soft" }, "nothing to draw"));
+    return node;
+  }
+  plots.push({ host, legend, figure, curves });
+  return node;
+}
+
+function draw(entry) {
+  const { host, legend, figure, curves } = entry;
+  const series = {};
+  const labels = curves.map((curve, i) => {
+    const label = curve.label + (curve.y_sigma ? ` ± ${SIGMAS}σ` : "");
+    return curves.findIndex((other) => other.label === curve.label) === i ? label : `${label} (${i + 1})`;
+  });
+  curves.forEach((curve, i) => {
+    series[labels[i]] = curve.points ? { plotter: pointPlotter, strokeWidth: 0 } : { strokeWidth: roleOf(curve.label) === "simulated" ? 1 : 1.4 };
+  });
+  entry.chart = new Dygraph(host, rowsOf(curves, figure.log_y), {
+    labels: ["x", ...labels], series, ...paint(curves),
+    customBars: true, fillAlpha: 0.16, connectSeparatedPoints: true,
+    xlabel: escaped(figure.x_label), ylabel: escaped(figure.y_label), logscale: figure.log_y,
+    axes: { x: { ...axisOptions(figure.log_x), drawGrid: true }, y: { ...axisOptions(figure.log_y), axisLabelWidth: 74 } },
+    labelsDiv: legend, legend: "always", legendFormatter: legendText,
+    highlightCircleSize: 3, xRangePad: figure.log_x ? 0 : 6, yRangePad: 8, gridLineWidth: 0.6, xLabelHeight: 20, yLabelWidth: 20,
+  });
+  listenToKeys(host, entry.chart, figure.log_x);
+}
+
+function repaint() {
+  for (const { chart, curves } of plots) chart.updateOptions(paint(curves));
+}
+
+// A canvas that is drawn anew while the page is being printed stays white, so it is only scaled.
+function fitPaper() {
+  const PAPER_PX = 640, GROW_MOST = 1.3;
+  for (const { host } of plots) {
+    const wide = host.offsetWidth, high = host.offsetHeight;
+    const scale = Math.min(GROW_MOST, PAPER_PX / wide);
+    host.style.cssText = `width: ${wide}px; transform: scale(${scale}); transform-origin: 0 0; margin-bottom: ${(scale - 1) * high}px`;
+  }
+}
+
+function leavePaper() {
+  for (const { host } of plots) host.style.cssText = "";
+}
+
+// --- the page -----------------------------------------------------------------------------------
+
+function opening() {
+  const { recording } = data;
+  const samples = recording.samples.map((count, i) => `${count} of gyro ${data.gyros[i]}`).join(", ");
+  return [
+    make("h1", {}, "Simulation and measurement"),
+    make("p", { class: "soft" }, `${data.log}: ${number(recording.seconds, 5)} s; samples: ${samples}; ` +
+      `${recording.with_reference ? "with" : "without"} a reference; ${recording.held_out} held out. ` +
+      `Model: ${data.model || "none"}. Configuration: ${data.config}.`),
+    make("p", { class: "verdict " + data.verdict }, data.verdict_text + "."),
+    gapFigure(),
+    data.notes.map((note) => make("p", { class: "soft" }, "Note: " + note + ".")),
+  ];
+}
+
+function rounds() {
+  if (data.effects.length === 0) return [];
+  const rows = data.effects.map((effect, i) => [
+    { number: String(i + 1) }, { number: number(effect.gap_before, 4) }, { number: number(effect.gap_after, 4) },
+    gyroName(effect.gyro), effect.kind, { number: effect.value }, { number: number(effect.p_value, 2) }, readings(effect) || "–"]);
+  return [make("h2", {}, "What was added"),
+    table(["round", "gap before", "after", "gyro", "effect", "value ± σ", "p", "may also be"], rows)];
+}
+
+function effectSection(effect, i) {
+  const lines = [make("h3", {}, `${i + 1}. ${effectName(effect)}`),
+    make("p", { class: "soft" }, `The gyro reads, in addition: ${effect.meaning}.`),
+    make("p", {}, make("span", { class: "number" }, effect.value))];
+  if (effect.evidence) lines.push(make("p", {}, effect.evidence));
+  const band = effect.where.band_hz;
+  lines.push(make("p", { class: "soft" }, `Seen from ${stretch(effect.where.from_s, effect.where.to_s)}, ` +
+    `${number(band[0], 3)} to ${number(band[1], 3)} Hz.`));
+  if (effect.ambiguous_with.length > 0) {
+    const tell = effect.experiment ? ` To tell them apart: ${effect.experiment}.` : "";
+    lines.push(make("p", {}, `This recording cannot tell it from: ${readings(effect)}.${tell}`));
+  }
+  if (effect.figure.curves.length > 0) lines.push(plot(effect.figure));
+  return lines;
+}
+
+function effects() {
+  return data.effects.length === 0 ? [] : [make("h2", {}, "What gave it away"), data.effects.map(effectSection).flat()];
+}
+
+function residuals() {
+  const drawn = data.figures.map((gyro, i) => [gyro.time, gyro.spectrum, gyro.allan]
+    .filter((figure) => figure.curves.length > 0)
+    .map((figure) => plot({ ...figure, title: `Gyro ${data.gyros[i]}: ${figure.title}` }))).flat();
+  return drawn.length === 0 ? [] : [make("h2", {}, "Measured less predicted"), drawn];
+}
+
+function remains() {
+  const heading = make("h2", {}, "What remains");
+  if (data.unexplained.length === 0) {
+    return [heading, make("p", {}, "Nothing that stands out of what the final model's own simulations show.")];
+  }
+  const rows = data.unexplained.map((rest) => [gyroName(rest.gyro), rest.signature, rest.text, stretch(rest.from_s, rest.to_s)]);
+  return [heading, make("p", {}, "No effect of the catalogue accounts for this; nothing was added for it."),
+    table(["gyro", "signature", "what is seen", "when"], rows)];
+}
+
+function untold() {
+  if (data.not_told.length === 0) return [];
+  return [make("h2", {}, "What could not be told"),
+    make("p", {}, "Whether these effects are there, this recording cannot show; what would show them stands beside."),
+    table(["gyro: effect", "why", "what would tell"], data.not_told.map((line) => [line.who, line.why, line.experiment || "–"]))];
+}
+
+const GLOSSARY = [
+  ["Gap, nats per sample", "How much less likely the recording is under the model than it should be: the negative log-likelihood of a sample, less what " +
+    "simulations of the final model score. At a gap of 0.1 every sample is, on the average, e^0.1 = 1.1 times less likely than it could be. Counted on samples that took no part in naming or fitting."],
+  ["Floor and band", "Simulations of the final model, scored in the same way, spread around the floor; 95 % of them lie inside the band. A gap inside the band is closed: the recording looks like one of the simulations."],
+  ["σ", "Standard error of an estimated number; 95 of 100 true values lie within 2 σ of the estimate. Bars and bands in the plots are 2 σ."],
+  ["p", "How often a score as high as this would turn up anywhere in the whole search if nothing were there."],
+  ["May also be", "Other effects that would have produced the same recording. The likelier reading was added; nothing is certain between them."],
+  ["Measured less predicted", "The gyro's reading less what the model says it should have read at the rate as far as that is known: from the reference, or else from both gyros together, where only differences between the gyros show."],
+  ["Allan deviation", "How far means over a time differ from the next such mean. White noise falls with the square root of the time, drift rises with it."],
+];
+
+function glossary() {
+  return [make("h2", {}, "What the numbers mean"),
+    make("dl", {}, GLOSSARY.map(([term, text]) => [make("dt", {}, term), make("dd", {}, text)]).flat())];
+}
+
+document.title = `vgyro gap: ${data.log}`;
+document.getElementById("page").append(...[opening(), rounds(), effects(), residuals(), remains(), untold(), glossary()].flat(2));
+plots.forEach(draw);
+window.addEventListener("beforeprint", fitPaper);
+window.addEventListener("afterprint", leavePaper);
+window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", repaint);
