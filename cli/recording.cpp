@@ -16,8 +16,9 @@ namespace {
 
 constexpr std::size_t kReferenceStream = 2;
 
-// A rate beyond this is no limit of a gyro but of a floating-point number.
-constexpr double kLimitMost_dps = 1e6;
+// A limit beyond this is none of a gyro: a floating-point number has no other than what is
+// plausible.
+constexpr double kLimitMost_dps = 5e4;
 
 double limit_of(const gateway::Quantity& rate) {
   const auto magnitude = [&](double raw) { return std::abs(raw * rate.scale + rate.shift); };

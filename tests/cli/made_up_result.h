@@ -36,7 +36,7 @@ inline gap::Figure made_up_figure(const char* title, bool logarithmic, bool poin
           logarithmic,
           logarithmic,
           {made_up_curve("before", 2e-3, 2e-4, points), made_up_curve("after", 4e-4, 1e-4, points),
-           made_up_curve("simulated", 4e-4, 2e-4, false)}};
+           made_up_curve("simulated", 9e-4, 2e-4, false)}};
 }
 
 inline gap::Result made_up_result() {
@@ -77,6 +77,9 @@ inline gap::Result made_up_result() {
     gyro = {made_up_figure("over time", false, false), made_up_figure("spectrum", true, false),
             made_up_figure("Allan deviation", true, true)};
   }
+  gap::Figure& hostile = result.figures[0].time;
+  hostile.title = hostile.x_label = hostile.y_label = kHostile;
+  hostile.curves[0].label = std::string("before ") + kHostile;
   result.seconds = 400.0;
   result.samples = {40'000, 40'001};
   result.held_out = 12'000;
