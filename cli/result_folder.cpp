@@ -4,6 +4,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <system_error>
+#include <unistd.h>
 
 #include <fmt/format.h>
 
@@ -18,13 +19,29 @@ namespace fs = std::filesystem;
 // Through symbolic links and without a slash at the end: its neighbours have names then.
 fs::path real_path(const std::string& folder) {
   std::error_code ignored;
-  fs::path path = fs::weakly_canonical(fs::absolute(folder, ignored), ignored);
+  const fs::path absolute = fs::absolute(folder, ignored);
+  fs::path path = fs::weakly_canonical(absolute, ignored);
+  if (path.empty()) path = absolute.lexically_normal();
   if (!path.has_filename()) path = path.parent_path();
   return path;
 }
 
 Error system_error(const std::string& folder, const std::error_code& code) {
   return {folder, "cannot be written: " + code.message(), {}};
+}
+
+// The nearest that is there must be a folder that may be written into.
+Expected<void> check_parents(const std::string& folder, fs::path path) {
+  std::error_code ignored;
+  while (!fs::exists(path, ignored) && path.has_relative_path())
+    path = path.parent_path();
+  if (!fs::is_directory(path, ignored)) {
+    return fail(folder, fmt::format("cannot be made: {} is no folder", path.string()));
+  }
+  if (::access(path.c_str(), W_OK) != 0) {
+    return fail(folder, fmt::format("cannot be made in {}: {}", path.string(), system_reason()));
+  }
+  return {};
 }
 
 // A folder that goes away again unless it is kept.
@@ -73,7 +90,7 @@ Expected<void> check_result_folder(const std::string& folder,
   const fs::path path = real_path(folder);
   std::error_code code;
   const fs::file_status status = fs::status(path, code);
-  if (!fs::exists(status)) return {};
+  if (!fs::exists(status)) return check_parents(folder, path);
   if (!fs::is_directory(status)) return fail(folder, "is no folder", "choose another name");
   for (const fs::directory_entry& entry : fs::directory_iterator(path, code)) {
     const std::string name = entry.path().filename();

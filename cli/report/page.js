@@ -292,7 +292,7 @@ function rounds() {
   if (data.effects.length === 0) return [];
   const rows = data.effects.map((effect, i) => [
     { number: String(i + 1) }, { number: number(effect.gap_before, 4) }, { number: number(effect.gap_after, 4) },
-    gyroName(effect.gyro), effect.kind, { number: effect.value }, { number: number(effect.p_value, 2) }, readings(effect) || "–"]);
+    gyroName(effect.gyro), effect.kind, { number: effect.value }, { number: effect.p_value > 0 ? number(effect.p_value, 2) : "≈ 0" }, readings(effect) || "–"]);
   return [make("h2", {}, "What was added"),
     table(["round", "gap before", "after", "gyro", "effect", "value ± σ", "p", "may also be"], rows)];
 }
@@ -303,7 +303,7 @@ function effectSection(effect, i) {
     make("p", {}, make("span", { class: "number" }, effect.value))];
   if (effect.evidence) lines.push(make("p", {}, effect.evidence));
   const band = effect.where.band_hz;
-  lines.push(make("p", { class: "soft" }, `Seen from ${stretch(effect.where.from_s, effect.where.to_s)}, ` +
+  if (effect.where.to_s > effect.where.from_s) lines.push(make("p", { class: "soft" }, `Seen from ${stretch(effect.where.from_s, effect.where.to_s)}, ` +
     `${number(band[0], 3)} to ${number(band[1], 3)} Hz.`));
   if (effect.ambiguous_with.length > 0) {
     const tell = effect.experiment ? ` To tell them apart: ${effect.experiment}.` : "";

@@ -79,7 +79,9 @@ TEST_F(ResultFolderTest, RefusesAFileAndAnEmptyName) {
   put("out", "a file");
   EXPECT_FALSE(check_result_folder(at("out"), {"a.json"}));
   EXPECT_FALSE(check_result_folder("", {"a.json"}));
+  EXPECT_FALSE(check_result_folder(at("out/below/deeper"), {"a.json"}));
   EXPECT_FALSE(write_result_folder(at("out/below"), files_));
+  EXPECT_TRUE(check_result_folder(at("not/there/yet"), {"a.json"}));
   EXPECT_EQ(read_file(at("out")).value(), "a file");
 }
 
