@@ -6,9 +6,9 @@
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
+#include <vgyro_report_text.h>
 
 #include "model/catalogue.h"
-#include "vgyro_report_text.h"
 
 namespace vgyro::cli {
 
