@@ -1,0 +1,109 @@
+#include "gap/signals.h"
+
+#include <cmath>
+#include <numbers>
+
+#include <gtest/gtest.h>
+
+namespace vgyro::gap {
+namespace {
+
+constexpr double kPi = std::numbers::pi;
+constexpr double kInterval_s = 0.01;
+
+template <class Function>
+SampledCurve sampled(const Function& f, double seconds) {
+  std::vector<double> t_s;
+  std::vector<double> value;
+  for (int i = 0; i * kInterval_s < seconds; ++i) {
+    t_s.push_back(kInterval_s * i);
+    value.push_back(f(t_s.back()));
+  }
+  return {t_s, value};
+}
+
+Signals turning_at(double frequency_hz, double amplitude_dps) {
+  Signals signals;
+  signals.motion = Motion(sampled(
+      [&](double t) { return amplitude_dps * std::sin(2.0 * kPi * frequency_hz * t); }, 20.0));
+  return signals;
+}
+
+TEST(Prediction, LowPassAnswersASineAsTheEquationSays) {
+  for (const double frequency_hz : {0.5, 2.0, 5.0}) {
+    const Signals signals = turning_at(frequency_hz, 40.0);
+    const double cutoff_hz = 4.0;
+    const std::array effects{model::Effect{0, model::Kind::kBandwidth, {cutoff_hz}, 0}};
+    const Prediction prediction(effects, signals);
+    const double x = frequency_hz / cutoff_hz;
+    for (double t = 5.0; t < 15.0; t += 0.0371) {
+      const double truth =
+          40.0 / std::sqrt(1.0 + x * x) * std::sin(2.0 * kPi * frequency_hz * t - std::atan(x));
+      // The rate is taken as straight over a quarter of a sample.
+      const double bend = 2.0 * kPi * frequency_hz * kInterval_s / 4.0;
+      EXPECT_NEAR(prediction.at(t), truth, 40.0 * (bend * bend / 8.0 + 2e-5));
+    }
+  }
+}
+
+TEST(Prediction, DelayReadsAnEarlierRate) {
+  const Signals signals = turning_at(1.0, 40.0);
+  const std::array effects{model::Effect{0, model::Kind::kDelay, {0.0123}, 0}};
+  const Prediction prediction(effects, signals);
+  for (double t = 1.0; t < 19.0; t += 0.0371)
+    EXPECT_NEAR(prediction.at(t), 40.0 * std::sin(2.0 * kPi * (t - 0.0123)), 1e-5);
+}
+
+TEST(Prediction, AddsAScaleFactorToTheRate) {
+  const Signals signals = turning_at(1.0, 40.0);
+  const std::array effects{model::Effect{0, model::Kind::kScaleFactor, {0.01}, 0},
+                           model::Effect{0, model::Kind::kBias, {0.5}, 0}};
+  const Prediction prediction(effects, signals);
+  for (double t = 1.0; t < 19.0; t += 0.0371)
+    EXPECT_NEAR(prediction.at(t), 40.4 * std::sin(2.0 * kPi * t) + 0.5, 1e-5);
+}
+
+TEST(Motion, AngleIsTheIntegralOfTheRate) {
+  const double frequency_hz = 0.8;
+  const Signals signals = turning_at(frequency_hz, 90.0);
+  const double omega = 2.0 * kPi * frequency_hz;
+  for (double t = 0.1; t < 19.0; t += 0.0371) {
+    const double truth_deg = 90.0 / omega * (1.0 - std::cos(omega * t));
+    EXPECT_NEAR(signals.motion.angle_rad(t), truth_deg * kPi / 180.0, 1e-6);
+  }
+}
+
+TEST(Temperature, SlopeIsThatOfTheTruthBehindCoarseSteps) {
+  GyroSeries gyro;
+  const double step_c = 1.0 / 128.0;
+  const auto truth = [](double t) { return 25.0 + 8.0 * std::sin(2.0 * kPi * t / 120.0); };
+  for (int i = 0; i < 12000; ++i) {
+    gyro.t_s.push_back(kInterval_s * i);
+    gyro.temperature_c.push_back(step_c * std::round(truth(gyro.t_s.back()) / step_c));
+  }
+  Signals signals;
+  smooth_temperature(gyro, signals);
+  for (double t = 3.0; t < 117.0; t += 0.37) {
+    EXPECT_NEAR(signals.at(t).temperature_c, truth(t), step_c);
+    const double slope = 8.0 * 2.0 * kPi / 120.0 * std::cos(2.0 * kPi * t / 120.0);
+    EXPECT_NEAR(signals.at(t).temperature_slope_c_s, slope, 0.02 * 8.0 * 2.0 * kPi / 120.0);
+  }
+}
+
+TEST(Acceleration, VibrationIsTheVarianceOfItsSizeOverASecond) {
+  AccelerationSeries acceleration;
+  for (int i = 0; i < 3000; ++i) {
+    acceleration.t_s.push_back(kInterval_s * i);
+    acceleration.g[0].push_back(0.0);
+    acceleration.g[1].push_back(0.0);
+    acceleration.g[2].push_back(1.0 + 0.1 * std::sin(2.0 * kPi * 10.0 * acceleration.t_s.back()));
+  }
+  Signals signals;
+  set_acceleration(acceleration, signals);
+  // Ten whole periods: half the amplitude's square, by one sample of a hundred at most.
+  EXPECT_NEAR(signals.at(20.0).vibration_g2, 0.005, 0.005 * 0.02);
+  EXPECT_NEAR(signals.at(20.0).acceleration_g[2], 1.0, 1e-9);
+}
+
+}  // namespace
+}  // namespace vgyro::gap
