@@ -1,7 +1,7 @@
 #pragma once
 
 // A sampled quantity between its samples: local polynomials through the nearest samples, so that a
-// sine of a tenth of the sampling rate is met to a hundred-thousandth of its amplitude.
+// sine of a tenth of the sampling rate is met to 3e-4 of its amplitude, one of a thirtieth to 1e-6.
 
 #include <span>
 #include <vector>

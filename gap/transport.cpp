@@ -232,7 +232,8 @@ class Check {
     // Levels that neighbour each other are one step apart: the tenth part with the least distance.
     std::sort(steps.begin(), steps.end());
     double step = steps[steps.size() / 20];
-    if (step < 2.5 * std::max(series_.step_dps, 1e-12)) return;
+    // On three of the frame's steps or fewer every value would seem to stand on the lattice below.
+    if (step < 3.5 * std::max(series_.step_dps, 1e-12)) return;
     // Refine: every level is a whole number of steps; the number is sure near zero first.
     std::vector<double> sizes;
     for (const double level : levels)

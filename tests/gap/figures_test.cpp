@@ -172,6 +172,7 @@ TEST(Figures, SimulatedSpectrumLiesAtTheInjectedDensity) {
 TEST(Differences, CleanRecordingsHaveNone) {
   for (const std::uint64_t seed : {31U, 32U, 33U}) {
     Making making;
+    making.seconds = 160.0;
     making.seed = seed;
     const Studied studied(making);
     ASSERT_NE(studied.study, nullptr);
