@@ -27,10 +27,10 @@ CASES = [
     Case("single", 306, "angle_harmonic", 20.0, short=True),
     Case("single", 307, "line", short=True),
     Case("single", 308, "delay", short=True),
-    Case("single", 309, "saturation", short=True),
+    Case("single", 309, "dropped_frames", short=True),
     Case("single", 310, "scale_factor", reference=False, short=True),
-    Case("pair", 311, short=True),
-    Case("outside", 312, "chirp", short=True),
+    Case("pair", 315, short=True),
+    Case("outside", 312, "loud_minute", short=True),
 ]
 
 
