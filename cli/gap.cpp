@@ -72,8 +72,10 @@ Expected<std::string> model_text(const model::Model& model) {
   if (!text) return text;
   constexpr model::Effect kTrial{0, model::Kind::kBias, {0.0}, 0};
   if (const auto trial = model::append_effect(*text, kTrial, {}); !trial) {
+    // It was given a text without a name, and knows at most the line.
     Error error = trial.error();
-    if (error.where.empty()) error.where = model.file;
+    const std::size_t colon = error.where.rfind(':');
+    error.where = model.file + (colon == std::string::npos ? "" : error.where.substr(colon));
     return tl::unexpected(error);
   }
   return text;

@@ -368,9 +368,10 @@ std::string comparison_text(const GapSubject& subject, const gap::Comparison& co
   const bool inside = gap.before <= gap.band95[1];
   text += fmt::format("gap {} nats per sample, {} what the model's own simulations score; {}\n",
                       gap_number(gap.before), inside ? "within" : "above", floor_text(gap));
-  if (comparison.differences.empty()) {
+  if (comparison.differences.empty() && inside) {
     text += "They differ nowhere by more than chance.\n";
-  } else {
+  }
+  if (!comparison.differences.empty()) {
     Rows rows{{"gyro", "against", "when", "band, Hz", "nats", "what"}};
     for (const gap::Difference& difference : comparison.differences) {
       rows.push_back(
