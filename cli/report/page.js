@@ -24,8 +24,9 @@ function number(value, digits) {
   if (!Number.isFinite(value)) return "–";
   if (value === 0) return "0";
   const size = Math.abs(value);
-  const text = size < 1e-3 || size >= 1e5 ? value.toExponential(digits - 1) : value.toPrecision(digits);
-  return text.replace(/(\.\d*?)0+(e|$)/, "$1$2").replace(/\.(e|$)/, "$1").replace(/^-/, "−").replace("e-", "e−").replace("e+", "e");
+  const rounded = Number(value.toPrecision(digits));
+  const text = size < 1e-3 || size >= 1e5 ? rounded.toExponential() : String(rounded);
+  return text.replace(/^-/, "−").replace("e-", "e−").replace("e+", "e");
 }
 
 function escaped(text) {
@@ -46,6 +47,7 @@ function table(head, rows) {
       typeof part === "object" ? cell("td", part.number, true) : cell("td", part)))))));
 }
 
+const sentence = (text) => text.replace(/^what /, "What ").replace(/\.?$/, "."); // it may begin with a sensor's name
 const gyroName = (gyro) => data.gyros[gyro - 1];
 const effectName = (effect) => `${effect.kind}, gyro ${gyroName(effect.gyro)}`;
 const readings = (effect) => effect.ambiguous_with.map(effectName).join("; ");
@@ -120,9 +122,9 @@ const ROLES = ["simulated", "before", "other", "effect", "after"]; // drawn in t
 
 function roleOf(label) {
   if (/simul|floor/i.test(label)) return "simulated";
-  if (/before|given/i.test(label)) return "before";
-  if (/after|final/i.test(label)) return "after";
-  if (/effect|named|fit/i.test(label)) return "effect";
+  if (/before|without/i.test(label)) return "before";
+  if (/after|\bwith\b/i.test(label)) return "after";
+  if (data.effects.some((effect) => effect.kind === label)) return "effect";
   return "other";
 }
 
@@ -301,12 +303,12 @@ function effectSection(effect, i) {
   const lines = [make("h3", {}, `${i + 1}. ${effectName(effect)}`),
     make("p", { class: "soft" }, `The gyro reads, in addition: ${effect.meaning}.`),
     make("p", {}, make("span", { class: "number" }, effect.value))];
-  if (effect.evidence) lines.push(make("p", {}, effect.evidence));
+  if (effect.evidence) lines.push(make("p", {}, sentence(effect.evidence)));
   const band = effect.where.band_hz;
   if (effect.where.to_s > effect.where.from_s) lines.push(make("p", { class: "soft" }, `Seen from ${stretch(effect.where.from_s, effect.where.to_s)}, ` +
     `${number(band[0], 3)} to ${number(band[1], 3)} Hz.`));
   if (effect.ambiguous_with.length > 0) {
-    const tell = effect.experiment ? ` To tell them apart: ${effect.experiment}.` : "";
+    const tell = effect.experiment ? ` To tell them apart: ${effect.experiment.replace(/\.$/, "")}.` : "";
     lines.push(make("p", {}, `This recording cannot tell it from: ${readings(effect)}.${tell}`));
   }
   if (effect.figure.curves.length > 0) lines.push(plot(effect.figure));
