@@ -17,6 +17,8 @@ using model::Kind;
 
 // Below this a variance is rounding of the arithmetic, not noise: (1e-9 deg/s)².
 constexpr double kVarianceMin = 1e-18;
+// Times that a fitted correlated term must have room to forget.
+constexpr double kMarkovSpans = 8.0;
 constexpr std::size_t kTermsMax = 1 + kMarkovMax;
 constexpr std::size_t kStatesMax = 2 * kTermsMax;
 
@@ -362,10 +364,14 @@ NoiseFitResult fit_pair_noise(const Eigen::VectorXd& residual, const Layout& lay
           {gyro, Unknown::What::kWalk, std::log(density) - 12.0, std::log(density) + 1.0});
     }
     if (free[gyro].markov) {
-      terms.markov.push_back({density * 0.1, 20.0});
+      terms.markov.push_back({density * 0.1, 10.0});
       slow.push_back(
           {gyro, Unknown::What::kSigma, std::log(density) - 9.0, std::log(density) + 6.0});
-      slow.push_back({gyro, Unknown::What::kTau, std::log(0.5), std::log(1000.0)});
+      // A term whose memory is longer than this is a bias or a walk: it would never be seen to
+      // forget.
+      const double seconds = layout.blocks.empty() ? 1.0 : layout.blocks.back().t_s;
+      slow.push_back({gyro, Unknown::What::kTau, std::log(0.5),
+                      std::log(std::max(2.0, seconds / kMarkovSpans))});
     }
   }
   const double within = maximise(result.noise, fast, 150, 1e-3, [&](const PairNoise& noise) {

@@ -17,7 +17,11 @@ namespace {
 using model::Effect;
 using model::Kind;
 
-constexpr std::size_t kFoundMax = 24;
+constexpr std::size_t kFoundMax = 10;
+// More of one kind for one gyro is something else in pieces.
+constexpr std::ptrdiff_t kLinesMax = 3;
+constexpr std::ptrdiff_t kStepsMax = 3;
+constexpr Eigen::Index kParts = 6;
 constexpr std::size_t kRefitsMax = 7;
 constexpr double kStepEvery_s = 2.0;
 constexpr double kLineLow_hz = 0.02;
@@ -94,6 +98,10 @@ Solution solve(const Eigen::MatrixXd& gram, const Eigen::VectorXd& right) {
   return solution;
 }
 
+bool is_timing(Kind kind) {
+  return kind == Kind::kDelay || kind == Kind::kBandwidth || kind == Kind::kClockSkew;
+}
+
 PairNoise only_walk(PairNoise noise, const PairNoise& file) {
   for (std::size_t gyro = 0; gyro < 2; ++gyro)
     noise[gyro].markov = file[gyro].markov;
@@ -105,6 +113,13 @@ PairNoise only_walk(PairNoise noise, const PairNoise& file) {
 Search::Search(Study& study, std::vector<Effect> known)
     : study_(study), known_(std::move(known)), file_noise_(noise_of(known_)) {
   noise_ = file_noise_;
+}
+
+void Search::keep_in_bounds(Effect& effect) const {
+  clamp_to_catalogue(effect);
+  // Nothing reads ahead of time; a reference may be late, but the other gyro has a name of its own.
+  if (effect.kind == Kind::kDelay && !study_.recording().has_reference)
+    effect.parameters[0] = std::max(0.0, effect.parameters[0]);
 }
 
 std::vector<Effect> Search::effects() const {
@@ -200,7 +215,7 @@ void Search::improve(std::size_t problem, Fit& fit) const {
       for (Term& term : trial) {
         for (const std::size_t parameter : term.free)
           term.effect.parameters[parameter] += scale * solution.x[place++];
-        clamp_to_catalogue(term.effect);
+        keep_in_bounds(term.effect);
       }
       const double now = square_of(trial);
       if (now <= square + 1e-9) {
@@ -363,11 +378,15 @@ std::vector<Search::Score> Search::score(std::size_t problem, const Fit& null,
       if (effect.kind == Kind::kWarmUp)
         effect.parameters[1] = cached.candidates[i].term.effect.parameters[1];
     }
-    clamp_to_catalogue(effect);
+    keep_in_bounds(effect);
     scores.push_back(std::move(score));
   }
-  score_steps(problem, null, noise, scores);
-  score_lines(problem, null, noise, scores);
+  const auto enough = [&](Kind kind, std::ptrdiff_t most) {
+    return std::count_if(null.terms.begin(), null.terms.end(),
+                         [&](const Term& term) { return term.effect.kind == kind; }) >= most;
+  };
+  if (!enough(Kind::kBiasStep, kStepsMax)) score_steps(problem, null, noise, scores);
+  if (!enough(Kind::kLine, kLinesMax)) score_lines(problem, null, noise, scores);
   std::sort(scores.begin(), scores.end(),
             [](const Score& a, const Score& b) { return a.adjusted() > b.adjusted(); });
   return scores;
@@ -556,8 +575,8 @@ void Search::place_step(std::size_t problem, const Fit& null, Term& term, double
   }
 }
 
-std::vector<Found> Search::refit_best(std::size_t problem, const Fit& null,
-                                      std::vector<Score> scores, std::size_t most) const {
+std::vector<Found> Search::refit_best(std::size_t problem, const Fit& null, const PairNoise& start,
+                                      const std::vector<Score>& scores, std::size_t most) const {
   std::vector<Found> list;
   std::vector<Reading> tried;
   for (const Score& score : scores) {
@@ -580,7 +599,7 @@ std::vector<Found> Search::refit_best(std::size_t problem, const Fit& null,
     }
     std::vector<Term> terms = null.terms;
     terms.push_back(term);
-    const Fit with = fit(problem, terms, null.noise);
+    const Fit with = fit(problem, terms, start);
     Found found;
     found.term = with.terms.back();
     found.statistic = 2.0 * (with.log_likelihood - null.log_likelihood);
@@ -615,14 +634,23 @@ bool Search::add_round() {
         file[gyro].white_dps_rthz = file_noise_[gyro].white_dps_rthz;
     }
     std::vector<Score> more = score(problem, null, file);
-    std::vector<Found> first = refit_best(problem, null, scores, kRefitsMax);
-    std::vector<Found> second = refit_best(problem, null, more, kRefitsMax);
+    std::vector<Found> first = refit_best(problem, null, null.noise, scores, kRefitsMax);
+    std::vector<Found> second = refit_best(problem, null, file, more, kRefitsMax);
     first.insert(first.end(), second.begin(), second.end());
     for (Found& found : first) {
       if (!best || found.statistic - found.penalty > best->statistic - best->penalty) best = found;
     }
   }
   if (!best || best->statistic - best->penalty < kStatisticMin) return false;
+  if (is_timing(best->term.effect.kind)) {
+    // Interpolation leaves a thousandth of a great timing effect, which looks like another one.
+    for (const Found& found : found_) {
+      if (is_timing(found.term.effect.kind) && found.term.effect.gyro == best->term.effect.gyro &&
+          best->statistic < 2e-3 * found.statistic) {
+        return false;
+      }
+    }
+  }
   found_.push_back(*best);
   settle();
   return true;
@@ -681,7 +709,7 @@ void Search::replace_round() {
       }
       if (score.adjusted() > 0.5 * (statistic - found_[i].penalty) - 10.0) rivals.push_back(score);
     }
-    const std::vector<Found> others = refit_best(problem, null, rivals, 6);
+    const std::vector<Found> others = refit_best(problem, null, noise_, rivals, 6);
     const double own_adjusted = statistic - found_[i].penalty;
     bool replaced = false;
     for (const Found& other : others) {
@@ -690,13 +718,14 @@ void Search::replace_round() {
       if (!replaced && adjusted > own_adjusted + 0.5) {
         const Reading reading{effect.kind, effect.gyro};
         Found better = other;
-        if (own_adjusted > adjusted - kLead) better.ambiguous_with.push_back(reading);
+        if (own_adjusted > adjusted - kLead - kLeadShare * adjusted)
+          better.ambiguous_with.push_back(reading);
         found_[i] = std::move(better);
         replaced = true;
         continue;
       }
       const double best = replaced ? found_[i].statistic - found_[i].penalty : own_adjusted;
-      if (adjusted > best - kLead) {
+      if (adjusted > best - kLead - kLeadShare * best) {
         found_[i].ambiguous_with.push_back({other.term.effect.kind, other.term.effect.gyro});
       }
     }
@@ -715,6 +744,117 @@ void Search::delete_backward() {
     replace_round();
     i = 0;
   }
+}
+
+Search::Change Search::change_over_time(std::size_t index) const {
+  const Term& term = found_[index].term;
+  const std::size_t problem = study_.problem_of(term.effect.gyro);
+  const Problem& data = study_.problems()[problem];
+  std::vector<Term> terms;
+  std::vector<Term> others;
+  for (std::size_t i = 0; i < found_.size(); ++i) {
+    if (study_.problem_of(found_[i].term.effect.gyro) != problem) continue;
+    terms.push_back(found_[i].term);
+    if (i != index) others.push_back(found_[i].term);
+  }
+  Matrix shape = columns_of(data, term);
+  const Eigen::Index width = shape.cols();
+  // Parts of about equal information.
+  const Matrix white_shape = whitened(shape, data.layout, noise_);
+  std::vector<std::pair<double, double>> information;
+  for (std::size_t b = 0; b < data.layout.blocks.size(); ++b) {
+    const Block& block = data.layout.blocks[b];
+    const double sum = white_shape.middleRows(block.first, block.count).squaredNorm() +
+                       white_shape.row(data.size() + static_cast<Eigen::Index>(b)).squaredNorm();
+    information.emplace_back(block.t_s, sum);
+  }
+  std::sort(information.begin(), information.end());
+  double total = 0.0;
+  for (const auto& [t_s, sum] : information)
+    total += sum;
+  std::vector<double> ends_s;
+  double so_far = 0.0;
+  for (const auto& [t_s, sum] : information) {
+    so_far += sum;
+    if (so_far >= total * static_cast<double>(ends_s.size() + 1) / kParts) ends_s.push_back(t_s);
+  }
+  ends_s.resize(kParts, 1e300);
+  ends_s.back() = 1e300;
+  Eigen::Index nuisance = 0;
+  for (const Term& other : others)
+    nuisance += static_cast<Eigen::Index>(other.free.size());
+  Matrix columns = Matrix::Zero(data.size(), 1 + nuisance + kParts * width);
+  columns.col(0) = residual_of(problem, terms);
+  Eigen::Index at = 1;
+  for (const Term& other : others) {
+    const auto count = static_cast<Eigen::Index>(other.free.size());
+    if (count > 0) columns.middleCols(at, count) = columns_of(data, other);
+    at += count;
+  }
+  for (Eigen::Index i = 0; i < data.size(); ++i) {
+    const double t_s = data.t_s[static_cast<std::size_t>(i)];
+    const auto part = std::lower_bound(ends_s.begin(), ends_s.end(), t_s) - ends_s.begin();
+    columns.row(i).segment(at + static_cast<Eigen::Index>(part) * width, width) = shape.row(i);
+  }
+  const Matrix white = whitened(columns, data.layout, noise_);
+  const Eigen::MatrixXd gram = white.transpose() * white;
+  const Eigen::Index all = gram.rows() - 1;
+  const double with = solve(gram.bottomRightCorner(all, all), gram.col(0).tail(all)).gain;
+  return {with, static_cast<double>((kParts - 1) * width)};
+}
+
+void Search::reject(const std::function<bool(std::size_t)>& is_wrong) {
+  std::vector<Found> kept;
+  const std::size_t before = found_.size();
+  for (std::size_t i = 0; i < found_.size(); ++i)
+    (is_wrong(i) ? rejected_ : kept).push_back(found_[i]);
+  found_ = std::move(kept);
+  if (found_.size() != before) settle();
+}
+
+// What is in the catalogue keeps its size throughout; what only resembles it does not.
+void Search::reject_unsteady() {
+  std::vector<bool> wrong(found_.size(), false);
+  for (std::size_t i = 0; i < found_.size(); ++i) {
+    const Effect& effect = found_[i].term.effect;
+    if (effect.kind == Kind::kWarmUp || effect.kind == Kind::kBiasStep) continue;
+    const Change change = change_over_time(i);
+    const double chance = change.freedom + 4.5 * std::sqrt(2.0 * change.freedom) + 10.0;
+    wrong[i] = change.statistic > chance && change.statistic > 0.04 * found_[i].statistic;
+  }
+  for (std::size_t gyro = 0; gyro < 2; ++gyro) {
+    // A handful of steps, or two that cancel, is a shape that comes and goes.
+    std::vector<std::size_t> steps;
+    for (std::size_t i = 0; i < found_.size(); ++i) {
+      const Effect& effect = found_[i].term.effect;
+      if (effect.gyro == gyro && effect.kind == Kind::kBiasStep) steps.push_back(i);
+    }
+    bool cancel = false;
+    for (const std::size_t i : steps) {
+      for (const std::size_t j : steps) {
+        const double sum =
+            found_[i].term.effect.parameters[0] + found_[j].term.effect.parameters[0];
+        const double sigma = std::hypot(found_[i].sigma[0], found_[j].sigma[0]);
+        const double size = std::abs(found_[i].term.effect.parameters[0]);
+        cancel = cancel || (i != j && std::abs(sum) < std::max(3.0 * sigma, 0.1 * size));
+      }
+    }
+    if (cancel || steps.size() >= static_cast<std::size_t>(kStepsMax)) {
+      for (const std::size_t i : steps)
+        wrong[i] = true;
+    }
+    std::vector<std::size_t> lines;
+    for (std::size_t i = 0; i < found_.size(); ++i) {
+      const Effect& effect = found_[i].term.effect;
+      if (effect.gyro == gyro && effect.kind == Kind::kLine) lines.push_back(i);
+    }
+    if (lines.size() >= static_cast<std::size_t>(kLinesMax)) {
+      for (const std::size_t i : lines)
+        wrong[i] = true;
+    }
+  }
+  if (std::none_of(wrong.begin(), wrong.end(), [](bool one) { return one; })) return;
+  reject([&](std::size_t i) { return wrong[i]; });
 }
 
 // Noise beyond what the model says: one term of one gyro free at a time, the others as they are.
@@ -832,6 +972,7 @@ void Search::run() {
   tell("weighing rivals", 0.75);
   replace_round();
   delete_backward();
+  reject_unsteady();
   tell("fitting the noise", 0.85);
   noise_rounds();
 }

@@ -21,6 +21,8 @@ namespace vgyro::gap {
 inline constexpr double kStatisticMin = 22.0;
 /// Rivals that are less than this worse cannot be told apart.
 inline constexpr double kLead = 7.0;
+/// Of great effects the arithmetic of interpolation is not sure to better than this share.
+inline constexpr double kLeadShare = 3e-3;
 
 struct Fit {
   std::vector<Term> terms;
@@ -48,6 +50,8 @@ class Search {
   void run();
 
   [[nodiscard]] const std::vector<Found>& found() const { return found_; }
+  /// What looked like an effect and is none of the catalogue's: it does not hold throughout.
+  [[nodiscard]] const std::vector<Found>& rejected() const { return rejected_; }
   /// The model's effects and what was found.
   [[nodiscard]] std::vector<model::Effect> effects() const;
   /// The noise that fits best, which may be less or more than the model's.
@@ -78,13 +82,24 @@ class Search {
                    std::vector<Score>& scores) const;
   void score_lines(std::size_t problem, const Fit& null, const PairNoise& noise,
                    std::vector<Score>& scores) const;
-  std::vector<Found> refit_best(std::size_t problem, const Fit& null, std::vector<Score> scores,
-                                std::size_t most) const;
+  /// `start`: the noise that the fits begin with.
+  std::vector<Found> refit_best(std::size_t problem, const Fit& null, const PairNoise& start,
+                                const std::vector<Score>& scores, std::size_t most) const;
+  void keep_in_bounds(model::Effect& effect) const;
   void place_step(std::size_t problem, const Fit& null, Term& term, double reach_s,
                   double step_s) const;
   bool add_round();
   void replace_round();
   void delete_backward();
+  /// How much better the effect fits with a size of its own in each part of the recording, as a
+  /// statistic, and its degrees of freedom.
+  struct Change {
+    double statistic = 0.0;
+    double freedom = 0.0;
+  };
+  Change change_over_time(std::size_t index) const;
+  void reject_unsteady();
+  void reject(const std::function<bool(std::size_t)>& is_wrong);
   void noise_rounds();
   void settle();
   void cache_candidates();
@@ -92,6 +107,7 @@ class Search {
   Study& study_;
   std::vector<model::Effect> known_;
   std::vector<Found> found_;
+  std::vector<Found> rejected_;
   PairNoise noise_;                    ///< fitted
   PairNoise file_noise_;               ///< what the model says, with what was found
   std::vector<Eigen::VectorXd> base_;  ///< residual of the known effects, by problem

@@ -17,35 +17,45 @@ constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr double kTemperatureReach_s = 2.0;
 constexpr double kGridStep_s = 0.25;
 
-// First-order low-pass with the rate straight between the curve's samples, each interval exactly;
-// the curve is refined first, so that straight is good enough.
-SampledCurve low_pass(const SampledCurve& curve, double cutoff_hz) {
-  constexpr int kRefine = 4;
-  const std::span<const double> times_s = curve.times_s();
-  const double pole = 2.0 * std::numbers::pi * cutoff_hz;
-  std::vector<double> t_s;
+// Values at the quarters of each interval of a curve, kQuarters for each.
+constexpr std::size_t kQuarters = 4;
+std::vector<double> quarters_of(const SampledCurve& curve) {
+  const std::span<const double> t_s = curve.times_s();
   std::vector<double> value;
-  t_s.reserve(times_s.size());
-  value.reserve(times_s.size());
-  double state = curve.values().front();
-  double last = state;
-  t_s.push_back(times_s.front());
-  value.push_back(state);
-  for (std::size_t i = 0; i + 1 < times_s.size(); ++i) {
-    const double step_s = (times_s[i + 1] - times_s[i]) / kRefine;
-    const double x = pole * step_s;
-    const double decay = std::exp(-x);
-    const double share = x > 1e-4 ? (1.0 - decay) / x : 1.0 - 0.5 * x;
-    for (int part = 1; part <= kRefine; ++part) {
-      const double next = part == kRefine
-                              ? curve.values()[i + 1]
-                              : curve.at(times_s[i] + static_cast<double>(part) * step_s).value;
-      // Response to a straight line from `last` to `next`.
-      state = decay * state + (share - decay) * last + (1.0 - share) * next;
-      last = next;
+  value.reserve(kQuarters * t_s.size());
+  for (std::size_t i = 0; i + 1 < t_s.size(); ++i) {
+    value.push_back(curve.values()[i]);
+    for (std::size_t part = 1; part < kQuarters; ++part) {
+      const double share = static_cast<double>(part) / kQuarters;
+      value.push_back(curve.at(t_s[i] + share * (t_s[i + 1] - t_s[i])).value);
     }
-    t_s.push_back(times_s[i + 1]);
-    value.push_back(state);
+  }
+  if (!t_s.empty()) value.push_back(curve.values().back());
+  return value;
+}
+
+// First-order low-pass, exact for a rate that is a parabola in each half of an interval.
+SampledCurve low_pass(const SampledCurve& curve, const std::vector<double>& quarters,
+                      double cutoff_hz) {
+  const std::span<const double> t_s = curve.times_s();
+  const double pole = 2.0 * std::numbers::pi * cutoff_hz;
+  std::vector<double> value(t_s.size());
+  double state = curve.values().front();
+  value[0] = state;
+  for (std::size_t i = 0; i + 1 < t_s.size(); ++i) {
+    const double half_s = 0.5 * (t_s[i + 1] - t_s[i]);
+    const double decay = std::exp(-pole * half_s);
+    for (std::size_t half = 0; half < 2; ++half) {
+      const double* u = &quarters[kQuarters * i + 2 * half];
+      const double bend = 2.0 * (u[0] - 2.0 * u[1] + u[2]) / (half_s * half_s);
+      const double slope = (u[2] - u[0]) / half_s - bend * half_s;
+      // y' = pole·(u − y) is met by a parabola and what decays.
+      const double c = bend;
+      const double b = slope - 2.0 * c / pole;
+      const double a = u[0] - b / pole;
+      state = a + (b + c * half_s) * half_s + (state - a) * decay;
+    }
+    value[i + 1] = state;
   }
   return {t_s, value};
 }
@@ -95,11 +105,12 @@ Motion::Motion(SampledCurve rate_dps) : rate_dps_(std::move(rate_dps)) {
   const std::span<const double> rate = rate_dps_.values();
   angle_deg_.resize(t_s.size());
   if (t_s.empty()) return;
+  quarters_dps_ = quarters_of(rate_dps_);
   double angle_deg = rate[0] * t_s[0];
   angle_deg_[0] = angle_deg;
   for (std::size_t i = 1; i < t_s.size(); ++i) {
     const double step_s = t_s[i] - t_s[i - 1];
-    const double middle = rate_dps_.at(t_s[i - 1] + 0.5 * step_s).value;
+    const double middle = quarters_dps_[kQuarters * (i - 1) + 2];
     angle_deg += step_s * (rate[i - 1] + 4.0 * middle + rate[i]) / 6.0;
     angle_deg_[i] = angle_deg;
   }
@@ -118,7 +129,7 @@ double Motion::angle_rad(double t_s) const {
 }
 
 SampledCurve Motion::low_passed(double cutoff_hz) const {
-  return low_pass(rate_dps_, cutoff_hz);
+  return low_pass(rate_dps_, quarters_dps_, cutoff_hz);
 }
 
 model::Surroundings Signals::at(double t_s) const {
@@ -200,7 +211,8 @@ Prediction::Prediction(std::span<const model::Effect> effects, const Signals& si
       case Kind::kBandwidth:
         low_passed_.push_back(low_passed_.empty()
                                   ? signals.motion.low_passed(effect.parameters[0])
-                                  : low_pass(low_passed_.back(), effect.parameters[0]));
+                                  : low_pass(low_passed_.back(), quarters_of(low_passed_.back()),
+                                             effect.parameters[0]));
         continue;
       default:
         break;

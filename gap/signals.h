@@ -28,7 +28,8 @@ class Motion {
 
  private:
   SampledCurve rate_dps_;
-  std::vector<double> angle_deg_;  ///< at the curve's samples, from time 0
+  std::vector<double> quarters_dps_;  ///< between the curve's samples
+  std::vector<double> angle_deg_;     ///< at the curve's samples, from time 0
 };
 
 struct Signals {

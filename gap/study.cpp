@@ -15,6 +15,7 @@ namespace {
 using model::Effect;
 using model::Kind;
 
+constexpr std::size_t kRemembered = 24;
 constexpr double kRecordingMin_s = 30.0;
 constexpr std::size_t kSamplesMin = 500;
 constexpr double kReferenceShareMin = 0.95;
@@ -232,7 +233,9 @@ void Study::find_spikes(const std::vector<Effect>& effects) {
       error[i] = series.rate_dps[i] - truth.at(t_s[i]).value;
     out[gyro].assign(n, 0.0);
     scale[gyro].assign(n, 0.0);
+    const std::vector<std::uint8_t>& masked = transports_[gyro].masked;
     for (std::size_t i = 2; i + 2 < n; ++i) {
+      if (masked[i - 2] + masked[i - 1] + masked[i] + masked[i + 1] + masked[i + 2] > 0) continue;
       std::array<double, 4> near{error[i - 2], error[i - 1], error[i + 1], error[i + 2]};
       std::sort(near.begin(), near.end());
       out[gyro][i] = error[i] - 0.5 * (near[1] + near[2]);
@@ -462,6 +465,10 @@ Problem Study::build_pair() {
 
 void Study::build() {
   problems_.clear();
+  remembered_.clear();
+  forget_next_ = 0;
+  // Reserved, because what is remembered points at them.
+  problems_.reserve(2);
   if (recording_.has_reference) {
     problems_.push_back(build_against_reference(0));
     problems_.push_back(build_against_reference(1));
@@ -525,6 +532,17 @@ Eigen::VectorXd Study::contribution(const Problem& problem, std::size_t gyro,
     if (nature == model::Nature::kOffset || nature == model::Nature::kResponse)
       added.push_back(effect);
   }
+  if (moving.size() == 1) {
+    const auto same = [&](const Remembered& one) {
+      return one.problem == &problem && one.effect.kind == moving[0].kind &&
+             one.effect.gyro == moving[0].gyro && one.effect.parameters == moving[0].parameters;
+    };
+    const auto found = std::find_if(remembered_.begin(), remembered_.end(), same);
+    if (found != remembered_.end()) {
+      sum += found->values;
+      moving.clear();
+    }
+  }
   if (!moving.empty()) {
     const Prediction prediction(moving, signals_[gyro]);
     for (Eigen::Index i = 0; i < problem.size(); ++i) {
@@ -532,6 +550,14 @@ Eigen::VectorXd Study::contribution(const Problem& problem, std::size_t gyro,
       const double share = share_of(problem.channel[place], gyro);
       if (share == 0.0) continue;
       sum[i] += share * (prediction.at(problem.t_s[place]) - problem.rate[gyro][place].value);
+    }
+    if (moving.size() == 1) {
+      const Remembered one{&problem, moving[0], sum};
+      if (remembered_.size() < kRemembered) {
+        remembered_.push_back(one);
+      } else {
+        remembered_[forget_next_++ % kRemembered] = one;
+      }
     }
   }
   for (const Effect& effect : added) {

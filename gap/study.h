@@ -82,7 +82,16 @@ class Study {
   Problem build_against_reference(std::size_t gyro);
   Problem build_pair();
 
+  /// The last contributions of timing effects: dear, and asked for again and again.
+  struct Remembered {
+    const Problem* problem = nullptr;
+    model::Effect effect;
+    Eigen::VectorXd values;
+  };
+
   const Recording& recording_;
+  mutable std::vector<Remembered> remembered_;
+  mutable std::size_t forget_next_ = 0;
   std::array<Transport, 2> transports_;
   std::array<Signals, 2> signals_;
   std::array<Excitation, 2> excitations_;
