@@ -20,6 +20,7 @@ constexpr double kFastSigmas = 7.0;
 constexpr double kSlowSigmas = 7.0;
 constexpr double kColourSigmas = 9.0;
 constexpr double kLowSigmas = 7.0;
+constexpr double kHeavySigmas = 10.0;
 
 // (χ² − n) in standard deviations, by Wilson and Hilferty's cube root.
 double sigmas(double chi_square, double freedom) {
@@ -34,6 +35,7 @@ struct Judgement {
   double slow = 0.0;  ///< worst stretch's excess of the drift filter's innovations
   Where slow_at;
   double colour = 0.0;  ///< of neighbouring samples
+  double heavy = 0.0;   ///< excess of the innovations' fourth powers over a Gaussian's
   double low = 0.0;     ///< excess of low frequencies in the innovations
 };
 
@@ -56,6 +58,8 @@ Judgement judge(const Study& study, const Problem& problem, std::size_t gyro,
   double product = 0.0;
   double expected = 0.0;
   double pairs = 0.0;
+  double fourth = 0.0;
+  double second = 0.0;
   for (std::size_t b = 0; b < problem.layout.blocks.size(); ++b) {
     const Block& block = problem.layout.blocks[b];
     if (!concerns(block.channel, gyro)) continue;
@@ -68,6 +72,9 @@ Judgement judge(const Study& study, const Problem& problem, std::size_t gyro,
     slow[chunk] += innovation * innovation;
     slow_n[chunk] += 1.0;
     innovations.push_back(innovation);
+    const double square = innovation * innovation;
+    fourth += square * square;
+    second += square;
     // Interpolation colours a difference.
     if (block.channel == Channel::kDifference || block.count < 5) continue;
     const double scale = rows.squaredNorm() / static_cast<double>(block.count - 1);
@@ -75,6 +82,11 @@ Judgement judge(const Study& study, const Problem& problem, std::size_t gyro,
       product += rows[i] * rows[i + 1];
     // Taking off the mean leaves −σ²/n in each product.
     expected -= static_cast<double>(block.count - 1) * scale / static_cast<double>(block.count);
+    // Drift within a block is common to neighbours.
+    expected += static_cast<double>(block.count - 1) * scale *
+                (1.0 - sample_variance(block, noise, problem.layout) /
+                           within_variance(block, noise, problem.layout)) *
+                0.5;
     pairs += static_cast<double>(block.count - 1) * scale * scale;
   }
   for (std::size_t i = 0; i < chunks; ++i) {
@@ -88,6 +100,9 @@ Judgement judge(const Study& study, const Problem& problem, std::size_t gyro,
   }
   if (pairs > 0.0) verdict.colour = std::abs(product - expected) / std::sqrt(pairs);
   if (innovations.size() < 64) return verdict;
+  const double n = static_cast<double>(innovations.size());
+  // Scaled by their own variance; its standard error is √(24/n).
+  verdict.heavy = ((fourth / n) / (second / n * second / n) - 3.0) / std::sqrt(24.0 / n);
   Eigen::FFT<double> transform;
   std::vector<std::complex<double>> spectrum;
   std::size_t length = 1;
@@ -202,13 +217,14 @@ std::vector<Unexplained> leftovers(const Study& study, const Search& search,
       }
       list.push_back(std::move(left));
     }
-    if (verdict.slow > kSlowSigmas || verdict.low > kLowSigmas) {
+    if (verdict.slow > kSlowSigmas || verdict.low > kLowSigmas || verdict.heavy > kHeavySigmas) {
       drop(false);
       Unexplained left;
-      left.signature = verdict.slow > kSlowSigmas ? "bursts" : "slow";
+      const bool bursts = verdict.slow > kSlowSigmas || verdict.heavy > kHeavySigmas;
+      left.signature = bursts ? "bursts" : "slow";
       left.gyro = gyro;
-      left.from_s = verdict.slow > kSlowSigmas ? verdict.slow_at.from_s : 0.0;
-      left.to_s = verdict.slow > kSlowSigmas ? verdict.slow_at.to_s : seconds;
+      left.from_s = bursts ? verdict.slow_at.from_s : 0.0;
+      left.to_s = bursts ? verdict.slow_at.to_s : seconds;
       left.text =
           verdict.slow > kSlowSigmas
               ? fmt::format(

@@ -97,6 +97,41 @@ double sample_variance(const Block& block, const PairNoise& noise, const Layout&
   return std::max(variance, kVarianceMin);
 }
 
+namespace {
+
+// Variance about its mean of a drift over `seconds`: of a walk K²T/6, of a correlated term its
+// variance less that of its mean.
+double drift_within(const NoiseTerms& terms, double seconds) {
+  double variance = terms.walk_dps_rts * terms.walk_dps_rts * seconds / 6.0;
+  for (const MarkovTerm& term : terms.markov) {
+    const double x = seconds / term.tau_s;
+    const double of_mean =
+        x > 1e-3 ? 2.0 / (x * x) * (x - 1.0 + std::exp(-x)) : 1.0 - x / 3.0 + x * x / 12.0;
+    variance += term.sigma_dps * term.sigma_dps * (1.0 - of_mean);
+  }
+  return variance;
+}
+
+double drift_within(Channel channel, const PairNoise& noise, double seconds) {
+  double variance = 0.0;
+  for (std::size_t gyro = 0; gyro < 2; ++gyro) {
+    if (share_of(channel, gyro) != 0.0) variance += drift_within(noise[gyro], seconds);
+  }
+  return variance;
+}
+
+double seconds_of(const Block& block, const Layout& layout) {
+  const std::size_t gyro = block.channel == Channel::kGyro2 ? 1 : 0;
+  return block.count * layout.interval_s[gyro];
+}
+
+}  // namespace
+
+double within_variance(const Block& block, const PairNoise& noise, const Layout& layout) {
+  return sample_variance(block, noise, layout) +
+         drift_within(block.channel, noise, seconds_of(block, layout));
+}
+
 Matrix block_means(const Matrix& columns, const Layout& layout) {
   Matrix means(static_cast<Eigen::Index>(layout.blocks.size()), columns.cols());
   for (std::size_t b = 0; b < layout.blocks.size(); ++b) {
@@ -178,7 +213,7 @@ double whiten_within(Matrix& columns, const Layout& layout, const PairNoise& noi
       rows.setZero();
       continue;
     }
-    const double variance = sample_variance(block, noise, layout);
+    const double variance = within_variance(block, noise, layout);
     const Eigen::RowVectorXd mean = rows.colwise().mean();
     rows = (rows.rowwise() - mean) / std::sqrt(variance);
     log_likelihood -= 0.5 * static_cast<double>(block.count - 1) * std::log(variance);
@@ -202,6 +237,7 @@ std::vector<WithinBin> within_bins(const Eigen::VectorXd& residual, const Layout
     bin.rate_square += freedom * block.rate_square;
     bin.gain[0] += freedom * block.gain[0];
     bin.gain[1] += freedom * block.gain[1];
+    bin.seconds += freedom * seconds_of(block, layout);
     bin.freedom += freedom;
     bin.squares += squares;
   }
@@ -210,6 +246,7 @@ std::vector<WithinBin> within_bins(const Eigen::VectorXd& residual, const Layout
     bin.rate_square /= bin.freedom;
     bin.gain[0] /= bin.freedom;
     bin.gain[1] /= bin.freedom;
+    bin.seconds /= bin.freedom;
     list.push_back(bin);
   }
   return list;
@@ -224,7 +261,7 @@ double within_log_likelihood(const std::vector<WithinBin>& bins, const PairNoise
       if (bin.gain[gyro] == 0.0) continue;
       variance += bin.gain[gyro] * noise[gyro].variance(bin.rate_square, layout.interval_s[gyro]);
     }
-    variance = std::max(variance, kVarianceMin);
+    variance = std::max(variance + drift_within(bin.channel, noise, bin.seconds), kVarianceMin);
     sum -= 0.5 * (bin.freedom * std::log(variance) + bin.squares / variance);
   }
   return sum;
@@ -374,14 +411,23 @@ NoiseFitResult fit_pair_noise(const Eigen::VectorXd& residual, const Layout& lay
                       std::log(std::max(2.0, seconds / kMarkovSpans))});
     }
   }
-  const double within = maximise(result.noise, fast, 150, 1e-3, [&](const PairNoise& noise) {
+  const auto within = [&](const PairNoise& noise) {
     return within_log_likelihood(bins, noise, layout);
-  });
+  };
+  maximise(result.noise, fast, 150, 1e-3, within);
   const Eigen::VectorXd means = block_means(residual, layout).col(0);
-  const double outer = maximise(
-      result.noise, slow, 60 * static_cast<int>(slow.size()), 2e-2,
-      [&](const PairNoise& noise) { return means_log_likelihood(means, layout, noise, part); });
-  result.log_likelihood = within + outer;
+  const auto both = [&](const PairNoise& noise) {
+    return within_log_likelihood(bins, noise, layout) +
+           means_log_likelihood(means, layout, noise, part);
+  };
+  result.log_likelihood =
+      maximise(result.noise, slow, 60 * static_cast<int>(slow.size()), 2e-2, both);
+  // A correlated term of short memory shares its variance with the white noise.
+  if ((free[0].markov || free[1].markov) && !fast.empty()) {
+    maximise(result.noise, fast, 150, 1e-3, within);
+    result.log_likelihood =
+        maximise(result.noise, slow, 60 * static_cast<int>(slow.size()), 2e-2, both);
+  }
   return result;
 }
 

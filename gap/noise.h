@@ -60,7 +60,7 @@ struct Block {
   std::array<double, 2> gain{};  ///< variance of this sample over that of one of gyro 1, 2
   bool held_out = false;
 };
-inline constexpr double kBlock_s = 0.25;
+inline constexpr double kBlock_s = 0.1;
 
 struct Layout {
   std::vector<Block> blocks;  ///< in the order of time
@@ -69,6 +69,9 @@ struct Layout {
   std::size_t samples = 0;
 };
 
+/// Of a sample about its block's mean: white noise, and what drift moves within a block.
+double within_variance(const Block& block, const PairNoise& noise, const Layout& layout);
+/// White noise alone.
 double sample_variance(const Block& block, const PairNoise& noise, const Layout& layout);
 
 /// Which blocks count.
@@ -93,6 +96,7 @@ struct WithinBin {
   Channel channel = Channel::kGyro1;
   double rate_square = 0.0;
   std::array<double, 2> gain{};
+  double seconds = 0.0;  ///< length of its blocks
   double freedom = 0.0;
   double squares = 0.0;
 };

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <future>
 #include <numbers>
 
 #include <Eigen/Eigenvalues>
@@ -96,6 +95,17 @@ Solution solve(const Eigen::MatrixXd& gram, const Eigen::VectorXd& right) {
   solution.x = solution.covariance * right;
   solution.gain = right.dot(solution.x);
   return solution;
+}
+
+// Amplitude above 0, phase from 0 to one turn.
+void tidy_phase(Effect& effect) {
+  if (effect.kind != Kind::kLine && effect.kind != Kind::kAngleHarmonic) return;
+  const double turn = 2.0 * std::numbers::pi;
+  if (effect.parameters[1] < 0.0) {
+    effect.parameters[1] = -effect.parameters[1];
+    effect.parameters[2] += std::numbers::pi;
+  }
+  effect.parameters[2] -= turn * std::floor(effect.parameters[2] / turn);
 }
 
 bool is_timing(Kind kind) {
@@ -256,7 +266,7 @@ Fit Search::fit(std::size_t problem, std::vector<Term> terms, const PairNoise& s
   for (std::size_t gyro = 0; gyro < 2; ++gyro) {
     if (!data.holds[gyro] || fit.noise[gyro].markov.size() >= kMarkovMax) continue;
     std::array<Freedom, 2> rich;
-    rich[0] = rich[1] = {false, false, true, false};
+    rich[0] = rich[1] = {true, true, true, false};
     rich[gyro].markov = true;
     const Eigen::VectorXd residual = residual_of(problem, fit.terms);
     const NoiseFitResult with =
@@ -637,11 +647,21 @@ bool Search::add_round() {
     std::vector<Found> first = refit_best(problem, null, null.noise, scores, kRefitsMax);
     std::vector<Found> second = refit_best(problem, null, file, more, kRefitsMax);
     first.insert(first.end(), second.begin(), second.end());
+    // Has the fitted noise grown beyond the model's?
+    const Problem& data = study_.problems()[problem];
+    bool modelled = true;
+    for (std::size_t gyro = 0; gyro < 2; ++gyro)
+      modelled = modelled && (!data.holds[gyro] || file_noise_[gyro].white_dps_rthz > 0.0);
+    const double at_file = modelled ? log_likelihood(residual_of(problem, null.terms), data.layout,
+                                                     file_noise_, Part::kFit)
+                                    : null.log_likelihood;
+    const bool grown = 2.0 * (null.log_likelihood - at_file) > kStatisticMin;
     for (Found& found : first) {
-      if (!best || found.statistic - found.penalty > best->statistic - best->penalty) best = found;
+      if (grown) found.needed = kStatisticMinAgainstNoise;
+      if (!best || found.margin() > best->margin()) best = found;
     }
   }
-  if (!best || best->statistic - best->penalty < kStatisticMin) return false;
+  if (!best || best->margin() < 0.0) return false;
   if (is_timing(best->term.effect.kind)) {
     // Interpolation leaves a thousandth of a great timing effect, which looks like another one.
     for (const Found& found : found_) {
@@ -672,6 +692,7 @@ void Search::settle() {
     for (Found& found : found_) {
       if (study_.problem_of(found.term.effect.gyro) != problem) continue;
       found.term = all.terms[place++];
+      tidy_phase(found.term.effect);
       for (const std::size_t parameter : found.term.free) {
         found.sigma[parameter] = std::sqrt(std::max(0.0, all.covariance(row, row)));
         ++row;
@@ -718,6 +739,7 @@ void Search::replace_round() {
       if (!replaced && adjusted > own_adjusted + 0.5) {
         const Reading reading{effect.kind, effect.gyro};
         Found better = other;
+        better.needed = found_[i].needed;
         if (own_adjusted > adjusted - kLead - kLeadShare * adjusted)
           better.ambiguous_with.push_back(reading);
         found_[i] = std::move(better);
@@ -735,7 +757,7 @@ void Search::replace_round() {
 
 void Search::delete_backward() {
   for (std::size_t i = 0; i < found_.size();) {
-    if (found_[i].statistic - found_[i].penalty >= kStatisticMin - 4.0) {
+    if (found_[i].margin() >= -4.0) {
       ++i;
       continue;
     }
@@ -873,7 +895,11 @@ void Search::noise_rounds() {
       const Eigen::VectorXd residual = residual_of(problem, terms_of_problem(terms, problem));
       const double base = log_likelihood(residual, data.layout, file_noise_, Part::kFit);
       for (std::size_t gyro = 0; gyro < 2; ++gyro) {
-        if (!data.holds[gyro]) continue;
+        // What is left of something unknown is no noise.
+        const bool unknown = std::any_of(rejected_.begin(), rejected_.end(), [&](const Found& one) {
+          return one.term.effect.gyro == gyro || study_.problems().size() == 1;
+        });
+        if (!data.holds[gyro] || unknown) continue;
         for (const Kind kind :
              {Kind::kWhiteNoise, Kind::kRateNoise, Kind::kRateRandomWalk, Kind::kGaussMarkov}) {
           std::array<Freedom, 2> free;
@@ -952,6 +978,12 @@ void Search::noise_rounds() {
         continue;
       if (adjusted > best->statistic - best->penalty - kLead)
         best->ambiguous_with.push_back(reading);
+    }
+    const Effect& effect = best->term.effect;
+    if (effect.kind == Kind::kGaussMarkov &&
+        effect.parameters[1] > study_.recording().seconds / 16.0) {
+      // Of what has hardly forgotten yet nobody can say that it ever will.
+      best->ambiguous_with.push_back({Kind::kRateRandomWalk, effect.gyro});
     }
     found_.push_back(*best);
     file_noise_[best->term.effect.gyro] = best_noise[best->term.effect.gyro];

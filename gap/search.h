@@ -19,6 +19,9 @@ namespace vgyro::gap {
 
 /// Statistic less penalty that a name needs; docs/gap.md says what chance brings.
 inline constexpr double kStatisticMin = 22.0;
+/// What it needs where the noise must have grown beyond the model's to do without it: then one name
+/// or another is due, and the question is only which.
+inline constexpr double kStatisticMinAgainstNoise = 13.0;
 /// Rivals that are less than this worse cannot be told apart.
 inline constexpr double kLead = 7.0;
 /// Of great effects the arithmetic of interpolation is not sure to better than this share.
@@ -36,7 +39,9 @@ struct Found {
   model::Parameters sigma{};
   double statistic = 0.0;
   double penalty = 0.0;
+  double needed = kStatisticMin;  ///< of statistic less penalty
   std::vector<Reading> ambiguous_with;
+  [[nodiscard]] double margin() const { return statistic - penalty - needed; }
 };
 
 class Search {

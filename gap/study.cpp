@@ -228,6 +228,7 @@ void Study::find_spikes(const std::vector<Effect>& effects) {
         recording_.has_reference
             ? SampledCurve(recording_.reference_dps.t_s, recording_.reference_dps.value)
             : SampledCurve(transports_[1 - gyro].t_s, recording_.gyros[1 - gyro].rate_dps);
+    const auto covered = [&](double at_s) { return at_s > truth.from_s() && at_s < truth.to_s(); };
     std::vector<double> error(n);
     for (std::size_t i = 0; i < n; ++i)
       error[i] = series.rate_dps[i] - truth.at(t_s[i]).value;
@@ -236,20 +237,31 @@ void Study::find_spikes(const std::vector<Effect>& effects) {
     const std::vector<std::uint8_t>& masked = transports_[gyro].masked;
     for (std::size_t i = 2; i + 2 < n; ++i) {
       if (masked[i - 2] + masked[i - 1] + masked[i] + masked[i + 1] + masked[i + 2] > 0) continue;
+      if (!covered(t_s[i - 2]) || !covered(t_s[i + 2])) continue;
       std::array<double, 4> near{error[i - 2], error[i - 1], error[i + 1], error[i + 2]};
       std::sort(near.begin(), near.end());
       out[gyro][i] = error[i] - 0.5 * (near[1] + near[2]);
     }
     const std::size_t reach =
         static_cast<std::size_t>(std::clamp(0.75 / transports_[gyro].interval_s, 20.0, 1000.0));
+    // Scatter of each short stretch; a sample is judged by the widest of three, because noise may
+    // rise with the rate.
+    std::vector<double> sigmas;
     std::vector<double> window;
     for (std::size_t from = 0; from < n; from += reach) {
       window.clear();
-      for (std::size_t i = from > reach ? from - reach : 0; i < std::min(n, from + 2 * reach); ++i)
-        window.push_back(std::abs(out[gyro][i]));
-      const double sigma = 1.4826 * median_of(window);
-      for (std::size_t i = from; i < std::min(n, from + reach); ++i)
-        scale[gyro][i] = sigma;
+      for (std::size_t i = from; i < std::min(n, from + reach); ++i) {
+        if (out[gyro][i] != 0.0) window.push_back(std::abs(out[gyro][i]));
+      }
+      sigmas.push_back(window.size() < 10 ? 0.0 : 1.4826 * median_of(window));
+    }
+    for (std::size_t i = 0; i < n; ++i) {
+      const std::size_t cell = i / reach;
+      double widest = sigmas[cell];
+      if (cell > 0) widest = std::max(widest, sigmas[cell - 1]);
+      if (cell + 1 < sigmas.size()) widest = std::max(widest, sigmas[cell + 1]);
+      // Nowhere near enough good neighbours: nothing stands out.
+      scale[gyro][i] = sigmas[cell] > 0.0 ? widest : 0.0;
     }
   }
   for (std::size_t gyro = 0; gyro < 2; ++gyro) {
@@ -261,7 +273,7 @@ void Study::find_spikes(const std::vector<Effect>& effects) {
     for (std::size_t i = 2; i + 2 < series.t_s.size(); ++i) {
       if (transport.masked[i] != 0 || scale[gyro][i] <= 0.0) continue;
       const double size = std::abs(out[gyro][i]);
-      if (size < kSpikeSigmas * std::max(scale[gyro][i], 0.3 * series.step_dps)) continue;
+      if (size < std::max(kSpikeSigmas * scale[gyro][i], 2.5 * transport.lattice_dps)) continue;
       if (size < std::abs(out[gyro][i - 1]) || size < std::abs(out[gyro][i + 1])) continue;
       if (!recording_.has_reference) {
         // Whose it is: interpolation spreads the other's.
@@ -270,7 +282,8 @@ void Study::find_spikes(const std::vector<Effect>& effects) {
         bool others = false;
         for (std::ptrdiff_t j = near - 2; j <= near + 1; ++j) {
           if (j < 2 || j + 2 >= static_cast<std::ptrdiff_t>(t_s.size())) continue;
-          others = others || std::abs(out[1 - gyro][static_cast<std::size_t>(j)]) > size;
+          others = others || std::abs(out[1 - gyro][static_cast<std::size_t>(j)]) > size ||
+                   transports_[1 - gyro].masked[static_cast<std::size_t>(j)] != 0;
         }
         if (others) continue;
       }
@@ -311,8 +324,9 @@ void Study::find_rest() {
   const auto cells = static_cast<std::size_t>(recording_.seconds) + 1;
   resting_.assign(cells, 1);
   for (std::size_t gyro = 0; gyro < 2; ++gyro) {
-    const std::span<const double> t_s = readings_[gyro].times_s();
-    const std::span<const double> rate = readings_[gyro].values();
+    // What is masked too: a dead band rests on 0.
+    const std::span<const double> t_s = transports_[gyro].t_s;
+    const std::span<const double> rate = recording_.gyros[gyro].rate_dps;
     std::vector<double> sum(cells, 0.0), squares(cells, 0.0), count(cells, 0.0);
     for (std::size_t i = 0; i < t_s.size(); ++i) {
       const std::size_t cell = std::min(cells - 1, static_cast<std::size_t>(std::max(0.0, t_s[i])));
@@ -415,6 +429,8 @@ Problem Study::build_against_reference(std::size_t gyro) {
   const double reach_s = 3.0 * motion.curve().interval_s();
   for (std::size_t i = 0; i < series.t_s.size(); ++i) {
     if (transport.masked[i] != 0 || motion.curve().hole_at(transport.t_s[i], reach_s)) continue;
+    if (transport.t_s[i] < motion.curve().from_s() || transport.t_s[i] > motion.curve().to_s())
+      continue;
     const double rate_dps = motion.rate(transport.t_s[i]).value;
     std::array<double, 2> gain{};
     gain[gyro] = 1.0;

@@ -18,6 +18,8 @@ constexpr double kStampResolution_s = 3e-6;
 constexpr std::size_t kStuckMin = 8;
 constexpr double kStuckMin_s = 0.15;
 constexpr double kChance = 1e-9;
+/// Share of equal neighbours above which a sensor is coarse.
+constexpr double kCoarse = 0.02;
 constexpr std::size_t kPlateauMin = 6;
 constexpr std::size_t kLostMin = 3;
 
@@ -45,6 +47,7 @@ class Check {
     find_lost();
     find_lateness();
     find_lattice();
+    result_.lattice_dps = lattice_dps_;
     find_stuck();
     find_saturation();
     find_dead_band();
@@ -292,6 +295,20 @@ class Check {
     }
     const double chance =
         std::clamp(repeats / static_cast<double>(n_), 1.0 / static_cast<double>(n_), 0.999);
+    // A coarse sensor repeats itself at rest: there only a run beyond all others counts.
+    std::vector<double> runs_s;
+    coarse_ = chance > kCoarse;
+    if (coarse_) {
+      for (std::size_t i = 0; i < n_;) {
+        std::size_t end = i + 1;
+        while (end < n_ && y[end] == y[i])
+          ++end;
+        runs_s.push_back(series_.t_s[end - 1] - series_.t_s[i]);
+        i = end;
+      }
+      std::sort(runs_s.begin(), runs_s.end());
+    }
+    const double longest_s = runs_s.size() > 1 ? runs_s[runs_s.size() - 2] : 0.0;
     for (std::size_t i = 0; i < n_;) {
       std::size_t end = i + 1;
       while (end < n_ && y[end] == y[i])
@@ -299,11 +316,12 @@ class Check {
       const std::size_t length = end - i;
       const double logp =
           static_cast<double>(length - 1) * std::log(chance) + std::log(static_cast<double>(n_));
-      const bool long_enough =
-          length >= kStuckMin && series_.t_s[end - 1] - series_.t_s[i] >= kStuckMin_s;
+      const bool long_enough = length >= kStuckMin && series_.t_s[end - 1] - series_.t_s[i] >=
+                                                          std::max(kStuckMin_s, 10.0 * longest_s);
       if (long_enough && logp < std::log(kChance) && y[i] != extreme && y[i] != least &&
           y[i] != 0.0) {
-        const double from_s = series_.t_s[i + 1];
+        // Frozen from some instant between its first sample and the next.
+        const double from_s = 0.5 * (series_.t_s[i] + series_.t_s[i + 1]);
         const double to_s = end < n_ ? series_.t_s[end] : series_.t_s[n_ - 1];
         // The first value may be a fresh one.
         for (std::size_t j = i + 1; j < end; ++j)
@@ -314,7 +332,7 @@ class Check {
                             effect.parameters[1] > from_s);
         }
         if (!known) {
-          const double sigma_s = result_.interval_s / std::sqrt(12.0);
+          const double sigma_s = 0.5 * result_.interval_s;
           Curve curve{"reading", {}, {}, {}, true};
           for (std::size_t j = i > 200 ? i - 200 : 0; j < std::min(n_, end + 200); ++j) {
             curve.x.push_back(series_.t_s[j]);
@@ -362,7 +380,8 @@ class Check {
     if (best == 0) return;
     // Nothing lies beyond the limit on the other side either.
     if (std::max(std::abs(top), std::abs(bottom)) > limit * (1.0 + 1e-9)) return;
-    if (limit < 20.0 * lattice_dps_) return;
+    // On a coarse lattice a steady turn stands on one value.
+    if (limit < 20.0 * lattice_dps_ || coarse_) return;
     mask_beyond(limit);
     Curve curve{"reading", {}, {}, {}, false};
     std::size_t at = 0;
@@ -438,6 +457,7 @@ class Check {
   std::size_t n_;
   std::vector<double> number_;  ///< on the even clock
   double lattice_dps_ = 0.0;
+  bool coarse_ = false;
   Transport result_;
 };
 

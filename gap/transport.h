@@ -30,6 +30,7 @@ struct Transport {
   std::vector<std::uint8_t> masked;  ///< not to be used
   std::vector<double> late_s;        ///< of each stamp behind the even clock
   double interval_s = 0.0;           ///< of the even clock
+  double lattice_dps = 0.0;          ///< least distance of the values
   double lost_share = 0.0;           ///< frames that never came
   std::vector<Finding> findings;     ///< beyond what `known` says
   std::vector<std::string> notes;
