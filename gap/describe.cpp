@@ -131,16 +131,19 @@ Figure regressor_figure(const Subject& s) {
   scale_by(bins.sigma, against.scale);
   for (std::vector<double>& value : bins.value)
     scale_by(value, against.scale);
-  return {
-      fmt::format("What is left of {} against {}, all other effects in the model", s.name(),
-                  against.what),
-      against.x_label,
-      against.y_label,
-      false,
-      false,
-      {{"without it", bins.at, bins.value[0], bins.sigma, true},
-       {"with it", bins.at, bins.value[1], bins.sigma, true},
-       {std::string(model::info(s.named.effect.kind).name), bins.at, bins.value[2], {}, false}}};
+  return {fmt::format("Residual of {} against {}, all other effects in the model", s.name(),
+                      against.what),
+          against.x_label,
+          against.y_label,
+          false,
+          false,
+          {{"before: without it", bins.at, bins.value[0], bins.sigma, true},
+           {"after: with it", bins.at, bins.value[1], bins.sigma, true},
+           {"fitted " + std::string(model::info(s.named.effect.kind).name),
+            bins.at,
+            bins.value[2],
+            {},
+            false}}};
 }
 
 // Means over time, with what white noise alone leaves of them as error: drift shows as itself.
@@ -159,9 +162,9 @@ Figure time_figure(const Subject& s) {
     without[bin] += share * s.without.segment(block.first, block.count).sum();
     with[bin] += share * s.with.segment(block.first, block.count).sum();
   }
-  Curve before{"without it", {}, {}, {}, true};
-  Curve after{"with it", {}, {}, {}, true};
-  Curve shape{std::string(model::info(s.named.effect.kind).name), {}, {}, {}, false};
+  Curve before{"before: without it", {}, {}, {}, true};
+  Curve after{"after: with it", {}, {}, {}, true};
+  Curve shape{"fitted " + std::string(model::info(s.named.effect.kind).name), {}, {}, {}, false};
   for (std::size_t bin = 0; bin < kTimeBins; ++bin) {
     if (count[bin] == 0.0) continue;
     const double t_s = time[bin] / count[bin];
@@ -174,7 +177,7 @@ Figure time_figure(const Subject& s) {
     shape.y.push_back((without[bin] - with[bin]) / count[bin]);
   }
   after.y_sigma = before.y_sigma;
-  return {fmt::format("What is left of {} over time, all other effects in the model", s.name()),
+  return {fmt::format("Residual of {} over time, all other effects in the model", s.name()),
           "time / s",
           "deg/s",
           false,
@@ -208,7 +211,7 @@ Curve amplitude_curve(const EvenSeries& series, double centre_hz, double seconds
 }
 
 Figure line_figure(const Subject& s) {
-  Figure figure{fmt::format("Sines in what is left of {} around {:.6g} Hz", s.name(), s.p()[0]),
+  Figure figure{fmt::format("Sines in the residual of {} around {:.6g} Hz", s.name(), s.p()[0]),
                 "frequency / Hz",
                 "amplitude / (deg/s)",
                 false,
@@ -228,8 +231,8 @@ Figure line_figure(const Subject& s) {
     }
     figure.curves.push_back(amplitude_curve(series, s.p()[0], seconds, std::move(label)));
   };
-  add(s.without, "without it");
-  add(s.with, "with it");
+  add(s.without, "before: without it");
+  add(s.with, "after: with it");
   return figure;
 }
 
@@ -265,8 +268,8 @@ Figure noise_figure(const Subject& s, const PairNoise& without) {
       curve.x.clear(), curve.y.clear();
     return curve;
   };
-  figure.curves = {measured, model_curve(without, "model without it"),
-                   model_curve(s.noise, "model with it")};
+  figure.curves = {measured, model_curve(without, "before: model without it"),
+                   model_curve(s.noise, "after: model with it")};
   return figure;
 }
 
@@ -286,69 +289,69 @@ std::string evidence_of(const Subject& s) {
       return first(fmt::format("{} reads {:+.3g} deg/s beside the truth all the time", a, p[0]));
     case Kind::kBiasRamp:
       return first(
-          fmt::format("what is left of {} climbs by {:+.3g} deg/s every second, {:+.3g} "
+          fmt::format("the residual of {} climbs by {:+.3g} deg/s every second, {:+.3g} "
                       "deg/s over the recording",
                       a, p[0], p[0] * s.study.recording().seconds));
     case Kind::kBiasStep:
       return first(
-          fmt::format("what is left of {} jumps by {:+.3g} deg/s at {:.1f} s", a, p[0], p[1]));
+          fmt::format("the residual of {} jumps by {:+.3g} deg/s at {:.1f} s", a, p[0], p[1]));
     case Kind::kWarmUp:
       return first(
-          fmt::format("what is left of {} starts {:+.3g} deg/s off and dies away within {:.3g} s",
+          fmt::format("the residual of {} starts {:+.3g} deg/s off and dies away within {:.4g} s",
                       a, p[0], p[1]));
     case Kind::kTemperatureBias:
       return first(
-          fmt::format("what is left of {} follows its temperature: {:+.3g} deg/s per K", a, p[0]));
+          fmt::format("the residual of {} follows its temperature: {:+.3g} deg/s per K", a, p[0]));
     case Kind::kTemperatureBiasQuadratic:
       return first(
-          fmt::format("what is left of {} follows the square of its temperature less "
+          fmt::format("the residual of {} follows the square of its temperature less "
                       "{:.4g} °C: {:+.3g} deg/s per K²",
                       a, p[1], p[0]));
     case Kind::kTemperatureRateBias:
       return first(fmt::format(
-          "what is left of {} follows the change of its temperature: {:+.3g} deg/s per K/s", a,
+          "the residual of {} follows the change of its temperature: {:+.3g} deg/s per K/s", a,
           p[0]));
     case Kind::kScaleFactor:
-      return first(fmt::format("what is left of {} follows the rate: {:+.3g} of it", a, p[0]));
+      return first(fmt::format("the residual of {} follows the rate: {:+.3g} of it", a, p[0]));
     case Kind::kScaleFactorAsymmetry:
       return first(fmt::format(
-          "what is left of {} follows the rate whatever its sign: {:+.3g} of |rate|", a, p[0]));
+          "the residual of {} follows the rate whatever its sign: {:+.3g} of |rate|", a, p[0]));
     case Kind::kScaleFactorQuadratic:
       return first(fmt::format(
-          "what is left of {} follows the square of the rate: {:+.3g} deg/s per (deg/s)²", a,
+          "the residual of {} follows the square of the rate: {:+.3g} deg/s per (deg/s)²", a,
           p[0]));
     case Kind::kScaleFactorCubic:
       return first(fmt::format(
-          "what is left of {} follows the cube of the rate: {:+.3g} deg/s per (deg/s)³", a, p[0]));
+          "the residual of {} follows the cube of the rate: {:+.3g} deg/s per (deg/s)³", a, p[0]));
     case Kind::kScaleFactorTemperature:
       return first(
-          fmt::format("what is left of {} follows the rate the more, the further its "
+          fmt::format("the residual of {} follows the rate the more, the further its "
                       "temperature is from {:.4g} °C: {:+.3g} of the rate per K",
                       a, p[1], p[0]));
     case Kind::kGSensitivity:
       return fmt::format(
-          "what is left of {} follows the acceleration along {}: {:+.3g} deg/s per "
+          "the residual of {} follows the acceleration along {}: {:+.3g} deg/s per "
           "g{}",
           a, "xyz"[static_cast<std::size_t>(p[0])], p[1], errors_text(s, 1));
     case Kind::kVibrationRectification:
       return first(fmt::format(
-          "what is left of {} follows the vibration: {:+.3g} deg/s per g² of variance", a, p[0]));
+          "the residual of {} follows the vibration: {:+.3g} deg/s per g² of variance", a, p[0]));
     case Kind::kDelay:
       return first(
-          fmt::format("what is left of {} follows the slope of the rate: it comes {:+.3g} ms late",
+          fmt::format("the residual of {} follows the slope of the rate: it comes {:+.3g} ms late",
                       a, 1e3 * p[0]));
     case Kind::kBandwidth:
       return fmt::format(
-          "what is left of {} grows with the frequency of the motion as behind a "
+          "the residual of {} grows with the frequency of the motion as behind a "
           "low-pass of {:.4g} Hz",
           a, p[0]);
     case Kind::kClockSkew:
       return first(fmt::format("the lag of {} grows by {:+.3g} µs every second", a, p[0]));
     case Kind::kAngleHarmonic:
-      return fmt::format("what is left of {} repeats {:.0f} times a turn, by {:.3g} deg/s{}", a,
+      return fmt::format("the residual of {} repeats {:.0f} times a turn, by {:.3g} deg/s{}", a,
                          p[0], std::abs(p[1]), errors_text(s, 1));
     case Kind::kLine:
-      return fmt::format("what is left of {} holds a sine of {:.6g} Hz and {:.3g} deg/s{}", a, p[0],
+      return fmt::format("the residual of {} holds a sine of {:.6g} Hz and {:.3g} deg/s{}", a, p[0],
                          std::abs(p[1]), errors_text(s, 1));
     case Kind::kWhiteNoise:
       return fmt::format(
@@ -363,7 +366,7 @@ std::string evidence_of(const Subject& s) {
           "{} wanders as a random walk of {:.3g} deg/s/√s beyond what the model says", a, p[0]);
     case Kind::kGaussMarkov:
       return fmt::format(
-          "{} wanders by {:.3g} deg/s and forgets it within {:.3g} s, beyond what the model says",
+          "{} wanders by {:.3g} deg/s and forgets it within {:.4g} s, beyond what the model says",
           a, p[0], p[1]);
     default:
       return fmt::format("{} shows {}", a, model::info(s.named.effect.kind).name);

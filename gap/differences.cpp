@@ -30,6 +30,9 @@ constexpr double kLoudCell_s = 5.0;
 constexpr std::size_t kLoudCellsMax = 150;
 constexpr double kNoiseTermsPenalty = 8.0;
 constexpr double kColourMin = 0.1;
+constexpr double kLoudByLag = 3.0;
+constexpr double kLagStep_s = 0.03;
+constexpr int kSkewSteps = 16;
 
 std::string_view against_word(Kind kind) {
   switch (kind) {
@@ -228,7 +231,7 @@ std::string text_of(const Chosen& one, const std::string& name) {
   const model::Parameters& p = one.shape.effect.parameters;
   const double errors = std::abs(one.size) / one.sigma;
   const auto with = [&](std::string_view follows, std::string_view unit) {
-    return fmt::format("what is left of {} {}: {:+.3g}{}{}, {:.0f} standard errors", name, follows,
+    return fmt::format("the residual of {} {}: {:+.3g}{}{}, {:.0f} standard errors", name, follows,
                        one.size, unit.empty() ? "" : " ", unit, errors);
   };
   switch (kind) {
@@ -267,13 +270,13 @@ std::string text_of(const Chosen& one, const std::string& name) {
     case Kind::kBandwidth:
       if (one.size <= 0.0) return with("leads where the rate bends, as behind a high-pass", "");
       return fmt::format(
-          "what is left of {} looks low-passed at about {:.3g} Hz, {:.0f} standard "
+          "the residual of {} looks low-passed at about {:.3g} Hz, {:.0f} standard "
           "errors",
           name, p[0] / one.size, errors);
     case Kind::kClockSkew:
       return with("lags more and more", "µs per s");
     case Kind::kAngleHarmonic:
-      return fmt::format("what is left of {} repeats {:.0f} times a turn", name, p[0]);
+      return fmt::format("the residual of {} repeats {:.0f} times a turn", name, p[0]);
     default:
       return with(std::string("shows ") + std::string(model::info(kind).name), "");
   }
@@ -408,10 +411,14 @@ class Comparer {
       : study_(study),
         problem_(problem),
         effects_(effects),
+        model_(noise_of(effects)),
         seconds_(study.recording().seconds),
         residual_(study.residual(problem, effects)) {}
 
   void run(std::vector<Difference>& list) {
+    for (std::size_t gyro = 0; gyro < 2; ++gyro) {
+      if (problem_.holds[gyro]) clock(gyro, list);
+    }
     shapes(list);
     lines(list);
     noise(list);
@@ -433,7 +440,7 @@ class Comparer {
   std::vector<Chosen> chosen_with(const std::vector<Shape>& all, const Eigen::VectorXd& observed,
                                   bool drift) {
     residual_ = observed;
-    noise_ = fitted(noise_of(effects_), drift);
+    noise_ = fitted(model_, drift);
     std::vector<Chosen> chosen;
     for (int round = 0; round < 2; ++round) {
       chosen = choose(whiten(problem_, noise_, observed, all), all);
@@ -441,9 +448,71 @@ class Comparer {
       for (const Chosen& one : chosen)
         residual_ -= one.size * column_of(study_, problem_, one.shape);
       if (chosen.empty()) break;
-      noise_ = fitted(noise_of(effects_), drift);
+      noise_ = fitted(model_, drift);
     }
     return chosen;
+  }
+
+  // Beyond a sample a lag is no longer its rate's slope: it is taken out first, as it is.
+  void clock(std::size_t gyro, std::vector<Difference>& list) {
+    const PairNoise loud = fitted(model_);
+    if (loud[gyro].white_dps_rthz < kLoudByLag * model_[gyro].white_dps_rthz) return;
+    std::vector<Effect> with = effects_;
+    with.push_back({gyro, Kind::kDelay, {0.0}, 0});
+    with.push_back({gyro, Kind::kClockSkew, {0.0}, 0});
+    Effect& delay = with[with.size() - 2];
+    Effect& skew = with.back();
+    const auto square = [&] { return study_.residual(problem_, with).squaredNorm(); };
+    double best = square();
+    double best_ppm = 0.0;
+    const double step_ppm = 1e6 * kLagStep_s / seconds_;
+    for (int i = -kSkewSteps; i <= kSkewSteps; ++i) {
+      skew.parameters[0] = step_ppm * i;
+      const double now = square();
+      if (now < best) best = now, best_ppm = skew.parameters[0];
+    }
+    skew.parameters[0] = best_ppm;
+    for (int round = 0; round < 6; ++round) {
+      Matrix columns(problem_.size(), 3);
+      columns.col(0) = study_.residual(problem_, with);
+      const std::array<double, 2> step{1e-4, 1.0};
+      for (std::size_t k = 0; k < 2; ++k) {
+        std::vector<Effect> moved = with;
+        moved[moved.size() - 2 + k].parameters[0] += step[k];
+        columns.col(static_cast<Eigen::Index>(k) + 1) =
+            (columns.col(0) - study_.residual(problem_, moved)) / step[k];
+      }
+      // In units of each other, so that seconds and millionths share a matrix.
+      const Eigen::Vector2d scale = columns.rightCols(2).colwise().norm().transpose();
+      if (!(scale.minCoeff() > 0.0)) return;
+      columns.col(1) /= scale[0];
+      columns.col(2) /= scale[1];
+      const Eigen::Matrix3d gram = columns.transpose() * columns;
+      const Eigen::Vector2d change =
+          gram.bottomRightCorner<2, 2>().ldlt().solve(gram.col(0).tail<2>());
+      delay.parameters[0] = std::clamp(delay.parameters[0] + change[0] / scale[0], -0.2, 0.2);
+      skew.parameters[0] = std::clamp(skew.parameters[0] + change[1] / scale[1], -5e3, 5e3);
+    }
+    const double at_the_end_s = 1e-6 * skew.parameters[0] * seconds_;
+    const double lag_s = std::max(std::abs(delay.parameters[0]), std::abs(at_the_end_s));
+    if (lag_s < problem_.layout.interval_s[gyro] || square() > 0.5 * residual_.squaredNorm())
+      return;
+    const Eigen::VectorXd before = residual_;
+    residual_ = study_.residual(problem_, with);
+    effects_ = std::move(with);
+    noise_ = fitted(model_);
+    const std::vector<double> gains = block_gains(problem_.layout, noise_, before, residual_);
+    const bool grows = std::abs(at_the_end_s) > std::abs(effects_.rbegin()[1].parameters[0]);
+    Difference difference;
+    difference.gyro = gyro;
+    difference.where = where_of(problem_, gyro, noise_, seconds_, gains, before - residual_);
+    difference.against = against_word(grows ? Kind::kClockSkew : Kind::kDelay);
+    difference.nats = std::accumulate(gains.begin(), gains.end(), 0.0);
+    difference.text =
+        fmt::format("{} reads the rate {:+.2f} ms late at first, {:+.2f} ms at the end", name(gyro),
+                    1e3 * effects_.rbegin()[1].parameters[0],
+                    1e3 * (effects_.rbegin()[1].parameters[0] + at_the_end_s));
+    list.push_back(std::move(difference));
   }
 
   void shapes(std::vector<Difference>& list) {
@@ -542,7 +611,7 @@ class Comparer {
       difference.where = where_of(problem_, one.gyro, noise_, seconds_, gains, shape);
       difference.against = "frequency";
       difference.nats = nats;
-      difference.text = fmt::format("what is left of {} holds a line at {:.4f} Hz of {:.3g} deg/s",
+      difference.text = fmt::format("the residual of {} holds a line at {:.4f} Hz of {:.3g} deg/s",
                                     name(one.gyro), one.line.frequency_hz, one.line.amplitude_dps);
       list.push_back(std::move(difference));
       residual_ -= shape;
@@ -550,7 +619,7 @@ class Comparer {
   }
 
   void noise(std::vector<Difference>& list) {
-    const PairNoise model = noise_of(effects_);
+    const PairNoise& model = model_;
     const PairNoise fit = fitted(model);
     const double as_modelled = log_likelihood(residual_, problem_.layout, model, Part::kAll);
     for (std::size_t gyro = 0; gyro < 2; ++gyro) {
@@ -619,7 +688,8 @@ class Comparer {
 
   const Study& study_;
   const Problem& problem_;
-  const std::vector<Effect>& effects_;
+  std::vector<Effect> effects_;
+  PairNoise model_;
   double seconds_;
   Eigen::VectorXd residual_;
   PairNoise noise_;

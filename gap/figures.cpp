@@ -88,12 +88,11 @@ std::array<Curve, 2> time_band(const Problem& problem, std::size_t gyro, Sight s
   return band;
 }
 
-Figure time_figure(const Problem& problem, std::size_t gyro, const std::string& name,
-                   const std::vector<Shown>& shown, const PairNoise& noise, double seconds) {
+Figure time_figure(const Problem& problem, std::size_t gyro, const std::vector<Shown>& shown,
+                   const PairNoise& noise, double seconds) {
   const double step_s = std::max(1.0, seconds / kTimePoints);
   Figure figure;
-  figure.title =
-      fmt::format("What {} measured less what the model predicts, means of {:.2g} s", name, step_s);
+  figure.title = fmt::format("Measured less predicted, means of {:.2g} s", step_s);
   figure.x_label = "time / s";
   figure.y_label = "deg/s";
   const Sight main = main_sight(problem, gyro);
@@ -127,22 +126,20 @@ std::array<GyroFigures, 2> gyro_figures(const Study& study, const std::vector<Ef
     if (!same) shown.push_back({"after", study.residual(problem, after)});
     const PairNoise noise = noise_of(after);
     const Shown simulated{"simulated", simulate_residual(problem, noise, seed + gyro)};
-    const std::string& name = study.recording().gyros[gyro].name;
     GyroFigures& mine = figures[gyro];
-    mine.time = time_figure(problem, gyro, name, shown, noise, study.recording().seconds);
+    mine.time = time_figure(problem, gyro, shown, noise, study.recording().seconds);
     shown.push_back(simulated);
     const Sight sight = main_sight(problem, gyro);
-    const std::string of = sight == Sight::kDifference ? "the difference of the two gyros"
-                           : problem.holds[1 - gyro]   ? name + " at rest"
-                                                       : name;
-    mine.spectrum = {
-        fmt::format("Residual of {} over frequency; white noise lies at its density", of),
-        "frequency / Hz",
-        "deg/s/√Hz",
-        true,
-        true,
-        {}};
-    mine.allan = {fmt::format("Allan deviation of the residual of {}", of),
+    const std::string of = sight == Sight::kDifference ? " of the difference of the two gyros"
+                           : problem.holds[1 - gyro]   ? " at rest"
+                                                       : "";
+    mine.spectrum = {fmt::format("Residual{} over frequency; white noise lies at its density", of),
+                     "frequency / Hz",
+                     "deg/s/√Hz",
+                     true,
+                     true,
+                     {}};
+    mine.allan = {fmt::format("Allan deviation of the residual{}", of),
                   "averaging time / s",
                   "deg/s",
                   true,

@@ -87,7 +87,7 @@ TEST(Figures, EvidenceSaysWhoFollowsWhatByHowMuch) {
   const Result result =
       described(*studied.study, noise_effects(making), {1, Kind::kScaleFactor, {-4.2e-4}, 0});
   EXPECT_EQ(result.effects[0].evidence,
-            "what is left of b follows the rate: -0.00042 of it, 20 standard errors");
+            "the residual of b follows the rate: -0.00042 of it, 20 standard errors");
 }
 
 TEST(Figures, WhereOfAScaleFactorIsWhereThePlatformTurns) {
@@ -201,6 +201,21 @@ TEST(Differences, LargestIsWhatWasInjected) {
       EXPECT_GE(difference.where.high_hz, 17.3 - 0.01);
     }
   }
+}
+
+TEST(Differences, ClockThatRunsAwayIsOneDifference) {
+  Making making;
+  making.seed = 36;
+  // 300 millionths of 240 s: a lag of 72 ms at the end.
+  making.error = [&](std::size_t gyro, double t_s, double rate_dps) {
+    return gyro == 1 ? true_rate_dps(making, t_s / (1.0 + 300e-6)) - rate_dps : 0.0;
+  };
+  const Studied studied(making);
+  ASSERT_NE(studied.study, nullptr);
+  const std::vector<Difference> list = differences(*studied.study, noise_effects(making));
+  ASSERT_EQ(list.size(), 1U);
+  EXPECT_EQ(list[0].gyro, 1U);
+  EXPECT_EQ(list[0].against, "stamps");
 }
 
 TEST(Differences, NoiseThatTheModelPutsTooLowIsSaid) {
