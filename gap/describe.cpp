@@ -402,8 +402,8 @@ Where where_of_noise(const Subject& s, const PairNoise& without) {
     const Block& block = s.problem.layout.blocks[b];
     const auto values = s.with.segment(block.first, block.count);
     const double squares = (values.array() - values.mean()).square().sum();
-    const double now = sample_variance(block, s.noise, s.problem.layout);
-    const double then = sample_variance(block, without, s.problem.layout);
+    const double now = within_variance(block, s.noise, s.problem.layout);
+    const double then = within_variance(block, without, s.problem.layout);
     const double freedom = static_cast<double>(block.count - 1);
     gains[b] = 0.5 * (freedom * std::log(then / now) + squares / then - squares / now);
   }

@@ -373,7 +373,7 @@ Loud loudest(const Problem& problem, std::size_t gyro, const PairNoise& noise,
         std::min(cells - 1, static_cast<std::size_t>(std::max(0.0, block.t_s) / cell_s));
     freedom[cell + 1] += block.count - 1.0;
     squares[cell + 1] += (values.array() - values.mean()).square().sum() /
-                         sample_variance(block, noise, problem.layout);
+                         within_variance(block, noise, problem.layout);
   }
   for (std::size_t i = 0; i < cells; ++i) {
     freedom[i + 1] += freedom[i];
@@ -455,8 +455,16 @@ class Comparer {
 
   // Beyond a sample a lag is no longer its rate's slope: it is taken out first, as it is.
   void clock(std::size_t gyro, std::vector<Difference>& list) {
-    const PairNoise loud = fitted(model_);
-    if (loud[gyro].white_dps_rthz < kLoudByLag * model_[gyro].white_dps_rthz) return;
+    double squares = 0.0;
+    double freedom = 0.0;
+    for (const Block& block : problem_.layout.blocks) {
+      if (share_of(block.channel, gyro) == 0.0 || block.count < 2) continue;
+      const auto values = residual_.segment(block.first, block.count);
+      squares += (values.array() - values.mean()).square().sum() /
+                 within_variance(block, model_, problem_.layout);
+      freedom += block.count - 1.0;
+    }
+    if (squares < kLoudByLag * kLoudByLag * freedom) return;
     std::vector<Effect> with = effects_;
     with.push_back({gyro, Kind::kDelay, {0.0}, 0});
     with.push_back({gyro, Kind::kClockSkew, {0.0}, 0});
