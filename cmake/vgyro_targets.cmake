@@ -35,7 +35,8 @@ if(CMAKE_BUILD_TYPE STREQUAL "Release" AND CMAKE_CXX_COMPILER_ID STREQUAL GNU)
 endif()
 function(vgyro_whole_program target)
   if(VGYRO_WHOLE_PROGRAM)
-    target_link_options(${target} PRIVATE -flto=auto -Wno-stringop-overflow)
+    # Resolved at the start and read-only from then on: nothing overwrites where a call goes.
+    target_link_options(${target} PRIVATE -flto=auto -Wno-stringop-overflow -Wl,-z,relro,-z,now)
   endif()
 endfunction()
 
