@@ -1,0 +1,216 @@
+"""Judges what the guest left behind: exit codes and outputs of the scenario's steps, and the captured frames."""
+
+import math
+import os
+import re
+import tomllib
+import zlib
+from pathlib import Path
+
+import numpy as np
+import verdicts
+from verdicts import require
+
+SOURCE = Path(os.environ.get("VGYRO_SOURCE", Path(__file__).resolve().parents[2]))
+BIASES_DPS = (0.033, -0.0074)
+NOISE_DPS_RTHZ = 2e-4
+REST_S = 3.0
+PLAY_S = 5.0
+SHORT_S = 2.5
+RATE_HZ = 100.0
+# The calibration's bias of both, weighed equally: N / √(2 rest). A mean of half a second of rates adds the rest.
+BIAS_SIGMA_DPS = NOISE_DPS_RTHZ / math.sqrt(2 * REST_S)
+ERROR_MOST_DPS = 6 * math.hypot(BIAS_SIGMA_DPS, NOISE_DPS_RTHZ / math.sqrt(2 * 0.5))
+EXPOSURE_MOST = 1.3
+
+
+class Run:
+    """The folder that the guest wrote."""
+
+    def __init__(self, out):
+        self.out = out
+        self.oracle = verdicts.Oracle(SOURCE / "dbc/vgyro.dbc")
+        self.frames = verdicts.read_log(out / "capture.log")
+
+    def text(self, name):
+        path = self.out / f"{name}.txt"
+        require(path.exists(), f"the step {name} did not run")
+        return path.read_text(encoding="utf-8", errors="replace")
+
+    def done(self, *names):
+        for name in names:
+            text, code = self.text(name), (self.out / f"{name}.exit").read_text().strip()
+            require(code == "0", f"{name}: exit {code}\n{text}")
+
+    def show(self, name):
+        self.done(name)
+        return dict(line.split("=", 1) for line in self.text(name).splitlines() if "=" in line)
+
+    def require_shows(self, name, **expected):
+        shown = self.show(name)
+        wrong = {key: shown.get(key) for key, value in expected.items() if shown.get(key) != value}
+        require(not wrong, f"{name}: {wrong}, not { {key: expected[key] for key in wrong} }")
+        return shown
+
+    def began_us(self, name):
+        return int(float((self.out / f"{name}.at").read_text()) * 1e6)
+
+    def sent(self, can_id, begin, end=None):
+        """Frames between the beginnings of two steps."""
+        until = self.began_us(end) if end else 1 << 62
+        return [line for line in self.frames
+                if int(line.name, 16) == can_id and self.began_us(begin) <= line.us < until]
+
+    def check_rates(self, begin, end, calibrated):
+        """Near the truth, 0, which no gyro reads; valid from the first pair on if biases were known before."""
+        lines = self.sent(0x610, begin, end)
+        _, rate, state = verdicts.rates_of(lines, self.oracle)
+        require(len(rate) > 0.9 * (SHORT_S if calibrated else PLAY_S) * RATE_HZ, f"{begin}: {len(rate)} rates")
+        valid = np.isfinite(rate)
+        if calibrated:
+            require(valid.all(), f"{begin}: {(~valid).sum()} of {len(rate)} rates are not valid")
+        else:
+            require(not valid[: int(0.9 * REST_S * RATE_HZ)].any(), f"{begin}: valid before the calibration was complete")
+        # After both were lost the first samples are one gyro's alone.
+        require(set(state[valid][5:]) == {2}, f"{begin}: states {set(state[valid][5:])}")
+        error = rate[valid].mean()
+        require(abs(error) < ERROR_MOST_DPS, f"{begin}: mean error {error:.2e} deg/s, more than {ERROR_MOST_DPS:.1e}")
+        return f"{valid.sum()} valid rates, mean error {error * 3600:+.2f} deg/h"
+
+
+def installs_and_waits(run):
+    """Installed on a machine that is not configured: enabled, skipped, says why, sends nothing."""
+    run.done("install", "unconfigured_failed")
+    run.require_shows("unconfigured", ActiveState="inactive", UnitFileState="enabled", NRestarts="0")
+    require(not run.text("unconfigured_failed").strip(), f"failed units: {run.text('unconfigured_failed')}")
+    require("names no gyros yet" in run.text("unconfigured_journal"), run.text("unconfigured_journal"))
+    require(not (run.out / "unconfigured.log").read_text(), "frames before it was configured")
+
+
+def starts(run):
+    """Configured and started: active when `systemctl start` returns, which is at READY."""
+    run.done("start")
+    run.require_shows("started", ActiveState="active", SubState="running", NRestarts="0", Result="success")
+
+
+def sandbox(run):
+    """No user of the host's, no capability, filtered system calls, namespaces of its own, a read-only system."""
+    run.done("process", "namespaces", "security")
+    status = dict(line.split(":\t", 1) for line in run.text("process").splitlines() if ":\t" in line)
+    require("0" not in status["Uid"].split(), f"Uid {status['Uid']}")
+    for kind in ("CapInh", "CapPrm", "CapEff", "CapBnd", "CapAmb"):
+        require(int(status[kind], 16) == 0, f"{kind} {status[kind]}")
+    require((status["NoNewPrivs"], status["Seccomp"]) == ("1", "2"), f"{status['NoNewPrivs']}, {status['Seccomp']}")
+    links = run.text("namespaces").split()
+    require(len(links) == 6 and links[0] != links[3] and links[1] != links[4], f"namespaces {links}")
+    options = {line.split()[4]: line.split()[5] for line in run.text("mounts").splitlines()}
+    require(options["/"].split(",")[0] == "ro", f"mounts {options}")
+    exposure = float(re.search(r"exposure level for \S+ ([0-9.]+)", run.text("security")).group(1))
+    require(exposure <= EXPOSURE_MOST, f"exposure {exposure}")
+    return f"exposure {exposure}"
+
+
+def calibrates(run):
+    """Recorded traffic in, a calibrated rate out."""
+    run.done("play")
+    require(run.show("running")["StatusText"].startswith("running"), run.text("running"))
+    return run.check_rates("play", "killed", calibrated=False)
+
+
+def kill_nine(run):
+    """Killed without warning: started again, and valid from the first pair with the biases of before."""
+    run.done("killed", "killed_play")
+    run.require_shows("killed_show", ActiveState="active", NRestarts="1")
+    require("took up the biases" in run.text("killed_journal"), run.text("killed_journal"))
+    return run.check_rates("killed_play", "link_play", calibrated=True)
+
+
+def link_faults(run):
+    """Link down and up: the same process goes on, and no burst of old frames comes out."""
+    run.done("link_play")
+    shown = run.require_shows("link_show", ActiveState="active")
+    require(shown["MainPID"] == run.text("link_main").strip(), "another process")
+    for text in ("vcan0: link went down", "vcan0: link is up again"):
+        require(text in run.text("link_journal"), f"not logged: {text}\n{run.text('link_journal')}")
+    quiet = [line for line in run.sent(0x611, "link_play") if line.us < run.began_us("link_play") + 100_000]
+    require(len(quiet) < 10, f"{len(quiet)} heartbeats in a tenth of a second")
+    return run.check_rates("link_play", "upgrade", calibrated=True)
+
+
+def upgrades(run):
+    """A newer package: another process, the same configuration, the same biases."""
+    run.done("upgrade", "upgraded_config", "upgraded_play")
+    shown = run.require_shows("upgraded", ActiveState="active", SubState="running", UnitFileState="enabled")
+    require(shown["MainPID"] != run.text("link_main").strip(), "the old process still runs")
+    require("took up the biases" in run.text("upgraded_journal"), run.text("upgraded_journal"))
+    return run.check_rates("upgraded_play", "stop", calibrated=True)
+
+
+def stops(run):
+    """Stopped: a clean end, and what it knew is on the disk, for its own eyes."""
+    run.done("stop", "state")
+    run.require_shows("stopped", ActiveState="inactive", Result="success", ExecMainStatus="0")
+    directory, file = run.text("state").splitlines()
+    require(directory.startswith("700 ") and file == "600 vgyro regular file", run.text("state"))
+    data = (run.out / "state.toml").read_bytes()
+    content, _, _ = data.rpartition(b"\n[checksum]\n")
+    kept = tomllib.loads(data.decode("ascii"))
+    require(kept["checksum"]["crc32"] == f"{zlib.crc32(content):08x}", "the state's checksum is wrong")
+    sigma = NOISE_DPS_RTHZ / math.sqrt(REST_S)
+    biases = kept["drift"]["bias_dps"]
+    require(np.allclose(biases, BIASES_DPS, rtol=0, atol=6 * sigma), f"biases {biases}")
+    return f"biases {biases[0]:.5f}, {biases[1]:.5f} deg/s"
+
+
+def goes_away(run):
+    """Removed: stopped, configuration and state kept. Purged: nothing left."""
+    run.done("remove", "removed_left", "purge", "purged_failed")
+    run.require_shows("removed", ActiveState="inactive", LoadState="not-found")
+    require("vgyrod" not in run.text("removed_processes"), "it still runs")
+    require(not run.text("purged_left").strip(), f"left behind:\n{run.text('purged_left')}")
+    require(not run.text("purged_failed").strip(), f"failed units: {run.text('purged_failed')}")
+
+
+def network_examples(run):
+    """systemd-networkd and udev understand the example units; the queue's length is set."""
+    run.done("links", "networkd")
+    told = [line for line in run.text("networkd").splitlines() if re.search(r"[78]0-can\d\.(network|link)", line)
+            and re.search(r"Unknown|Failed|Invalid|ignoring|not supported", line, re.IGNORECASE)]
+    require(not told, "\n".join(told))
+    require("Enumeration completed" in run.text("networkd"), f"systemd-networkd did not run\n{run.text('networkd')}")
+    require(re.search(r"\bqlen 128\b", run.text("links")), run.text("links"))
+
+
+def protection(run):
+    """Every frame that went out carries a right E2E header."""
+    require(len(run.frames) > 1000, f"{len(run.frames)} frames")
+    for line in run.frames:
+        verdicts.check_crc(line, int(line.name, 16))
+    return f"{len(run.frames)} frames"
+
+
+CHECKS = (network_examples, installs_and_waits, starts, sandbox, calibrates, kill_nine, link_faults, upgrades, stops,
+          goes_away, protection)
+
+
+def judge(out):
+    """The number of checks that failed."""
+    verdicts.check_own_vectors()
+    if not (out / "capture.log").exists():
+        left = sorted(path.name for path in out.iterdir())
+        print(f"systemd: the scenario did not end; it left: {' '.join(left)}")
+        return 1
+    run = Run(out)
+    failed = 0
+    for check in CHECKS:
+        try:
+            text, passed = check(run) or "", True
+        except (verdicts.Failure, KeyError, IndexError, ValueError, OSError, AttributeError) as failure:
+            text, passed = f"{type(failure).__name__}: {failure}", False
+        failed += not passed
+        print(f"  {'pass' if passed else 'FAIL'}  {check.__name__}: {check.__doc__}" + (f"\n        {text}" if text else ""))
+    if failed:
+        print(f"systemd: {failed} of {len(CHECKS)} checks FAILED inside User Mode Linux")
+    else:
+        print(f"systemd: {len(CHECKS)} checks passed inside User Mode Linux, with the package installed in a booted Debian")
+    return failed

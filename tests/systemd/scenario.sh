@@ -1,0 +1,115 @@
+# Runs in the guest, on a Debian that has just started: the package's whole life. Each step leaves what it printed
+# and its exit code in out/, in the host's folder; the host judges. Starting a program is slow here (45 ms).
+here=/run/proof
+out=$here/out
+export LC_ALL=C SYSTEMD_COLORS=0 SYSTEMD_PAGER= DEBIAN_FRONTEND=noninteractive
+
+step() {  # step NAME COMMAND...
+    local name=$1; shift
+    echo "$EPOCHREALTIME" >"$out/$name.at"
+    "$@" >"$out/$name.txt" 2>&1 </dev/null
+    echo $? >"$out/$name.exit"
+}
+within() {  # within SECONDS COMMAND...: until the command succeeds
+    local end=$((SECONDS + $1)); shift
+    until "$@" >/dev/null 2>&1; do
+        ((SECONDS < end)) || { echo "not within the time: $*"; return 1; }
+        sleep 0.2
+    done
+}
+show() { systemctl show vgyrod -p ActiveState,SubState,Result,MainPID,NRestarts,StatusText,ExecMainStatus,UnitFileState,LoadState; }
+says() { [[ $(systemctl show vgyrod -p "$1" --value) == $2 ]]; }
+pid() { systemctl show vgyrod -p MainPID --value; }
+journal() { journalctl -u vgyrod --no-pager -o short-unix --since "@$1"; }
+other_pid() { says ActiveState active && says MainPID '[1-9]*' && ! says MainPID "$1"; }
+play() { canplayer -I "$here/$1.log"; }
+# While they send, the rates are judged: enough of them after the gyros were heard.
+play_until_running() {  # play_until_running NAME
+    play "$1" & within 8 says StatusText 'running*'; local code=$?; wait $!; return $code
+}
+
+mkdir -p /run/modules
+mount -t hostfs none /run/modules -o "$(cat $here/modules.path)"
+for module in can can-raw can-dev vcan; do insmod "$(find /run/modules -name "$module.ko*")"; done 2>"$out/modules.txt"
+
+# The examples, before the interfaces are there.
+cp $here/examples/*.network $here/examples/*.link /etc/systemd/network/
+udevadm control --reload
+for name in vcan0 vcan1 can0; do ip link add $name type vcan && ip link set $name up; done
+udevadm settle
+step links ip -details link show can0
+systemctl start systemd-networkd
+step networkd journalctl -b -u systemd-networkd -u systemd-udevd --no-pager
+systemctl stop systemd-networkd
+
+candump -L -D -r 4000000 vcan0,610:7FC >/run/capture.log &
+dump=$!
+
+# Installed, not configured.
+step install dpkg -i $here/vgyro.deb
+step unconfigured show
+step unconfigured_journal journal 0
+step unconfigured_failed systemctl list-units --failed --no-legend
+cp /run/capture.log $out/unconfigured.log
+
+# Configured.
+cp $here/vgyro.toml /etc/vgyro/vgyro.toml
+cp $here/twin.dbc /usr/local/share/twin.dbc
+step start systemctl start vgyrod
+step started show
+main=$(pid)
+step process cat /proc/$main/status
+step namespaces readlink /proc/1/ns/{mnt,user,ipc} /proc/$main/ns/{mnt,user,ipc}
+step mounts grep -E ' / | /etc | /tmp | /dev ' /proc/$main/mountinfo
+step security systemd-analyze security vgyrod --no-pager
+step play play_until_running calibration
+step running show
+
+# Killed without warning, and back with what it knew.
+since=$(date +%s)
+kill -9 $main
+step killed within 20 other_pid $main
+step killed_show show
+step killed_play play_until_running rest
+step killed_journal journal $since
+main=$(pid)
+
+# The link goes and comes.
+since=$(date +%s)
+ip link set vcan0 down
+sleep 1.5
+ip link set vcan0 up
+sleep 1.5
+cp /run/capture.log $out/before_link_play.log
+step link_play play_until_running rest
+step link_show show
+step link_journal journal $since
+echo $main >$out/link_main.txt
+
+# Another version, with the same configuration file.
+since=$(date +%s)
+step upgrade dpkg -i $here/vgyro-next.deb
+step upgraded show
+step upgraded_config cmp /etc/vgyro/vgyro.toml $here/vgyro.toml
+step upgraded_play play_until_running rest
+step upgraded_journal journal $since
+
+# Stopped, removed, purged.
+step stop systemctl stop vgyrod
+step stopped show
+step state stat -L -c '%a %U %F' /var/lib/vgyro /var/lib/vgyro/state.toml
+cp /var/lib/vgyro/state.toml $out/state.toml
+systemctl start vgyrod
+step remove dpkg -r vgyro
+step removed show
+step removed_left ls /etc/vgyro/vgyro.toml /var/lib/vgyro/state.toml
+step removed_processes sh -c "grep -l vgyrod /proc/[0-9]*/comm"
+step purge dpkg -P vgyro
+step purged_left find / -xdev '(' -path /usr/local -o -path /proc -o -path /var/lib/dpkg -o -path /run ')' -prune -o -name '*vgyro*' -print
+step purged_failed systemctl list-units --failed --no-legend
+
+kill $dump
+wait $dump
+cp /run/capture.log $out/capture.log
+step journal journalctl -b --no-pager -p warning
+cat /proc/uptime >$out/uptime.txt
