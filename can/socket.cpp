@@ -6,6 +6,7 @@
 #include <cstring>
 #include <fcntl.h>
 #include <linux/can.h>
+#include <linux/can/error.h>
 #include <linux/can/raw.h>
 #include <linux/errqueue.h>
 #include <linux/net_tstamp.h>
@@ -19,6 +20,8 @@
 #include <vector>
 
 #include <fmt/core.h>
+
+#include "can/error_frame.h"
 
 namespace vgyro::can {
 namespace {
@@ -80,6 +83,11 @@ bool set_filters(int fd, std::span<const Filter> filters) {
   }
   return ::setsockopt(fd, SOL_CAN_RAW, CAN_RAW_FILTER, raw.data(),
                       static_cast<socklen_t>(raw.size() * sizeof(can_filter))) == 0;
+}
+
+bool set_error_filter(int fd) {
+  const can_err_mask_t wanted = kErrorsWanted;
+  return set_option(fd, SOL_CAN_RAW, CAN_RAW_ERR_FILTER, wanted);
 }
 
 void set_buffers(int fd, const SocketOptions& options) {
@@ -150,6 +158,18 @@ std::size_t to_kernel(const Frame& frame, canfd_frame& raw) {
 static_assert(offsetof(can_frame, len8_dlc) == offsetof(canfd_frame, __res1));
 static_assert(offsetof(can_frame, data) == offsetof(canfd_frame, data));
 
+static_assert(kSendTimeout == CAN_ERR_TX_TIMEOUT && kLostArbitration == CAN_ERR_LOSTARB &&
+              kControllerProblem == CAN_ERR_CRTL && kProtocolViolation == CAN_ERR_PROT &&
+              kTransceiver == CAN_ERR_TRX && kNotAcknowledged == CAN_ERR_ACK &&
+              kBusOff == CAN_ERR_BUSOFF && kBusError == CAN_ERR_BUSERROR &&
+              kRestarted == CAN_ERR_RESTARTED);
+static_assert(kReceiveOverflow == CAN_ERR_CRTL_RX_OVERFLOW &&
+              kSendOverflow == CAN_ERR_CRTL_TX_OVERFLOW &&
+              kReceiveWarning == CAN_ERR_CRTL_RX_WARNING &&
+              kSendWarning == CAN_ERR_CRTL_TX_WARNING &&
+              kReceivePassive == CAN_ERR_CRTL_RX_PASSIVE &&
+              kSendPassive == CAN_ERR_CRTL_TX_PASSIVE && kActiveAgain == CAN_ERR_CRTL_ACTIVE);
+
 }  // namespace
 
 struct Socket::Buffers {
@@ -181,7 +201,9 @@ Expected<Socket> Socket::open(const std::string& interface, std::span<const Filt
   if (!link) return tl::unexpected(link.error());
   socket.fd_frames_ = link->fd_frames;
   // All before bind(): nothing unwanted or unstamped is ever queued.
-  if (!set_filters(*fd, filters)) return fail(interface, "no CAN filters: " + system_reason(errno));
+  if (!set_filters(*fd, filters) || !set_error_filter(*fd)) {
+    return fail(interface, "no CAN filters: " + system_reason(errno));
+  }
   set_buffers(*fd, options);
   if (!set_stamps_and_drop_count(*fd)) {
     return fail(interface, "no kernel time stamps: " + system_reason(errno));
@@ -193,6 +215,16 @@ Expected<Socket> Socket::open(const std::string& interface, std::span<const Filt
   socklen_t size = sizeof(socket.receive_buffer_bytes_);
   ::getsockopt(*fd, SOL_SOCKET, SO_RCVBUF, &socket.receive_buffer_bytes_, &size);
   return socket;
+}
+
+bool may_appear(const std::string& interface) {
+  if (interface.size() >= IFNAMSIZ) return false;
+  const Expected<int> fd = open_raw(interface);
+  if (!fd) return false;
+  ifreq request = request_for(interface);
+  const bool is_there = ::ioctl(*fd, SIOCGIFINDEX, &request) == 0;
+  ::close(*fd);
+  return !is_there;
 }
 
 Socket::Socket(std::string interface, int fd)

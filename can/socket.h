@@ -2,8 +2,9 @@
 
 // One raw SocketCAN socket on one interface; with socket.cpp the only place that knows linux/can.
 // The kernel filters for exactly the wanted identifiers, and frames come in batches with the
-// kernel's stamps. Never blocks and never allocates once open. Other programs on the host keep
-// seeing what it sends; it does not see its own frames.
+// kernel's stamps; error frames (can/error_frame.h) come among them. Never blocks and never
+// allocates once open. Other programs on the host keep seeing what it sends; it does not see its
+// own frames.
 
 #include <cstdint>
 #include <memory>
@@ -28,6 +29,10 @@ struct SocketOptions {
   int receive_buffer_bytes = 2 << 20;  ///< the kernel may grant less
   int send_buffer_bytes = 0;           ///< 0: the kernel's default
 };
+
+/// Is there hope that the interface appears? Not where one of that name is of another kind, and not
+/// where the kernel has no CAN.
+bool may_appear(const std::string& interface);
 
 struct Received {
   Frame frame;

@@ -10,9 +10,12 @@
 
 #include "base/error.h"
 #include "base/time.h"
+#include "can/error_frame.h"
 #include "can/sender.h"
 #include "can/socket.h"
 #include "can/stamp_clock.h"
+#include "daemon/bus_status.h"
+#include "daemon/line_budget.h"
 #include "daemon/log.h"
 
 namespace vgyro::daemon {
@@ -25,9 +28,10 @@ struct Arrival {
 class Bus final : public can::Sender {
  public:
   /// Without filters the bus is only written to.
-  Bus(std::string name, std::vector<can::Filter> filters, Log& log);
+  Bus(std::string name, std::vector<can::Filter> filters, can::SocketOptions options, Log& log);
 
-  /// Binds a new socket, filters included.
+  /// Binds a new socket, filters included. An interface that is not there yet is no error: it is
+  /// told once, and is_open() stays false.
   Expected<void> open();
 
   /// Poll reported something: read again when peek() runs dry, but not without end.
@@ -36,9 +40,13 @@ class Bus final : public can::Sender {
     now_ = now;
   }
 
-  /// The oldest frame not yet taken; its frame is null when there is none for now.
+  /// The oldest frame not yet taken; its frame is null when there is none for now. Error frames are
+  /// kept here.
   Arrival peek();
-  void take() { ++next_; }
+  void take() {
+    ++next_;
+    ++received_;
+  }
 
   /// Nothing is left in the kernel as far as is known.
   [[nodiscard]] bool drained() const { return !more_; }
@@ -47,30 +55,43 @@ class Bus final : public can::Sender {
     return socket_ ? socket_->send(frame) : can::SendResult::kLinkDown;
   }
 
-  /// Looks whether a link that was down is up again.
-  void check_link();
+  /// Throws away what the kernel holds.
+  void discard() {
+    for (begin_reading({}); peek().frame != nullptr;)
+      take();
+  }
+
+  /// To be called about once a second: looks whether a link that was down is up again.
+  void second_passed();
 
   [[nodiscard]] const std::string& name() const { return name_; }
   [[nodiscard]] bool is_open() const { return socket_.has_value(); }
   /// Only while open.
   [[nodiscard]] const can::Socket& socket() const { return *socket_; }
-  [[nodiscard]] std::uint64_t received() const { return received_; }
-  [[nodiscard]] std::uint64_t lost() const {
-    return lost_before_ + (socket_ ? socket_->drops() : 0);
-  }
+  [[nodiscard]] BusStatus status() const;
 
  private:
   // 1024 frames: more than a second of a busy bus, so the other buses do not starve.
   static constexpr int kReadsPerCycle = 16;
 
   bool refill();
+  void link_went_down();
   void close_dead(const std::string& why);
+  template <class... Args>
+  void tell(Severity severity, std::string_view cause, fmt::format_string<Args...> text,
+            Args&&... args) {
+    if (!lines_.take()) return;
+    log_->tell(severity, {.cause = cause, .bus = name_}, text, std::forward<Args>(args)...);
+  }
 
   std::string name_;
   std::vector<can::Filter> filters_;
-  Log& log_;
+  can::SocketOptions options_;
+  Log* log_;
+  LineBudget lines_;
   std::optional<can::Socket> socket_;
   can::StampClock clock_;
+  can::ControllerWatch controller_;
   can::Batch batch_;
   std::size_t next_ = 0;
   TimePoint next_stamp_;
@@ -79,8 +100,12 @@ class Bus final : public can::Sender {
   int reads_left_ = 0;
   bool more_ = false;
   bool down_ = false;
+  bool was_open_ = false;
+  bool told_of_absence_ = false;
   std::uint64_t received_ = 0;
   std::uint64_t lost_before_ = 0;  ///< by sockets that are gone
+  std::uint64_t downs_ = 0;
+  std::uint64_t reopened_ = 0;
 };
 
 }  // namespace vgyro::daemon

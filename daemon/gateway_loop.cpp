@@ -6,7 +6,6 @@
 #include <csignal>
 #include <ctime>
 #include <sys/signalfd.h>
-#include <systemd/sd-daemon.h>
 #include <unistd.h>
 #include <utility>
 
@@ -17,15 +16,16 @@ constexpr std::uint32_t kEventsTag = 0xFFFFFFFF;
 constexpr std::uint64_t kSecondUsec = 1'000'000;
 constexpr int kPollMostMs = 1000;
 
-// Two periods of a 100-Hz gyro: what the bus has not taken by then is worth less than its
-// successor.
-constexpr Duration kPatience = std::chrono::milliseconds(20);
 // A process that was stopped must not send its backlog.
 constexpr Duration kAgeMost = std::chrono::milliseconds(250);
 
-TimePoint host_clock() {
+// The kernel's least, some six frames. What a bus does not take waits in the queue here, where it
+// is dropped when it is stale; from the kernel it would come out in a burst.
+constexpr int kSendBufferBytes = 1;
+
+TimePoint read_clock(clockid_t clock) {
   timespec now{};
-  ::clock_gettime(CLOCK_REALTIME, &now);
+  ::clock_gettime(clock, &now);
   return time_from_ns(static_cast<std::int64_t>(now.tv_sec) * 1'000'000'000 + now.tv_nsec);
 }
 
@@ -37,19 +37,31 @@ std::vector<can::Filter> filters_of(const gateway::Plan& plan, std::size_t bus) 
   return filters;
 }
 
+int milliseconds_until(TimePoint deadline, TimePoint now) {
+  if (deadline <= now) return 0;
+  if (deadline > now + std::chrono::milliseconds(kPollMostMs)) return kPollMostMs;
+  return static_cast<int>(std::chrono::ceil<std::chrono::milliseconds>(deadline - now).count());
+}
+
 }  // namespace
 
-GatewayLoop::GatewayLoop(const gateway::Plan& plan, StateKeeper* keeper, Log& log)
-    : plan_(plan),
-      keeper_(keeper),
-      log_(log),
-      reporter_({plan.gyros[0].name, plan.gyros[1].name}, plan.calibration.rest_s, log),
-      pipeline_(plan) {
-  buses_.reserve(plan.buses.size());
+GatewayLoop::Setup::Setup(gateway::Plan the_plan, Log& log)
+    : plan(std::move(the_plan)),
+      reporter({plan.gyros[0].name, plan.gyros[1].name}, plan.calibration.rest_s, log),
+      pipeline(plan) {
+  buses.reserve(plan.buses.size());
   for (std::size_t i = 0; i < plan.buses.size(); ++i) {
-    buses_.emplace_back(plan.buses[i], filters_of(plan, i), log);
+    can::SocketOptions options;
+    options.send_buffer_bytes = kSendBufferBytes;
+    buses.emplace_back(plan.buses[i], filters_of(plan, i), options, log);
   }
 }
+
+GatewayLoop::GatewayLoop(gateway::Plan plan, Loader loader, StateKeeper* keeper, Log& log)
+    : loader_(std::move(loader)),
+      keeper_(keeper),
+      log_(log),
+      setup_(std::make_unique<Setup>(std::move(plan), log)) {}
 
 GatewayLoop::~GatewayLoop() {
   if (epoll_fd_ >= 0) ::close(epoll_fd_);
@@ -58,37 +70,49 @@ GatewayLoop::~GatewayLoop() {
 Expected<void> GatewayLoop::start() {
   epoll_fd_ = ::epoll_create1(EPOLL_CLOEXEC);
   if (epoll_fd_ < 0) return fail("epoll", system_reason(errno));
-  for (std::size_t i = 0; i < buses_.size(); ++i) {
-    if (const Expected<void> opened = buses_[i].open(); !opened) return opened;
-    if (!poll_bus(i)) return fail(buses_[i].name(), "cannot poll: " + system_reason(errno));
-  }
-  if (const Expected<void> checked = check_output(); !checked) return checked;
+  if (const Expected<void> opened = open_buses(*setup_); !opened) return opened;
+  if (const Expected<void> polled = poll_buses(); !polled) return polled;
   take_up_state();
   return start_events();
 }
 
-void GatewayLoop::take_up_state() {
-  if (keeper_ == nullptr) return;
-  const std::optional<gateway::SavedState> state = keeper_->load(plan_);
-  if (!state) return;
-  if (const Expected<void> taken = pipeline_.resume(*state); !taken) {
-    log_.notice("saved state: {}", taken.error().message());
+Expected<void> GatewayLoop::open_buses(Setup& setup) {
+  for (Bus& bus : setup.buses) {
+    if (const Expected<void> opened = bus.open(); !opened) return opened;
   }
+  return check_output(setup);
 }
 
-Expected<void> GatewayLoop::check_output() const {
-  const Bus& output = buses_[plan_.output.bus];
-  if (!plan_.output.fd || output.socket().fd_frames()) return {};
+Expected<void> GatewayLoop::check_output(const Setup& setup) {
+  const Bus& output = setup.buses[setup.plan.output.bus];
+  if (!setup.plan.output.fd || !output.is_open() || output.socket().fd_frames()) return {};
   return fail(output.name(), "carries no CAN FD frames, but the config says `[output] fd = true`",
               "set `fd = false`, or enable FD on the link (`ip link set " + output.name() +
                   " mtu 72` for vcan, `type can … dbitrate … fd on` for a controller)");
+}
+
+Expected<void> GatewayLoop::poll_buses() {
+  for (std::size_t i = 0; i < setup_->buses.size(); ++i) {
+    const Bus& bus = setup_->buses[i];
+    if (bus.is_open() && !poll_bus(i)) return fail(bus.name(), "cannot poll: " + system_reason());
+  }
+  return {};
 }
 
 bool GatewayLoop::poll_bus(std::size_t index) {
   epoll_event event{};
   event.events = EPOLLIN;
   event.data.u32 = static_cast<std::uint32_t>(index);
-  return ::epoll_ctl(epoll_fd_, EPOLL_CTL_ADD, buses_[index].socket().fd(), &event) == 0;
+  return ::epoll_ctl(epoll_fd_, EPOLL_CTL_ADD, setup_->buses[index].socket().fd(), &event) == 0;
+}
+
+void GatewayLoop::take_up_state() {
+  if (keeper_ == nullptr) return;
+  const std::optional<gateway::SavedState> state = keeper_->load(setup_->plan);
+  if (!state) return;
+  if (const Expected<void> taken = setup_->pipeline.resume(*state); !taken) {
+    log_.notice("saved state: {}", taken.error().message());
+  }
 }
 
 Expected<void> GatewayLoop::start_events() {
@@ -99,14 +123,20 @@ Expected<void> GatewayLoop::start_events() {
 
   sigset_t signals;
   ::sigemptyset(&signals);
-  ::sigaddset(&signals, SIGTERM);
-  ::sigaddset(&signals, SIGINT);
+  for (const int number : {SIGTERM, SIGINT, SIGHUP})
+    ::sigaddset(&signals, number);
   ::pthread_sigmask(SIG_BLOCK, &signals, nullptr);
-  result = sd_event_add_signal(events, nullptr, SIGTERM, &on_signal, this);
-  if (result >= 0) result = sd_event_add_signal(events, nullptr, SIGINT, &on_signal, this);
+  result = sd_event_add_signal(events, nullptr, SIGTERM, &on_stop, this);
+  if (result >= 0) result = sd_event_add_signal(events, nullptr, SIGINT, &on_stop, this);
+  if (result >= 0) result = sd_event_add_signal(events, nullptr, SIGHUP, &on_hangup, this);
   if (result >= 0) {
     result = sd_event_add_time_relative(events, nullptr, CLOCK_MONOTONIC, kSecondUsec, 0,
                                         &on_second, this);
+  }
+  watchdog_half_usec_ = watchdog_usec() / 2;
+  if (result >= 0 && watchdog_half_usec_ > 0) {
+    result = sd_event_add_time_relative(events, nullptr, CLOCK_MONOTONIC, watchdog_half_usec_, 1,
+                                        &on_watchdog, this);
   }
   if (result < 0) return fail("sd-event", system_reason(-result));
 
@@ -122,11 +152,8 @@ Expected<void> GatewayLoop::start_events() {
 Expected<void> GatewayLoop::run() {
   std::array<epoll_event, 16> ready{};
   if (const Expected<void> armed = serve_events(false); !armed) return armed;
-  sd_notify(0, "READY=1\nSTATUS=waiting for both gyros");
-  for (const Bus& bus : buses_) {
-    log_.info("{}: bound{}", bus.name(), bus.socket().fd_frames() ? ", CAN FD" : "");
-  }
-  now_ = host_clock();
+  read_clocks();
+  notify_ready(status_line());
   while (!stopping_) {
     const int count =
         ::epoll_wait(epoll_fd_, ready.data(), static_cast<int>(ready.size()), timeout_ms());
@@ -134,10 +161,12 @@ Expected<void> GatewayLoop::run() {
     const std::span<const epoll_event> events{ready.data(),
                                               static_cast<std::size_t>(std::max(count, 0))};
     if (const Expected<void> done = cycle(events); !done) return done;
+    if (!std::exchange(reload_wanted_, false)) continue;
+    if (const Expected<void> done = reload(); !done) return done;
   }
-  sd_notify(0, "STOPPING=1\nSTATUS=stopping");
-  if (keeper_ != nullptr) keeper_->finish(pipeline_.memory());
-  reporter_.summarize(pipeline_.status(), traffic());
+  notify_stopping();
+  if (keeper_ != nullptr) keeper_->finish(setup_->pipeline.memory());
+  setup_->reporter.summarize(setup_->pipeline.status(), traffic());
   return {};
 }
 
@@ -152,8 +181,14 @@ Expected<void> GatewayLoop::serve_events(bool armed) {
   }
 }
 
+void GatewayLoop::read_clocks() {
+  now_ = read_clock(CLOCK_REALTIME);
+  steady_now_ = read_clock(CLOCK_MONOTONIC);
+  pipeline_now_ = forward_.update(now_, steady_now_);
+}
+
 Expected<void> GatewayLoop::cycle(std::span<const epoll_event> ready) {
-  now_ = host_clock();
+  read_clocks();
   bool events_ready = false;
   for (const epoll_event& event : ready) {
     if (event.data.u32 == kEventsTag) {
@@ -161,26 +196,34 @@ Expected<void> GatewayLoop::cycle(std::span<const epoll_event> ready) {
       continue;
     }
     if ((event.events & EPOLLOUT) != 0) queue_.on_writable();
-    if ((event.events & ~std::uint32_t{EPOLLOUT}) != 0) buses_[event.data.u32].begin_reading(now_);
+    if ((event.events & ~std::uint32_t{EPOLLOUT}) != 0)
+      setup_->buses[event.data.u32].begin_reading(now_);
   }
   hand_on_arrivals();
-  if (now_ >= pipeline_.next_deadline()) {
+  if (pipeline_now_ >= setup_->pipeline.next_deadline()) {
     // Frames that came before now_ but after poll had looked count before the time-out does.
-    for (Bus& bus : buses_)
+    for (Bus& bus : setup_->buses)
       bus.begin_reading(now_);
     hand_on_arrivals();
-    if (all_drained()) pipeline_.advance(now_, *this);
+    if (all_drained()) setup_->pipeline.advance(pipeline_now_, *this);
   }
   flush();
-  if (std::exchange(has_spoken_, false)) reporter_.check_state(pipeline_.status());
+  if (std::exchange(has_spoken_, false)) look_at_status();
   return events_ready ? serve_events(true) : Expected<void>{};
+}
+
+void GatewayLoop::look_at_status() {
+  const gateway::Status& status = setup_->pipeline.status();
+  setup_->reporter.check_state(status);
+  const std::uint64_t samples = status.gyros[0].samples + status.gyros[1].samples;
+  if (std::exchange(samples_, samples) != samples) forward_.sample_came();
 }
 
 void GatewayLoop::hand_on_arrivals() {
   Arrival arrival;
   while (Bus* bus = earliest(arrival)) {
-    const auto index = static_cast<can::BusIndex>(bus - buses_.data());
-    pipeline_.receive(index, *arrival.frame, arrival.stamp, *this);
+    const auto index = static_cast<can::BusIndex>(bus - setup_->buses.data());
+    setup_->pipeline.receive(index, *arrival.frame, arrival.stamp, *this);
     bus->take();
     flush();
   }
@@ -188,7 +231,7 @@ void GatewayLoop::hand_on_arrivals() {
 
 Bus* GatewayLoop::earliest(Arrival& arrival) {
   Bus* from = nullptr;
-  for (Bus& bus : buses_) {
+  for (Bus& bus : setup_->buses) {
     const Arrival candidate = bus.peek();
     if (candidate.frame == nullptr) continue;
     if (from == nullptr || candidate.stamp < arrival.stamp) {
@@ -200,22 +243,24 @@ Bus* GatewayLoop::earliest(Arrival& arrival) {
 }
 
 void GatewayLoop::put(const can::Frame& frame, TimePoint stamp) {
-  queue_.push(frame, std::min(stamp + kAgeMost, now_ + kPatience));
+  if (frame.id == setup_->plan.output.rate_id) patience_.rate_at(stamp);
+  queue_.push(frame, steady_now_ + std::min(patience_.value(), stamp + kAgeMost - now_));
   has_spoken_ = true;
+  ++put_out_;
 }
 
 void GatewayLoop::flush() {
   if (queue_.size() == 0) return;
-  queue_.drain(now_, buses_[plan_.output.bus]);
+  queue_.drain(steady_now_, setup_->buses[setup_->plan.output.bus]);
   if (queue_.wants_writable() != polls_writable_) poll_writable(!polls_writable_);
 }
 
 void GatewayLoop::poll_writable(bool wanted) {
-  const Bus& output = buses_[plan_.output.bus];
+  const Bus& output = setup_->buses[setup_->plan.output.bus];
   if (!output.is_open()) return;
   epoll_event event{};
   event.events = EPOLLIN | (wanted ? std::uint32_t{EPOLLOUT} : 0U);
-  event.data.u32 = plan_.output.bus;
+  event.data.u32 = setup_->plan.output.bus;
   if (::epoll_ctl(epoll_fd_, EPOLL_CTL_MOD, output.socket().fd(), &event) == 0) {
     polls_writable_ = wanted;
   }
@@ -223,55 +268,117 @@ void GatewayLoop::poll_writable(bool wanted) {
 
 // Never zero: a deadline that somehow stays in the past must not turn into a busy loop.
 int GatewayLoop::timeout_ms() const {
-  const TimePoint deadline =
-      std::min(pipeline_.next_deadline(), queue_.next_deadline().value_or(TimePoint::max()));
-  if (deadline <= now_) return 1;
-  if (deadline > now_ + std::chrono::milliseconds(kPollMostMs)) return kPollMostMs;
-  return static_cast<int>(std::chrono::ceil<std::chrono::milliseconds>(deadline - now_).count());
+  const int pipeline_ms = milliseconds_until(setup_->pipeline.next_deadline(), pipeline_now_);
+  const int queue_ms =
+      milliseconds_until(queue_.next_deadline().value_or(TimePoint::max()), steady_now_);
+  return std::max(std::min(pipeline_ms, queue_ms), 1);
 }
 
 bool GatewayLoop::all_drained() const {
-  return std::all_of(buses_.begin(), buses_.end(), [](const Bus& bus) { return bus.drained(); });
+  return std::all_of(setup_->buses.begin(), setup_->buses.end(),
+                     [](const Bus& bus) { return bus.drained(); });
 }
 
 Traffic GatewayLoop::traffic() const {
-  Traffic sum;
-  for (const Bus& bus : buses_) {
-    sum.received += bus.received();
-    sum.lost_by_kernel += bus.lost();
-  }
-  sum.transmitted = queue_.counts();
-  return sum;
+  Traffic traffic;
+  for (const Bus& bus : setup_->buses)
+    traffic.buses.push_back(bus.status());
+  traffic.transmitted = queue_.counts();
+  return traffic;
 }
 
+// --- what is slow --------------------------------------------------------------------------------
+
 void GatewayLoop::second_passed() {
-  for (Bus& bus : buses_)
-    bus.check_link();
+  for (Bus& bus : setup_->buses)
+    bus.second_passed();
   reopen_dead_buses();
-  const std::string status = reporter_.second_passed(pipeline_.status(), traffic());
-  sd_notify(0, ("STATUS=" + status).c_str());
-  if (keeper_ != nullptr && keeper_->second_passed()) keeper_->keep(pipeline_.memory());
+  notify_status(status_line());
+  if (keeper_ != nullptr && keeper_->second_passed()) keeper_->keep(setup_->pipeline.memory());
+}
+
+std::string GatewayLoop::status_line() {
+  std::string line = setup_->reporter.second_passed(setup_->pipeline.status(), traffic());
+  if (reload_refused_) line += "; the new configuration was refused";
+  return line;
 }
 
 void GatewayLoop::reopen_dead_buses() {
-  for (std::size_t i = 0; i < buses_.size(); ++i) {
-    if (buses_[i].is_open() || !buses_[i].open() || !poll_bus(i)) continue;
-    log_.notice("{}: open again", buses_[i].name());
-    if (i == plan_.output.bus) {
-      polls_writable_ = false;
-      queue_.on_writable();
+  for (std::size_t i = 0; i < setup_->buses.size(); ++i) {
+    Bus& bus = setup_->buses[i];
+    if (bus.is_open() || !bus.open() || !bus.is_open() || !poll_bus(i)) continue;
+    if (i != setup_->plan.output.bus) continue;
+    polls_writable_ = false;
+    queue_.on_writable();
+    if (const Expected<void> fits = check_output(*setup_); !fits) {
+      log_.tell(Severity::kError, {.cause = "no_fd", .bus = bus.name()}, "{}",
+                fits.error().message());
     }
   }
 }
 
-int GatewayLoop::on_signal(sd_event_source*, const signalfd_siginfo*, void* self) {
+// The gateway goes on with the old configuration until the new one is known to work.
+Expected<void> GatewayLoop::reload() {
+  notify_reloading();
+  log_.info("reading the configuration again");
+  std::optional<gateway::Plan> plan = loader_();
+  Expected<void> replaced = plan ? replace_setup(std::move(*plan)) : fail({}, {});
+  reload_refused_ = !replaced;
+  if (!replaced) {
+    if (!replaced.error().what.empty()) log_.error("{}", replaced.error().message());
+    log_.tell(Severity::kError, {.cause = "config_refused"},
+              "the new configuration is refused; the old one goes on");
+  }
+  read_clocks();
+  notify_ready(status_line());
+  return {};
+}
+
+Expected<void> GatewayLoop::replace_setup(gateway::Plan plan) {
+  auto next = std::make_unique<Setup>(std::move(plan), log_);
+  if (const Expected<void> opened = open_buses(*next); !opened) return opened;
+  // The old pipeline takes what has come so far, also through the sockets of the new one.
+  read_clocks();
+  for (Bus& bus : setup_->buses)
+    bus.begin_reading(now_);
+  hand_on_arrivals();
+  for (Bus& bus : next->buses)
+    bus.discard();
+  next->reporter.start_from(queue_.counts());
+  next->pipeline.count_on_from(setup_->pipeline);
+  const std::optional<gateway::SavedState> memory = setup_->pipeline.memory();
+  const Expected<void> resumed =
+      memory ? next->pipeline.resume(*memory) : Expected<void>(fail({}, "nothing was learned yet"));
+  setup_ = std::move(next);
+  polls_writable_ = false;
+  queue_.on_writable();
+  log_.notice("the new configuration is in use{}",
+              resumed ? std::string(", with what was learned")
+                      : "; calibrating anew: " + resumed.error().message());
+  return poll_buses();
+}
+
+int GatewayLoop::on_stop(sd_event_source*, const signalfd_siginfo*, void* self) {
   static_cast<GatewayLoop*>(self)->stopping_ = true;
+  return 0;
+}
+
+// Not from within the dispatching: the buses are replaced.
+int GatewayLoop::on_hangup(sd_event_source*, const signalfd_siginfo*, void* self) {
+  static_cast<GatewayLoop*>(self)->reload_wanted_ = true;
   return 0;
 }
 
 int GatewayLoop::on_second(sd_event_source* source, std::uint64_t, void* self) {
   static_cast<GatewayLoop*>(self)->second_passed();
   sd_event_source_set_time_relative(source, kSecondUsec);
+  return sd_event_source_set_enabled(source, SD_EVENT_ONESHOT);
+}
+
+int GatewayLoop::on_watchdog(sd_event_source* source, std::uint64_t, void* self) {
+  auto& loop = *static_cast<GatewayLoop*>(self);
+  if (loop.life_.has_moved(loop.steady_now_, loop.put_out_)) notify_alive();
+  sd_event_source_set_time_relative(source, loop.watchdog_half_usec_);
   return sd_event_source_set_enabled(source, SD_EVENT_ONESHOT);
 }
 

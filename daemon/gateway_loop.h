@@ -5,7 +5,9 @@
 // status of each second); frames go past it, straight from epoll. Nothing on the frame path
 // allocates.
 
+#include <functional>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <sys/epoll.h>
@@ -15,8 +17,10 @@
 #include "base/error.h"
 #include "can/transmit.h"
 #include "daemon/bus.h"
+#include "daemon/host_time.h"
 #include "daemon/log.h"
 #include "daemon/reporter.h"
+#include "daemon/service.h"
 #include "daemon/state_keeper.h"
 #include "gateway/pipeline.h"
 #include "gateway/plan.h"
@@ -25,56 +29,85 @@ namespace vgyro::daemon {
 
 class GatewayLoop final : private gateway::FrameSink {
  public:
+  /// Reads the configuration again; nothing, when it cannot be used, and then it has said why.
+  using Loader = std::function<std::optional<gateway::Plan>()>;
+
   /// `keeper` is null where nothing is kept across a restart.
-  GatewayLoop(const gateway::Plan& plan, StateKeeper* keeper, Log& log);
+  GatewayLoop(gateway::Plan plan, Loader loader, StateKeeper* keeper, Log& log);
   GatewayLoop(const GatewayLoop&) = delete;
   GatewayLoop& operator=(const GatewayLoop&) = delete;
   ~GatewayLoop() override;
 
-  /// Takes up what was kept, binds all sockets and catches SIGTERM and SIGINT; an error says what
-  /// the user can do.
+  /// Takes up what was kept, binds the sockets and catches signals; an error says what the user can
+  /// do. Interfaces that are not there yet are waited for.
   Expected<void> start();
 
-  /// Until SIGTERM or SIGINT.
+  /// Until SIGTERM or SIGINT; SIGHUP reads the configuration again.
   Expected<void> run();
 
  private:
   using EventPointer = std::unique_ptr<sd_event, decltype(&sd_event_unref)>;
 
+  /// What one configuration makes; replaced as a whole.
+  struct Setup {
+    Setup(gateway::Plan the_plan, Log& log);
+    gateway::Plan plan;
+    Reporter reporter;
+    gateway::Pipeline pipeline;
+    std::vector<Bus> buses;
+  };
+
   void put(const can::Frame& frame, TimePoint stamp) override;
 
   void take_up_state();
   Expected<void> start_events();
-  Expected<void> check_output() const;
+  static Expected<void> open_buses(Setup& setup);
+  static Expected<void> check_output(const Setup& setup);
+  Expected<void> poll_buses();
   bool poll_bus(std::size_t index);
   Expected<void> serve_events(bool armed);
   Expected<void> cycle(std::span<const epoll_event> ready);
+  void read_clocks();
   void hand_on_arrivals();
   Bus* earliest(Arrival& arrival);
   void flush();
   void poll_writable(bool wanted);
+  void look_at_status();
   void second_passed();
   void reopen_dead_buses();
+  Expected<void> reload();
+  Expected<void> replace_setup(gateway::Plan plan);
   [[nodiscard]] int timeout_ms() const;
   [[nodiscard]] Traffic traffic() const;
   [[nodiscard]] bool all_drained() const;
+  [[nodiscard]] std::string status_line();
 
-  static int on_signal(sd_event_source* source, const struct signalfd_siginfo* info, void* self);
+  static int on_stop(sd_event_source* source, const struct signalfd_siginfo* info, void* self);
+  static int on_hangup(sd_event_source* source, const struct signalfd_siginfo* info, void* self);
   static int on_second(sd_event_source* source, std::uint64_t usec, void* self);
+  static int on_watchdog(sd_event_source* source, std::uint64_t usec, void* self);
 
-  const gateway::Plan& plan_;
+  Loader loader_;
   StateKeeper* keeper_;
   Log& log_;
-  Reporter reporter_;
-  gateway::Pipeline pipeline_;
+  std::unique_ptr<Setup> setup_;
   can::TransmitQueue queue_;
-  std::vector<Bus> buses_;
   EventPointer events_{nullptr, &sd_event_unref};
   int epoll_fd_ = -1;
   bool polls_writable_ = false;
   bool has_spoken_ = false;  ///< in this cycle; no state changes without an output frame
   bool stopping_ = false;
-  TimePoint now_;  ///< the host's clock when the present cycle began
+  bool reload_wanted_ = false;
+  bool reload_refused_ = false;
+  std::uint64_t watchdog_half_usec_ = 0;
+  LifeSign life_;
+  std::uint64_t put_out_ = 0;  ///< frames that the pipeline has put out
+  std::uint64_t samples_ = 0;  ///< of both gyros, when last looked at
+  Patience patience_;
+  ForwardTime forward_;
+  TimePoint now_;           ///< the host's clock when the present cycle began
+  TimePoint pipeline_now_;  ///< the same without its backward steps
+  TimePoint steady_now_;    ///< the same on a clock that nobody sets
 };
 
 }  // namespace vgyro::daemon

@@ -1,9 +1,11 @@
 #include "daemon/log.h"
 
+#include <array>
 #include <cstdlib>
 #include <iterator>
-#include <string_view>
+#include <string>
 #include <sys/stat.h>
+#include <systemd/sd-journal.h>
 #include <unistd.h>
 
 #include <fmt/format.h>
@@ -21,17 +23,30 @@ bool stderr_is_journal() {
 
 }  // namespace
 
-Log::Log() : to_journal_(stderr_is_journal()) {}
+Log::Log() : journal_(stderr_is_journal() ? &sd_journal_sendv : nullptr) {}
 
-void Log::write(Severity severity, fmt::string_view text, fmt::format_args args) const {
-  fmt::memory_buffer line;
-  if (to_journal_) {
-    fmt::format_to(std::back_inserter(line), "<{}>", static_cast<int>(severity));
-  } else {
-    fmt::format_to(std::back_inserter(line), "vgyrod: ");
+bool Log::write_journal(Severity severity, const Subject& subject, std::string_view message) const {
+  const std::array<std::string, 5> fields{
+      fmt::format("MESSAGE={}", message), fmt::format("PRIORITY={}", static_cast<int>(severity)),
+      fmt::format("VGYRO_GYRO={}", subject.gyro), fmt::format("VGYRO_CAUSE={}", subject.cause),
+      fmt::format("VGYRO_BUS={}", subject.bus)};
+  std::array<iovec, fields.size()> parts{};
+  int count = 0;
+  for (const std::string& field : fields) {
+    if (field.back() == '=') continue;  // nothing to say
+    parts[static_cast<std::size_t>(count++)] = {const_cast<char*>(field.data()), field.size()};
   }
-  fmt::vformat_to(std::back_inserter(line), text, args);
-  line.push_back('\n');
+  return journal_(parts.data(), count) >= 0;
+}
+
+void Log::write(Severity severity, const Subject& subject, fmt::string_view text,
+                fmt::format_args args) const {
+  const std::string message = fmt::vformat(text, args);
+  if (journal_ != nullptr && write_journal(severity, subject, message)) return;
+  // Where journald does not answer its stream may; it takes the priority from the line's beginning.
+  const std::string line = journal_ != nullptr
+                               ? fmt::format("<{}>{}\n", static_cast<int>(severity), message)
+                               : fmt::format("vgyrod: {}\n", message);
   // A full or closed stderr must not stop the gateway.
   [[maybe_unused]] const ssize_t written = ::write(STDERR_FILENO, line.data(), line.size());
 }

@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include <CLI/CLI.hpp>
 
@@ -35,21 +36,27 @@ std::string default_state() {
   return std::string(all.substr(0, all.find(':'))) + "/state.toml";
 }
 
-int run(const Options& options, vgyro::daemon::Log& log) {
-  const vgyro::gateway::ConfigResult loaded = vgyro::gateway::load_config(
+std::optional<vgyro::gateway::Plan> load(const Options& options, vgyro::daemon::Log& log) {
+  vgyro::gateway::ConfigResult loaded = vgyro::gateway::load_config(
       options.config, {vgyro::gateway::method_from(options.method), options.model});
   if (!loaded) {
     for (const vgyro::Error& error : loaded.error())
-      log.error("{}", error.message());
-    return kBadInput;
+      log.tell(vgyro::daemon::Severity::kError, {.cause = "config"}, "{}", error.message());
+    return std::nullopt;
   }
   for (const vgyro::Error& warning : loaded->warnings)
-    log.warning("{}", warning.message());
+    log.tell(vgyro::daemon::Severity::kWarning, {.cause = "config"}, "{}", warning.message());
+  return std::move(loaded->plan);
+}
 
+int run(const Options& options, vgyro::daemon::Log& log) {
+  std::optional<vgyro::gateway::Plan> plan = load(options, log);
+  if (!plan) return kBadInput;
   std::optional<vgyro::daemon::StateKeeper> keeper;
   if (!options.state.empty()) keeper.emplace(options.state, log);
   if (keeper && options.forget) keeper->forget();
-  vgyro::daemon::GatewayLoop loop(loaded->plan, keeper ? &*keeper : nullptr, log);
+  vgyro::daemon::GatewayLoop loop(
+      std::move(*plan), [&] { return load(options, log); }, keeper ? &*keeper : nullptr, log);
   vgyro::Expected<void> result = loop.start();
   if (result) result = loop.run();
   if (!result) log.error("{}", result.error().message());
@@ -78,6 +85,7 @@ int main(int argc, char** argv) {
   app.set_version_flag("--version", "vgyrod " VGYRO_VERSION);
   app.footer(
       "`vgyro check FILE` explains a configuration before it is trusted.\n"
+      "SIGHUP reads the configuration again; one that cannot be used is refused.\n"
       "Exit codes: 0 stopped by a signal, 1 configuration or interface unusable, 2 wrong usage.");
   try {
     app.parse(argc, argv);

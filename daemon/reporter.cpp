@@ -48,53 +48,107 @@ const char* sentence(gateway::Fault fault) {
   return "";
 }
 
+// The beginning of a sentence that ends with how often it was so.
+const char* sentence(can::ErrorCause cause) {
+  switch (cause) {
+    case can::ErrorCause::kBusOff:
+      return "bus-off: wiring, bit rate, or nobody else on the bus; `ip link set … type can "
+             "restart-ms 100` brings the controller back by itself;";
+    case can::ErrorCause::kRestarted:
+      return "the controller is back on the bus, restarted";
+    case can::ErrorCause::kErrorPassive:
+      return "error-passive";
+    case can::ErrorCause::kErrorWarning:
+      return "the controller warns of many errors on the bus,";
+    case can::ErrorCause::kLostArbitration:
+      return "a frame lost the arbitration and was not sent,";
+    case can::ErrorCause::kNotAcknowledged:
+      return "nobody else on the bus acknowledged a frame,";
+    case can::ErrorCause::kOverflow:
+      return "the controller's buffers overflowed";
+    case can::ErrorCause::kSendTimeout:
+      return "the driver gave up a frame that could not be sent,";
+    case can::ErrorCause::kTransceiver:
+      return "the transceiver tells of a fault of the wires,";
+  }
+  return "";
+}
+
+std::string trouble_of(const BusStatus& bus) {
+  if (!bus.present) return fmt::format("; {} is not there", bus.name);
+  if (!bus.link_up) return fmt::format("; {} is down", bus.name);
+  switch (bus.controller) {
+    case can::ControllerState::kBusOff:
+      return fmt::format("; {} is bus-off", bus.name);
+    case can::ControllerState::kPassive:
+      return fmt::format("; {} is error-passive", bus.name);
+    case can::ControllerState::kActive:
+    case can::ControllerState::kWarning:
+      break;
+  }
+  return {};
+}
+
 }  // namespace
 
 Reporter::Reporter(std::array<std::string, 2> gyro_names, double rest_s, Log& log)
     : names_(std::move(gyro_names)), rest_s_(rest_s), log_(log) {}
 
+std::uint64_t Traffic::received() const {
+  std::uint64_t sum = 0;
+  for (const BusStatus& bus : buses)
+    sum += bus.received;
+  return sum;
+}
+
+std::uint64_t Traffic::lost() const {
+  std::uint64_t sum = 0;
+  for (const BusStatus& bus : buses)
+    sum += bus.lost;
+  return sum;
+}
+
+void Reporter::start_from(const can::TransmitCounts& transmitted) {
+  last_sent_ = transmitted.sent;
+  stale_.count = transmitted.dropped_stale;
+  overflow_.count = transmitted.dropped_overflow;
+  failed_.count = transmitted.dropped_failed;
+}
+
 void Reporter::state_changed(const gateway::Status& status) {
   const gateway::State before = std::exchange(state_, status.state);
-  if (state_lines_left_ == 0) {
-    ++state_lines_held_;
-    return;
-  }
-  --state_lines_left_;
+  if (!state_lines_.take()) return;
   std::string silent;
   for (std::size_t k = 0; k < status.gyros.size(); ++k) {
     if (!status.gyros[k].heard && !status.gyros[k].fault)
       silent += fmt::format(", gyro {} is silent", names_[k]);
   }
-  log_.notice("{} (was {}){}", to_string(status.state), to_string(before), silent);
-}
-
-bool Reporter::may_tell_of_health() {
-  if (health_lines_left_ == 0) {
-    ++health_lines_held_;
-    return false;
-  }
-  --health_lines_left_;
-  return true;
+  log_.tell(Severity::kNotice, {.cause = to_string(status.state)}, "{} (was {}){}",
+            to_string(status.state), to_string(before), silent);
 }
 
 void Reporter::fault_changed(std::size_t gyro, const gateway::Status& status) {
   const auto now = status.gyros[gyro].fault;
   const auto before = std::exchange(faults_[gyro], now);
-  if (!may_tell_of_health()) return;
+  if (!health_lines_.take()) return;
   if (now) {
-    log_.warning("gyro {} {}", names_[gyro], sentence(*now));
+    log_.tell(Severity::kWarning, {.gyro = names_[gyro], .cause = to_string(*now)}, "gyro {} {}",
+              names_[gyro], sentence(*now));
   } else if (status.gyros[gyro].heard) {
-    log_.notice("gyro {} is well again (was {})", names_[gyro], to_string(*before));
+    log_.tell(Severity::kNotice, {.gyro = names_[gyro], .cause = "well"},
+              "gyro {} is well again (was {})", names_[gyro], to_string(*before));
   } else {
-    log_.notice("gyro {} is silent (was {})", names_[gyro], to_string(*before));
+    log_.tell(Severity::kNotice, {.gyro = names_[gyro], .cause = "silent"},
+              "gyro {} is silent (was {})", names_[gyro], to_string(*before));
   }
 }
 
 void Reporter::disagreement_changed(const gateway::Status& status) {
   disagree_ = status.disagree;
-  if (!may_tell_of_health()) return;
+  if (!health_lines_.take()) return;
   if (disagree_) {
-    log_.warning("the gyros disagree; which one is wrong cannot be told");
+    log_.tell(Severity::kWarning, {.cause = "disagree"},
+              "the gyros disagree; which one is wrong cannot be told");
   } else {
     log_.notice("the gyros no longer disagree");
   }
@@ -102,24 +156,20 @@ void Reporter::disagreement_changed(const gateway::Status& status) {
 
 std::string Reporter::second_passed(const gateway::Status& status, const Traffic& traffic) {
   ++second_;
-  if (second_ % kRepeatSeconds == 0) {
-    if (state_lines_held_ > 0) {
-      log_.warning("{} more changes of state in the last minute", state_lines_held_);
-    }
-    if (health_lines_held_ > 0) {
-      log_.warning("{} more changes of health in the last minute", health_lines_held_);
-    }
-    health_lines_held_ = 0;
-    health_lines_left_ = kHealthLinesMost;
-    state_lines_held_ = 0;
-    state_lines_left_ = kStateLinesMost;
+  if (const std::uint64_t held = state_lines_.second_passed(); held > 0) {
+    log_.warning("{} more changes of state in the last minute", held);
+  }
+  if (const std::uint64_t held = health_lines_.second_passed(); held > 0) {
+    log_.warning("{} more changes of health in the last minute", held);
   }
   for (std::size_t k = 0; k < gyros_.size(); ++k) {
     tell_gyro(names_[k], status.gyros[k], gyros_[k]);
   }
   tell_pipeline(status);
   tell_restored(status);
-  tell_traffic(traffic);
+  tell_sent(traffic.transmitted);
+  for (const BusStatus& bus : traffic.buses)
+    tell_bus(bus, buses_[bus.name]);
 
   std::string doing{to_string(status.state)};
   if (status.state == gateway::State::kCalibrating) {
@@ -130,7 +180,10 @@ std::string Reporter::second_passed(const gateway::Status& status, const Traffic
   if (status.restored == gateway::Restored::kTakenUp) {
     doing += fmt::format(", on biases of {} before the start", age_text(status.restored_age_s));
   }
-  const std::uint64_t received = traffic.received - std::exchange(last_received_, traffic.received);
+  for (const BusStatus& bus : traffic.buses)
+    doing += trouble_of(bus);
+  const std::uint64_t received =
+      traffic.received() - std::exchange(last_received_, traffic.received());
   const std::uint64_t sent =
       traffic.transmitted.sent - std::exchange(last_sent_, traffic.transmitted.sent);
   return fmt::format("{}; bias {} deg/h; {} frames/s in, {} out", doing, biases(status), received,
@@ -147,16 +200,19 @@ std::uint64_t Reporter::news(Told& told, std::uint64_t count) const {
 void Reporter::tell_gyro(const std::string& name, const gateway::GyroStatus& gyro, GyroTold& told) {
   for (std::size_t cause = 0; cause < gateway::kRejectCount; ++cause) {
     if (const std::uint64_t n = news(told.rejected[cause], gyro.rejected[cause]); n > 0) {
-      log_.warning("gyro {}: {} frames not used: {}", name, n,
-                   to_string(static_cast<gateway::Reject>(cause)));
+      const std::string_view why = to_string(static_cast<gateway::Reject>(cause));
+      log_.tell(Severity::kWarning, {.gyro = name, .cause = why}, "gyro {}: {} frames not used: {}",
+                name, n, why);
     }
   }
   tell_waiting(name, gyro, told);
   if (const std::uint64_t n = news(told.missing, gyro.missing); n > 0) {
-    log_.warning("gyro {}: {} frames missing by its counter", name, n);
+    log_.tell(Severity::kWarning, {.gyro = name, .cause = "missing"},
+              "gyro {}: {} frames missing by its counter", name, n);
   }
   if (const std::uint64_t n = news(told.unpaired, gyro.unpaired); n > 0) {
-    log_.info("gyro {}: {} samples found no partner: the other gyro had a gap", name, n);
+    log_.tell(Severity::kInfo, {.gyro = name, .cause = "unpaired"},
+              "gyro {}: {} samples found no partner: the other gyro had a gap", name, n);
   }
 }
 
@@ -172,7 +228,7 @@ void Reporter::tell_waiting(const std::string& name, const gateway::GyroStatus& 
 
 void Reporter::tell_pipeline(const gateway::Status& status) {
   if (const std::uint64_t n = news(clock_steps_, status.clock_steps); n > 0) {
-    log_.warning("the stamps were set back {} times", n);
+    log_.tell(Severity::kWarning, {.cause = "clock_step"}, "the stamps were set back {} times", n);
   }
   if (const std::uint64_t n = news(rates_out_of_range_, status.rates_out_of_range); n > 0) {
     log_.warning("{} virtual rates were beyond what VG_Rate can carry", n);
@@ -222,18 +278,34 @@ void Reporter::tell_restored(const gateway::Status& status) {
   }
 }
 
-void Reporter::tell_traffic(const Traffic& traffic) {
-  if (const std::uint64_t n = news(lost_by_kernel_, traffic.lost_by_kernel); n > 0) {
-    log_.warning("{} received frames lost: the socket's buffer was full", n);
+void Reporter::tell_sent(const can::TransmitCounts& sent) {
+  if (const std::uint64_t n = news(stale_, sent.dropped_stale); n > 0) {
+    log_.tell(Severity::kWarning, {.cause = "stale"},
+              "{} frames dropped: the bus did not take them in time", n);
   }
-  if (const std::uint64_t n = news(stale_, traffic.transmitted.dropped_stale); n > 0) {
-    log_.warning("{} frames dropped: the bus did not take them in time", n);
+  if (const std::uint64_t n = news(overflow_, sent.dropped_overflow); n > 0) {
+    log_.tell(Severity::kWarning, {.cause = "overflow"},
+              "{} frames dropped: too many waited for the bus", n);
   }
-  if (const std::uint64_t n = news(overflow_, traffic.transmitted.dropped_overflow); n > 0) {
-    log_.warning("{} frames dropped: too many waited for the bus", n);
+  if (const std::uint64_t n = news(failed_, sent.dropped_failed); n > 0) {
+    log_.tell(Severity::kWarning, {.cause = "refused"},
+              "{} frames dropped: the link does not carry them", n);
   }
-  if (const std::uint64_t n = news(failed_, traffic.transmitted.dropped_failed); n > 0) {
-    log_.warning("{} frames dropped: the link does not carry them", n);
+}
+
+void Reporter::tell_bus(const BusStatus& bus, BusTold& told) {
+  if (const std::uint64_t n = news(told.lost, bus.lost); n > 0) {
+    log_.tell(Severity::kWarning, {.cause = "receive_overrun", .bus = bus.name},
+              "{}: {} received frames lost: the socket's buffer was full", bus.name, n);
+  }
+  for (std::size_t i = 0; i < can::kErrorCauseCount; ++i) {
+    const auto cause = static_cast<can::ErrorCause>(i);
+    if (const std::uint64_t n = news(told.errors[i], bus.errors[i]); n > 0) {
+      const bool good = cause == can::ErrorCause::kRestarted;
+      log_.tell(good ? Severity::kNotice : Severity::kWarning,
+                {.cause = to_string(cause), .bus = bus.name}, "{}: {} {}", bus.name,
+                sentence(cause), n == 1 ? std::string("once") : fmt::format("{} times", n));
+    }
   }
 }
 
@@ -247,9 +319,9 @@ void Reporter::summarize(const gateway::Status& status, const Traffic& traffic) 
   log_.notice(
       "stopped: {} frames in ({} lost by the kernel), {} pairs, {} virtual rates ({} valid), "
       "{} frames out ({} stale, {} overflowed, {} refused, {} retries); bias {} deg/h",
-      traffic.received, traffic.lost_by_kernel, status.pairs, status.rates_out,
-      status.rates_out_valid, sent.sent, sent.dropped_stale, sent.dropped_overflow,
-      sent.dropped_failed, sent.retries, biases(status));
+      traffic.received(), traffic.lost(), status.pairs, status.rates_out, status.rates_out_valid,
+      sent.sent, sent.dropped_stale, sent.dropped_overflow, sent.dropped_failed, sent.retries,
+      biases(status));
 }
 
 }  // namespace vgyro::daemon

@@ -6,10 +6,14 @@
 
 #include <array>
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "can/transmit.h"
+#include "daemon/bus_status.h"
+#include "daemon/line_budget.h"
 #include "daemon/log.h"
 #include "gateway/status.h"
 
@@ -17,14 +21,19 @@ namespace vgyro::daemon {
 
 /// What went through the sockets since the start.
 struct Traffic {
-  std::uint64_t received = 0;
-  std::uint64_t lost_by_kernel = 0;  ///< dropped because the receive buffer was full
+  std::vector<BusStatus> buses;
   can::TransmitCounts transmitted;
+
+  [[nodiscard]] std::uint64_t received() const;
+  [[nodiscard]] std::uint64_t lost() const;
 };
 
 class Reporter {
  public:
   Reporter(std::array<std::string, 2> gyro_names, double rest_s, Log& log);
+
+  /// What was sent before is known already.
+  void start_from(const can::TransmitCounts& transmitted);
 
   /// Logs a change of state or of a gyro's health. Cheap when there is none.
   void check_state(const gateway::Status& status) {
@@ -41,8 +50,6 @@ class Reporter {
 
  private:
   static constexpr std::uint64_t kRepeatSeconds = 60;
-  static constexpr int kStateLinesMost = 10;
-  static constexpr int kHealthLinesMost = 10;
 
   /// A counter of troubles, and how much of it has been told.
   struct Told {
@@ -54,17 +61,21 @@ class Reporter {
     Told missing, unpaired;
     bool waiting = false;
   };
+  struct BusTold {
+    std::array<Told, can::kErrorCauseCount> errors;
+    Told lost;
+  };
 
   void state_changed(const gateway::Status& status);
   void fault_changed(std::size_t gyro, const gateway::Status& status);
   void disagreement_changed(const gateway::Status& status);
-  [[nodiscard]] bool may_tell_of_health();
   std::uint64_t news(Told& told, std::uint64_t count) const;
   void tell_gyro(const std::string& name, const gateway::GyroStatus& gyro, GyroTold& told);
   void tell_waiting(const std::string& name, const gateway::GyroStatus& gyro, GyroTold& told);
   void tell_pipeline(const gateway::Status& status);
   void tell_restored(const gateway::Status& status);
-  void tell_traffic(const Traffic& traffic);
+  void tell_sent(const can::TransmitCounts& sent);
+  void tell_bus(const BusStatus& bus, BusTold& told);
   [[nodiscard]] std::string biases(const gateway::Status& status) const;
 
   std::array<std::string, 2> names_;
@@ -72,17 +83,16 @@ class Reporter {
   Log& log_;
   gateway::Restored restored_ = gateway::Restored::kNothing;
   gateway::State state_ = gateway::State::kWaiting;
-  int state_lines_left_ = kStateLinesMost;
-  std::uint64_t state_lines_held_ = 0;
+  LineBudget state_lines_;
   std::array<std::optional<gateway::Fault>, 2> faults_;
   bool disagree_ = false;
-  int health_lines_left_ = kHealthLinesMost;
-  std::uint64_t health_lines_held_ = 0;
+  LineBudget health_lines_;
   std::uint64_t second_ = 0;
   std::array<GyroTold, 2> gyros_;
   Told clock_steps_, rates_out_of_range_, reference_rejected_, accelerometer_rejected_,
       speed_rejected_, windows_skipped_, restarts_;
-  Told lost_by_kernel_, stale_, overflow_, failed_;
+  Told stale_, overflow_, failed_;
+  std::map<std::string, BusTold> buses_;
   bool told_of_motion_ = false;
   std::uint64_t last_received_ = 0;
   std::uint64_t last_sent_ = 0;

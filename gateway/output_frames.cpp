@@ -71,6 +71,15 @@ OutputEncoder::OutputEncoder(const OutputPlan& plan)
       bias_protection_(static_cast<std::uint16_t>(plan.bias_id)),
       model_protection_(static_cast<std::uint16_t>(plan.model_id)) {}
 
+void OutputEncoder::count_on_from(const OutputEncoder& before) {
+  if (rate_.id == before.rate_.id) {
+    rate_protection_ = before.rate_protection_;
+    fd_rate_protection_ = before.fd_rate_protection_;
+  }
+  if (bias_.id == before.bias_.id) bias_protection_ = before.bias_protection_;
+  if (model_.id == before.model_.id) model_protection_ = before.model_protection_;
+}
+
 bool OutputEncoder::can_carry(double rate_dps) const {
   const double limit = fd_ ? 2147483647.0 / kFdRatePerDps : 8388607.0 / kRatePerDps;
   return std::abs(rate_dps) <= limit;

@@ -71,6 +71,9 @@ class OutputEncoder {
  public:
   explicit OutputEncoder(const OutputPlan& plan);
 
+  /// Counters of the streams that both send go on where the other's stand.
+  void count_on_from(const OutputEncoder& before);
+
   /// Can VG_Rate carry this rate in the chosen format?
   [[nodiscard]] bool can_carry(double rate_dps) const;
 

@@ -334,6 +334,8 @@ void Pipeline::Impl::receive_reference(const can::Frame& frame, TimePoint stamp,
 void Pipeline::Impl::take_sample(std::size_t gyro, TimePoint t, double rate_dps, TimePoint stamp,
                                  FrameSink& sink) {
   if (!heard[0] && !heard[1] && status.pairs == 0) first_heard = t;
+  // Where the clock was set back in a silence, what was due then is due too late.
+  if (!heard[gyro]) deadline = std::min(deadline, t);
   // First what is due, or a silence of both would be noticed of one alone.
   if (t >= deadline) do_what_is_due(t, stamp, sink);
   heard[gyro] = true;
@@ -639,7 +641,8 @@ void Pipeline::Impl::send_bias(TimePoint stamp, FrameSink& sink) {
 }
 
 void Pipeline::Impl::send_bias_when_due(TimePoint t, TimePoint stamp, FrameSink& sink) {
-  if (t < next_bias) return;
+  const bool clock_set_back = next_bias - t > kTimeOutMax;
+  if (t < next_bias && !clock_set_back) return;
   send_bias(stamp, sink);
   next_bias = next_on_grid(t);
 }
@@ -707,6 +710,10 @@ Expected<void> Pipeline::resume(const SavedState& state) {
   impl_->saved = state;
   impl_->status.restored = Restored::kOffered;
   return {};
+}
+
+void Pipeline::count_on_from(const Pipeline& before) {
+  impl_->encoder.count_on_from(before.impl_->encoder);
 }
 
 void Pipeline::observe(RateObserver* observer) {

@@ -75,6 +75,11 @@ class Pipeline {
   /// method keeps none; then nothing has changed.
   Expected<void> resume(const SavedState& state);
 
+  /// Before the first output: the counters of the frames' headers go on where another one's stand,
+  /// so that receivers see no break. A frame with another identifier is another stream and begins
+  /// anew.
+  void count_on_from(const Pipeline& before);
+
   /// Null to take it off again.
   void observe(RateObserver* observer);
 

@@ -43,8 +43,13 @@ class ReporterTest : public testing::Test {
     return said_during([&] { last_line = reporter.second_passed(status, traffic); });
   }
 
+  BusStatus& bus() { return traffic.buses.front(); }
+  std::uint64_t& errors(can::ErrorCause cause) {
+    return bus().errors[static_cast<std::size_t>(cause)];
+  }
+
   gateway::Status status;
-  Traffic traffic;
+  Traffic traffic{.buses = {{.name = "can0", .present = true, .link_up = true}}, .transmitted = {}};
   Log log;
   Reporter reporter{{"left", "right"}, 60.0, log};
   std::string last_line;
@@ -130,21 +135,61 @@ TEST_F(ReporterTest, SaysNothingWhenNothingIsWrong) {
 }
 
 TEST_F(ReporterTest, TellsFramesThatWereLostOrDropped) {
-  traffic.lost_by_kernel = 7;
+  bus().lost = 7;
   traffic.transmitted.dropped_stale = 8;
   const std::string said = second();
-  EXPECT_EQ(count_of("7 received frames lost", said), 1U) << said;
+  EXPECT_EQ(count_of("can0: 7 received frames lost", said), 1U) << said;
   EXPECT_EQ(count_of("8 frames dropped: the bus did not take them in time", said), 1U) << said;
 }
 
+TEST_F(ReporterTest, TellsOfTheControllersTroubleOnceAMinuteAndInTheStatus) {
+  errors(can::ErrorCause::kBusOff) = 1;
+  bus().controller = can::ControllerState::kBusOff;
+  std::string said = second();
+  EXPECT_EQ(count_of("can0: bus-off", said), 1U) << said;
+  EXPECT_EQ(count_of("restart-ms", said), 1U) << said;
+  EXPECT_NE(last_line.find("; can0 is bus-off;"), std::string::npos) << last_line;
+  errors(can::ErrorCause::kRestarted) = 1;
+  bus().controller = can::ControllerState::kActive;
+  EXPECT_EQ(count_of("can0: the controller is back on the bus, restarted once", second()), 1U);
+  EXPECT_EQ(last_line.find("bus-off"), std::string::npos) << last_line;
+  said.clear();
+  for (int i = 0; i < 300; ++i) {
+    errors(can::ErrorCause::kBusOff) += 3;
+    errors(can::ErrorCause::kLostArbitration) += 1000;
+    said += second();
+  }
+  EXPECT_LE(count_of("\n", said), 12U) << said;
+  EXPECT_GE(count_of("can0: bus-off", said), 4U) << said;
+}
+
+TEST_F(ReporterTest, SaysInTheStatusWhichInterfaceIsMissingOrDown) {
+  bus().present = false;
+  second();
+  EXPECT_NE(last_line.find("; can0 is not there;"), std::string::npos) << last_line;
+  bus().present = true;
+  bus().link_up = false;
+  second();
+  EXPECT_NE(last_line.find("; can0 is down;"), std::string::npos) << last_line;
+}
+
+// After a reload the queue's counters go on, and so does what was told of them.
+TEST_F(ReporterTest, DoesNotTellAgainWhatWasSentBeforeItBegan) {
+  traffic.transmitted.sent = 1'000'000;
+  traffic.transmitted.dropped_stale = 50;
+  reporter.start_from(traffic.transmitted);
+  EXPECT_EQ(second(), "");
+  EXPECT_NE(last_line.find(" 0 out"), std::string::npos) << last_line;
+}
+
 TEST_F(ReporterTest, PutsStateRateBiasesAndTrafficInTheStatusLine) {
-  traffic.received = 1000;
+  bus().received = 1000;
   second();
   status.state = State::kRunning;
   status.rate_dps = 50.00321;
   status.gyros[0].bias_dps = 0.0330;
   status.gyros[1].bias_dps = -0.0074;
-  traffic.received = 2000;
+  bus().received = 2000;
   traffic.transmitted.sent = 520;
   second();
   EXPECT_EQ(last_line,

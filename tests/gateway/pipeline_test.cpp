@@ -483,6 +483,25 @@ TEST(PipelineTime, ClockSetBackIsCountedAndSurvived) {
             recording.back().stamp - recording.back().stamp.time_since_epoch() % ms(10) + ms(3));
 }
 
+// The daemon lets time go on while nobody speaks, whatever the clock does; when frames come back
+// with stamps of the clock as it was set, heartbeat and time-outs must not wait for it to catch up.
+TEST(PipelineTime, ClockSetBackInASilenceStopsNothing) {
+  constexpr Duration kStart = std::chrono::hours(100);
+  for (const Duration by : {Duration{0}, ms(20'000), ms(3'600'000)}) {
+    Bench run;
+    run.last = TimePoint{kStart};
+    run.play_live(shifted(both(ms(3000)), kStart), at_ms(3000) + kStart);
+    run.step_to(at_ms(60'000) + kStart);
+    const std::size_t before = run.out.with_id(0x611).size();
+    const Recording back = shifted(both(ms(5000)), kStart + ms(60'000) - by);
+    run.play(back);
+    EXPECT_EQ(run.pipeline.status().state, State::kRunning);
+    EXPECT_GE(run.out.with_id(0x611).size() - before, 48U) << to_seconds(by) << " s set back";
+    EXPECT_LE(run.pipeline.next_deadline(), back.back().stamp + ms(300))
+        << to_seconds(by) << " s set back";
+  }
+}
+
 // Set back again and again, as far as a log's stamps can go: time stays inside its 64 bits.
 TEST(PipelineTime, ClockSetBackByCenturiesTwiceIsSurvived) {
   constexpr TimePoint kLatest = time_from_ns(9'000'000'000'000'000'000 - 3'000'000'000);
@@ -675,6 +694,23 @@ TEST(PipelineRepeats, ItselfAfterAMove) {
   Collector out;
   rig::play(second, both(ms(3000)), out);
   EXPECT_EQ(out.frames, run.out.frames);
+}
+
+// After a reload receivers see one stream.
+TEST(PipelineRepeats, CountsOnFromAnotherOne) {
+  Bench first;
+  first.play(both(ms(1234)));
+  Plan plan = rig::two_gyros();
+  plan.output.bias_id = 0x711;
+  Bench second(plan);
+  second.pipeline.count_on_from(first.pipeline);
+  second.play(both(ms(500)));
+  const auto counter = [](const rig::Output& output) { return rig::bits(output.frame, 8, 4); };
+  for (const std::uint32_t id : {0x610U, 0x612U}) {
+    EXPECT_EQ(counter(second.out.with_id(id).front()),
+              (counter(first.out.with_id(id).back()) + 1) % 15);
+  }
+  EXPECT_EQ(counter(second.out.with_id(0x711).front()), 0U) << "another stream";
 }
 
 // --- reference -----------------------------------------------------------------------------------

@@ -14,6 +14,7 @@ import time
 
 READY_WITHIN_S = 30.0
 STOP_WITHIN_S = 20.0
+WATCHDOG_USEC = 2_000_000
 
 
 class Daemon:
@@ -29,11 +30,12 @@ class Daemon:
         self.command = command
         self.stderr_path = os.path.join(folder, "vgyrod.err")
         self.restarts_us = []  # on the clock of the frames
+        self.reloads_us = []
         self.start()
 
     def start(self):
         with open(self.stderr_path, "ab") as stderr:
-            environment = dict(os.environ, NOTIFY_SOCKET=self.address)
+            environment = dict(os.environ, NOTIFY_SOCKET=self.address, WATCHDOG_USEC=str(WATCHDOG_USEC))
             self.process = subprocess.Popen(self.command, stderr=stderr, env=environment)
 
     def kill_and_restart(self):
@@ -43,6 +45,12 @@ class Daemon:
         self.start()
         if not self.listen(READY_WITHIN_S, "READY=1"):
             raise OSError("not READY after it was killed and started again")
+
+    def reload(self):
+        self.reloads_us.append(time.time_ns() // 1000)
+        self.process.send_signal(signal.SIGHUP)
+        if not self.listen(READY_WITHIN_S, "RELOADING=1") or not self.listen(READY_WITHIN_S, "READY=1"):
+            raise OSError("no RELOADING and READY after SIGHUP")
 
     def listen(self, seconds, until=None):
         """Collects notices for some time, or until one of them starts with `until`."""
@@ -71,6 +79,7 @@ class Daemon:
             "rss_kb": int(fields["VmRSS"].split()[0]),
             "rss_most_kb": int(fields["VmHWM"].split()[0]),
             "cpu_s": (int(user) + int(system)) / tick,
+            "wake_ups": int(fields["voluntary_ctxt_switches"]),
         }
 
     def stop(self, number):
@@ -109,6 +118,8 @@ def make_links(case, verb):
     lines = []
     for link in case["links"]:
         if verb == "add":
+            if link.get("absent"):  # a step will make it
+                continue
             lines += [f"link add {link['name']} mtu {link.get('mtu', 16)} type vcan", f"link set {link['name']} up"]
         else:
             lines.append(f"link del {link['name']}")
@@ -118,10 +129,13 @@ def make_links(case, verb):
             subprocess.run(command, check=True)
 
 
-def play(log, daemon, folder):
-    """Recorded traffic onto the buses, in its own time."""
+def play(log, daemon, folder, reload_after_s=None):
+    """Recorded traffic onto the buses, in its own time; a reload in the midst of it."""
     with open(os.path.join(folder, "canplayer.err"), "ab") as stderr:
         player = subprocess.Popen(["canplayer", "-I", log], stderr=stderr)
+    if reload_after_s is not None:
+        daemon.listen(reload_after_s)
+        daemon.reload()
     while player.poll() is None:
         daemon.listen(0.2)
     if player.returncode != 0:
@@ -136,6 +150,10 @@ def take_steps(steps, daemon, folder):
             daemon.listen(what)
         elif verb == "kill_and_restart":
             daemon.kill_and_restart()
+        elif verb == "play_and_reload":
+            play(what[0], daemon, folder, what[1])
+        elif verb == "reload":
+            daemon.reload()
         else:
             subprocess.run(what, check=True)
 
@@ -152,12 +170,14 @@ def run_case(case, folder, memory):
             daemon = Daemon(case["command"], folder)
             result["ready"] = daemon.listen(READY_WITHIN_S, "READY=1")
             if result["ready"]:
+                result["resources_at_start"] = daemon.resources()
                 take_steps([["wait", 0.2], *case["steps"], ["wait", 0.5]], daemon, folder)
                 if daemon.process.poll() is None:
                     result["resources"] = daemon.resources()
             result["exit"] = daemon.stop(getattr(signal, case.get("signal", "SIGTERM")))
             result["notices"] = daemon.notices
             result["restarts_us"] = daemon.restarts_us
+            result["reloads_us"] = daemon.reloads_us
             wait_until_still(capture_path)
             stop_quietly(dump)
         with open(capture_path, "rb") as capture, open(os.path.join(folder, "capture.log"), "wb") as out:

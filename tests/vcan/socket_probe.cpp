@@ -14,6 +14,7 @@
 #include <fmt/core.h>
 #include <gtest/gtest.h>
 
+#include "can/error_frame.h"
 #include "can/socket.h"
 #include "can/transmit.h"
 
@@ -208,6 +209,47 @@ TEST_F(SocketProbe, GivesTheKernelsStampsTheSameToEveryReceiver) {
     EXPECT_GT(first[i].stamp, i == 0 ? before : first[i - 1].stamp);
     EXPECT_LT(first[i].stamp, after) << "stamped when read, not when received";
   }
+}
+
+// vcan makes no error frames of its own; a peer may write them.
+TEST_F(SocketProbe, HearsErrorFramesAlsoWithoutFiltersAndAfterRebinding) {
+  const auto error_frame = [](std::uint32_t classes) { return frame_of(classes, kError, 8); };
+  for (int round = 0; round < 2; ++round) {
+    Socket sender = open(kBus, {});
+    Socket writer = open(kBus, {});
+    Socket receiver = open(kBus, {{0x101, 0x7FF, false}});
+    for (const std::uint32_t classes :
+         {std::uint32_t{kBusOff}, std::uint32_t{kLostArbitration},
+          std::uint32_t{kProtocolViolation}, std::uint32_t{kBusError}})
+      EXPECT_EQ(sender.send(error_frame(classes)), SendResult::kSent);
+    EXPECT_EQ(sender.send(classic(0x101)), SendResult::kSent);
+    const std::vector<Frame> errors{error_frame(kBusOff), error_frame(kLostArbitration)};
+    EXPECT_EQ(frames_of(receive_all(writer)), errors);
+    EXPECT_EQ(frames_of(receive_all(receiver)),
+              (std::vector<Frame>{errors[0], errors[1], classic(0x101)}));
+    if (round > 0) break;
+    change_links(
+        "ip link del probe0 && ip link add probe0 mtu 72 type vcan && ip link set probe0 up");
+  }
+}
+
+TEST_F(SocketProbe, KnowsWhichInterfacesMayStillAppear) {
+  EXPECT_TRUE(may_appear("nosuch0"));
+  EXPECT_FALSE(may_appear("lo"));
+  EXPECT_FALSE(may_appear(kBus));
+  EXPECT_FALSE(may_appear("a-name-that-is-longer-than-the-kernel-allows"));
+}
+
+// What has gone to the kernel cannot be called back, so little may be there.
+TEST_F(SocketProbe, HoldsFewFramesInTheKernelWhereTheBufferIsSmall) {
+  change_links("tc qdisc add dev probe0 root tbf rate 1kbit burst 200 limit 100000");
+  Socket socket = open(kBus, {}, {.send_buffer_bytes = 1});
+  int sent = 0;
+  while (sent < 1000 && socket.send(classic(0x610)) == SendResult::kSent)
+    ++sent;
+  constexpr int kPassedAtOnce = 200 / 16;  // the bucket's
+  EXPECT_LE(sent - kPassedAtOnce, 8);
+  EXPECT_GE(sent - kPassedAtOnce, 3) << "VG_Rate, VG_Bias and VG_Model go out together";
 }
 
 TEST_F(SocketProbe, CountsFramesThatTheKernelDropped) {

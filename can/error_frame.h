@@ -1,0 +1,83 @@
+#pragma once
+
+// What a CAN controller tells of itself: error frames as Linux puts them beside the bus's own, into
+// a state and counters. Pure; that the numbers are the kernel's is checked where the socket is.
+
+#include <array>
+#include <cstdint>
+#include <string_view>
+
+#include "can/frame.h"
+
+namespace vgyro::can {
+
+/// Classes of error frames: bits of the identifier.
+enum ErrorClass : std::uint32_t {
+  kSendTimeout = 0x001,
+  kLostArbitration = 0x002,
+  kControllerProblem = 0x004,  ///< data byte 1: ControllerBit
+  kProtocolViolation = 0x008,
+  kTransceiver = 0x010,
+  kNotAcknowledged = 0x020,
+  kBusOff = 0x040,
+  kBusError = 0x080,
+  kRestarted = 0x100
+};
+
+enum ControllerBit : std::uint8_t {
+  kReceiveOverflow = 0x01,
+  kSendOverflow = 0x02,
+  kReceiveWarning = 0x04,
+  kSendWarning = 0x08,
+  kReceivePassive = 0x10,
+  kSendPassive = 0x20,
+  kActiveAgain = 0x40
+};
+
+/// What is asked of the kernel. Single bit errors are not: a loose cable makes thousands a second
+/// of them, and the controller's state says what they come to.
+inline constexpr std::uint32_t kErrorsWanted = kSendTimeout | kLostArbitration |
+                                               kControllerProblem | kTransceiver |
+                                               kNotAcknowledged | kBusOff | kRestarted;
+
+enum class ControllerState : std::uint8_t { kActive, kWarning, kPassive, kBusOff };
+std::string_view to_string(ControllerState state);
+
+enum class ErrorCause : std::uint8_t {
+  kBusOff,           ///< the controller left the bus
+  kRestarted,        ///< and came back
+  kErrorPassive,     ///< it may no longer disturb others: next to bus-off
+  kErrorWarning,     ///< a hundred errors more than successes
+  kLostArbitration,  ///< told only by controllers that send once
+  kNotAcknowledged,  ///< nobody else is on the bus
+  kOverflow,         ///< of the controller's own buffers
+  kSendTimeout,      ///< the driver gave a frame up
+  kTransceiver       ///< wires or transceiver
+};
+inline constexpr std::size_t kErrorCauseCount = 9;
+std::string_view to_string(ErrorCause cause);
+
+class ControllerWatch {
+ public:
+  /// Anything but an error frame is no news.
+  void note(const Frame& frame);
+  /// The link came up anew: what was so before is over.
+  void forget_state() { state_ = ControllerState::kActive; }
+
+  [[nodiscard]] ControllerState state() const { return state_; }
+  [[nodiscard]] std::uint64_t count(ErrorCause cause) const {
+    return counts_[static_cast<std::size_t>(cause)];
+  }
+  [[nodiscard]] const std::array<std::uint64_t, kErrorCauseCount>& counts() const {
+    return counts_;
+  }
+
+ private:
+  void add(ErrorCause cause) { ++counts_[static_cast<std::size_t>(cause)]; }
+  void note_controller(std::uint8_t bits);
+
+  ControllerState state_ = ControllerState::kActive;
+  std::array<std::uint64_t, kErrorCauseCount> counts_{};
+};
+
+}  // namespace vgyro::can

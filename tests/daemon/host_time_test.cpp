@@ -1,0 +1,104 @@
+#include "daemon/host_time.h"
+
+#include <gtest/gtest.h>
+
+#include "daemon/service.h"
+
+namespace vgyro::daemon {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr TimePoint at(Duration t) {
+  return time_from_ns(1'700'000'000'000'000'000) + t;
+}
+constexpr TimePoint steady(Duration t) {
+  return time_from_ns(5'000'000'000) + t;
+}
+
+TEST(ForwardTime, IsTheWallClockWhileThatGoesForward) {
+  ForwardTime time;
+  EXPECT_EQ(time.update(at(0s), steady(0s)), at(0s));
+  EXPECT_EQ(time.update(at(1s), steady(1s)), at(1s));
+  EXPECT_EQ(time.update(at(1h), steady(2s)), at(1h)) << "set ahead";
+  EXPECT_EQ(time.update(at(1h + 1s), steady(3s)), at(1h + 1s));
+}
+
+TEST(ForwardTime, GoesOnWhenTheClockIsSetBack) {
+  ForwardTime time;
+  time.update(at(0s), steady(0s));
+  EXPECT_EQ(time.update(at(-1h), steady(1s)), at(1s));
+  EXPECT_EQ(time.update(at(-1h + 1s), steady(2s)), at(2s));
+  EXPECT_EQ(time.update(at(-2h), steady(3s)), at(3s)) << "and again";
+}
+
+TEST(ForwardTime, IsTheWallClockAgainWhenASampleHasToldOfIt) {
+  ForwardTime time;
+  time.update(at(0s), steady(0s));
+  time.update(at(-1h), steady(1s));
+  time.sample_came();
+  EXPECT_EQ(time.update(at(-1h + 1s), steady(2s)), at(-1h + 1s));
+}
+
+TEST(ForwardTime, LetsAClockBeSlewed) {
+  ForwardTime time;
+  time.update(at(0s), steady(0s));
+  for (int i = 1; i < 100; ++i)
+    EXPECT_EQ(time.update(at(i * 999ms), steady(i * 1000ms)), at(i * 999ms));
+}
+
+TEST(Patience, IsTwoPeriodsOfTheRate) {
+  for (const Duration period : {Duration(2ms), Duration(10ms), Duration(20ms), Duration(50ms)}) {
+    Patience patience;
+    for (int i = 0; i < 200; ++i)
+      patience.rate_at(at(i * period));
+    EXPECT_NEAR(to_seconds(patience.value()), 2.0 * to_seconds(period), 1e-5);
+  }
+}
+
+TEST(Patience, HasLimitsAndIsNotMovedByPausesOrClocks) {
+  Patience fast;
+  Patience slow;
+  for (int i = 0; i < 500; ++i) {
+    fast.rate_at(at(i * 100us));
+    slow.rate_at(at(i * 900ms));
+  }
+  EXPECT_EQ(fast.value(), Duration(2ms));
+  EXPECT_EQ(slow.value(), Duration(200ms));
+  Patience patience;
+  const Duration before = patience.value();
+  for (const Duration t : {Duration(0s), Duration(1h), Duration(2s), Duration(2s)})
+    patience.rate_at(at(t));
+  EXPECT_EQ(patience.value(), before);
+}
+
+TEST(LifeSign, IsGivenWhileFramesGoOut) {
+  LifeSign life;
+  std::uint64_t put_out = 0;
+  for (int i = 0; i < 10; ++i)
+    EXPECT_TRUE(life.has_moved(steady(i * 5s), put_out += 30));
+}
+
+TEST(LifeSign, EndsWhenNothingGoesOutAlthoughTheLoopTurns) {
+  LifeSign life;
+  EXPECT_TRUE(life.has_moved(steady(0s), 10));
+  EXPECT_FALSE(life.has_moved(steady(5s), 10));
+  EXPECT_FALSE(life.has_moved(steady(10s), 10));
+  EXPECT_TRUE(life.has_moved(steady(15s), 11));
+}
+
+// Between two heartbeats that are looked at too often lies no death.
+TEST(LifeSign, MayBeAskedMoreOftenThanFramesGoOut) {
+  LifeSign life;
+  EXPECT_TRUE(life.has_moved(steady(0ms), 10));
+  EXPECT_TRUE(life.has_moved(steady(50ms), 10));
+  EXPECT_TRUE(life.has_moved(steady(100ms), 12));
+}
+
+TEST(LifeSign, IsNoneBeforeTheFirstFrame) {
+  LifeSign life;
+  EXPECT_FALSE(life.has_moved(time_from_ns(0), 0));
+}
+
+}  // namespace
+}  // namespace vgyro::daemon
