@@ -76,8 +76,12 @@ bool GyroInput::count(std::span<const std::uint8_t> payload, std::uint32_t& miss
   const bool known = counter_known_;
   counter_ = now;
   counter_known_ = true;
-  if (!known) return true;
-  missing = step == 0 ? 0 : step - 1;
+  if (!known) {
+    counts_missing_ = true;
+    return true;
+  }
+  missing = step == 0 || !counts_missing_ ? 0 : step - 1;
+  if (step != 0) counts_missing_ = true;
   return step != 0;
 }
 

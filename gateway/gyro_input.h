@@ -24,8 +24,9 @@ class GyroInput {
   };
   Result decode(const can::Frame& frame);
 
-  /// After a silence the counter says nothing about how many frames are missing.
-  void forget_counter() { counter_known_ = false; }
+  /// After a silence the counter says nothing about how many frames are missing. The last frame
+  /// sent once more is still none that is new; of a healthy gyro that costs one frame now and then.
+  void fall_silent() { counts_missing_ = false; }
 
   /// As the newest frame that was used carried it.
   [[nodiscard]] std::uint32_t counter() const { return counter_; }
@@ -44,6 +45,7 @@ class GyroInput {
   can::Frame newest_;  ///< that carried the temperature; length 0 before the first
   std::uint32_t counter_ = 0;
   bool counter_known_ = false;
+  bool counts_missing_ = false;  ///< the counter has not been interrupted since
 };
 
 /// Is the comparison true of this value?

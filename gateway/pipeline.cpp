@@ -377,7 +377,10 @@ void Pipeline::Impl::take_pair(const fusion::AlignedPair& pair, TimePoint stamp,
   if (observer != nullptr) {
     observer->on_rate(pair.t - guard.offset(), pair.rate_dps, calibrated ? rate.rate_dps : kNone);
   }
-  send_rate(rate, calibrated, pair.t, pair.complete - pair.t, stamp, sink);
+  // A silence came before the choice of who paces: what waited for it is no rate of now.
+  const Duration age = pair.complete - pair.t;
+  if (calibrated && age > time_out(aligner.pacing_gyro())) return;
+  send_rate(rate, calibrated, pair.t, age, stamp, sink);
   send_bias_when_due(pair.t + lag_most(), stamp, sink);
 }
 
@@ -554,7 +557,7 @@ void Pipeline::Impl::do_what_is_due(TimePoint t, TimePoint stamp, FrameSink& sin
       if (heard[gyro]) pairing = false;
       heard[gyro] = false;
       health_of[gyro].fall_silent(last_heard[gyro]);
-      inputs[gyro].forget_counter();
+      inputs[gyro].fall_silent();
     } else {
       next = std::min(next, until);
     }

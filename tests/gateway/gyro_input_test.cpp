@@ -198,15 +198,18 @@ TEST(GyroInput, SurvivesACounterValueThatDoesNotExist) {
   EXPECT_LT(input.decode(counted(3)).missing, 15U);
 }
 
-// After a silence nobody can say how often the counter turned: the first frame counts nothing.
-TEST(GyroInput, ForgetsTheCounterAfterASilence) {
+// After a silence nobody can say how often the counter turned: the first frame counts nothing. But
+// a sender that hangs and comes back may repeat the frame it had sent last.
+TEST(GyroInput, CountsNothingAcrossASilenceAndStillRefusesTheLastFrame) {
   const GyroPlan plan = counted_plan(8, 256);
   GyroInput input(plan);
   EXPECT_FALSE(input.decode(counted(7)).reject);
-  input.forget_counter();
-  const GyroInput::Result again = input.decode(counted(7));
+  input.fall_silent();
+  EXPECT_EQ(input.decode(counted(7)).reject, Reject::kCounterRepeated);
+  const GyroInput::Result again = input.decode(counted(11));
   EXPECT_FALSE(again.reject);
   EXPECT_EQ(again.missing, 0U);
+  EXPECT_EQ(input.decode(counted(13)).missing, 1U);
 }
 
 // Some cars send magnitude and sign apart; 1 is negative.

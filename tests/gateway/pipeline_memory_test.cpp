@@ -115,6 +115,28 @@ TEST_F(PipelineMemory, FirstPairIsValidAndSaysRestored) {
     EXPECT_NE(rig::bits(output.frame, 56, 3), 1U) << "VB_Mode says calibrating";
 }
 
+// Samples wait for the choice of who paces. A silence in between must not make them rates of now:
+// VG_Age could not say how old they are.
+TEST_F(PipelineMemory, WhatWaitedThroughASilenceIsNotSentAsANewRate) {
+  constexpr double kBefore_dps = 5.0;
+  Pipeline pipeline = make(plan);
+  ASSERT_TRUE(pipeline.resume(state_at(1000)));
+  const auto from = std::chrono::seconds(3601);
+  rig::play(pipeline,
+            rig::merge({rig::stream_a(from, from + ms(30), rig::constant(kBefore_dps)),
+                        rig::stream_b(from, from + ms(30), rig::constant(kBefore_dps))}),
+            out);
+  for (int i = 1; i < 300; ++i)
+    pipeline.advance(TimePoint{from + ms(30 + 10 * i)}, out);
+  rig::play(pipeline, both(3604, 1), out);
+  const std::vector<rig::RateSeen> rates = rig::rates_seen(out);
+  ASSERT_GT(rates.size(), 80U);
+  for (const rig::RateSeen& rate : rates) {
+    ASSERT_TRUE(rate.valid);
+    ASSERT_NEAR(rate.rate_dps, 0.0, rig::kRateStep_dps);
+  }
+}
+
 // The age runs from the stamp of the last rate to that of the first pair.
 TEST_F(PipelineMemory, AgeIsTakenFromTheStamps) {
   Pipeline pipeline = make(plan);
