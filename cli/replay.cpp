@@ -130,7 +130,6 @@ class Replay {
  public:
   Replay(const ReplayOptions& options, const gateway::Plan& plan, OutputFile& output, BusMap buses)
       : options_(options),
-        plan_(plan),
         output_(output),
         buses_(std::move(buses)),
         pipeline_(plan),
@@ -199,7 +198,6 @@ class Replay {
   }
 
   const ReplayOptions& options_;
-  const gateway::Plan& plan_;
   OutputFile& output_;
   BusMap buses_;
   gateway::Pipeline pipeline_;
