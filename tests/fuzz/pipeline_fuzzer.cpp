@@ -1,5 +1,5 @@
 // Any frames at any times on any bus: the pipeline stays inside its memory and its numbers, keeps
-// its books, and never asks to be woken in the past.
+// its books, never asks to be woken in the past, and sends nothing that looks valid and is not.
 
 #include <algorithm>
 #include <array>
@@ -10,6 +10,7 @@
 #include <span>
 
 #include "dbc/parser.h"
+#include "gateway/model_plan.h"
 #include "gateway/pipeline.h"
 
 namespace {
@@ -27,7 +28,52 @@ BO_ 258 GYRO_B: 8 RIG
  SG_ Negative : 40|1@1+ (1,0) [0|1] "" RIG
 BO_ 259 TABLE: 4 RIG
  SG_ Rate : 0|32@1- (1E-006,0) [0|0] "deg/s" RIG
+BO_ 260 ACCEL: 6 RIG
+ SG_ X : 0|16@1- (0.001,0) [0|0] "g" RIG
+ SG_ Y : 16|16@1- (0.001,0) [0|0] "g" RIG
+ SG_ Z : 32|16@1- (0.001,0) [0|0] "g" RIG
+BO_ 261 WHEEL: 8 RIG
+ SG_ Speed : 0|64@1- (1,0) [0|100] "m/s" RIG
 SIG_VALTYPE_ 258 Rate : 1;
+SIG_VALTYPE_ 261 Speed : 2;
+)";
+
+constexpr const char* kModel = R"(format = 1
+[[effect]]
+gyro = 1
+kind = "temperature_rate_bias"
+coefficient_dps_s_k = 0.5
+[[effect]]
+gyro = 1
+kind = "g_sensitivity"
+axis = "y"
+coefficient_dps_g = 0.1
+[[effect]]
+gyro = 1
+kind = "delay"
+seconds = 0.02
+[[effect]]
+gyro = 2
+kind = "scale_factor_cubic"
+coefficient_per_dps2 = 1e-8
+[[effect]]
+gyro = 2
+kind = "vibration_rectification"
+coefficient_dps_g2 = 0.1
+[[effect]]
+gyro = 2
+kind = "angle_harmonic"
+harmonic = 4
+amplitude_dps = 0.1
+phase_rad = 1.0
+[[effect]]
+gyro = 2
+kind = "saturation"
+limit_dps = 900.0
+[[effect]]
+gyro = 2
+kind = "dead_band"
+width_dps = 0.01
 )";
 
 class Input {
@@ -72,6 +118,25 @@ gateway::GyroPlan gyro(const dbc::Message& message, can::BusIndex bus) {
           .valid = {}};
 }
 
+void add_surroundings(gateway::Plan& plan, const dbc::Database& database) {
+  const dbc::Message& accel = *database.find_message("ACCEL");
+  const dbc::Message& wheel = *database.find_message("WHEEL");
+  plan.accelerometer = gateway::AccelerometerPlan{
+      "can1",
+      "ACCEL",
+      {1, accel.id, accel.id_mask(), false},
+      {quantity(accel, "X", 1e5), quantity(accel, "Y", 1e5), quantity(accel, "Z", 1e5)}};
+  plan.speed = gateway::SpeedPlan{
+      "can0", "WHEEL", {0, wheel.id, wheel.id_mask(), false}, quantity(wheel, "Speed", 100.0)};
+}
+
+void add_model(gateway::Plan& plan) {
+  plan.model = model::parse_model(kModel, "model.toml").value();
+  std::vector<Error> errors;
+  gateway::apply_model(model::Model(*plan.model), plan, errors);
+  assert(errors.empty());
+}
+
 // Each bit of `choice` is one of the ways to configure a gateway.
 gateway::Plan plan_of(std::uint8_t choice) {
   static const dbc::Database database = dbc::parse(kBench, "fuzzer.dbc");
@@ -96,21 +161,38 @@ gateway::Plan plan_of(std::uint8_t choice) {
                                  : (choice & 2U) != 0            ? fusion::WhenMoving::kAccept
                                                                  : fusion::WhenMoving::kWait;
   plan.calibration.rest_s = 0.1;
-  plan.corrector.method = (choice & 4U) != 0 ? gateway::Method::kMean : gateway::Method::kMutual;
+  plan.corrector.method = (choice & 64U) != 0  ? gateway::Method::kOptimal
+                          : (choice & 4U) != 0 ? gateway::Method::kMean
+                                               : gateway::Method::kMutual;
   plan.corrector.window_s = 0.2;
   plan.corrector.order = (choice >> 3U) & 3U;
   plan.output.fd = (choice & 32U) != 0;
+  add_surroundings(plan, database);
+  if ((choice & 128U) != 0) add_model(plan);
   return plan;
 }
 
 class Counter final : public gateway::FrameSink {
  public:
   void put(const can::Frame& frame, TimePoint /*stamp*/) override {
+    if (frame.id == 0x610) check_rate(frame);
     rates += frame.id == 0x610 ? 1U : 0U;
     biases += frame.id == 0x611 ? 1U : 0U;
   }
   std::uint64_t rates = 0;
   std::uint64_t biases = 0;
+  std::uint64_t valid = 0;
+
+ private:
+  // A rate that says it is valid has a value, one that says it is not has none.
+  void check_rate(const can::Frame& frame) {
+    if (frame.length != 8) return;  // the FD variant keeps both elsewhere
+    const auto raw =
+        static_cast<std::uint32_t>(frame.data[2] | frame.data[3] << 8U | frame.data[4] << 16U);
+    const bool is_valid = (frame.data[6] & 0x80U) != 0;
+    assert(is_valid == (raw != 0x800000));
+    valid += is_valid ? 1U : 0U;
+  }
 };
 
 // Stamps go on by milliseconds as a rule; one kind of step goes anywhere that a log can name.
@@ -126,7 +208,7 @@ TimePoint next_stamp(Input& input, TimePoint now, std::uint8_t kind) {
 }
 
 can::Frame next_frame(Input& input, std::uint8_t kind) {
-  constexpr std::uint32_t kIds[] = {257, 258, 257, 258, 259, 0x7FF};
+  constexpr std::uint32_t kIds[] = {257, 258, 257, 258, 259, 0x7FF, 260, 261};
   can::Frame frame;
   frame.id = kIds[kind / 16 % std::size(kIds)];
   const auto payload = input.take<std::array<std::uint8_t, 8>>();
@@ -148,6 +230,7 @@ void check_books(const gateway::Status& status, const Counter& out) {
   }
   assert(status.rates_out == out.rates && status.biases_out == out.biases);
   assert(status.rates_out_valid + status.rates_out_of_range <= status.rates_out);
+  assert(out.valid == 0 || out.valid == status.rates_out_valid);
 }
 
 }  // namespace
@@ -162,7 +245,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     const auto kind = input.take<std::uint8_t>();
     now = next_stamp(input, now, kind);
     const can::Frame frame = next_frame(input, kind);
-    pipeline.receive(frame.id == 258 ? 1 : 0, frame, now, out);
+    pipeline.receive(frame.id == 258 || frame.id == 260 ? 1 : 0, frame, now, out);
     wild = wild || kind % 16 == 15;
     if (kind % 8 != 3) continue;
     pipeline.advance(now, out);

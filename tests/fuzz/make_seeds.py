@@ -1,0 +1,146 @@
+#!/usr/bin/python3
+"""Corpora for the fuzzers to begin with, from the project's own recordings and files: make_seeds.py FOLDER."""
+
+import lzma
+import re
+import struct
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+LINE = re.compile(r"\((\d+)\.(\d{6})\) (\S+) ([0-9A-F]+)#([0-9A-F]*)")
+
+
+def recording():
+    return lzma.decompress((ROOT / "examples/twin.log.xz").read_bytes()).decode("ascii").splitlines(keepends=True)
+
+
+def dbc_files():
+    return [path.read_bytes() for path in sorted((ROOT / "dbc").rglob("*.dbc"))] + [(ROOT / "examples/twin.dbc").read_bytes()]
+
+
+def candump_logs(lines):
+    # The fuzzer's first four bytes are the sizes of the pieces in which a log arrives.
+    forms = ["(0.000001) can0 123#R5\n", "(1.123456789) vcan12 12345678#1122334455667788_B T\n", "(2.5) can0 123##5AABB R\n",
+             "DROPCOUNT: 5\n", "(3.000000)   can1 20000004#0000000000000000\n", "(4.1) can0 45123#81:00:12345678#AABB\n"]
+    yield b"\x01\x07\x3f\xff" + "".join(forms).encode()
+    yield b"\xff\xff\xff\xff" + "".join(lines[:200]).encode()
+    yield b"\x00\x00\x00\x00" + "".join(lines[5000:5040] + forms).encode()
+
+
+def configurations():
+    for path in (ROOT / "examples/twin.toml", ROOT / "systemd/vgyro.toml"):
+        text = re.sub(r"^#(?=[a-z\[])", "", path.read_text(encoding="utf-8"), flags=re.MULTILINE)
+        text = re.sub(r'^dbc = ".*?"', 'dbc = "201"', text, flags=re.MULTILINE)
+        yield text.encode() + b"\0" + (ROOT / "examples/twin.dbc").read_bytes()
+    # Every key that the manual has, over frames that have everything.
+    bench = (ROOT / "tests/fuzz/pipeline_fuzzer.cpp").read_text(encoding="utf-8").split('R"(')[1].split(')"')[0]
+    yield EVERYTHING.encode() + b"\0" + bench.encode()
+
+
+EVERYTHING = """\
+[[gyro]]
+name = "a"
+bus = "can0"
+dbc = "201"
+message = "GYRO_A"
+rate = "Rate"
+unit = "deg/h"
+sign = -1
+temperature = "Temp"
+counter = "Counter"
+valid = "Status <= 9"
+[[gyro]]
+name = "b"
+bus = "can1"
+dbc = "201"
+message = "GYRO_B"
+rate = "Rate"
+sign_signal = "Negative"
+[reference]
+bus = "can0"
+dbc = "201"
+message = "TABLE"
+rate = "Rate"
+[accelerometer]
+bus = "can1"
+dbc = "201"
+message = "ACCEL"
+x = "X"
+y = "Y"
+z = "Z"
+[speed]
+bus = "can0"
+dbc = "201"
+message = "WHEEL"
+signal = "Speed"
+[calibration]
+rest_s = 0.5
+latitude_deg = -50.45
+source = "reference"
+when_moving = "accept"
+[corrector]
+method = "mutual"
+window_s = 10
+order = 3
+[output]
+bus = "can0"
+rate_id = 0x620
+bias_id = 0x621
+model_id = 0x622
+fd = true
+"""
+
+
+def models():
+    yield (ROOT / "examples/turns.toml").read_bytes()
+    # Every kind of the catalogue, from the table in its document.
+    text = (ROOT / "docs/model-file.md").read_text(encoding="utf-8")
+    parts = ["format = 1\n"]
+    for kind, parameters in re.findall(r"^\| `([a-z_]+)` \| (`[^|]*) \|", text, re.MULTILINE):
+        parts.append(f'[[effect]]\ngyro = {1 + len(parts) % 2}\nkind = "{kind}"\n')
+        for name in re.findall(r"`([a-z_0-9]+)`", parameters):
+            if name in ("x", "y", "z"):
+                continue
+            parts.append(f'{name} = "x"\n' if name == "axis" else f"{name} = {2 if name == 'harmonic' else 0.01}\n")
+    yield "".join(parts).encode()
+
+
+def saved_states():
+    text = (ROOT / "tests/fuzz/state.toml").read_bytes()
+    yield text
+    yield text.rpartition(b"\n[checksum]\n")[0]
+
+
+def frames(lines):
+    """The recording in the pipeline fuzzer's form: choice of the configuration, then for every frame its kind, the step
+    of its stamp in microseconds, and its payload."""
+    for choice in (0b000, 0b1000, 0b10, 0b100, 0b100000, 0b1000000, 0b1100000, 0b11000000, 0b11000001):
+        out, last = [bytes([choice])], None
+        for line in lines[:400]:
+            seconds, micros, _, can_id, data = LINE.match(line).groups()
+            now = int(seconds) * 1_000_000 + int(micros)
+            step = min(now - last, 65535) if last is not None else 0
+            last = now
+            payload = bytes.fromhex(data).ljust(8, b"\0")[:8]
+            if can_id == "102":
+                rate = struct.unpack(">i", payload[:4])[0] * 1e-6
+                payload = struct.pack(">f", rate) + b"\0\0\0\1"
+            out.append(struct.pack("<BH", 0x10 if can_id == "102" else 0x00, step) + payload)
+        yield b"".join(out)
+
+
+def main():
+    folder = Path(sys.argv[1])
+    lines = recording()
+    corpora = {"dbc": dbc_files(), "candump": candump_logs(lines), "config": configurations(), "model": models(),
+               "saved_state": saved_states(), "pipeline": frames(lines)}
+    for name, seeds in corpora.items():
+        to = folder / f"fuzz_{name}"
+        to.mkdir(parents=True, exist_ok=True)
+        for number, seed in enumerate(seeds):
+            (to / f"seed-{number}").write_bytes(seed)
+
+
+if __name__ == "__main__":
+    main()
