@@ -19,6 +19,7 @@ namespace {
 constexpr int kDone = 0;
 constexpr int kBadInput = 1;
 constexpr int kWrongUsage = 2;
+constexpr int kSystemTrouble = 3;
 
 struct Options {
   std::string config;
@@ -57,10 +58,13 @@ int run(const Options& options, vgyro::daemon::Log& log) {
   if (keeper && options.forget) keeper->forget();
   vgyro::daemon::GatewayLoop loop(
       std::move(*plan), [&] { return load(options, log); }, keeper ? &*keeper : nullptr, log);
-  vgyro::Expected<void> result = loop.start();
-  if (result) result = loop.run();
+  if (const vgyro::Expected<void> started = loop.start(); !started) {
+    log.error("{}", started.error().message());
+    return kBadInput;
+  }
+  const vgyro::Expected<void> result = loop.run();
   if (!result) log.error("{}", result.error().message());
-  return result ? kDone : kBadInput;
+  return result ? kDone : kSystemTrouble;
 }
 
 }  // namespace
@@ -86,7 +90,8 @@ int main(int argc, char** argv) {
   app.footer(
       "`vgyro check FILE` explains a configuration before it is trusted.\n"
       "SIGHUP reads the configuration again; one that cannot be used is refused.\n"
-      "Exit codes: 0 stopped by a signal, 1 configuration or interface unusable, 2 wrong usage.");
+      "Exit codes: 0 stopped by a signal, 1 configuration unusable, 2 wrong usage, 3 the system "
+      "failed.");
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
@@ -99,6 +104,6 @@ int main(int argc, char** argv) {
     return run(options, log);
   } catch (const std::exception& error) {
     log.error("{}", error.what());
-    return kBadInput;
+    return kSystemTrouble;
   }
 }

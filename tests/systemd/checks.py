@@ -88,7 +88,9 @@ def installs_and_waits(run):
 
 
 def starts(run):
-    """Configured and started: active when `systemctl start` returns, which is at READY."""
+    """A bad configuration fails once; with a good one it is active when `systemctl start` returns, at READY."""
+    # A configuration that cannot be used is told at once, and not tried again and again.
+    run.require_shows("bad_started", ActiveState="failed", Result="exit-code", NRestarts="0", ExecMainStatus="1")
     run.done("start")
     run.require_shows("started", ActiveState="active", SubState="running", NRestarts="0", Result="success")
 
@@ -113,7 +115,6 @@ def sandbox(run):
 def calibrates(run):
     """Recorded traffic in, a calibrated rate out."""
     run.done("play")
-    require(run.show("running")["StatusText"].startswith("running"), run.text("running"))
     return run.check_rates("play", "killed", calibrated=False)
 
 
@@ -122,7 +123,28 @@ def kill_nine(run):
     run.done("killed", "killed_play")
     run.require_shows("killed_show", ActiveState="active", NRestarts="1")
     require("took up the biases" in run.text("killed_journal"), run.text("killed_journal"))
-    return run.check_rates("killed_play", "link_play", calibrated=True)
+    return run.check_rates("killed_play", "reload_bad", calibrated=True)
+
+
+def reloads(run):
+    """SIGHUP: a bad configuration is refused with its line, a good one taken; the same process, what was learned kept."""
+    run.done("reload_bad", "reload_good", "reload_play", "reload_back")
+    pid = run.show("killed_show")["MainPID"]
+    run.require_shows("reload_bad_show", ActiveState="active", MainPID=pid)
+    run.require_shows("reload_show", ActiveState="active", MainPID=pid, NRestarts="1")
+    require(re.search(r"vgyro\.toml:\d+: .*resst_s", run.text("reload_journal")), run.text("reload_journal"))
+    require(not run.sent(0x613, "play", "reload_good"), "the other identifier before the reload")
+    require(len(run.sent(0x613, "reload_play", "reload_back")) >= 10, "not the identifier of the new configuration")
+    require(len(run.sent(0x611, "reload_show")) > 0 and not run.sent(0x613, "reload_show"), "not the first identifier again")
+    return run.check_rates("reload_play", "reload_back", calibrated=True)
+
+
+def watchdog(run):
+    """A process that is stopped: ended by the watchdog, started again with what it knew."""
+    run.done("watchdog", "watchdog_play")
+    run.require_shows("watchdog_show", ActiveState="active", NRestarts="2")
+    require("watchdog" in run.text("watchdog_journal").lower(), run.text("watchdog_journal"))
+    return run.check_rates("watchdog_play", "link_play", calibrated=True)
 
 
 def link_faults(run):
@@ -189,7 +211,7 @@ def protection(run):
     return f"{len(run.frames)} frames"
 
 
-CHECKS = (network_examples, installs_and_waits, starts, sandbox, calibrates, kill_nine, link_faults, upgrades, stops,
+CHECKS = (network_examples, installs_and_waits, starts, sandbox, calibrates, kill_nine, reloads, watchdog, link_faults, upgrades, stops,
           goes_away, protection)
 
 

@@ -52,6 +52,12 @@ step unconfigured_journal journal 0
 step unconfigured_failed systemctl list-units --failed --no-legend
 cp /run/capture.log $out/unconfigured.log
 
+# Badly configured.
+echo '[[gyro]]' >/etc/vgyro/vgyro.toml
+step bad_start systemctl start vgyrod
+sleep 3
+step bad_started show
+
 # Configured.
 cp $here/vgyro.toml /etc/vgyro/vgyro.toml
 cp $here/twin.dbc /usr/local/share/twin.dbc
@@ -63,7 +69,6 @@ step namespaces readlink /proc/1/ns/{mnt,user,ipc} /proc/$main/ns/{mnt,user,ipc}
 step mounts grep -E ' / | /etc | /tmp | /dev ' /proc/$main/mountinfo
 step security systemd-analyze security vgyrod --no-pager
 step play play_until_running calibration
-step running show
 
 # Killed without warning, and back with what it knew.
 since=$(date +%s)
@@ -72,6 +77,31 @@ step killed within 20 other_pid $main
 step killed_show show
 step killed_play play_until_running rest
 step killed_journal journal $since
+main=$(pid)
+
+# Another configuration: a bad one, one with another identifier, and the first again.
+since=$(date +%s)
+sed 's/^rest_s/resst_s/' $here/vgyro.toml >/etc/vgyro/vgyro.toml
+step reload_bad systemctl reload vgyrod
+sleep 1
+step reload_bad_show show
+tac $here/vgyro.toml | sed '0,/^bus = /s//bias_id = 0x613\n&/' | tac >/etc/vgyro/vgyro.toml
+step reload_good systemctl reload vgyrod
+sleep 1
+step reload_play play_until_running rest
+cp $here/vgyro.toml /etc/vgyro/vgyro.toml
+step reload_back systemctl reload vgyrod
+sleep 1
+step reload_show show
+step reload_journal journal $since
+
+# Stopped by somebody: the watchdog ends it.
+since=$(date +%s)
+kill -STOP $main
+step watchdog within 40 other_pid $main
+step watchdog_show show
+step watchdog_play play_until_running rest
+step watchdog_journal journal $since
 main=$(pid)
 
 # The link goes and comes.
