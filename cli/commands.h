@@ -91,6 +91,14 @@ struct SimulateOptions {
 };
 int run_simulate(const SimulateOptions& options);
 
+struct StatusOptions {
+  bool json = false;
+  bool watch = false;
+  double interval_s = 1.0;  ///< of `watch`
+};
+int run_status(const StatusOptions& options);
+int run_recalibrate();
+
 /// "error: where: what; remedy" on stderr; returns kBadInput.
 int report(const Error& error);
 int report(const std::vector<Error>& errors);

@@ -18,6 +18,7 @@ struct Options {
   CompareOptions compare;
   GapOptions gap;
   SimulateOptions simulate;
+  StatusOptions status;
   std::string method;
 };
 
@@ -169,6 +170,26 @@ CLI::App* add_gap(CLI::App& app, GapOptions& options) {
   return command;
 }
 
+CLI::App* add_status(CLI::App& app, StatusOptions& options) {
+  CLI::App* command =
+      app.add_subcommand("status", "Show what the running gateway knows: state, gyros, buses");
+  CLI::Option* json = command->add_flag("--json", options.json, "the same as JSON");
+  command->add_flag("-w,--watch", options.watch, "a live view; into a pipe: one line each time")
+      ->excludes(json);
+  command->add_option("--interval", options.interval_s, "seconds between two looks with --watch")
+      ->check(CLI::Range(0.1, 3600.0))
+      ->capture_default_str();
+  command->footer("Asks vgyrod over D-Bus. Every field is explained in docs/service.md.");
+  return command;
+}
+
+CLI::App* add_recalibrate(CLI::App& app) {
+  CLI::App* command = app.add_subcommand(
+      "recalibrate", "Let the running gateway forget its biases and calibrate anew");
+  command->footer("Only for root. Platform at rest, unless a reference is configured.");
+  return command;
+}
+
 // CLI11 would only say that a subcommand is missing.
 std::optional<vgyro::Error> unknown_command(const CLI::App& app, int argc, char** argv) {
   if (argc < 2 || argv[1][0] == '-') return std::nullopt;
@@ -197,6 +218,8 @@ int main(int argc, char** argv) {
   CLI::App* compare = add_compare(app, options.compare);
   CLI::App* gap = add_gap(app, options.gap);
   CLI::App* simulate = add_simulate(app, options.simulate);
+  CLI::App* status = add_status(app, options.status);
+  CLI::App* recalibrate = add_recalibrate(app);
   if (const auto unknown = unknown_command(app, argc, argv)) {
     report(*unknown);
     return kWrongUsage;
@@ -216,6 +239,8 @@ int main(int argc, char** argv) {
   if (compare->parsed()) return run_compare(options.compare);
   if (gap->parsed()) return run_gap(options.gap);
   if (simulate->parsed()) return run_simulate(options.simulate);
+  if (status->parsed()) return run_status(options.status);
+  if (recalibrate->parsed()) return run_recalibrate();
   // Frames are the main result; they give way only to a summary that wants the same place.
   const bool output_given = replay->count("--output") > 0;
   if (!output_given && options.replay.json != "-") options.replay.output = "-";

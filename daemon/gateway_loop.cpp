@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <cmath>
 #include <csignal>
 #include <ctime>
+#include <limits>
 #include <sys/signalfd.h>
 #include <unistd.h>
 #include <utility>
@@ -57,9 +59,11 @@ GatewayLoop::Setup::Setup(gateway::Plan the_plan, Log& log)
   }
 }
 
-GatewayLoop::GatewayLoop(gateway::Plan plan, Loader loader, StateKeeper* keeper, Log& log)
+GatewayLoop::GatewayLoop(gateway::Plan plan, Loader loader, StateKeeper* keeper,
+                         MetricsFile* metrics, Log& log)
     : loader_(std::move(loader)),
       keeper_(keeper),
+      metrics_(metrics),
       log_(log),
       setup_(std::make_unique<Setup>(std::move(plan), log)) {}
 
@@ -70,15 +74,15 @@ GatewayLoop::~GatewayLoop() {
 Expected<void> GatewayLoop::start() {
   epoll_fd_ = ::epoll_create1(EPOLL_CLOEXEC);
   if (epoll_fd_ < 0) return fail("epoll", system_reason(errno));
-  if (const Expected<void> opened = open_buses(*setup_); !opened) return opened;
-  if (const Expected<void> polled = poll_buses(); !polled) return polled;
+  if (Expected<void> opened = open_buses(*setup_); !opened) return opened;
+  if (Expected<void> polled = poll_buses(); !polled) return polled;
   take_up_state();
   return start_events();
 }
 
 Expected<void> GatewayLoop::open_buses(Setup& setup) {
   for (Bus& bus : setup.buses) {
-    if (const Expected<void> opened = bus.open(); !opened) return opened;
+    if (Expected<void> opened = bus.open(); !opened) return opened;
   }
   return check_output(setup);
 }
@@ -151,8 +155,14 @@ Expected<void> GatewayLoop::start_events() {
 
 Expected<void> GatewayLoop::run() {
   std::array<epoll_event, 16> ready{};
-  if (const Expected<void> armed = serve_events(false); !armed) return armed;
   read_clocks();
+  started_ = steady_now_;
+  control_.emplace(events_.get(),
+                   Control::Gateway{.snapshot = [this]() -> const Snapshot& { return snapshot(); },
+                                    .recalibrate = [this] { recalibration_wanted_ = true; },
+                                    .save_state = [this] { return save_state(); }},
+                   log_);
+  if (Expected<void> armed = serve_events(false); !armed) return armed;
   notify_ready(status_line());
   while (!stopping_) {
     const int count =
@@ -160,9 +170,8 @@ Expected<void> GatewayLoop::run() {
     if (count < 0 && errno != EINTR) return fail("epoll", system_reason(errno));
     const std::span<const epoll_event> events{ready.data(),
                                               static_cast<std::size_t>(std::max(count, 0))};
-    if (const Expected<void> done = cycle(events); !done) return done;
-    if (!std::exchange(reload_wanted_, false)) continue;
-    if (const Expected<void> done = reload(); !done) return done;
+    if (Expected<void> done = cycle(events); !done) return done;
+    if (Expected<void> done = do_what_was_asked(); !done) return done;
   }
   notify_stopping();
   if (keeper_ != nullptr) keeper_->finish(setup_->pipeline.memory());
@@ -294,6 +303,8 @@ void GatewayLoop::second_passed() {
     bus.second_passed();
   reopen_dead_buses();
   notify_status(status_line());
+  control_->second_passed();
+  if (metrics_ != nullptr && metrics_->second_passed()) metrics_->write(snapshot());
   if (keeper_ != nullptr && keeper_->second_passed()) keeper_->keep(setup_->pipeline.memory());
 }
 
@@ -317,12 +328,59 @@ void GatewayLoop::reopen_dead_buses() {
   }
 }
 
+// Not from within the dispatching: the buses are replaced.
+Expected<void> GatewayLoop::do_what_was_asked() {
+  if (std::exchange(reload_wanted_, false)) {
+    if (Expected<void> done = reload(); !done) return done;
+  }
+  if (std::exchange(recalibration_wanted_, false)) recalibrate();
+  return {};
+}
+
+void GatewayLoop::recalibrate() {
+  log_.tell(Severity::kNotice, {.cause = "recalibrate"}, "asked to calibrate anew");
+  const Expected<void> replaced = replace_setup(setup_->plan, false);
+  if (!replaced) {
+    log_.error("calibrating anew: {}", replaced.error().message());
+  } else if (keeper_ != nullptr) {
+    keeper_->forget();
+  }
+}
+
+Expected<void> GatewayLoop::save_state() {
+  if (keeper_ == nullptr) {
+    return fail({}, "the gateway keeps no state",
+                "start it with --state FILE, or with StateDirectory= in its unit");
+  }
+  const std::optional<gateway::SavedState> memory = setup_->pipeline.memory();
+  if (!memory) return fail({}, "nothing was learned yet that is worth keeping");
+  keeper_->keep(memory);
+  return {};
+}
+
+// Once in a cycle: a request for all properties asks for each of them.
+const Snapshot& GatewayLoop::snapshot() {
+  if (std::exchange(snapshot_at_, steady_now_) == steady_now_ && snapshot_.plan != nullptr)
+    return snapshot_;
+  snapshot_.plan = &setup_->plan;
+  snapshot_.status = setup_->pipeline.status();
+  snapshot_.traffic = traffic();
+  snapshot_.uptime_s = to_seconds(steady_now_ - started_);
+  snapshot_.config_refused = reload_refused_;
+  snapshot_.bias_sigma_dps.fill(std::numeric_limits<double>::quiet_NaN());
+  if (const std::optional<gateway::SavedState> memory = setup_->pipeline.memory()) {
+    const std::array<double, 3>& covariance = memory->drift.bias_covariance;
+    snapshot_.bias_sigma_dps = {std::sqrt(covariance[0]), std::sqrt(covariance[2])};
+  }
+  return snapshot_;
+}
+
 // The gateway goes on with the old configuration until the new one is known to work.
 Expected<void> GatewayLoop::reload() {
   notify_reloading();
   log_.info("reading the configuration again");
   std::optional<gateway::Plan> plan = loader_();
-  Expected<void> replaced = plan ? replace_setup(std::move(*plan)) : fail({}, {});
+  Expected<void> replaced = plan ? replace_setup(std::move(*plan), true) : fail({}, {});
   reload_refused_ = !replaced;
   if (!replaced) {
     if (!replaced.error().what.empty()) log_.error("{}", replaced.error().message());
@@ -334,9 +392,9 @@ Expected<void> GatewayLoop::reload() {
   return {};
 }
 
-Expected<void> GatewayLoop::replace_setup(gateway::Plan plan) {
+Expected<void> GatewayLoop::replace_setup(gateway::Plan plan, bool keep) {
   auto next = std::make_unique<Setup>(std::move(plan), log_);
-  if (const Expected<void> opened = open_buses(*next); !opened) return opened;
+  if (Expected<void> opened = open_buses(*next); !opened) return opened;
   // The old pipeline takes what has come so far, also through the sockets of the new one.
   read_clocks();
   for (Bus& bus : setup_->buses)
@@ -346,15 +404,17 @@ Expected<void> GatewayLoop::replace_setup(gateway::Plan plan) {
     bus.discard();
   next->reporter.start_from(queue_.counts());
   next->pipeline.count_on_from(setup_->pipeline);
+  Expected<void> resumed = fail({}, "nothing was learned yet");
+  if (!keep) resumed = fail({}, "as asked");
   const std::optional<gateway::SavedState> memory = setup_->pipeline.memory();
-  const Expected<void> resumed =
-      memory ? next->pipeline.resume(*memory) : Expected<void>(fail({}, "nothing was learned yet"));
+  if (keep && memory) resumed = next->pipeline.resume(*memory);
   setup_ = std::move(next);
+  snapshot_.plan = nullptr;
   polls_writable_ = false;
   queue_.on_writable();
-  log_.notice("the new configuration is in use{}",
+  log_.notice("{}{}", keep ? "the new configuration is in use" : "begun anew",
               resumed ? std::string(", with what was learned")
-                      : "; calibrating anew: " + resumed.error().message());
+                      : "; calibrating: " + resumed.error().message());
   return poll_buses();
 }
 
@@ -363,7 +423,6 @@ int GatewayLoop::on_stop(sd_event_source*, const signalfd_siginfo*, void* self) 
   return 0;
 }
 
-// Not from within the dispatching: the buses are replaced.
 int GatewayLoop::on_hangup(sd_event_source*, const signalfd_siginfo*, void* self) {
   static_cast<GatewayLoop*>(self)->reload_wanted_ = true;
   return 0;

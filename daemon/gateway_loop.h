@@ -17,10 +17,13 @@
 #include "base/error.h"
 #include "can/transmit.h"
 #include "daemon/bus.h"
+#include "daemon/control.h"
 #include "daemon/host_time.h"
 #include "daemon/log.h"
+#include "daemon/metrics.h"
 #include "daemon/reporter.h"
 #include "daemon/service.h"
+#include "daemon/snapshot.h"
 #include "daemon/state_keeper.h"
 #include "gateway/pipeline.h"
 #include "gateway/plan.h"
@@ -32,8 +35,9 @@ class GatewayLoop final : private gateway::FrameSink {
   /// Reads the configuration again; nothing, when it cannot be used, and then it has said why.
   using Loader = std::function<std::optional<gateway::Plan>()>;
 
-  /// `keeper` is null where nothing is kept across a restart.
-  GatewayLoop(gateway::Plan plan, Loader loader, StateKeeper* keeper, Log& log);
+  /// `keeper` is null where nothing is kept across a restart, `metrics` where nobody wants them.
+  GatewayLoop(gateway::Plan plan, Loader loader, StateKeeper* keeper, MetricsFile* metrics,
+              Log& log);
   GatewayLoop(const GatewayLoop&) = delete;
   GatewayLoop& operator=(const GatewayLoop&) = delete;
   ~GatewayLoop() override;
@@ -76,7 +80,12 @@ class GatewayLoop final : private gateway::FrameSink {
   void second_passed();
   void reopen_dead_buses();
   Expected<void> reload();
-  Expected<void> replace_setup(gateway::Plan plan);
+  Expected<void> do_what_was_asked();
+  void recalibrate();
+  Expected<void> save_state();
+  /// `keep`: goes on with what was learned, where the gyros are the same.
+  Expected<void> replace_setup(gateway::Plan plan, bool keep);
+  const Snapshot& snapshot();
   [[nodiscard]] int timeout_ms() const;
   [[nodiscard]] Traffic traffic() const;
   [[nodiscard]] bool all_drained() const;
@@ -89,15 +98,19 @@ class GatewayLoop final : private gateway::FrameSink {
 
   Loader loader_;
   StateKeeper* keeper_;
+  MetricsFile* metrics_;
   Log& log_;
   std::unique_ptr<Setup> setup_;
   can::TransmitQueue queue_;
   EventPointer events_{nullptr, &sd_event_unref};
+  std::optional<Control> control_;
+  Snapshot snapshot_;
   int epoll_fd_ = -1;
   bool polls_writable_ = false;
   bool has_spoken_ = false;  ///< in this cycle; no state changes without an output frame
   bool stopping_ = false;
   bool reload_wanted_ = false;
+  bool recalibration_wanted_ = false;
   bool reload_refused_ = false;
   std::uint64_t watchdog_half_usec_ = 0;
   LifeSign life_;
@@ -108,6 +121,8 @@ class GatewayLoop final : private gateway::FrameSink {
   TimePoint now_;           ///< the host's clock when the present cycle began
   TimePoint pipeline_now_;  ///< the same without its backward steps
   TimePoint steady_now_;    ///< the same on a clock that nobody sets
+  TimePoint started_;       ///< likewise
+  TimePoint snapshot_at_;
 };
 
 }  // namespace vgyro::daemon

@@ -11,6 +11,7 @@
 
 #include "daemon/gateway_loop.h"
 #include "daemon/log.h"
+#include "daemon/metrics.h"
 #include "daemon/state_keeper.h"
 #include "gateway/config.h"
 
@@ -27,6 +28,7 @@ struct Options {
   std::optional<std::string> model;
   std::string state;
   bool forget = false;
+  std::string metrics;
 };
 
 // systemd names the directory that it made for the service; of several the first.
@@ -56,8 +58,11 @@ int run(const Options& options, vgyro::daemon::Log& log) {
   std::optional<vgyro::daemon::StateKeeper> keeper;
   if (!options.state.empty()) keeper.emplace(options.state, log);
   if (keeper && options.forget) keeper->forget();
+  std::optional<vgyro::daemon::MetricsFile> metrics;
+  if (!options.metrics.empty()) metrics.emplace(options.metrics, log);
   vgyro::daemon::GatewayLoop loop(
-      std::move(*plan), [&] { return load(options, log); }, keeper ? &*keeper : nullptr, log);
+      std::move(*plan), [&] { return load(options, log); }, keeper ? &*keeper : nullptr,
+      metrics ? &*metrics : nullptr, log);
   if (const vgyro::Expected<void> started = loop.start(); !started) {
     log.error("{}", started.error().message());
     return kBadInput;
@@ -74,7 +79,12 @@ int main(int argc, char** argv) {
       "vgyrod: a gateway that reads two gyros from CAN and sends one better gyro.\n"
       "Runs in the foreground until SIGTERM; as a service: systemctl start vgyrod.",
       "vgyrod");
-  Options options{.config = {}, .method = {}, .model = {}, .state = default_state()};
+  Options options{.config = {},
+                  .method = {},
+                  .model = {},
+                  .state = default_state(),
+                  .forget = false,
+                  .metrics = {}};
   app.add_option("--config", options.config, "The gateway's configuration (vgyro.toml)")
       ->required()
       ->type_name("FILE");
@@ -86,6 +96,9 @@ int main(int argc, char** argv) {
                  "keeps the biases across a restart; default: state.toml in $STATE_DIRECTORY")
       ->type_name("FILE");
   app.add_flag("--forget", options.forget, "removes what --state has kept: calibrates anew");
+  app.add_option("--metrics", options.metrics,
+                 "writes Prometheus metrics into this file every 5 seconds")
+      ->type_name("FILE");
   app.set_version_flag("--version", "vgyrod " VGYRO_VERSION);
   app.footer(
       "`vgyro check FILE` explains a configuration before it is trusted.\n"

@@ -1,16 +1,13 @@
 #include "daemon/state_keeper.h"
 
-#include <csignal>
 #include <utility>
 
 namespace vgyro::daemon {
 
 StateKeeper::StateKeeper(std::string path, Log& log)
-    : file_(std::move(path), gateway::kSavedStateBytesMax), log_(log) {}
-
-StateKeeper::~StateKeeper() {
-  stop_thread();
-}
+    : file_(std::move(path), gateway::kSavedStateBytesMax),
+      log_(log),
+      writer_([this](const std::string& text) { return file_.write(text); }) {}
 
 std::optional<gateway::SavedState> StateKeeper::load(const gateway::Plan& plan) {
   file_.clean_up();
@@ -52,11 +49,7 @@ void StateKeeper::forget() {
 }
 
 bool StateKeeper::second_passed() {
-  std::optional<Expected<void>> result;
-  {
-    const std::scoped_lock lock(mutex_);
-    result = std::exchange(result_, std::nullopt);
-  }
+  const std::optional<Expected<void>> result = writer_.take_result();
   if (result) tell(*result);
   if (seconds_left_ > 0) --seconds_left_;
   return seconds_left_ == 0;
@@ -73,18 +66,13 @@ void StateKeeper::keep(const std::optional<gateway::SavedState>& state) {
   }
   latest_ = text;
   seconds_left_ = kPeriod_s;
-  if (!thread_.joinable()) start_thread();
-  {
-    const std::scoped_lock lock(mutex_);
-    to_write_ = std::move(text);
-  }
-  wake_.notify_one();
+  writer_.put(std::move(text));
 }
 
 void StateKeeper::finish(const std::optional<gateway::SavedState>& state) {
   keep(state);
-  stop_thread();
-  if (result_) tell(*result_);
+  writer_.finish();
+  if (const std::optional<Expected<void>> result = writer_.take_result()) tell(*result);
 }
 
 void StateKeeper::tell(const Expected<void>& written) {
@@ -92,39 +80,6 @@ void StateKeeper::tell(const Expected<void>& written) {
   if (!written) latest_.clear();
   if (!written && !failed_before) log_.warning("{}", written.error().message());
   if (written && failed_before) log_.notice("{}: written again", file_.path());
-}
-
-// The signals are the event loop's.
-void StateKeeper::start_thread() {
-  sigset_t all;
-  sigset_t before;
-  ::sigfillset(&all);
-  ::pthread_sigmask(SIG_BLOCK, &all, &before);
-  thread_ = std::thread([this] { write_what_comes(); });
-  ::pthread_sigmask(SIG_SETMASK, &before, nullptr);
-}
-
-void StateKeeper::stop_thread() {
-  if (!thread_.joinable()) return;
-  {
-    const std::scoped_lock lock(mutex_);
-    stopping_ = true;
-  }
-  wake_.notify_one();
-  thread_.join();
-}
-
-void StateKeeper::write_what_comes() {
-  std::unique_lock lock(mutex_);
-  for (;;) {
-    wake_.wait(lock, [this] { return stopping_ || to_write_; });
-    if (!to_write_) return;
-    const std::string text = *std::exchange(to_write_, std::nullopt);
-    lock.unlock();
-    const Expected<void> written = file_.write(text);
-    lock.lock();
-    result_ = written;
-  }
 }
 
 }  // namespace vgyro::daemon

@@ -4,13 +4,11 @@
 // something new was learned, at most once a minute, and at the end. A disk may take its time, so a
 // thread of its own writes; only finish() waits. Trouble with the file is told, and never fatal.
 
-#include <condition_variable>
-#include <mutex>
 #include <optional>
 #include <string>
-#include <thread>
 
 #include "base/error.h"
+#include "daemon/background_writer.h"
 #include "daemon/log.h"
 #include "daemon/state_file.h"
 #include "gateway/plan.h"
@@ -23,9 +21,6 @@ class StateKeeper {
   static constexpr int kPeriod_s = 60;
 
   StateKeeper(std::string path, Log& log);
-  StateKeeper(const StateKeeper&) = delete;
-  StateKeeper& operator=(const StateKeeper&) = delete;
-  ~StateKeeper();
 
   /// What an earlier run left, when it is whole and of these gyros. What is not is set aside.
   std::optional<gateway::SavedState> load(const gateway::Plan& plan);
@@ -42,9 +37,6 @@ class StateKeeper {
 
  private:
   void refuse(Error error);
-  void start_thread();
-  void stop_thread();
-  void write_what_comes();
   void tell(const Expected<void>& written);
 
   StateFile file_;
@@ -52,13 +44,7 @@ class StateKeeper {
   int seconds_left_ = 0;
   std::string latest_;   ///< given to the thread, or written
   bool failed_ = false;  ///< and told
-
-  std::thread thread_;
-  std::mutex mutex_;  ///< guards what follows
-  std::condition_variable wake_;
-  bool stopping_ = false;
-  std::optional<std::string> to_write_;
-  std::optional<Expected<void>> result_;  ///< of the last write, until it is told
+  BackgroundWriter writer_;
 };
 
 }  // namespace vgyro::daemon

@@ -15,16 +15,6 @@
 
 namespace vgyro::gateway {
 
-/// VG_Quality on the wire.
-enum class Quality : std::uint8_t {
-  kUnusable = 0,
-  kOneGyro = 4,
-  kDisagree = 6,              ///< both in use, but they contradict each other
-  kCalibrationUncertain = 8,  ///< the platform moved while it should have rested
-  kRestored = 12,             ///< biases of an earlier run, not confirmed yet
-  kTwoGyros = 15
-};
-
 /// VB_Mode on the wire.
 enum class BiasMode : std::uint8_t {
   kNone = 0,

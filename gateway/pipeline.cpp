@@ -167,6 +167,8 @@ Pipeline::Impl::Impl(const Plan& the_plan, std::unique_ptr<fusion::Corrector> th
       encoder(plan.output) {
   calibrated = !corrector->needs_calibration();
   status.rate_dps = kNone;
+  status.sigma_dps = kNone;
+  status.bias_sigma_dps = kNone;
   for (GyroStatus& gyro : status.gyros) {
     gyro.last_rate_dps = kNone;
     gyro.bias_dps = kNone;
@@ -612,6 +614,8 @@ void Pipeline::Impl::send_rate(const fusion::VirtualRate& rate, bool valid, Time
   if (carried) ++status.rates_out_valid;
   if (valid && !carried) ++status.rates_out_of_range;
   status.rate_dps = carried ? rate.rate_dps : kNone;
+  status.sigma_dps = carried ? rate.sigma_dps : kNone;
+  status.quality = carried ? quality() : Quality::kUnusable;
   sink.put(encoder.rate({.valid = carried,
                          .rate_dps = rate.rate_dps,
                          .sigma_dps = rate.sigma_dps,
@@ -663,6 +667,7 @@ const Status& Pipeline::Impl::refreshed_status() {
     status.gyros[gyro].waits_for = surroundings.missing(gyro, needs[gyro]);
     status.gyros[gyro].unpaired = aligner.counts().unpaired[gyro];
   }
+  status.bias_sigma_dps = drift.bias_sigma_dps;
   status.disagree = pairing && condition.disagree;
   status.disagreements = condition.disagreements;
   status.stops = condition.stops;

@@ -20,7 +20,19 @@ enum class State : std::uint8_t {
   kDegraded = 3,     ///< one gyro in use, the other timed out or was set aside
   kLost = 4          ///< calibrated, but no gyro is in use
 };
+inline constexpr int kStateCount = 5;
 std::string_view to_string(State state);
+
+/// VG_Quality on the wire.
+enum class Quality : std::uint8_t {
+  kUnusable = 0,
+  kOneGyro = 4,
+  kDisagree = 6,              ///< both in use, but they contradict each other
+  kCalibrationUncertain = 8,  ///< the platform moved while it should have rested
+  kRestored = 12,             ///< biases of an earlier run, not confirmed yet
+  kTwoGyros = 15
+};
+std::string_view to_string(Quality quality);
 
 /// Why a frame of a configured identifier was not used.
 enum class Reject : std::uint8_t {
@@ -50,6 +62,7 @@ enum class Restored : std::uint8_t {
   kTakenUp,   ///< in use instead of a calibration, VG_Quality says `restored`
   kConfirmed  ///< in use, and a stop has been learned from since
 };
+std::string_view to_string(Restored restored);
 
 /// What can be wrong with a gyro. What is neither silence nor a dead band makes it "suspect" in
 /// VB_Health; a noisy gyro stays in use.
@@ -105,6 +118,9 @@ struct Status {
   std::uint64_t windows = 0;               ///< corrector windows completed
   std::uint64_t windows_skipped = 0;       ///< too few pairs in the window: drift held
   double rate_dps = 0.0;                   ///< last virtual rate; NaN when invalid
+  double sigma_dps = 0.0;                  ///< its σ; NaN when invalid or not stated
+  Quality quality = Quality::kUnusable;    ///< of it
+  double bias_sigma_dps = 0.0;             ///< of what is taken off it; NaN when not stated
   double calibrated_s = 0.0;               ///< calibration progress
   std::uint64_t calibration_restarts = 0;  ///< the platform moved, or the stream had holes
   bool moved_in_calibration = false;       ///< and that was accepted

@@ -27,7 +27,7 @@ ARROWS = {
 # What, as a pattern of an included header → the files that may include it.
 SYSTEM_HEADERS = (
     (r"linux/can.*|sys/socket\.h|net/if\.h", r"can/socket\.(h|cpp)"),
-    (r"systemd/.*", r"daemon/.*"),
+    (r"systemd/.*", r"daemon/.*|cli/gateway_client\.cpp"),
     (r"Eigen/.*|unsupported/Eigen/.*", r"(fusion|gateway|model|analysis|gap)/.*"),
     (r"iostream|istream|ostream|fstream|sstream|iomanip", r"(base|daemon|cli)/.*"),
 )
@@ -97,6 +97,7 @@ PLANTED = (  # file, text, is it a breach?
     ("daemon/a.cpp", '#include "fusion/mutual.h"', True),
     ("cli/a.cpp", '#include "daemon/loop.h"', True),
     ("can/b.cpp", "#include <linux/can/raw.h>", True),
+    ("cli/gateway_client.cpp", "#include <systemd/sd-bus.h>", False),
     ("gateway/c.cpp", "#include <sys/socket.h>", True),
     ("can/c.cpp", "#include <net/if.h>", True),
     ("cli/b.cpp", "#include <systemd/sd-event.h>", True),

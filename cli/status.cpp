@@ -1,0 +1,144 @@
+// vgyro status, vgyro recalibrate: what the running gateway says and does.
+
+#include <cerrno>
+#include <csignal>
+#include <cstdio>
+#include <cstdlib>
+#include <ctime>
+#include <deque>
+#include <limits>
+#include <string>
+#include <unistd.h>
+#include <vector>
+
+#include <fmt/core.h>
+
+#include "cli/commands.h"
+#include "cli/gateway_client.h"
+#include "cli/status_view.h"
+
+namespace vgyro::cli {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr std::size_t kRatesShown = 60;
+
+volatile std::sig_atomic_t interrupted = 0;
+
+void on_interrupt(int) {
+  interrupted = 1;
+}
+
+void sleep_s(double seconds) {
+  timespec left{
+      static_cast<time_t>(seconds),
+      static_cast<long>((seconds - static_cast<double>(static_cast<time_t>(seconds))) * 1e9)};
+  while (interrupted == 0 && ::nanosleep(&left, &left) != 0 && errno == EINTR) {
+  }
+}
+
+std::string time_of_day() {
+  const std::time_t now = std::time(nullptr);
+  std::tm parts{};
+  ::localtime_r(&now, &parts);
+  return fmt::format("{:02}:{:02}:{:02}", parts.tm_hour, parts.tm_min, parts.tm_sec);
+}
+
+bool wants_colour() {
+  return ::isatty(STDOUT_FILENO) == 1 &&
+         std::getenv("NO_COLOR") == nullptr;  // NOLINT(concurrency-mt-unsafe): one thread
+}
+
+Expected<Json> ask() {
+  Expected<GatewayClient> client = GatewayClient::connect();
+  if (!client) return tl::unexpected(client.error());
+  return client->status();
+}
+
+/// A live view: the screen is drawn anew, or, into a pipe, a line is added.
+class Watch {
+ public:
+  Watch() : screen_(::isatty(STDOUT_FILENO) == 1) {
+    if (screen_) fmt::print("\x1b[?25l\x1b[2J");  // no cursor, a clean screen
+  }
+  Watch(const Watch&) = delete;
+  Watch& operator=(const Watch&) = delete;
+  ~Watch() {
+    if (screen_) fmt::print("\x1b[?25h");
+    std::fflush(stdout);
+  }
+
+  void show(const Expected<Json>& status) {
+    if (status) note_rate(*status);
+    if (screen_) {
+      draw(status ? status_table(*status, {wants_colour(), {rates_.begin(), rates_.end()}})
+                  : status.error().message() + "\n");
+    } else {
+      fmt::print("{} {}\n", time_of_day(),
+                 status ? status_line(*status) : status.error().message());
+    }
+    std::fflush(stdout);
+  }
+
+ private:
+  void note_rate(const Json& status) {
+    const auto rate = status.find("rate_dps");
+    const bool known = rate != status.end() && rate->is_number();
+    rates_.push_back(known ? rate->get<double>() : std::numeric_limits<double>::quiet_NaN());
+    if (rates_.size() > kRatesShown) rates_.pop_front();
+  }
+
+  // Line by line over the old picture, so that nothing flickers.
+  static void draw(const std::string& text) {
+    std::string picture = "\x1b[H";
+    for (const char c : text) {
+      if (c == '\n') picture += "\x1b[K";
+      picture += c;
+    }
+    fmt::print("{}\x1b[J\x1b[K\n{}, Ctrl-C ends", picture, time_of_day());
+    fmt::print("\x1b[K");
+  }
+
+  bool screen_;
+  std::deque<double> rates_;
+};
+
+int watch(double interval_s) {
+  struct sigaction action {};
+  action.sa_handler = &on_interrupt;
+  ::sigaction(SIGINT, &action, nullptr);
+  ::sigaction(SIGTERM, &action, nullptr);
+  Watch view;
+  while (interrupted == 0) {
+    view.show(ask());
+    if (std::ferror(stdout) != 0) return kDone;  // nobody reads any more
+    sleep_s(interval_s);
+  }
+  return kDone;
+}
+
+}  // namespace
+
+int run_status(const StatusOptions& options) {
+  if (options.watch) return watch(options.interval_s);
+  const Expected<Json> status = ask();
+  if (!status) return report(status.error());
+  if (options.json) {
+    fmt::print("{}\n", status->dump(2));
+  } else {
+    fmt::print("{}", status_table(*status, {wants_colour(), {}}));
+  }
+  return kDone;
+}
+
+int run_recalibrate() {
+  Expected<GatewayClient> client = GatewayClient::connect();
+  if (!client) return report(client.error());
+  if (const Expected<void> done = client->recalibrate(); !done) return report(done.error());
+  fmt::print(
+      "the gateway has forgotten its biases and calibrates; `vgyro status` shows how far it is\n");
+  return kDone;
+}
+
+}  // namespace vgyro::cli

@@ -1,0 +1,268 @@
+#include "cli/status_view.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <iterator>
+#include <limits>
+#include <string_view>
+
+#include <fmt/format.h>
+
+namespace vgyro::cli {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr double kDegPerHour = 3600.0;
+constexpr const char* kNothing = "–";
+
+Json at(const Json& object, const char* key) {
+  return object.is_object() && object.contains(key) ? object.at(key) : Json();
+}
+std::string text_of(const Json& object, const char* key) {
+  const Json value = at(object, key);
+  return value.is_string() ? value.get<std::string>() : std::string(kNothing);
+}
+std::uint64_t count_of(const Json& object, const char* key) {
+  const Json value = at(object, key);
+  return value.is_number_unsigned() ? value.get<std::uint64_t>() : 0;
+}
+bool flag_of(const Json& object, const char* key) {
+  const Json value = at(object, key);
+  return value.is_boolean() && value.get<bool>();
+}
+double number_of(const Json& object, const char* key) {
+  const Json value = at(object, key);
+  return value.is_number() ? value.get<double>() : std::numeric_limits<double>::quiet_NaN();
+}
+
+std::string number_text(double value, const char* form) {
+  return std::isfinite(value) ? fmt::format(fmt::runtime(form), value) : std::string(kNothing);
+}
+
+std::string with_sigma(double value, double sigma, const char* form, const char* sigma_form) {
+  std::string text = number_text(value, form);
+  if (std::isfinite(value) && std::isfinite(sigma)) text += " ± " + number_text(sigma, sigma_form);
+  return text;
+}
+
+std::string duration_text(double seconds) {
+  if (!std::isfinite(seconds)) return kNothing;
+  const auto s = static_cast<std::uint64_t>(std::max(seconds, 0.0));
+  if (s >= 86'400) return fmt::format("{} d {} h", s / 86'400, s % 86'400 / 3600);
+  if (s >= 3600) return fmt::format("{} h {} min", s / 3600, s % 3600 / 60);
+  if (s >= 60) return fmt::format("{} min {} s", s / 60, s % 60);
+  return fmt::format("{} s", s);
+}
+
+/// "stale 3, overflow 1" of the counters above 0.
+std::string counts_text(const Json& counts) {
+  std::string text;
+  if (!counts.is_object()) return kNothing;
+  for (const auto& [name, count] : counts.items()) {
+    if (!count.is_number_unsigned() || count.get<std::uint64_t>() == 0) continue;
+    text += fmt::format("{}{} {}", text.empty() ? "" : ", ", name, count.get<std::uint64_t>());
+  }
+  std::replace(text.begin(), text.end(), '_', ' ');
+  return text.empty() ? std::string(kNothing) : text;
+}
+
+std::size_t columns_of(std::string_view text) {
+  // Bytes that go on a character of UTF-8 take no column.
+  return static_cast<std::size_t>(std::count_if(text.begin(), text.end(), [](char c) {
+    return (static_cast<unsigned char>(c) & 0xC0U) != 0x80U;
+  }));
+}
+
+enum class Mood : std::uint8_t { kPlain, kGood, kDoubtful, kBad, kQuiet };
+
+class Paint {
+ public:
+  explicit Paint(bool colour) : colour_(colour) {}
+  [[nodiscard]] std::string operator()(Mood mood, const std::string& text) const {
+    constexpr std::array<const char*, 5> kCodes{"", "32", "33", "31", "2"};
+    if (!colour_ || mood == Mood::kPlain) return text;
+    return fmt::format("\x1b[{}m{}\x1b[0m", kCodes[static_cast<std::size_t>(mood)], text);
+  }
+
+ private:
+  bool colour_;
+};
+
+struct Cell {
+  std::string text;
+  Mood mood = Mood::kPlain;
+  bool right = false;
+};
+
+std::string table(const std::vector<std::vector<Cell>>& rows, const Paint& paint) {
+  std::vector<std::size_t> widths;
+  for (const std::vector<Cell>& row : rows) {
+    widths.resize(std::max(widths.size(), row.size()));
+    for (std::size_t i = 0; i < row.size(); ++i)
+      widths[i] = std::max(widths[i], columns_of(row[i].text));
+  }
+  std::string text;
+  for (const std::vector<Cell>& row : rows) {
+    std::string line;
+    for (std::size_t i = 0; i < row.size(); ++i) {
+      const std::string blanks(widths[i] - columns_of(row[i].text), ' ');
+      const bool last = i + 1 == row.size();
+      if (i > 0) line += "  ";
+      if (row[i].right) line += blanks;
+      line += paint(row[i].mood, row[i].text);
+      if (!row[i].right && !last) line += blanks;
+    }
+    text += line + '\n';
+  }
+  return text;
+}
+
+std::vector<Cell> header(std::initializer_list<const char*> names) {
+  std::vector<Cell> row;
+  for (const char* name : names)
+    row.push_back({name, Mood::kQuiet});
+  return row;
+}
+
+Mood mood_of_state(const std::string& state) {
+  if (state == "running") return Mood::kGood;
+  return state == "lost" ? Mood::kBad : Mood::kDoubtful;
+}
+
+std::string gyros_table(const Json& status, const Paint& paint) {
+  std::vector<std::vector<Cell>> rows{
+      header({"gyro", "bus", "health", "bias, deg/h", "reads, deg/s", "°C", "frames", "used",
+              "lost", "not used"})};
+  for (const Json& gyro : at(status, "gyros")) {
+    const std::string health = text_of(gyro, "health");
+    const std::uint64_t frames = count_of(gyro, "frames");
+    const double used =
+        100.0 * static_cast<double>(count_of(gyro, "samples")) / static_cast<double>(frames);
+    rows.push_back(
+        {{text_of(gyro, "name")},
+         {text_of(gyro, "bus")},
+         {health, health == "ok" ? Mood::kGood : Mood::kBad},
+         {with_sigma(number_of(gyro, "bias_dps") * kDegPerHour,
+                     number_of(gyro, "bias_sigma_dps") * kDegPerHour, "{:+.2f}", "{:.2f}"),
+          Mood::kPlain, true},
+         {number_text(number_of(gyro, "rate_dps"), "{:+.5f}"), Mood::kPlain, true},
+         {number_text(number_of(gyro, "temperature_c"), "{:.1f}"), Mood::kPlain, true},
+         {fmt::format("{}", frames), Mood::kPlain, true},
+         {frames > 0 ? fmt::format("{:.1f} %", used) : kNothing, Mood::kPlain, true},
+         {fmt::format("{}", count_of(gyro, "missing")), Mood::kPlain, true},
+         {counts_text(at(gyro, "rejected"))}});
+  }
+  return table(rows, paint);
+}
+
+std::string buses_table(const Json& status, const Paint& paint) {
+  std::vector<std::vector<Cell>> rows{
+      header({"bus", "link", "controller", "received", "lost", "downs", "errors"})};
+  for (const Json& bus : at(status, "buses")) {
+    const bool present = flag_of(bus, "present");
+    const bool up = flag_of(bus, "link_up");
+    const std::string controller = text_of(bus, "controller");
+    const bool active = controller == "active";
+    rows.push_back({{text_of(bus, "name")},
+                    {up ? "up" : (present ? "down" : "not there"), up ? Mood::kGood : Mood::kBad},
+                    {controller, active ? Mood::kGood
+                                        : (controller == "bus_off" ? Mood::kBad : Mood::kDoubtful)},
+                    {fmt::format("{}", count_of(bus, "received")), Mood::kPlain, true},
+                    {fmt::format("{}", count_of(bus, "lost")), Mood::kPlain, true},
+                    {fmt::format("{}", count_of(bus, "downs")), Mood::kPlain, true},
+                    {counts_text(at(bus, "errors"))}});
+  }
+  return table(rows, paint);
+}
+
+std::string head(const Json& status, const ViewOptions& options, const Paint& paint) {
+  const std::string state = text_of(status, "state");
+  std::string text = paint(mood_of_state(state), state);
+  if (state == "calibrating") {
+    text += fmt::format(" {} of {} s", number_text(number_of(status, "calibrated_s"), "{:.1f}"),
+                        number_text(number_of(status, "rest_s"), "{:g}"));
+  }
+  const double rate_dps = number_of(status, "rate_dps");
+  if (std::isfinite(rate_dps)) {
+    text +=
+        "  " + with_sigma(rate_dps, number_of(status, "sigma_dps"), "{:+.5f}", "{:.5f}") + " deg/s";
+    const std::string quality = text_of(status, "quality");
+    text += "  " + paint(quality == "two_gyros" ? Mood::kGood : Mood::kDoubtful, quality);
+  }
+  text += '\n';
+  if (options.rates_dps.size() > 1) text += sparkline(options.rates_dps) + '\n';
+  const double bias_sigma_dps = number_of(status, "bias_sigma_dps");
+  if (std::isfinite(bias_sigma_dps)) {
+    text += fmt::format("its drift is known to ± {:.2f} deg/h\n", bias_sigma_dps * kDegPerHour);
+  }
+  const auto remark = [&](bool applies, Mood mood, const char* words) {
+    if (applies) text += paint(mood, words) + '\n';
+  };
+  remark(text_of(status, "restored") == "taken_up", Mood::kDoubtful,
+         "on biases of an earlier run, which no stop has confirmed");
+  remark(flag_of(status, "disagree"), Mood::kBad,
+         "the gyros disagree; which one is wrong cannot be told");
+  remark(flag_of(status, "config_refused"), Mood::kBad,
+         "the new configuration was refused; journalctl -u vgyrod says why");
+  return text;
+}
+
+}  // namespace
+
+std::string sparkline(const std::vector<double>& values) {
+  constexpr std::array<const char*, 8> kBlocks{"▁", "▂", "▃", "▄", "▅", "▆", "▇", "█"};
+  double low = std::numeric_limits<double>::infinity();
+  double high = -low;
+  for (const double value : values) {
+    if (!std::isfinite(value)) continue;
+    low = std::min(low, value);
+    high = std::max(high, value);
+  }
+  std::string text;
+  for (const double value : values) {
+    if (!std::isfinite(value)) {
+      text += ' ';
+      continue;
+    }
+    const double share = high > low ? (value - low) / (high - low) : 0.0;
+    text += kBlocks[static_cast<std::size_t>(std::lround(share * (kBlocks.size() - 1)))];
+  }
+  return text;
+}
+
+std::string status_table(const Json& status, const ViewOptions& options) {
+  const Paint paint(options.colour);
+  const Json counters = at(status, "counters");
+  std::string text = head(status, options, paint);
+  text += '\n' + gyros_table(status, paint) + '\n' + buses_table(status, paint) + '\n';
+  text += fmt::format(
+      "sent {} frames, {} valid rates of {}; dropped: stale {}, overflow {}, refused {}\n",
+      count_of(counters, "frames_sent"), count_of(counters, "rates_valid"),
+      count_of(counters, "rates"), count_of(counters, "frames_stale"),
+      count_of(counters, "frames_overflowed"), count_of(counters, "frames_refused"));
+  text += paint(Mood::kQuiet, fmt::format("vgyrod {}, method {}, up {}", text_of(status, "version"),
+                                          text_of(status, "method"),
+                                          duration_text(number_of(status, "uptime_s")))) +
+          '\n';
+  return text;
+}
+
+std::string status_line(const Json& status) {
+  std::string text = text_of(status, "state");
+  const double rate_dps = number_of(status, "rate_dps");
+  if (std::isfinite(rate_dps)) {
+    text += fmt::format(" {} deg/s, {}",
+                        with_sigma(rate_dps, number_of(status, "sigma_dps"), "{:+.5f}", "{:.5f}"),
+                        text_of(status, "quality"));
+  }
+  for (const Json& gyro : at(status, "gyros")) {
+    text += fmt::format("; {} {}, bias {} deg/h", text_of(gyro, "name"), text_of(gyro, "health"),
+                        number_text(number_of(gyro, "bias_dps") * kDegPerHour, "{:+.2f}"));
+  }
+  return text;
+}
+
+}  // namespace vgyro::cli

@@ -1,0 +1,336 @@
+#include "daemon/control.h"
+
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <string_view>
+#include <utility>
+
+#include "gateway/config.h"
+
+namespace vgyro::daemon {
+namespace {
+
+constexpr const char* kName = "org.vgyro.Gateway1";
+constexpr const char* kPath = "/org/vgyro/Gateway1";
+constexpr const char* kNothingToSave = "org.vgyro.Error.NothingToSave";
+
+/// Writes one dictionary {string: variant} or {string: number}; the first error stays.
+class Dictionary {
+ public:
+  Dictionary(sd_bus_message* message, const char* entry) : message_(message), entry_(entry) {
+    keep(sd_bus_message_open_container(message_, 'a', entry_));
+  }
+
+  void put(const char* key, const std::string& value) {
+    keep(sd_bus_message_append(message_, "{sv}", key, "s", value.c_str()));
+  }
+  void put(const char* key, double value) {
+    keep(sd_bus_message_append(message_, "{sv}", key, "d", value));
+  }
+  void put(const char* key, bool value) {
+    keep(sd_bus_message_append(message_, "{sv}", key, "b", static_cast<int>(value)));
+  }
+  void put(const char* key, std::uint64_t value) {
+    keep(sd_bus_message_append(message_, "{sv}", key, "t", value));
+  }
+  void put_count(std::string_view key, std::uint64_t value) {
+    keep(sd_bus_message_append(message_, "{st}", std::string(key).c_str(), value));
+  }
+
+  /// A dictionary of counters as the value of `key`.
+  template <class Counts, class NameOf>
+  void put_counts(const char* key, const Counts& counts, const NameOf& name_of) {
+    keep(sd_bus_message_open_container(message_, 'e', "sv"));
+    keep(sd_bus_message_append(message_, "s", key));
+    keep(sd_bus_message_open_container(message_, 'v', "a{st}"));
+    Dictionary inner(message_, "{st}");
+    for (std::size_t i = 0; i < counts.size(); ++i)
+      inner.put_count(name_of(i), counts[i]);
+    keep(inner.close());
+    keep(sd_bus_message_close_container(message_));
+    keep(sd_bus_message_close_container(message_));
+  }
+
+  int close() {
+    keep(sd_bus_message_close_container(message_));
+    return result_;
+  }
+
+ private:
+  void keep(int result) {
+    if (result < 0 && result_ >= 0) result_ = result;
+  }
+  sd_bus_message* message_;
+  const char* entry_;
+  int result_ = 0;
+};
+
+int append_gyro(sd_bus_message* reply, const Snapshot& now, std::size_t k) {
+  const gateway::GyroPlan& plan = now.plan->gyros[k];
+  const gateway::GyroStatus& gyro = now.status.gyros[k];
+  std::array<std::uint64_t, gateway::kFaultCount> faults{};
+  for (std::size_t i = 0; i < faults.size(); ++i)
+    faults[i] = gyro.faults[i].times;
+  Dictionary fields(reply, "{sv}");
+  fields.put("name", plan.name);
+  fields.put("bus", plan.bus);
+  fields.put("message", plan.message);
+  fields.put("in_use", gyro.heard);
+  fields.put("health", health_text(gyro));
+  fields.put("rate_dps", gyro.last_rate_dps);
+  fields.put("bias_dps", gyro.bias_dps);
+  fields.put("bias_sigma_dps", now.bias_sigma_dps[k]);
+  fields.put("temperature_c", gyro.temperature_c);
+  fields.put("frames", gyro.frames);
+  fields.put("samples", gyro.samples);
+  fields.put("missing", gyro.missing);
+  fields.put("unpaired", gyro.unpaired);
+  fields.put_counts("rejected", gyro.rejected,
+                    [](std::size_t i) { return to_string(static_cast<gateway::Reject>(i)); });
+  fields.put_counts("faults", faults,
+                    [](std::size_t i) { return to_string(static_cast<gateway::Fault>(i)); });
+  return fields.close();
+}
+
+int append_bus(sd_bus_message* reply, const BusStatus& bus) {
+  Dictionary fields(reply, "{sv}");
+  fields.put("name", bus.name);
+  fields.put("present", bus.present);
+  fields.put("link_up", bus.link_up);
+  fields.put("controller", std::string(to_string(bus.controller)));
+  fields.put("received", bus.received);
+  fields.put("lost", bus.lost);
+  fields.put("downs", bus.downs);
+  fields.put("reopened", bus.reopened);
+  fields.put_counts("errors", bus.errors,
+                    [](std::size_t i) { return to_string(static_cast<can::ErrorCause>(i)); });
+  return fields.close();
+}
+
+int append_gyros(sd_bus_message* reply, const Snapshot& now) {
+  int result = sd_bus_message_open_container(reply, 'a', "a{sv}");
+  for (std::size_t k = 0; k < now.status.gyros.size() && result >= 0; ++k)
+    result = append_gyro(reply, now, k);
+  return result < 0 ? result : sd_bus_message_close_container(reply);
+}
+
+int append_buses(sd_bus_message* reply, const Snapshot& now) {
+  int result = sd_bus_message_open_container(reply, 'a', "a{sv}");
+  for (const BusStatus& bus : now.traffic.buses) {
+    if (result >= 0) result = append_bus(reply, bus);
+  }
+  return result < 0 ? result : sd_bus_message_close_container(reply);
+}
+
+int append_counters(sd_bus_message* reply, const Snapshot& now) {
+  const gateway::Status& status = now.status;
+  const can::TransmitCounts& sent = now.traffic.transmitted;
+  const std::pair<const char*, std::uint64_t> counters[] = {
+      {"pairs", status.pairs},
+      {"rates", status.rates_out},
+      {"rates_valid", status.rates_out_valid},
+      {"rates_out_of_range", status.rates_out_of_range},
+      {"biases", status.biases_out},
+      {"windows", status.windows},
+      {"windows_skipped", status.windows_skipped},
+      {"stops", status.stops},
+      {"stops_refused", status.stops_refused},
+      {"disagreements", status.disagreements},
+      {"calibration_restarts", status.calibration_restarts},
+      {"clock_steps", status.clock_steps},
+      {"reference_rejected", status.reference_rejected},
+      {"accelerometer_rejected", status.accelerometer_rejected},
+      {"speed_rejected", status.speed_rejected},
+      {"frames_received", now.traffic.received()},
+      {"frames_lost", now.traffic.lost()},
+      {"frames_sent", sent.sent},
+      {"frames_stale", sent.dropped_stale},
+      {"frames_overflowed", sent.dropped_overflow},
+      {"frames_refused", sent.dropped_failed},
+      {"send_retries", sent.retries},
+  };
+  Dictionary fields(reply, "{st}");
+  for (const auto& [name, count] : counters)
+    fields.put_count(name, count);
+  return fields.close();
+}
+
+int append_text(sd_bus_message* reply, std::string_view text) {
+  return sd_bus_message_append(reply, "s", std::string(text).c_str());
+}
+int append_number(sd_bus_message* reply, double number) {
+  return sd_bus_message_append(reply, "d", number);
+}
+int append_flag(sd_bus_message* reply, bool flag) {
+  return sd_bus_message_append(reply, "b", static_cast<int>(flag));
+}
+
+using Append = int (*)(sd_bus_message*, const Snapshot&);
+
+struct Property {
+  const char* name;
+  Append append;
+};
+
+constexpr Property kProperties[] = {
+    {"Version", [](sd_bus_message* m, const Snapshot&) { return append_text(m, VGYRO_VERSION); }},
+    {"Method",
+     [](sd_bus_message* m, const Snapshot& now) {
+       return append_text(m, gateway::to_string(now.plan->corrector.method));
+     }},
+    {"UptimeS",
+     [](sd_bus_message* m, const Snapshot& now) { return append_number(m, now.uptime_s); }},
+    {"ConfigRefused",
+     [](sd_bus_message* m, const Snapshot& now) { return append_flag(m, now.config_refused); }},
+    {"State", [](sd_bus_message* m,
+                 const Snapshot& now) { return append_text(m, to_string(now.status.state)); }},
+    {"Quality", [](sd_bus_message* m,
+                   const Snapshot& now) { return append_text(m, to_string(now.status.quality)); }},
+    {"Restored",
+     [](sd_bus_message* m, const Snapshot& now) {
+       return append_text(m, to_string(now.status.restored));
+     }},
+    {"Valid",
+     [](sd_bus_message* m, const Snapshot& now) {
+       return append_flag(m, std::isfinite(now.status.rate_dps));
+     }},
+    {"Disagree",
+     [](sd_bus_message* m, const Snapshot& now) { return append_flag(m, now.status.disagree); }},
+    {"RateDps",
+     [](sd_bus_message* m, const Snapshot& now) { return append_number(m, now.status.rate_dps); }},
+    {"SigmaDps",
+     [](sd_bus_message* m, const Snapshot& now) { return append_number(m, now.status.sigma_dps); }},
+    {"BiasSigmaDps",
+     [](sd_bus_message* m, const Snapshot& now) {
+       return append_number(m, now.status.bias_sigma_dps);
+     }},
+    {"CalibratedS", [](sd_bus_message* m,
+                       const Snapshot& now) { return append_number(m, now.status.calibrated_s); }},
+    {"RestS", [](sd_bus_message* m,
+                 const Snapshot& now) { return append_number(m, now.plan->calibration.rest_s); }},
+    {"Gyros", append_gyros},
+    {"Buses", append_buses},
+    {"Counters", append_counters},
+};
+
+}  // namespace
+
+// A method without "unprivileged" makes sd-bus ask the bus who calls, and wait for the answer; who
+// may call is the policy file's business.
+const sd_bus_vtable Control::kInterface[] = {
+    SD_BUS_VTABLE_START(0),
+    SD_BUS_PROPERTY("Version", "s", on_get, 0, SD_BUS_VTABLE_PROPERTY_CONST),
+    SD_BUS_PROPERTY("Method", "s", on_get, 0, 0),
+    SD_BUS_PROPERTY("UptimeS", "d", on_get, 0, 0),
+    SD_BUS_PROPERTY("ConfigRefused", "b", on_get, 0, SD_BUS_VTABLE_PROPERTY_EMITS_CHANGE),
+    SD_BUS_PROPERTY("State", "s", on_get, 0, SD_BUS_VTABLE_PROPERTY_EMITS_CHANGE),
+    SD_BUS_PROPERTY("Quality", "s", on_get, 0, SD_BUS_VTABLE_PROPERTY_EMITS_CHANGE),
+    SD_BUS_PROPERTY("Restored", "s", on_get, 0, SD_BUS_VTABLE_PROPERTY_EMITS_CHANGE),
+    SD_BUS_PROPERTY("Valid", "b", on_get, 0, SD_BUS_VTABLE_PROPERTY_EMITS_CHANGE),
+    SD_BUS_PROPERTY("Disagree", "b", on_get, 0, SD_BUS_VTABLE_PROPERTY_EMITS_CHANGE),
+    SD_BUS_PROPERTY("RateDps", "d", on_get, 0, SD_BUS_VTABLE_PROPERTY_EMITS_CHANGE),
+    SD_BUS_PROPERTY("SigmaDps", "d", on_get, 0, SD_BUS_VTABLE_PROPERTY_EMITS_CHANGE),
+    SD_BUS_PROPERTY("BiasSigmaDps", "d", on_get, 0, SD_BUS_VTABLE_PROPERTY_EMITS_CHANGE),
+    SD_BUS_PROPERTY("CalibratedS", "d", on_get, 0, SD_BUS_VTABLE_PROPERTY_EMITS_CHANGE),
+    SD_BUS_PROPERTY("RestS", "d", on_get, 0, 0),
+    SD_BUS_PROPERTY("Gyros", "aa{sv}", on_get, 0, SD_BUS_VTABLE_PROPERTY_EMITS_CHANGE),
+    SD_BUS_PROPERTY("Buses", "aa{sv}", on_get, 0, SD_BUS_VTABLE_PROPERTY_EMITS_INVALIDATION),
+    SD_BUS_PROPERTY("Counters", "a{st}", on_get, 0, SD_BUS_VTABLE_PROPERTY_EMITS_INVALIDATION),
+    SD_BUS_METHOD("Recalibrate", "", "", on_recalibrate, SD_BUS_VTABLE_UNPRIVILEGED),
+    SD_BUS_METHOD("SaveState", "", "", on_save_state, SD_BUS_VTABLE_UNPRIVILEGED),
+    SD_BUS_VTABLE_END};
+
+Control::Control(sd_event* events, Gateway gateway, Log& log)
+    : events_(events), gateway_(std::move(gateway)), log_(log) {
+  connect();
+}
+
+Control::~Control() {
+  if (bus_ != nullptr) sd_bus_close_unref(bus_);  // flushing would wait
+}
+
+// No step of it waits: the handshake goes on within the event loop, the name comes with on_name().
+void Control::connect() {
+  wait_ = kRetrySeconds;
+  has_name_ = false;
+  int result = sd_bus_open_system(&bus_);
+  if (result >= 0) result = sd_bus_attach_event(bus_, events_, SD_EVENT_PRIORITY_NORMAL);
+  if (result >= 0) {
+    result = sd_bus_add_object_vtable(bus_, nullptr, kPath, kName, kInterface, this);
+  }
+  if (result >= 0) result = sd_bus_request_name_async(bus_, nullptr, kName, 0, &on_name, this);
+  if (result < 0) disconnect(-result);
+}
+
+void Control::disconnect(int error) {
+  if (bus_ != nullptr) {
+    sd_bus_detach_event(bus_);
+    sd_bus_close_unref(bus_);
+    bus_ = nullptr;
+  }
+  if (std::exchange(told_of_failure_, true)) return;
+  log_.tell(Severity::kNotice, {.cause = "no_dbus"},
+            "no D-Bus: {}; `vgyro status` does not work until there is one", system_reason(error));
+}
+
+int Control::on_name(sd_bus_message* reply, void* self, sd_bus_error*) {
+  auto& control = *static_cast<Control*>(self);
+  if (sd_bus_message_is_method_error(reply, nullptr) != 0) {
+    const char* why = sd_bus_message_get_error(reply)->message;
+    if (!std::exchange(control.told_of_failure_, true)) {
+      control.log_.tell(Severity::kNotice, {.cause = "no_dbus"},
+                        "the bus does not give the name {}: {}; org.vgyro.Gateway1.conf belongs "
+                        "into /usr/share/dbus-1/system.d",
+                        kName, why == nullptr ? "no reason given" : why);
+    }
+    return 0;
+  }
+  control.has_name_ = true;
+  if (std::exchange(control.told_of_failure_, false)) {
+    control.log_.notice("on D-Bus as {}", kName);
+  }
+  return 0;
+}
+
+void Control::second_passed() {
+  if (bus_ != nullptr && sd_bus_is_open(bus_) <= 0) disconnect(ECONNRESET);
+  if (wait_ > 0) --wait_;
+  if (bus_ == nullptr && wait_ == 0) connect();
+  // The name may be another daemon's that is about to end, or the policy may be changed.
+  if (bus_ != nullptr && !has_name_ && wait_ == 0) {
+    wait_ = kRetrySeconds;
+    sd_bus_request_name_async(bus_, nullptr, kName, 0, &on_name, this);
+  }
+  if (has_name_) tell_changes();
+}
+
+void Control::tell_changes() {
+  std::uint64_t queued = 0;
+  if (sd_bus_get_n_queued_write(bus_, &queued) < 0 || queued > kQueuedMost) return;
+  sd_bus_emit_properties_changed(bus_, kPath, kName, "State", "Quality", "Restored", "Valid",
+                                 "Disagree", "RateDps", "SigmaDps", "BiasSigmaDps", "CalibratedS",
+                                 "ConfigRefused", "Gyros", "Buses", "Counters", nullptr);
+}
+
+int Control::on_get(sd_bus*, const char*, const char*, const char* property, sd_bus_message* reply,
+                    void* self, sd_bus_error*) {
+  const Snapshot& now = static_cast<Control*>(self)->gateway_.snapshot();
+  for (const Property& one : kProperties) {
+    if (std::strcmp(one.name, property) == 0) return one.append(reply, now);
+  }
+  return -ENOENT;
+}
+
+int Control::on_recalibrate(sd_bus_message* call, void* self, sd_bus_error*) {
+  static_cast<Control*>(self)->gateway_.recalibrate();
+  return sd_bus_reply_method_return(call, "");
+}
+
+int Control::on_save_state(sd_bus_message* call, void* self, sd_bus_error* error) {
+  const Expected<void> saved = static_cast<Control*>(self)->gateway_.save_state();
+  if (!saved) return sd_bus_error_set(error, kNothingToSave, saved.error().message().c_str());
+  return sd_bus_reply_method_return(call, "");
+}
+
+}  // namespace vgyro::daemon

@@ -1,0 +1,217 @@
+#include "daemon/metrics.h"
+
+#include <cmath>
+#include <cstdio>
+#include <fcntl.h>
+#include <iterator>
+#include <string_view>
+#include <sys/stat.h>
+#include <unistd.h>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+
+namespace vgyro::daemon {
+namespace {
+
+using Labels = std::vector<std::pair<std::string_view, std::string_view>>;
+
+std::string escaped(std::string_view value) {
+  std::string out;
+  for (const char c : value) {
+    if (c == '\\' || c == '"') out += '\\';
+    if (c == '\n') {
+      out += "\\n";
+    } else {
+      out += c;
+    }
+  }
+  return out;
+}
+
+class Text {
+ public:
+  void family(std::string_view name, std::string_view type, std::string_view help) {
+    name_ = name;
+    fmt::format_to(std::back_inserter(text_), "# HELP {} {}\n# TYPE {} {}\n", name, help, name,
+                   type);
+  }
+  void sample(const Labels& labels, double value) {
+    line(labels, std::isfinite(value) ? fmt::format("{}", value) : "NaN");
+  }
+  void sample(const Labels& labels, std::uint64_t value) { line(labels, fmt::format("{}", value)); }
+  void sample(const Labels& labels, bool value) { line(labels, value ? "1" : "0"); }
+  std::string take() { return std::move(text_); }
+
+ private:
+  void line(const Labels& labels, const std::string& value) {
+    text_ += name_;
+    char before = '{';
+    for (const auto& [key, content] : labels) {
+      fmt::format_to(std::back_inserter(text_), "{}{}=\"{}\"", before, key, escaped(content));
+      before = ',';
+    }
+    if (!labels.empty()) text_ += '}';
+    fmt::format_to(std::back_inserter(text_), " {}\n", value);
+  }
+
+  std::string_view name_;
+  std::string text_;
+};
+
+void add_rate(Text& text, const Snapshot& now) {
+  const gateway::Status& status = now.status;
+  text.family("vgyro_state", "gauge", "The gateway's state: 1 for the present one.");
+  for (int i = 0; i < gateway::kStateCount; ++i) {
+    const auto state = static_cast<gateway::State>(i);
+    text.sample({{"state", to_string(state)}}, status.state == state);
+  }
+  text.family("vgyro_rate_valid", "gauge", "1 while a valid rate goes out.");
+  text.sample({}, std::isfinite(status.rate_dps));
+  text.family("vgyro_rate_degrees_per_second", "gauge", "The virtual rate; NaN while invalid.");
+  text.sample({}, status.rate_dps);
+  text.family("vgyro_rate_sigma_degrees_per_second", "gauge", "Its standard deviation.");
+  text.sample({}, status.sigma_dps);
+  text.family("vgyro_bias_sigma_degrees_per_second", "gauge",
+              "Standard deviation of the drift that is taken off the rate.");
+  text.sample({}, status.bias_sigma_dps);
+  text.family("vgyro_gyros_disagree", "gauge", "1 while the gyros contradict each other.");
+  text.sample({}, status.disagree);
+  text.family("vgyro_uptime_seconds", "gauge", "Since the start of the process.");
+  text.sample({}, now.uptime_s);
+  text.family("vgyro_config_refused", "gauge", "1 while a configuration is refused.");
+  text.sample({}, now.config_refused);
+}
+
+void add_counters(Text& text, const Snapshot& now) {
+  const gateway::Status& status = now.status;
+  const can::TransmitCounts& sent = now.traffic.transmitted;
+  text.family("vgyro_pairs_total", "counter", "Aligned pairs of samples.");
+  text.sample({}, status.pairs);
+  text.family("vgyro_rates_total", "counter", "VG_Rate frames made, by whether they were valid.");
+  text.sample({{"valid", "yes"}}, status.rates_out_valid);
+  text.sample({{"valid", "no"}}, status.rates_out - status.rates_out_valid);
+  text.family("vgyro_stops_total", "counter", "Stops that the drifts were learned from.");
+  text.sample({}, status.stops);
+  text.family("vgyro_clock_steps_total", "counter", "Times that the stamps were set back.");
+  text.sample({}, status.clock_steps);
+  text.family("vgyro_sent_frames_total", "counter", "Frames that the bus took.");
+  text.sample({}, sent.sent);
+  text.family("vgyro_dropped_frames_total", "counter", "Frames that did not go out, by cause.");
+  text.sample({{"cause", "stale"}}, sent.dropped_stale);
+  text.sample({{"cause", "overflow"}}, sent.dropped_overflow);
+  text.sample({{"cause", "refused"}}, sent.dropped_failed);
+}
+
+void add_gyros(Text& text, const Snapshot& now) {
+  const auto each = [&](const auto& add) {
+    for (std::size_t k = 0; k < now.status.gyros.size(); ++k)
+      add(std::string_view(now.plan->gyros[k].name), now.status.gyros[k], k);
+  };
+  using Gyro = const gateway::GyroStatus&;
+  using Name = std::string_view;
+  text.family("vgyro_gyro_in_use", "gauge", "1 while the gyro's samples are used.");
+  each([&](Name name, Gyro gyro, std::size_t) { text.sample({{"gyro", name}}, gyro.heard); });
+  text.family("vgyro_gyro_rate_degrees_per_second", "gauge", "Its last sample.");
+  each([&](Name name, Gyro gyro, std::size_t) {
+    text.sample({{"gyro", name}}, gyro.last_rate_dps);
+  });
+  text.family("vgyro_gyro_bias_degrees_per_second", "gauge", "Its drift; NaN until calibrated.");
+  each([&](Name name, Gyro gyro, std::size_t) { text.sample({{"gyro", name}}, gyro.bias_dps); });
+  text.family("vgyro_gyro_bias_sigma_degrees_per_second", "gauge", "How well that is known.");
+  each([&](Name name, Gyro, std::size_t k) {
+    text.sample({{"gyro", name}}, now.bias_sigma_dps[k]);
+  });
+  text.family("vgyro_gyro_temperature_celsius", "gauge", "NaN where it tells none.");
+  each([&](Name name, Gyro gyro, std::size_t) {
+    text.sample({{"gyro", name}}, gyro.temperature_c);
+  });
+  text.family("vgyro_gyro_frames_total", "counter", "Frames with its identifier.");
+  each([&](Name name, Gyro gyro, std::size_t) { text.sample({{"gyro", name}}, gyro.frames); });
+  text.family("vgyro_gyro_missing_frames_total", "counter", "Lost on the way, by its counter.");
+  each([&](Name name, Gyro gyro, std::size_t) { text.sample({{"gyro", name}}, gyro.missing); });
+  text.family("vgyro_gyro_rejected_frames_total", "counter", "Not used, by cause.");
+  each([&](Name name, Gyro gyro, std::size_t) {
+    for (std::size_t i = 0; i < gateway::kRejectCount; ++i) {
+      text.sample({{"gyro", name}, {"cause", to_string(static_cast<gateway::Reject>(i))}},
+                  gyro.rejected[i]);
+    }
+  });
+  text.family("vgyro_gyro_faults_total", "counter", "Times that a fault began.");
+  each([&](Name name, Gyro gyro, std::size_t) {
+    for (std::size_t i = 0; i < gateway::kFaultCount; ++i) {
+      text.sample({{"gyro", name}, {"fault", to_string(static_cast<gateway::Fault>(i))}},
+                  gyro.faults[i].times);
+    }
+  });
+}
+
+void add_buses(Text& text, const Snapshot& now) {
+  const std::vector<BusStatus>& buses = now.traffic.buses;
+  text.family("vgyro_bus_up", "gauge", "1 while the interface is there and its link is up.");
+  for (const BusStatus& bus : buses)
+    text.sample({{"bus", bus.name}}, bus.link_up);
+  text.family("vgyro_bus_off", "gauge", "1 while its controller is bus-off.");
+  for (const BusStatus& bus : buses)
+    text.sample({{"bus", bus.name}}, bus.controller == can::ControllerState::kBusOff);
+  text.family("vgyro_bus_received_frames_total", "counter", "Frames that passed the filters.");
+  for (const BusStatus& bus : buses)
+    text.sample({{"bus", bus.name}}, bus.received);
+  text.family("vgyro_bus_lost_frames_total", "counter", "Lost in the socket's buffer.");
+  for (const BusStatus& bus : buses)
+    text.sample({{"bus", bus.name}}, bus.lost);
+  text.family("vgyro_bus_link_downs_total", "counter", "Times that the link went down.");
+  for (const BusStatus& bus : buses)
+    text.sample({{"bus", bus.name}}, bus.downs);
+  text.family("vgyro_bus_errors_total", "counter", "What its controller told, by cause.");
+  for (const BusStatus& bus : buses) {
+    for (std::size_t i = 0; i < can::kErrorCauseCount; ++i) {
+      text.sample({{"bus", bus.name}, {"cause", to_string(static_cast<can::ErrorCause>(i))}},
+                  bus.errors[i]);
+    }
+  }
+}
+
+}  // namespace
+
+std::string metrics_text(const Snapshot& now) {
+  Text text;
+  add_rate(text, now);
+  add_counters(text, now);
+  add_gyros(text, now);
+  add_buses(text, now);
+  return text.take();
+}
+
+MetricsFile::MetricsFile(std::string path, Log& log)
+    : path_(std::move(path)),
+      new_path_(path_ + ".new"),
+      log_(log),
+      writer_([this](const std::string& text) { return replace(text); }) {}
+
+bool MetricsFile::second_passed() {
+  if (const std::optional<Expected<void>> written = writer_.take_result()) {
+    const bool failed_before = std::exchange(failed_, !*written);
+    if (!*written && !failed_before) log_.warning("{}", written->error().message());
+    if (*written && failed_before) log_.notice("{}: written again", path_);
+  }
+  return second_++ % kPeriod_s == 0;
+}
+
+// No fsync: what is lost with the power is old anyway.
+Expected<void> MetricsFile::replace(const std::string& text) const {
+  const int fd =
+      ::open(new_path_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC | O_NOFOLLOW, 0644);
+  // For others to read, whatever the service's umask.
+  const bool whole = fd >= 0 && ::fchmod(fd, 0644) == 0 &&
+                     ::write(fd, text.data(), text.size()) == static_cast<ssize_t>(text.size());
+  if (whole && ::close(fd) == 0 && ::rename(new_path_.c_str(), path_.c_str()) == 0) return {};
+  auto failed = fail(path_, "metrics cannot be written: " + system_reason(),
+                     "name a file in a folder that the gateway may write to (--metrics FILE)");
+  if (fd >= 0 && !whole) ::close(fd);
+  ::unlink(new_path_.c_str());
+  return failed;
+}
+
+}  // namespace vgyro::daemon

@@ -1,0 +1,38 @@
+#pragma once
+
+// The gateway in numbers for Prometheus: a text file that node_exporter's textfile collector reads.
+// Written whole or not at all, in a thread of its own; a file that cannot be written is told once.
+
+#include <string>
+
+#include "daemon/background_writer.h"
+#include "daemon/log.h"
+#include "daemon/snapshot.h"
+
+namespace vgyro::daemon {
+
+/// In Prometheus' text form; units in the names.
+std::string metrics_text(const Snapshot& now);
+
+class MetricsFile {
+ public:
+  static constexpr int kPeriod_s = 5;
+
+  MetricsFile(std::string path, Log& log);
+
+  /// To be called about once a second; true when it is time for write().
+  bool second_passed();
+  void write(const Snapshot& now) { writer_.put(metrics_text(now)); }
+
+ private:
+  [[nodiscard]] Expected<void> replace(const std::string& text) const;
+
+  std::string path_;
+  std::string new_path_;
+  Log& log_;
+  int second_ = 0;
+  bool failed_ = false;  ///< and told
+  BackgroundWriter writer_;
+};
+
+}  // namespace vgyro::daemon

@@ -1,0 +1,29 @@
+#pragma once
+
+// Everything that is known of the running gateway at one moment, for those who ask or watch.
+
+#include <array>
+#include <string>
+
+#include "daemon/reporter.h"
+#include "gateway/plan.h"
+#include "gateway/status.h"
+
+namespace vgyro::daemon {
+
+struct Snapshot {
+  const gateway::Plan* plan = nullptr;  ///< lives as long as the snapshot is the newest
+  gateway::Status status;
+  std::array<double, 2> bias_sigma_dps{};  ///< of each gyro; NaN where it is not known
+  Traffic traffic;
+  double uptime_s = 0.0;
+  bool config_refused = false;  ///< by the last reload
+};
+
+/// "ok", or what is wrong: gateway::Fault in words.
+inline std::string health_text(const gateway::GyroStatus& gyro) {
+  if (gyro.fault) return std::string(to_string(*gyro.fault));
+  return gyro.heard ? "ok" : std::string(to_string(gateway::Fault::kSilent));
+}
+
+}  // namespace vgyro::daemon

@@ -1,0 +1,100 @@
+// A gateway without buses, for control_test.py: its face on D-Bus and its metrics, over a status
+// that moves by itself. Prints a line a second: a loop that waits for the bus would not.
+
+#include <cmath>
+#include <cstdio>
+#include <string>
+#include <systemd/sd-event.h>
+
+#include <fmt/core.h>
+
+#include "daemon/control.h"
+#include "daemon/metrics.h"
+#include "tests/gateway/rig.h"
+
+namespace {
+
+using namespace vgyro;
+
+struct Sample {
+  gateway::Plan plan = gateway::rig::two_gyros();
+  daemon::Snapshot now;
+  daemon::Log log;
+  daemon::Control* control = nullptr;
+  daemon::MetricsFile* metrics = nullptr;
+  int seconds = 0;
+
+  Sample() {
+    plan.gyros[0].name = "left \"one\" \\";
+    plan.gyros[1].name = "right";
+    now.plan = &plan;
+    now.status.state = gateway::State::kRunning;
+    now.status.quality = gateway::Quality::kTwoGyros;
+    now.status.rate_dps = 50.25;
+    now.status.sigma_dps = 0.0005;
+    now.status.bias_sigma_dps = 0.0001;
+    now.status.pairs = 1ULL << 40U;
+    gateway::GyroStatus& left = now.status.gyros[0];
+    left.heard = true;
+    left.frames = 1000;
+    left.samples = 990;
+    left.bias_dps = 0.033;
+    left.last_rate_dps = 50.283;
+    left.temperature_c = 21.5;
+    left.rejected[static_cast<std::size_t>(gateway::Reject::kCounterRepeated)] = 10;
+    gateway::GyroStatus& right = now.status.gyros[1];
+    right.fault = gateway::Fault::kStuck;
+    right.faults[static_cast<std::size_t>(gateway::Fault::kStuck)].times = 2;
+    right.bias_dps = right.temperature_c = std::nan("");
+    now.bias_sigma_dps = {0.0002, std::nan("")};
+    now.traffic.transmitted.sent = 12'345;
+    now.traffic.transmitted.dropped_stale = 7;
+    daemon::BusStatus bus{.name = "can0", .present = true, .link_up = true};
+    bus.errors[static_cast<std::size_t>(can::ErrorCause::kBusOff)] = 3;
+    bus.received = 4321;
+    now.traffic.buses = {bus, {.name = "can1"}};
+  }
+
+  Expected<void> save_state() {
+    if (now.status.state == gateway::State::kRunning) return {};
+    return fail({}, "nothing was learned yet that is worth keeping");
+  }
+  void recalibrate() {
+    now.status.state = gateway::State::kCalibrating;
+    now.status.quality = gateway::Quality::kUnusable;
+    now.status.rate_dps = now.status.sigma_dps = std::nan("");
+  }
+  void second_passed() {
+    ++seconds;
+    if (std::isfinite(now.status.rate_dps)) now.status.rate_dps += 0.5;
+    now.uptime_s = seconds;
+    control->second_passed();
+    if (metrics != nullptr && metrics->second_passed()) metrics->write(now);
+    fmt::print("second {}\n", seconds);
+    std::fflush(stdout);
+  }
+};
+
+int on_second(sd_event_source* source, std::uint64_t, void* self) {
+  static_cast<Sample*>(self)->second_passed();
+  sd_event_source_set_time_relative(source, 1'000'000);
+  return sd_event_source_set_enabled(source, SD_EVENT_ONESHOT);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  Sample sample;
+  sd_event* events = nullptr;
+  if (sd_event_new(&events) < 0) return 1;
+  daemon::Control control(events,
+                          {.snapshot = [&]() -> const daemon::Snapshot& { return sample.now; },
+                           .recalibrate = [&] { sample.recalibrate(); },
+                           .save_state = [&] { return sample.save_state(); }},
+                          sample.log);
+  sample.control = &control;
+  std::optional<daemon::MetricsFile> metrics;
+  if (argc > 1) sample.metrics = &metrics.emplace(argv[1], sample.log);
+  sd_event_add_time_relative(events, nullptr, CLOCK_MONOTONIC, 1'000'000, 0, &on_second, &sample);
+  return sd_event_loop(events) < 0 ? 1 : 0;
+}

@@ -1,0 +1,385 @@
+"""The gateway's face on D-Bus, `vgyro status` and the metrics: on a private bus with the policy file as it is
+installed, seen through busctl. The gateway is control_sample; its figures are known."""
+
+import contextlib
+import json
+import os
+import pty
+import re
+import select
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+from pathlib import Path
+
+SOURCE = Path(os.environ["VGYRO_SOURCE"])
+SAMPLE = sys.argv.pop(1)
+VGYRO = str(Path(os.environ["VGYRO_BIN"]) / "vgyro")
+NAME, OBJECT = "org.vgyro.Gateway1", "/org/vgyro/Gateway1"
+NOBODY = 65534
+GYRO = 'left "one" \\'
+IS_ROOT = os.geteuid() == 0
+
+# What Debian's system bus lets through; who may own the name in production is the policy file's, here it is also us.
+BUS_CONFIG = """<!DOCTYPE busconfig PUBLIC "-//freedesktop//DTD D-Bus Bus Configuration 1.0//EN"
+ "http://www.freedesktop.org/standards/dbus/1.0/busconfig.dtd">
+<busconfig>
+  <type>system</type>
+  <listen>unix:path={folder}/bus</listen>
+  <auth>EXTERNAL</auth>
+  <policy context="default">
+    <allow user="*"/>
+    <deny own="*"/>
+    <deny send_type="method_call"/>
+    <allow send_type="signal"/>
+    <allow send_requested_reply="true" send_type="method_return"/>
+    <allow send_requested_reply="true" send_type="error"/>
+    <allow receive_type="method_call"/>
+    <allow receive_type="method_return"/>
+    <allow receive_type="error"/>
+    <allow receive_type="signal"/>
+    <allow send_destination="org.freedesktop.DBus"/>
+  </policy>
+  <include>{policy}</include>
+  <policy user="{uid}"><allow own="{name}"/></policy>
+</busconfig>
+"""
+
+
+def until(condition, seconds=30.0):
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        if condition():
+            return True
+        time.sleep(0.05)
+    return False
+
+
+class Bench(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory(prefix="vgyro-dbus-")
+        self.addCleanup(folder.cleanup)
+        self.folder = Path(folder.name)
+        self.folder.chmod(0o755)
+        self.address = f"unix:path={self.folder}/bus"
+        self.environment = {**os.environ, "DBUS_SYSTEM_BUS_ADDRESS": self.address, "NO_COLOR": "1"}
+        (self.folder / "bus.conf").write_text(BUS_CONFIG.format(
+            folder=self.folder, policy=SOURCE / "dbus/org.vgyro.Gateway1.conf", uid=os.geteuid(), name=NAME))
+
+    def end(self, process):
+        with contextlib.suppress(ProcessLookupError):
+            process.send_signal(signal.SIGCONT)
+        process.kill()
+        process.wait()
+
+    def start_bus(self):
+        (self.folder / "bus").unlink(missing_ok=True)
+        with open(self.folder / "bus.err", "ab") as errors:
+            bus = subprocess.Popen(["dbus-daemon", f"--config-file={self.folder}/bus.conf", "--nofork", "--nopidfile"],
+                                   stderr=errors)
+        self.addCleanup(self.end, bus)
+        self.assertTrue(until((self.folder / "bus").exists), (self.folder / "bus.err").read_text())
+        return bus
+
+    def start_sample(self, *arguments):
+        with open(self.folder / "sample.out", "wb") as out, open(self.folder / "sample.err", "wb") as errors:
+            sample = subprocess.Popen([SAMPLE, *arguments], stdout=out, stderr=errors, env=self.environment)
+        self.addCleanup(self.end, sample)
+        return sample
+
+    def seconds_told(self):
+        return (self.folder / "sample.out").read_text().count("second")
+
+    def run_as(self, command, uid=None):
+        def become():
+            if uid is not None:
+                os.setgroups([])
+                os.setgid(uid)
+                os.setuid(uid)
+        return subprocess.run(command, env=self.environment, capture_output=True, text=True, timeout=60, check=False,
+                              preexec_fn=become)
+
+    def busctl(self, *arguments, uid=None):
+        return self.run_as(["busctl", f"--address={self.address}", *arguments], uid)
+
+    def vgyro(self, *arguments, uid=None):
+        return self.run_as([VGYRO, *arguments], uid)
+
+    def is_there(self):
+        return self.busctl("get-property", NAME, OBJECT, NAME, "State").returncode == 0
+
+    def get(self, name):
+        got = self.busctl("--json=short", "get-property", NAME, OBJECT, NAME, name)
+        self.assertEqual(got.returncode, 0, got.stderr)
+        return json.loads(got.stdout)["data"]
+
+
+class OnTheBus(Bench):
+    def setUp(self):
+        super().setUp()
+        self.bus = self.start_bus()
+        self.sample = self.start_sample()
+        self.assertTrue(until(self.is_there), (self.folder / "sample.err").read_text())
+
+    def test_introspection_lists_every_property_and_method(self):
+        listed = self.busctl("introspect", NAME, OBJECT, NAME)
+        self.assertEqual(listed.returncode, 0, listed.stderr)
+        members = {line.split()[0]: line.split()[1:3] for line in listed.stdout.splitlines() if line.startswith(".")}
+        expected = {".Recalibrate": ["method", "-"], ".SaveState": ["method", "-"], ".Counters": ["property", "a{st}"],
+                    ".Gyros": ["property", "aa{sv}"], ".Buses": ["property", "aa{sv}"]}
+        expected |= {f".{name}": ["property", "s"] for name in ("Version", "Method", "State", "Quality", "Restored")}
+        expected |= {f".{name}": ["property", "b"] for name in ("Valid", "Disagree", "ConfigRefused")}
+        expected |= {f".{name}": ["property", "d"] for name in ("RateDps", "SigmaDps", "BiasSigmaDps", "CalibratedS",
+                                                                "RestS", "UptimeS")}
+        self.assertEqual(members, expected)
+
+    def test_properties_hold_what_the_gateway_knows(self):
+        self.assertEqual(self.get("State"), "running")
+        self.assertEqual(self.get("Quality"), "two_gyros")
+        self.assertIs(self.get("Valid"), True)
+        self.assertEqual((self.get("RateDps") - 50.25) % 0.5, 0.0)
+        left, right = self.get("Gyros")
+        self.assertEqual(left["name"]["data"], GYRO)
+        self.assertEqual(left["bias_dps"]["data"], 0.033)
+        self.assertEqual(left["health"]["data"], "ok")
+        self.assertEqual(left["rejected"]["data"]["counter_repeated"], 10)
+        self.assertEqual(right["health"]["data"], "stuck")
+        self.assertEqual(right["faults"]["data"]["stuck"], 2)
+        can0, can1 = self.get("Buses")
+        self.assertEqual(can0["errors"]["data"]["bus_off"], 3)
+        self.assertIs(can1["present"]["data"], False)
+        self.assertEqual(self.get("Counters")["pairs"], 1 << 40)
+
+    def test_changes_are_told_once_a_second(self):
+        with subprocess.Popen(["busctl", f"--address={self.address}", "--json=short", "monitor", NAME],
+                              stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, env=self.environment) as monitor:
+            before = self.seconds_told()
+            self.assertTrue(until(lambda: self.seconds_told() >= before + 5))
+            passed = self.seconds_told() - before
+            monitor.terminate()
+            messages = [json.loads(line) for line in monitor.stdout.read().splitlines()]
+        told = [m["payload"]["data"] for m in messages if m.get("member") == "PropertiesChanged"]
+        self.assertGreaterEqual(len(told), 2)
+        self.assertLessEqual(len(told), passed + 1)
+        rates = [changed["RateDps"]["data"] for _, changed, _ in told]
+        self.assertEqual([round(b - a, 9) for a, b in zip(rates, rates[1:])], [0.5] * (len(rates) - 1))
+        self.assertEqual(set(told[0][2]), {"Buses", "Counters"})
+
+    def test_methods_are_for_root_and_properties_for_all(self):
+        stranger = NOBODY if IS_ROOT else None
+        for method in ("Recalibrate", "SaveState"):
+            refused = self.busctl("call", NAME, OBJECT, NAME, method, uid=stranger)
+            self.assertNotEqual(refused.returncode, 0)
+            self.assertIn("denied", refused.stderr.lower())
+        wants = self.vgyro("recalibrate", uid=stranger)
+        self.assertEqual(wants.returncode, 1)
+        self.assertIn("only root may do this; try it again with sudo", wants.stderr)
+        self.assertEqual(self.get("State"), "running")
+        seen = self.vgyro("status", "--json", uid=stranger)
+        self.assertEqual(seen.returncode, 0, seen.stderr)
+        written = self.busctl("set-property", NAME, OBJECT, NAME, "State", "s", "lost", uid=stranger)
+        self.assertNotEqual(written.returncode, 0)
+        # Nobody may take the name either.
+        if IS_ROOT:
+            thief = self.busctl("call", "org.freedesktop.DBus", "/org/freedesktop/DBus", "org.freedesktop.DBus",
+                                "RequestName", "su", NAME, "2", uid=NOBODY)
+            self.assertIn("denied", thief.stderr.lower())
+
+    @unittest.skipUnless(IS_ROOT, "the policy lets only root do this; the refusal is tested")
+    def test_recalibrate_and_save_state_do_what_they_say(self):
+        self.assertEqual(self.busctl("call", NAME, OBJECT, NAME, "SaveState").returncode, 0)
+        done = self.vgyro("recalibrate")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertEqual(self.get("State"), "calibrating")
+        self.assertIs(self.get("Valid"), False)
+        refused = self.busctl("call", NAME, OBJECT, NAME, "SaveState")
+        self.assertIn("nothing was learned yet", refused.stderr)
+
+    def test_status_as_json_says_the_same_as_the_bus(self):
+        done = self.vgyro("status", "--json")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        status = json.loads(done.stdout)
+        self.assertEqual(status["format"], 1)
+        self.assertEqual((status["state"], status["quality"], status["valid"]), ("running", "two_gyros", True))
+        self.assertEqual(status["sigma_dps"], 0.0005)
+        self.assertEqual([g["name"] for g in status["gyros"]], [GYRO, "right"])
+        self.assertEqual(status["gyros"][0]["bias_sigma_dps"], 0.0002)
+        self.assertIsNone(status["gyros"][1]["bias_dps"])
+        self.assertEqual(status["counters"]["frames_sent"], 12345)
+        self.assertEqual(status["buses"][0]["errors"]["bus_off"], 3)
+
+    def test_status_as_a_table(self):
+        done = self.vgyro("status")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertNotIn("\x1b", done.stdout)
+        self.assertRegex(done.stdout, r"(?m)^running  \+5\d\.\d{5} ± 0\.00050 deg/s  two_gyros$")
+        self.assertRegex(done.stdout, r'(?m)^left "one" \\  can0 +ok +\+118\.80 ± 0\.72 +\+50\.28300 +21\.5 +1000 +99\.0 % +0  counter repeated 10$')
+        self.assertRegex(done.stdout, r"(?m)^right +can1 +stuck +– ")
+        self.assertRegex(done.stdout, r"(?m)^can0 +up +active +4321 +0 +0  bus off 3$")
+        self.assertRegex(done.stdout, r"(?m)^can1 +not there ")
+        # Columns stand under each other, also beside characters of several bytes.
+        lines = done.stdout.splitlines()
+        at = next(i for i, line in enumerate(lines) if line.startswith("gyro "))
+        column = lines[at].index("bus")
+        self.assertEqual({lines[at + 1][column:column + 4], lines[at + 2][column:column + 4]}, {"can0", "can1"})
+
+    def test_watch_writes_lines_into_a_pipe(self):
+        with subprocess.Popen([VGYRO, "status", "--watch", "--interval", "0.2"], stdout=subprocess.PIPE,
+                              env=self.environment, text=True) as watch:
+            lines = [watch.stdout.readline() for _ in range(3)]
+            watch.send_signal(signal.SIGINT)
+            self.assertEqual(watch.wait(20), 0)
+        for line in lines:
+            self.assertRegex(line, r'^\d\d:\d\d:\d\d running \+5\d\.\d+ ± 0\.00050 deg/s, two_gyros; left "one" \\ ok, '
+                                   r"bias \+118\.80 deg/h; right stuck, bias – deg/h$")
+
+    def test_watch_ends_with_its_reader(self):
+        with subprocess.Popen([VGYRO, "status", "--watch", "--interval", "0.1"], stdout=subprocess.PIPE,
+                              env=self.environment) as watch:
+            watch.stdout.readline()
+            watch.stdout.close()
+            watch.wait(20)
+
+    def test_watch_draws_on_a_terminal_and_gives_the_cursor_back(self):
+        reader, writer = pty.openpty()
+        environment = {key: value for key, value in self.environment.items() if key != "NO_COLOR"}
+        watch = subprocess.Popen([VGYRO, "status", "--watch", "--interval", "0.2"], stdout=writer, env=environment)
+        self.addCleanup(self.end, watch)
+        os.close(writer)
+        seen = ""
+
+        def read_some():
+            nonlocal seen
+            if select.select([reader], [], [], 0.1)[0]:
+                with contextlib.suppress(OSError):
+                    seen += os.read(reader, 65536).decode("utf-8", "replace")
+        self.assertTrue(until(lambda: read_some() or seen.count("\x1b[H") >= 15))
+        self.assertIn("\x1b[32mrunning\x1b[0m", seen)
+        self.assertRegex(seen, "[▁▂▃▄▅▆▇█]{5}", "no picture of the rate")
+        # The gateway goes away: said in place, and nothing ends.
+        self.end(self.sample)
+        self.assertTrue(until(lambda: read_some() or "no gateway answers" in seen))
+        watch.send_signal(signal.SIGINT)
+        self.assertEqual(watch.wait(20), 0)
+        read_some()
+        self.assertTrue(seen.rstrip().endswith("\x1b[?25h"), repr(seen[-40:]))
+        os.close(reader)
+
+    def test_a_bus_that_hangs_does_not_stop_the_gateway(self):
+        self.bus.send_signal(signal.SIGSTOP)
+        before = self.seconds_told()
+        self.assertTrue(until(lambda: self.seconds_told() >= before + 4, 60), "the loop waits for the bus")
+        self.bus.send_signal(signal.SIGCONT)
+        self.assertTrue(until(self.is_there))
+
+    def test_a_bus_that_ends_and_comes_again_is_found(self):
+        self.end(self.bus)
+        before = self.seconds_told()
+        self.assertTrue(until(lambda: self.seconds_told() >= before + 2), "the loop ended with the bus")
+        self.start_bus()
+        self.assertTrue(until(self.is_there, 60), (self.folder / "sample.err").read_text())
+        said = (self.folder / "sample.err").read_text()
+        self.assertEqual(said.count("no D-Bus: "), 1, said)
+        self.assertIn("on D-Bus as org.vgyro.Gateway1", said)
+
+
+class WithoutAnything(Bench):
+    def test_status_says_what_is_missing(self):
+        done = self.vgyro("status")
+        self.assertEqual(done.returncode, 1)
+        self.assertRegex(done.stderr, r"^error: D-Bus: there is no system bus: .*; `apt install dbus`")
+        self.start_bus()
+        for command in (["status"], ["status", "--json"]):
+            done = self.vgyro(*command)
+            self.assertEqual((done.returncode, done.stdout), (1, ""))
+            self.assertIn("no gateway answers on D-Bus; `systemctl status vgyrod` says whether it runs", done.stderr)
+
+    def test_the_gateway_may_be_there_before_the_bus(self):
+        self.start_sample()
+        self.assertTrue(until(lambda: self.seconds_told() >= 1))
+        self.start_bus()
+        self.assertTrue(until(self.is_there, 60), (self.folder / "sample.err").read_text())
+
+
+# Prometheus' text format by its specification: https://prometheus.io/docs/instrumenting/exposition_formats/
+LABEL = r'[a-zA-Z_][a-zA-Z0-9_]*="(?:[^"\\\n]|\\\\|\\"|\\n)*"'
+SAMPLE_LINE = re.compile(rf"([a-zA-Z_:][a-zA-Z0-9_:]*)(?:\{{({LABEL}(?:,{LABEL})*)\}})? (NaN|[+-]?Inf|[+-]?[0-9.]+(?:e[+-]?[0-9]+)?)")
+
+
+def parse_metrics(text):
+    types, samples = {}, {}
+    family = None
+    if not text.endswith("\n"):
+        raise ValueError("no end of the last line")
+    for line in text.splitlines():
+        if line.startswith("# HELP "):
+            family = line.split(" ", 3)[2]
+            if family in types:
+                raise ValueError(f"{family} twice")
+        elif line.startswith("# TYPE "):
+            _, _, name, kind = line.split(" ")
+            if name != family or kind not in ("gauge", "counter"):
+                raise ValueError(line)
+            types[name] = kind
+        else:
+            match = SAMPLE_LINE.fullmatch(line)
+            if not match or match.group(1) != family or family not in types:
+                raise ValueError(f"no sample: {line!r}")
+            labels = re.findall(r'([a-zA-Z_]+)="((?:[^"\\]|\\.)*)"', match.group(2) or "")
+            key = family, tuple((k, v.replace('\\"', '"').replace("\\n", "\n").replace("\\\\", "\\")) for k, v in labels)
+            if key in samples:
+                raise ValueError(f"{key} twice")
+            samples[key] = float(match.group(3))
+    return types, samples
+
+
+class Metrics(Bench):
+    def test_the_parser_refuses_what_is_no_metric(self):
+        head = "# HELP a b\n# TYPE a gauge\n"
+        self.assertEqual(parse_metrics(head + 'a{x="\\"\\\\"} 1\n')[1], {("a", (("x", '"\\'),)): 1.0})
+        for bad in ("a 1", head + "a  1\n", head + 'a{x="y} 1\n', head + "b 1\n", head + "a 1\na 1\n", head + "a nan\n",
+                    head + 'a{x="\n"} 1\n', "a 1\n"):
+            with self.assertRaises(ValueError, msg=bad):
+                parse_metrics(bad)
+
+    def test_the_file_is_whole_and_true(self):
+        path = self.folder / "vgyro.prom"
+        old_umask = os.umask(0o077)
+        self.addCleanup(os.umask, old_umask)
+        self.start_sample(str(path))
+        self.assertTrue(until(path.exists))
+        types, samples = parse_metrics(path.read_text(encoding="utf-8"))
+        self.assertTrue(all(name.startswith("vgyro_") for name in types))
+        self.assertTrue(all((kind == "counter") == name.endswith("_total") for name, kind in types.items()), types)
+        self.assertEqual({labels[0][1]: value for (name, labels), value in samples.items() if name == "vgyro_state"},
+                         {"waiting": 0, "calibrating": 0, "running": 1, "degraded": 0, "lost": 0})
+        self.assertEqual(samples["vgyro_gyro_bias_degrees_per_second", (("gyro", GYRO),)], 0.033)
+        rate = samples["vgyro_gyro_bias_degrees_per_second", (("gyro", "right"),)]
+        self.assertNotEqual(rate, rate, "not NaN")
+        self.assertEqual(samples["vgyro_pairs_total", ()], float(1 << 40))
+        self.assertEqual(samples["vgyro_dropped_frames_total", (("cause", "stale"),)], 7)
+        self.assertEqual(samples["vgyro_bus_errors_total", (("bus", "can0"), ("cause", "bus_off"))], 3)
+        self.assertEqual(samples["vgyro_gyro_rejected_frames_total", (("gyro", GYRO), ("cause", "counter_repeated"))], 10)
+        self.assertEqual(path.stat().st_mode & 0o777, 0o644)
+
+    def test_a_reader_never_sees_half_a_file(self):
+        path = self.folder / "vgyro.prom"
+        self.start_sample(str(path))
+        self.assertTrue(until(path.exists))
+        first = path.stat().st_ino
+        self.assertTrue(until(lambda: path.exists() and (parse_metrics(path.read_text()), path.stat().st_ino != first)[1]),
+                        "not written again")
+        self.assertEqual([p.name for p in self.folder.glob("vgyro.prom*")], ["vgyro.prom"])
+
+    def test_a_file_that_cannot_be_written_is_told_once(self):
+        self.start_sample(str(self.folder / "nosuch" / "vgyro.prom"))
+        self.assertTrue(until(lambda: self.seconds_told() >= 8, 60))
+        said = (self.folder / "sample.err").read_text()
+        self.assertEqual(said.count("metrics cannot be written: No such file or directory"), 1, said)
+
+
+if __name__ == "__main__":
+    unittest.main(verbosity=2)
