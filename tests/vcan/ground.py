@@ -36,8 +36,8 @@ class Native:
     def __init__(self, unshare):
         self.unshare = unshare
 
-    def run(self, folder, seconds):
-        done = subprocess.run([*self.unshare, PYTHON, str(HERE / "inside.py"), str(folder), str(folder)],
+    def run(self, folder, seconds, inside=HERE / "inside.py"):
+        done = subprocess.run([*self.unshare, PYTHON, str(inside), str(folder), str(folder)],
                               stdout=sys.stderr, timeout=seconds, check=False)
         return done.returncode
 
@@ -49,11 +49,11 @@ class UserModeLinux:
         self.kernel = kernel
         self.modules = modules
 
-    def run(self, folder, seconds):
+    def run(self, folder, seconds, inside=HERE / "inside.py"):
         init = folder / "init"
         init.write_text(GUEST_INIT.format(
             modules=" ".join(shlex.quote(str(m)) for m in self.modules), python=shlex.quote(PYTHON),
-            inside=shlex.quote(str(HERE / "inside.py")), folder=shlex.quote(str(folder))))
+            inside=shlex.quote(str(inside)), folder=shlex.quote(str(folder))))
         init.chmod(0o755)
         command = [self.kernel, "mem=512M", "rootfstype=hostfs", "rootflags=/", "rw", "quiet", f"init={init}",
                    "con=null", "con0=fd:0,fd:1"]

@@ -1,0 +1,76 @@
+/* Two gyros at any rate, for bench/faults: bus_load BUS_A BUS_B PAIRS_PER_S SECONDS [steady]
+   Frames as examples/twin.dbc describes them. Intervals are random about their mean, so that nothing falls into step with
+   a kernel's clock ticks, or `steady`. Prints what it sent. */
+
+#define _GNU_SOURCE
+#include <errno.h>
+#include <linux/can.h>
+#include <linux/can/raw.h>
+#include <net/if.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/ioctl.h>
+#include <sys/socket.h>
+#include <time.h>
+#include <unistd.h>
+
+static uint64_t state = 88172645463325252u;
+
+static uint32_t dice(void) {
+  state ^= state << 13;
+  state ^= state >> 7;
+  state ^= state << 17;
+  return (uint32_t)(state >> 32);
+}
+
+static int open_bus(const char *name) {
+  struct sockaddr_can address = {.can_family = AF_CAN};
+  int fd = socket(PF_CAN, SOCK_RAW, CAN_RAW);
+  address.can_ifindex = (int)if_nametoindex(name);
+  setsockopt(fd, SOL_CAN_RAW, CAN_RAW_FILTER, NULL, 0);
+  if (fd < 0 || bind(fd, (struct sockaddr *)&address, sizeof address) != 0) {
+    perror(name);
+    exit(1);
+  }
+  return fd;
+}
+
+static void wait_until(int64_t ns) {
+  struct timespec t = {.tv_sec = ns / 1000000000, .tv_nsec = ns % 1000000000};
+  while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &t, NULL) == EINTR) {
+  }
+}
+
+int main(int argc, char **argv) {
+  if (argc < 5) return 2;
+  const int fds[2] = {open_bus(argv[1]), open_bus(argv[2])};
+  const double rate = atof(argv[3]);
+  const int steady = argc > 5;
+  const int64_t half = (int64_t)(0.5e9 / rate);
+  const long pairs = (long)(rate * atof(argv[4]));
+  long failed = 0;
+  struct timespec now;
+  clock_gettime(CLOCK_MONOTONIC, &now);
+  int64_t due = (int64_t)now.tv_sec * 1000000000 + now.tv_nsec;
+  for (long i = 0; i < pairs; ++i) {
+    for (int gyro = 0; gyro < 2; ++gyro) {
+      const int32_t raw = (gyro == 0 ? 33000 : -7400) + (int32_t)(dice() % 4096) - 2048;
+      struct can_frame frame = {.can_id = gyro == 0 ? 0x101 : 0x102, .can_dlc = 8};
+      for (int byte = 0; byte < 4; ++byte)
+        frame.data[gyro == 0 ? byte : 3 - byte] = (uint8_t)((uint32_t)raw >> (8 * byte));
+      frame.data[6] = (uint8_t)i;
+      due += steady ? half : half / 2 + (int64_t)(dice() % (uint32_t)half);
+      wait_until(due);
+      while (write(fds[gyro], &frame, sizeof frame) != sizeof frame) {
+        ++failed;
+        usleep(100);
+      }
+    }
+  }
+  clock_gettime(CLOCK_MONOTONIC, &now);
+  printf("%ld %ld %.3f\n", 2 * pairs, failed,
+         ((double)now.tv_sec * 1e9 + (double)now.tv_nsec - (double)due) * 1e-9);
+  return 0;
+}

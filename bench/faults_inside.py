@@ -1,0 +1,76 @@
+#!/usr/bin/python3
+"""The part of bench/faults that runs where the vcan interfaces are; see tests/vcan/ground.py. Orders come in
+plan.json in the folder named first, results go beside it; captures are kept in the folder named second meanwhile."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+TICK = os.sysconf("SC_CLK_TCK")
+
+
+def cpu_s(pid):
+    with open(f"/proc/{pid}/stat", encoding="ascii") as file:
+        user, system = file.read().rsplit(")", 1)[1].split()[11:13]
+    return (int(user) + int(system)) / TICK
+
+
+def resident_kb(pid):
+    with open(f"/proc/{pid}/status", encoding="ascii") as file:
+        return int(next(line for line in file if line.startswith("VmHWM")).split()[1])
+
+
+def latencies_us(path):
+    """From the second gyro's stamp to the rate's, by the kernel's stamps."""
+    found, last = [], None
+    with open(path, encoding="ascii") as file:
+        for line in file:
+            stamp, _, frame = line.split()[:3]
+            if frame.startswith("102#"):
+                last = float(stamp.strip("()"))
+            elif frame.startswith("610#") and last is not None:
+                found.append((float(stamp.strip("()")) - last) * 1e6)
+    return found
+
+
+def run(job, folder, memory):
+    capture = os.path.join(memory, "capture.log")
+    with open(os.path.join(folder, job["name"] + ".err"), "wb") as errors, open(capture, "wb") as out:
+        dump = None
+        if job["capture"]:
+            dump = subprocess.Popen(["candump", "-L", "-r", "8000000", "any,101:7FE,102:7FF,610:7FF"], stdout=out)
+        program = subprocess.Popen(job["command"], stderr=errors, cwd=folder)
+        time.sleep(job.get("settle_s", 1.0))
+        before = cpu_s(program.pid)
+        load = subprocess.run(job["load"], capture_output=True, text=True, check=True)
+        time.sleep(0.3)
+        used, resident = cpu_s(program.pid) - before, resident_kb(program.pid)
+        program.send_signal(signal.SIGTERM)
+        program.wait(20)
+        if dump:
+            time.sleep(0.5)
+            dump.terminate()
+            dump.wait()
+    sent, refused, late_s = load.stdout.split()
+    result = {"name": job["name"], "frames": int(sent), "refused": int(refused), "late_s": float(late_s), "cpu_s": used, "resident_kb": resident}
+    if job["capture"]:
+        result["latencies_us"] = latencies_us(capture)
+    return result
+
+
+def main():
+    folder, memory = sys.argv[1:]
+    with open(os.path.join(folder, "plan.json"), encoding="utf-8") as file:
+        plan = json.load(file)
+    subprocess.run(["ip", "-batch", "-"], check=True, input="".join(
+        f"link add {name} type vcan\nlink set {name} up\n" for name in plan["links"]).encode())
+    results = [run(job, folder, memory) for job in plan["jobs"]]
+    with open(os.path.join(folder, "results.json"), "w", encoding="utf-8") as file:
+        json.dump(results, file)
+
+
+if __name__ == "__main__":
+    main()
