@@ -1,7 +1,8 @@
 // The pipeline and its transmit queue under faults, and for a long day; no bus, no clock.
-//   vgyro_fault_bench sequences COUNT FIRST_SEED    random faults; prints JSON, a failed seed on
-//   stderr vgyro_fault_bench drive HOURS                   a drive with stops; prints JSON
-// Truth and noise are made here, frames by hand, and what comes out is read from its bits.
+//   vgyro_faults sequences COUNT FIRST_SEED    random faults; a failed seed goes to stderr
+//   vgyro_faults drive HOURS                   a drive with stops
+// Both print JSON. Truth and noise are made here, frames by hand, and what comes out is read from
+// its bits.
 
 #include <algorithm>
 #include <array>
@@ -593,6 +594,6 @@ int main(int argc, char** argv) {
     return run_sequences(static_cast<unsigned>(std::atoi(argv[2])),
                          std::strtoull(argv[3], nullptr, 10));
   if (mode == "drive" && argc == 3) return run_drive(std::atof(argv[2]));
-  std::fputs("usage: vgyro_fault_bench sequences COUNT FIRST_SEED | drive HOURS\n", stderr);
+  std::fputs("usage: vgyro_faults sequences COUNT FIRST_SEED | drive HOURS\n", stderr);
   return 2;
 }
