@@ -1,5 +1,6 @@
 """Judges what the guest left behind: exit codes and outputs of the scenario's steps, and the captured frames."""
 
+import json
 import math
 import os
 import re
@@ -115,7 +116,19 @@ def sandbox(run):
 def calibrates(run):
     """Recorded traffic in, a calibrated rate out."""
     run.done("play")
-    return run.check_rates("play", "killed", calibrated=False)
+    return run.check_rates("play", "introspect", calibrated=False)
+
+
+def speaks_on_dbus(run):
+    """Over D-Bus: introspected, read by everybody, told to calibrate anew by root alone."""
+    run.done("introspect", "property", "status", "recalibrate", "recalibrate_play", "save")
+    for member in (".State", ".RateDps", ".Recalibrate", ".SaveState"):
+        require(re.search(rf"^\{member} ", run.text("introspect"), re.MULTILINE), f"no {member}\n{run.text('introspect')}")
+    require(re.fullmatch(r's "(running|degraded|lost)"\n', run.text("property")), run.text("property"))
+    status = json.loads(run.text("status"))
+    require(status["State"] == "running" and abs(status["RateDps"]) < 0.05, run.text("status"))
+    require((run.out / "refused.exit").read_text().strip() != "0" and "denied" in run.text("refused").lower(), run.text("refused"))
+    return run.check_rates("recalibrate_play", "save", calibrated=False)
 
 
 def kill_nine(run):
@@ -211,7 +224,7 @@ def protection(run):
     return f"{len(run.frames)} frames"
 
 
-CHECKS = (network_examples, installs_and_waits, starts, sandbox, calibrates, kill_nine, reloads, watchdog, link_faults, upgrades, stops,
+CHECKS = (network_examples, installs_and_waits, starts, sandbox, calibrates, speaks_on_dbus, kill_nine, reloads, watchdog, link_faults, upgrades, stops,
           goes_away, protection)
 
 

@@ -70,6 +70,19 @@ step mounts grep -E ' / | /etc | /tmp | /dev ' /proc/$main/mountinfo
 step security systemd-analyze security vgyrod --no-pager
 step play play_until_running calibration
 
+# Asked over D-Bus: by anybody to be read, by root alone to do something.
+gateway=(org.vgyro.Gateway1 /org/vgyro/Gateway1)
+nobody() { setpriv --reuid=65534 --regid=65534 --clear-groups "$@"; }
+while_playing() { play rest & within 8 says StatusText 'running*' && "$@"; local code=$?; wait $!; return $code; }
+step introspect busctl introspect "${gateway[@]}" --no-pager
+step property nobody busctl get-property "${gateway[@]}" org.vgyro.Gateway1 State
+step status while_playing nobody vgyro status --json
+step refused nobody busctl call "${gateway[@]}" org.vgyro.Gateway1 Recalibrate
+step recalibrate vgyro recalibrate
+sleep 1
+step recalibrate_play play_until_running calibration
+step save busctl call "${gateway[@]}" org.vgyro.Gateway1 SaveState
+
 # Killed without warning, and back with what it knew.
 since=$(date +%s)
 kill -9 $main
