@@ -49,7 +49,8 @@ int milliseconds_until(TimePoint deadline, TimePoint now) {
 
 GatewayLoop::Setup::Setup(gateway::Plan the_plan, Log& log)
     : plan(std::move(the_plan)),
-      reporter({plan.gyros[0].name, plan.gyros[1].name}, plan.calibration.rest_s, log),
+      reporter(std::make_unique<Reporter>(std::array{plan.gyros[0].name, plan.gyros[1].name},
+                                          plan.calibration.rest_s, log)),
       pipeline(plan) {
   buses.reserve(plan.buses.size());
   for (std::size_t i = 0; i < plan.buses.size(); ++i) {
@@ -175,7 +176,7 @@ Expected<void> GatewayLoop::run() {
   }
   notify_stopping();
   if (keeper_ != nullptr) keeper_->finish(setup_->pipeline.memory());
-  setup_->reporter.summarize(setup_->pipeline.status(), traffic());
+  setup_->reporter->summarize(setup_->pipeline.status(), traffic());
   return {};
 }
 
@@ -223,7 +224,7 @@ Expected<void> GatewayLoop::cycle(std::span<const epoll_event> ready) {
 
 void GatewayLoop::look_at_status() {
   const gateway::Status& status = setup_->pipeline.status();
-  setup_->reporter.check_state(status);
+  setup_->reporter->check_state(status);
   const std::uint64_t samples = status.gyros[0].samples + status.gyros[1].samples;
   if (std::exchange(samples_, samples) != samples) forward_.sample_came();
 }
@@ -309,7 +310,7 @@ void GatewayLoop::second_passed() {
 }
 
 std::string GatewayLoop::status_line() {
-  std::string line = setup_->reporter.second_passed(setup_->pipeline.status(), traffic());
+  std::string line = setup_->reporter->second_passed(setup_->pipeline.status(), traffic());
   if (reload_refused_) line += "; the new configuration was refused";
   return line;
 }
@@ -402,20 +403,35 @@ Expected<void> GatewayLoop::replace_setup(gateway::Plan plan, bool keep) {
   hand_on_arrivals();
   for (Bus& bus : next->buses)
     bus.discard();
-  next->reporter.start_from(queue_.counts());
-  next->pipeline.count_on_from(setup_->pipeline);
-  Expected<void> resumed = fail({}, "nothing was learned yet");
-  if (!keep) resumed = fail({}, "as asked");
-  const std::optional<gateway::SavedState> memory = setup_->pipeline.memory();
-  if (keep && memory) resumed = next->pipeline.resume(*memory);
+  const std::string how = keep ? hand_over(*next) : begin_anew(*next);
   setup_ = std::move(next);
   snapshot_.plan = nullptr;
   polls_writable_ = false;
   queue_.on_writable();
-  log_.notice("{}{}", keep ? "the new configuration is in use" : "begun anew",
-              resumed ? std::string(", with what was learned")
-                      : "; calibrating: " + resumed.error().message());
+  log_.notice("{}", how);
   return poll_buses();
+}
+
+// What the present pipeline has learned, as much of it as the next one can use; tells how much.
+std::string GatewayLoop::hand_over(Setup& next) {
+  if (gateway::same_but_output(setup_->plan, next.plan)) {
+    next.pipeline.take_over(std::move(setup_->pipeline));
+    next.reporter = std::move(setup_->reporter);
+    next.reporter->buses_are_new();
+    return "the new configuration is in use; its gyros are the same: nothing was interrupted";
+  }
+  const std::optional<gateway::SavedState> memory = setup_->pipeline.memory();
+  begin_anew(next);
+  const Expected<void> resumed =
+      memory ? next.pipeline.resume(*memory) : Expected<void>(fail({}, "nothing was learned yet"));
+  if (resumed) return "the new configuration is in use, with what was learned";
+  return "the new configuration is in use; calibrating anew: " + resumed.error().message();
+}
+
+std::string GatewayLoop::begin_anew(Setup& next) {
+  next.pipeline.count_on_from(setup_->pipeline);
+  next.reporter->start_from(queue_.counts());
+  return "calibrating anew";
 }
 
 int GatewayLoop::on_stop(sd_event_source*, const signalfd_siginfo*, void* self) {

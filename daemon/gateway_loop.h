@@ -56,7 +56,7 @@ class GatewayLoop final : private gateway::FrameSink {
   struct Setup {
     Setup(gateway::Plan the_plan, Log& log);
     gateway::Plan plan;
-    Reporter reporter;
+    std::unique_ptr<Reporter> reporter;
     gateway::Pipeline pipeline;
     std::vector<Bus> buses;
   };
@@ -85,6 +85,8 @@ class GatewayLoop final : private gateway::FrameSink {
   Expected<void> save_state();
   /// `keep`: goes on with what was learned, where the gyros are the same.
   Expected<void> replace_setup(gateway::Plan plan, bool keep);
+  std::string hand_over(Setup& next);
+  std::string begin_anew(Setup& next);
   const Snapshot& snapshot();
   [[nodiscard]] int timeout_ms() const;
   [[nodiscard]] Traffic traffic() const;

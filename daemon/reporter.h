@@ -34,6 +34,11 @@ class Reporter {
 
   /// What was sent before is known already.
   void start_from(const can::TransmitCounts& transmitted);
+  /// Their counters begin at 0 again.
+  void buses_are_new() {
+    buses_.clear();
+    last_received_ = 0;
+  }
 
   /// Logs a change of state or of a gyro's health. Cheap when there is none.
   void check_state(const gateway::Status& status) {

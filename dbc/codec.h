@@ -48,6 +48,8 @@ class SignalCodec {
   [[nodiscard]] double representable_min() const;
   [[nodiscard]] double representable_max() const;
 
+  friend bool operator==(const SignalCodec&, const SignalCodec&) = default;
+
  private:
   SignalCodec() = default;
 

@@ -78,6 +78,19 @@ Expected<Presence> Presence::make(const Message& message, const Signal& signal,
   return PresenceBuilder(message).make(signal, where);
 }
 
+bool operator==(const Presence& a, const Presence& b) {
+  const Presence::Step* one = a.last_.get();
+  const Presence::Step* other = b.last_.get();
+  while (one != other && one != nullptr && other != nullptr) {
+    if (one->multiplexor != other->multiplexor || one->mask != other->mask ||
+        one->ranges != other->ranges)
+      return false;
+    one = one->above.get();
+    other = other->above.get();
+  }
+  return one == other;
+}
+
 bool Presence::holds(std::span<const std::uint8_t> payload) const {
   for (const Step* step = last_.get(); step != nullptr; step = step->above.get()) {
     if (!step->multiplexor.fits(payload.size())) return false;

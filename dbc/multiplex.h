@@ -34,6 +34,9 @@ class Presence {
   void arrange(std::span<std::uint8_t> payload) const;
   [[nodiscard]] bool always() const { return last_ == nullptr; }
 
+  /// The same conditions, from whatever file.
+  friend bool operator==(const Presence& a, const Presence& b);
+
  private:
   friend class PresenceBuilder;
   /// Signals of the same message share what they have in common.

@@ -12,6 +12,8 @@ namespace vgyro::fusion {
 struct GaussMarkov {
   double sigma_dps = 0.0;
   double tau_s = 1.0;
+
+  friend bool operator==(const GaussMarkov&, const GaussMarkov&) = default;
 };
 
 struct GyroParameters {
@@ -23,6 +25,8 @@ struct GyroParameters {
   std::size_t gauss_markov_count = 0;
   double rate_noise_rthz = 0.0;  ///< white noise of density rate_noise_rthz · |Ω|, on top of N
   double resolution_dps = 0.0;   ///< step of the values, 0 when unknown
+
+  friend bool operator==(const GyroParameters&, const GyroParameters&) = default;
 };
 
 }  // namespace vgyro::fusion

@@ -122,7 +122,7 @@ struct Pipeline::Impl {
   void tell_surroundings(TimePoint t, double rate_dps, bool valid);
   [[nodiscard]] double seconds(TimePoint t) const { return to_seconds(t - origin); }
 
-  const Plan plan;
+  Plan plan;
   Router router;
   std::array<GyroInput, 2> inputs;
   std::array<GyroHealth, 2> health_of;
@@ -722,6 +722,15 @@ Expected<void> Pipeline::resume(const SavedState& state) {
 
 void Pipeline::count_on_from(const Pipeline& before) {
   impl_->encoder.count_on_from(before.impl_->encoder);
+}
+
+void Pipeline::take_over(Pipeline&& before) {
+  assert(same_but_output(impl_->plan, before.impl_->plan));
+  impl_->encoder.count_on_from(before.impl_->encoder);
+  std::swap(impl_->encoder, before.impl_->encoder);
+  // Parts of the pipeline refer to the rest of its plan.
+  before.impl_->plan.output = impl_->plan.output;
+  impl_ = std::move(before.impl_);
 }
 
 void Pipeline::observe(RateObserver* observer) {

@@ -80,6 +80,10 @@ class Pipeline {
   /// anew.
   void count_on_from(const Pipeline& before);
 
+  /// Instead of a beginning: goes on as another one whose plan is the same but for the output, and
+  /// which is at its end then. The frames' counters go on as with count_on_from().
+  void take_over(Pipeline&& before);
+
   /// Null to take it off again.
   void observe(RateObserver* observer);
 

@@ -10,4 +10,11 @@ std::vector<FrameMatch> Plan::inputs() const {
   return matches;
 }
 
+// The names of the buses stand in what is read from them.
+bool same_but_output(const Plan& a, const Plan& b) {
+  return a.gyros == b.gyros && a.reference == b.reference && a.accelerometer == b.accelerometer &&
+         a.speed == b.speed && a.calibration == b.calibration && a.corrector == b.corrector &&
+         a.model == b.model;
+}
+
 }  // namespace vgyro::gateway

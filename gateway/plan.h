@@ -28,6 +28,8 @@ struct FrameMatch {
   std::uint32_t mask = 0;
   bool extended = false;
   std::uint8_t bytes = can::kClassicBytesMax;  ///< of the payload, by the DBC file
+
+  friend bool operator==(const FrameMatch&, const FrameMatch&) = default;
 };
 
 /// A physical quantity in a frame.
@@ -42,6 +44,8 @@ struct Quantity {
   double maximum = 0.0;
   std::string layout;  ///< for people: "32 bits from bit 0, Intel, signed, x 1e-06"
   double step = 0.0;   ///< between neighbouring values, in the product's unit; 0 for floats
+
+  friend bool operator==(const Quantity&, const Quantity&) = default;
 };
 
 enum class Comparison : std::uint8_t {
@@ -59,12 +63,16 @@ struct Condition {
   Comparison comparison = Comparison::kEqual;
   double value = 0.0;
   std::string text;  ///< as configured
+
+  friend bool operator==(const Condition&, const Condition&) = default;
 };
 
 struct AliveCounter {
   std::string name;
   dbc::SignalCodec codec;
   std::uint32_t modulus = 256;  ///< values it runs through: 0 … modulus − 1
+
+  friend bool operator==(const AliveCounter&, const AliveCounter&) = default;
 };
 
 struct GyroPlan {
@@ -80,6 +88,8 @@ struct GyroPlan {
   std::optional<double> saturation_dps = {};  ///< from the model file: it clips at ± this
   double dead_band_dps = 0.0;                 ///< likewise: it reads 0 below; 0: it has none
   std::string taken_back = {};                ///< digest of what is taken back; empty: nothing
+
+  friend bool operator==(const GyroPlan&, const GyroPlan&) = default;
 };
 
 struct ReferencePlan {
@@ -87,6 +97,8 @@ struct ReferencePlan {
   std::string message;
   FrameMatch match;
   Quantity rate;
+
+  friend bool operator==(const ReferencePlan&, const ReferencePlan&) = default;
 };
 
 struct AccelerometerPlan {
@@ -94,6 +106,8 @@ struct AccelerometerPlan {
   std::string message;
   FrameMatch match;
   std::array<Quantity, 3> axes;  ///< x, y, z
+
+  friend bool operator==(const AccelerometerPlan&, const AccelerometerPlan&) = default;
 };
 
 struct SpeedPlan {
@@ -101,6 +115,8 @@ struct SpeedPlan {
   std::string message;
   FrameMatch match;
   Quantity speed;
+
+  friend bool operator==(const SpeedPlan&, const SpeedPlan&) = default;
 };
 
 struct CalibrationPlan {
@@ -109,6 +125,8 @@ struct CalibrationPlan {
   bool from_reference = false;  ///< calibrate against [reference] instead
   std::optional<double> stop_rate_dps = 0.0;  ///< true rate at a stop, where it is known
   fusion::WhenMoving when_moving = fusion::WhenMoving::kWait;
+
+  friend bool operator==(const CalibrationPlan&, const CalibrationPlan&) = default;
 };
 
 struct CorrectorPlan {
@@ -116,6 +134,8 @@ struct CorrectorPlan {
   double window_s = 10.0;
   int order = 1;                                ///< of `mutual`
   std::array<fusion::GyroParameters, 2> gyros;  ///< what the model file knows of the noise
+
+  friend bool operator==(const CorrectorPlan&, const CorrectorPlan&) = default;
 };
 
 struct OutputPlan {
@@ -140,5 +160,8 @@ struct Plan {
   /// Every frame that the pipeline wants to receive: the kernel filters.
   [[nodiscard]] std::vector<FrameMatch> inputs() const;
 };
+
+/// Do both mean the same but for where the result goes?
+bool same_but_output(const Plan& a, const Plan& b);
 
 }  // namespace vgyro::gateway

@@ -53,6 +53,8 @@ struct Effect {
   Kind kind = Kind::kBias;
   Parameters parameters{};
   unsigned line = 0;  ///< of its table in the model file; 0 when it comes from elsewhere
+
+  friend bool operator==(const Effect&, const Effect&) = default;
 };
 
 /// What a gyro's error depends on besides the true rate, at one instant. NaN: not known.

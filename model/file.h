@@ -17,6 +17,8 @@ namespace vgyro::model {
 struct Model {
   std::string file;
   std::vector<Effect> effects;  ///< in the order of the file
+
+  friend bool operator==(const Model&, const Model&) = default;
 };
 
 using ModelResult = tl::expected<Model, std::vector<Error>>;

@@ -54,6 +54,21 @@ TEST(MessageCodec, FollowsMultiplexorsOfMultiplexors) {
   EXPECT_EQ(seen(database.messages[0], {2, 5, 9, 0, 0, 0, 0, 0}), "X=2 ");
 }
 
+// Two readings of one file mean the same; another page is another thing.
+TEST(Presence, IsTheSameWhereItsConditionsAre) {
+  const auto presence_of_a = [](const std::string& page, unsigned multiplexor_bit) {
+    const Database database =
+        parsed(line("X M", 0) + line("Y m1M", multiplexor_bit) + line("A m" + page, 32) +
+               "SG_MUL_VAL_ 1 Y X 1-1, 3-4;\n" + "SG_MUL_VAL_ 1 A Y " + page + "-9;\n");
+    return Presence::make(database.messages[0], database.messages[0].signals[2], "test").value();
+  };
+  EXPECT_EQ(presence_of_a("5", 8), presence_of_a("5", 8));
+  EXPECT_FALSE(presence_of_a("5", 8) == presence_of_a("6", 8));
+  EXPECT_FALSE(presence_of_a("5", 8) == presence_of_a("5", 16));
+  EXPECT_EQ(Presence(), Presence());
+  EXPECT_FALSE(presence_of_a("5", 8) == Presence());
+}
+
 // A multiplexor declared signed is compared by its bits.
 TEST(MessageCodec, ComparesTheBitsOfASignedMultiplexor) {
   const Database database = parsed(" SG_ X M : 0|8@1- (1,0) [0|0] \"\" E\n" + line("A m255", 8));

@@ -1,12 +1,15 @@
 #include "gateway/pipeline.h"
 
 #include <cmath>
+#include <functional>
+#include <iterator>
 #include <limits>
 #include <memory>
 #include <random>
 
 #include <gtest/gtest.h>
 
+#include "gateway/config.h"
 #include "tests/gateway/rig.h"
 
 namespace vgyro::gateway {
@@ -694,6 +697,62 @@ TEST(PipelineRepeats, ItselfAfterAMove) {
   Collector out;
   rig::play(second, both(ms(3000)), out);
   EXPECT_EQ(out.frames, run.out.frames);
+}
+
+// A reload that changes where the rates go, and nothing of what they are made of.
+TEST(PipelineRepeats, ItselfWhereAnotherOneTakesOverInTheMidst) {
+  for (const Method method : {Method::kOptimal, Method::kMutual, Method::kMean}) {
+    Plan plan = rig::two_gyros();
+    plan.corrector.method = method;
+    Bench whole(plan);
+    const Recording recording = both(ms(4000));
+    whole.play(recording);
+    Bench first(plan);
+    Plan other = plan;
+    other.output.bias_id = 0x711;
+    other.buses.emplace_back("can7");
+    Bench second(other);
+    for (std::size_t i = 0; i < recording.size(); ++i) {
+      if (i == recording.size() / 3) second.pipeline.take_over(std::move(first.pipeline));
+      const rig::Event& event = recording[i];
+      Bench& bench = i < recording.size() / 3 ? first : second;
+      bench.pipeline.receive(event.bus, event.frame, event.stamp, bench.out);
+    }
+    auto payloads = rate_payloads(first.out);
+    for (const auto& payload : rate_payloads(second.out))
+      payloads.push_back(payload);
+    EXPECT_EQ(payloads, rate_payloads(whole.out)) << to_string(method);
+    EXPECT_TRUE(second.out.with_id(0x611).empty());
+    EXPECT_FALSE(second.out.with_id(0x711).empty());
+    EXPECT_EQ(second.pipeline.status().pairs, whole.pipeline.status().pairs);
+  }
+}
+
+TEST(PlanComparison, SeesEveryChangeButTheOutputs) {
+  const Plan plan = rig::with_reference();
+  Plan same = rig::with_reference();
+  same.output = {.bus = 1, .rate_id = 0x700, .fd = true};
+  same.buses.emplace_back("can7");
+  EXPECT_TRUE(same_but_output(plan, same));
+  const std::function<void(Plan&)> changes[] = {
+      [](Plan& p) { p.gyros[1].match.id = 0x1FF; },
+      [](Plan& p) { p.gyros[0].bus = "can9"; },
+      [](Plan& p) { p.gyros[0].rate.scale = -1.0; },
+      [](Plan& p) { p.gyros[0].rate.codec = rig::codec_of(rig::signal_of(0, 31)); },
+      [](Plan& p) { p.gyros[1].name = "c"; },
+      [](Plan& p) { p.reference.reset(); },
+      [](Plan& p) { p.calibration.rest_s = 2.0; },
+      [](Plan& p) { p.corrector.window_s = 2.0; },
+      [](Plan& p) { p.corrector.gyros[0].white_dps_rthz = 1e-3; },
+      [](Plan& p) {
+        p.model = model::Model{"m.toml", {{.gyro = 0}}};
+      },
+  };
+  for (const auto& change : changes) {
+    Plan changed = rig::with_reference();
+    change(changed);
+    EXPECT_FALSE(same_but_output(plan, changed)) << &change - std::begin(changes);
+  }
 }
 
 // After a reload receivers see one stream.
