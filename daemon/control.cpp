@@ -275,21 +275,25 @@ void Control::disconnect(int error) {
 }
 
 int Control::on_name(sd_bus_message* reply, void* self, sd_bus_error*) {
+  constexpr std::uint32_t kOwner = 1;
+  constexpr std::uint32_t kOwnerAlready = 4;
   auto& control = *static_cast<Control*>(self);
+  std::uint32_t answer = 0;
+  const char* why = "another gateway has it";
   if (sd_bus_message_is_method_error(reply, nullptr) != 0) {
-    const char* why = sd_bus_message_get_error(reply)->message;
-    if (!std::exchange(control.told_of_failure_, true)) {
-      control.log_.tell(Severity::kNotice, {.cause = "no_dbus"},
-                        "the bus does not give the name {}: {}; org.vgyro.Gateway1.conf belongs "
-                        "into /usr/share/dbus-1/system.d",
-                        kName, why == nullptr ? "no reason given" : why);
-    }
-    return 0;
+    why = sd_bus_message_get_error(reply)->message;
+  } else {
+    sd_bus_message_read(reply, "u", &answer);
   }
-  control.has_name_ = true;
-  if (std::exchange(control.told_of_failure_, false)) {
+  control.has_name_ = answer == kOwner || answer == kOwnerAlready;
+  if (control.has_name_ && std::exchange(control.told_of_failure_, false)) {
     control.log_.notice("on D-Bus as {}", kName);
   }
+  if (control.has_name_ || std::exchange(control.told_of_failure_, true)) return 0;
+  control.log_.tell(Severity::kNotice, {.cause = "no_dbus"},
+                    "the bus does not give the name {}: {}; trying on (org.vgyro.Gateway1.conf "
+                    "belongs into /usr/share/dbus-1/system.d)",
+                    kName, why == nullptr ? "no reason given" : why);
   return 0;
 }
 

@@ -275,6 +275,17 @@ class OnTheBus(Bench):
         self.bus.send_signal(signal.SIGCONT)
         self.assertTrue(until(self.is_there))
 
+    def test_a_second_gateway_waits_for_the_name(self):
+        with open(self.folder / "second.err", "wb") as errors:
+            second = subprocess.Popen([SAMPLE], stdout=subprocess.DEVNULL, stderr=errors, env=self.environment)
+        self.addCleanup(self.end, second)
+        said = (self.folder / "second.err").read_text
+        self.assertTrue(until(lambda: "another gateway has it" in said()), said())
+        self.end(self.sample)
+        self.assertTrue(until(self.is_there), said())
+        self.assertEqual(said().count("another gateway has it"), 1, said())
+        self.assertTrue(until(lambda: "on D-Bus as org.vgyro.Gateway1" in said()), said())
+
     def test_a_bus_that_ends_and_comes_again_is_found(self):
         self.end(self.bus)
         before = self.seconds_told()
