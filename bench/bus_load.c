@@ -1,6 +1,7 @@
-/* Two gyros at any rate, for bench/faults: bus_load BUS_A BUS_B PAIRS_PER_S SECONDS [steady]
+/* Two gyros at any rate, for bench/faults: bus_load BUS_A BUS_B PAIRS_PER_S SECONDS [OTHERS]
    Frames as examples/twin.dbc describes them. Intervals are random about their mean, so that nothing falls into step with
-   a kernel's clock ticks, or `steady`. Prints what it sent. */
+   a kernel's clock ticks; with OTHERS they are even, and so many frames of other identifiers follow each gyro's. Prints
+   the gyros' frames, all frames, and by how many seconds the last was late. */
 
 #define _GNU_SOURCE
 #include <errno.h>
@@ -43,14 +44,18 @@ static void wait_until(int64_t ns) {
   }
 }
 
+static void send_frame(int fd, const struct can_frame *frame) {
+  while (write(fd, frame, sizeof *frame) != sizeof *frame) usleep(100);
+}
+
 int main(int argc, char **argv) {
   if (argc < 5) return 2;
   const int fds[2] = {open_bus(argv[1]), open_bus(argv[2])};
   const double rate = atof(argv[3]);
   const int steady = argc > 5;
-  const int64_t half = (int64_t)(0.5e9 / rate);
+  const int others = steady ? atoi(argv[5]) : 0;
+  const int64_t half = (int64_t)(0.5e9 / rate) / (1 + others);
   const long pairs = (long)(rate * atof(argv[4]));
-  long failed = 0;
   struct timespec now;
   clock_gettime(CLOCK_MONOTONIC, &now);
   int64_t due = (int64_t)now.tv_sec * 1000000000 + now.tv_nsec;
@@ -63,14 +68,17 @@ int main(int argc, char **argv) {
       frame.data[6] = (uint8_t)i;
       due += steady ? half : half / 2 + (int64_t)(dice() % (uint32_t)half);
       wait_until(due);
-      while (write(fds[gyro], &frame, sizeof frame) != sizeof frame) {
-        ++failed;
-        usleep(100);
-      }
+      send_frame(fds[gyro], &frame);
+    }
+    for (int other = 0; other < 2 * others; ++other) {
+      const struct can_frame frame = {.can_id = 0x300 + (uint32_t)other, .can_dlc = 8};
+      due += half;
+      wait_until(due);
+      send_frame(fds[other % 2], &frame);
     }
   }
   clock_gettime(CLOCK_MONOTONIC, &now);
-  printf("%ld %ld %.3f\n", 2 * pairs, failed,
+  printf("%ld %ld %.3f\n", 2 * pairs, 2 * pairs * (1 + others),
          ((double)now.tv_sec * 1e9 + (double)now.tv_nsec - (double)due) * 1e-9);
   return 0;
 }

@@ -24,39 +24,51 @@ def resident_kb(pid):
 
 
 def latencies_us(path):
-    """From the second gyro's stamp to the rate's, by the kernel's stamps."""
+    """From the stamp of the gyro frame that came last to the rate's, by the kernel's stamps."""
     found, last = [], None
     with open(path, encoding="ascii") as file:
         for line in file:
             stamp, _, frame = line.split()[:3]
-            if frame.startswith("102#"):
+            if frame.startswith(("101#", "102#")):
                 last = float(stamp.strip("()"))
             elif frame.startswith("610#") and last is not None:
                 found.append((float(stamp.strip("()")) - last) * 1e6)
     return found
 
 
+def mark(folder, name):
+    """The host looks at its own clock of processor time when this appears."""
+    time.sleep(0.3)
+    with open(os.path.join(folder, name), "wb"):
+        pass
+    time.sleep(0.3)
+
+
 def run(job, folder, memory):
     capture = os.path.join(memory, "capture.log")
     with open(os.path.join(folder, job["name"] + ".err"), "wb") as errors, open(capture, "wb") as out:
-        dump = None
-        if job["capture"]:
+        dump = program = None
+        if job.get("capture"):
             dump = subprocess.Popen(["candump", "-L", "-r", "8000000", "any,101:7FE,102:7FF,610:7FF"], stdout=out)
-        program = subprocess.Popen(job["command"], stderr=errors, cwd=folder)
+        if job["command"]:
+            program = subprocess.Popen(job["command"], stderr=errors, cwd=folder)
         time.sleep(job.get("settle_s", 1.0))
-        before = cpu_s(program.pid)
+        mark(folder, job["name"] + ".begin")
+        before = cpu_s(program.pid) if program else 0.0
         load = subprocess.run(job["load"], capture_output=True, text=True, check=True)
-        time.sleep(0.3)
-        used, resident = cpu_s(program.pid) - before, resident_kb(program.pid)
-        program.send_signal(signal.SIGTERM)
-        program.wait(20)
+        mark(folder, job["name"] + ".end")
+        used, resident = (cpu_s(program.pid) - before, resident_kb(program.pid)) if program else (0.0, 0)
+        if program:
+            program.send_signal(signal.SIGTERM)
+            program.wait(20)
         if dump:
             time.sleep(0.5)
             dump.terminate()
             dump.wait()
-    sent, refused, late_s = load.stdout.split()
-    result = {"name": job["name"], "frames": int(sent), "refused": int(refused), "late_s": float(late_s), "cpu_s": used, "resident_kb": resident}
-    if job["capture"]:
+    frames, everything, late_s = load.stdout.split()
+    result = {"name": job["name"], "frames": int(frames), "sent": int(everything), "late_s": float(late_s), "cpu_s": used,
+              "resident_kb": resident}
+    if job.get("capture"):
         result["latencies_us"] = latencies_us(capture)
     return result
 
