@@ -125,7 +125,8 @@ def speaks_on_dbus(run):
     for member in (".State", ".RateDps", ".Recalibrate", ".SaveState"):
         require(re.search(rf"^\{member} ", run.text("introspect"), re.MULTILINE), f"no {member}\n{run.text('introspect')}")
     require(re.fullmatch(r's "(running|degraded|lost)"\n', run.text("property")), run.text("property"))
-    status = json.loads(run.text("status"))
+    said = run.text("status")
+    status = json.loads(said[said.rindex("\n{\n") if "\n{\n" in said else said.index("{"):])
     require(status["state"] == "running" and status["valid"] and abs(status["rate_dps"]) < 0.05, run.text("status"))
     require((run.out / "refused.exit").read_text().strip() != "0" and "denied" in run.text("refused").lower(), run.text("refused"))
     return run.check_rates("recalibrate_play", "save", calibrated=False)

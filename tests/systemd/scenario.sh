@@ -23,11 +23,6 @@ pid() { systemctl show vgyrod -p MainPID --value; }
 journal() { journalctl -u vgyrod --no-pager -o short-unix --since "@$1"; }
 other_pid() { says ActiveState active && says MainPID '[1-9]*' && ! says MainPID "$1"; }
 play() { canplayer -I "$here/$1.log"; }
-# While they send, the rates are judged: enough of them after the gyros were heard.
-play_until_running() {  # play_until_running NAME
-    play "$1" & within 8 says StatusText 'running*'; local code=$?; wait $!; return $code
-}
-
 mkdir -p /run/modules
 mount -t hostfs none /run/modules -o "$(cat $here/modules.path)"
 for module in can can-raw can-dev vcan; do insmod "$(find /run/modules -name "$module.ko*")"; done 2>"$out/modules.txt"
@@ -68,19 +63,28 @@ step process cat /proc/$main/status
 step namespaces readlink /proc/1/ns/{mnt,user,ipc} /proc/$main/ns/{mnt,user,ipc}
 step mounts grep -E ' / | /etc | /tmp | /dev ' /proc/$main/mountinfo
 step security systemd-analyze security vgyrod --no-pager
-step play play_until_running calibration
+step play play calibration
 
 # Asked over D-Bus: by anybody to be read, by root alone to do something.
 gateway=(org.vgyro.Gateway1 /org/vgyro/Gateway1)
 nobody() { setpriv --reuid=65534 --regid=65534 --clear-groups "$@"; }
-while_playing() { play rest & within 8 says StatusText 'running*' && "$@"; local code=$?; wait $!; return $code; }
+while_running() {  # STATUS comes once a second, and a busy host may miss it
+    local try code=1
+    for try in 1 2 3 4; do
+        play rest &
+        within 3 says StatusText 'running*' && "$@" && code=0
+        wait $!
+        ((code)) || return 0
+    done
+    return 1
+}
 step introspect busctl introspect "${gateway[@]}" --no-pager
 step property nobody busctl get-property "${gateway[@]}" org.vgyro.Gateway1 State
-step status while_playing nobody vgyro status --json
+step status while_running nobody vgyro status --json
 step refused nobody busctl call "${gateway[@]}" org.vgyro.Gateway1 Recalibrate
 step recalibrate vgyro recalibrate
 sleep 1
-step recalibrate_play play_until_running calibration
+step recalibrate_play play calibration
 step save busctl call "${gateway[@]}" org.vgyro.Gateway1 SaveState
 
 # Killed without warning, and back with what it knew.
@@ -88,7 +92,7 @@ since=$(date +%s)
 kill -9 $main
 step killed within 20 other_pid $main
 step killed_show show
-step killed_play play_until_running rest
+step killed_play play rest
 step killed_journal journal $since
 main=$(pid)
 
@@ -101,7 +105,7 @@ step reload_bad_show show
 tac $here/vgyro.toml | sed '0,/^bus = /s//bias_id = 0x613\n&/' | tac >/etc/vgyro/vgyro.toml
 step reload_good systemctl reload vgyrod
 sleep 1
-step reload_play play_until_running rest
+step reload_play play rest
 cp $here/vgyro.toml /etc/vgyro/vgyro.toml
 step reload_back systemctl reload vgyrod
 sleep 1
@@ -113,7 +117,7 @@ since=$(date +%s)
 kill -STOP $main
 step watchdog within 40 other_pid $main
 step watchdog_show show
-step watchdog_play play_until_running rest
+step watchdog_play play rest
 step watchdog_journal journal $since
 main=$(pid)
 
@@ -124,7 +128,7 @@ sleep 1.5
 ip link set vcan0 up
 sleep 1.5
 cp /run/capture.log $out/before_link_play.log
-step link_play play_until_running rest
+step link_play play rest
 step link_show show
 step link_journal journal $since
 echo $main >$out/link_main.txt
@@ -134,7 +138,7 @@ since=$(date +%s)
 step upgrade dpkg -i $here/vgyro-next.deb
 step upgraded show
 step upgraded_config cmp /etc/vgyro/vgyro.toml $here/vgyro.toml
-step upgraded_play play_until_running rest
+step upgraded_play play rest
 step upgraded_journal journal $since
 
 # Stopped, removed, purged.
