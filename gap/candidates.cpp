@@ -28,6 +28,25 @@ Candidate plain(std::size_t gyro, Kind kind, model::Parameters parameters, doubl
   return {Term{Effect{gyro, kind, parameters, 0}, free_parameters(kind)}, penalty};
 }
 
+double derivative_step(const Effect& effect, std::size_t parameter) {
+  switch (effect.kind) {
+    case Kind::kDelay:
+      return 1e-4;
+    case Kind::kBandwidth:
+      return 1e-3 * effect.parameters[0];
+    case Kind::kClockSkew:
+      return 1.0;
+    case Kind::kWarmUp:
+      return parameter == 0 ? 1.0 : 1e-3 * effect.parameters[1];
+    case Kind::kLine:
+      return parameter == 0 ? 1e-6 : parameter == 1 ? 1.0 : 1e-4;
+    case Kind::kAngleHarmonic:
+      return parameter == 1 ? 1.0 : 1e-4;
+    default:
+      return 1.0;
+  }
+}
+
 }  // namespace
 
 std::vector<std::size_t> free_parameters(Kind kind) {
@@ -58,6 +77,22 @@ bool is_linear(Kind kind, std::size_t parameter) {
     default:
       return true;
   }
+}
+
+Eigen::VectorXd derivative(const Study& study, const Problem& problem, const Effect& effect,
+                           std::size_t parameter) {
+  Effect above = effect;
+  if (is_linear(effect.kind, parameter)) {
+    above.parameters[parameter] = 1.0;
+    return study.contribution(problem, effect.gyro, {above});
+  }
+  const double step = derivative_step(effect, parameter);
+  Effect below = effect;
+  above.parameters[parameter] += step;
+  below.parameters[parameter] -= step;
+  return (study.contribution(problem, effect.gyro, {above}) -
+          study.contribution(problem, effect.gyro, {below})) /
+         (2.0 * step);
 }
 
 std::vector<Candidate> shaped_candidates(const Study& study, std::size_t gyro) {

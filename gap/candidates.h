@@ -29,6 +29,10 @@ std::vector<std::size_t> free_parameters(model::Kind kind);
 /// Those in which the reading is linear.
 bool is_linear(model::Kind kind, std::size_t parameter);
 
+/// d contribution / d parameter, of every sample of the problem.
+Eigen::VectorXd derivative(const Study& study, const Problem& problem, const model::Effect& effect,
+                           std::size_t parameter);
+
 /// Candidates whose shape is known but for their size; lines and steps are searched for elsewhere.
 /// Their effects have unit size.
 std::vector<Candidate> shaped_candidates(const Study& study, std::size_t gyro);

@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 
+#include "gap/median.h"
+
 namespace vgyro::gap {
 
 namespace {
@@ -22,9 +24,7 @@ SampledCurve::SampledCurve(std::span<const double> t_s, std::span<const double> 
   std::vector<double> steps_s(t_s_.size() - 1);
   for (std::size_t i = 0; i + 1 < t_s_.size(); ++i)
     steps_s[i] = t_s_[i + 1] - t_s_[i];
-  const auto middle = steps_s.begin() + static_cast<std::ptrdiff_t>(steps_s.size() / 2);
-  std::nth_element(steps_s.begin(), middle, steps_s.end());
-  interval_s_ = *middle;
+  interval_s_ = median_of(steps_s);
 }
 
 std::size_t SampledCurve::index_before(double t_s) const {

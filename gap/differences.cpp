@@ -10,6 +10,7 @@
 
 #include "gap/candidates.h"
 #include "gap/figures.h"
+#include "gap/median.h"
 #include "gap/views.h"
 #include "model/catalogue.h"
 
@@ -85,12 +86,7 @@ std::vector<Shape> shapes_of(const Study& study, const Problem& problem, std::si
     Effect effect = candidate.term.effect;
     const auto of = [&](const Effect& one) { return study.contribution(problem, gyro, {one}); };
     if (effect.kind == Kind::kDelay || effect.kind == Kind::kClockSkew) {
-      const double step = effect.kind == Kind::kDelay ? 1e-4 : 1.0;
-      Effect above = effect;
-      Effect below = effect;
-      above.parameters[0] += step;
-      below.parameters[0] -= step;
-      shapes.push_back({effect, candidate.penalty, (of(above) - of(below)) / (2.0 * step)});
+      shapes.push_back({effect, candidate.penalty, derivative(study, problem, effect, 0)});
       continue;
     }
     shapes.push_back({effect, candidate.penalty, of(effect)});
@@ -328,9 +324,7 @@ std::vector<Line> lines_of(const EvenSeries& even, double seconds, const Psd& ps
     const std::size_t high = std::min(power.size(), low + 2 * kAround);
     around.assign(power.begin() + static_cast<std::ptrdiff_t>(low),
                   power.begin() + static_cast<std::ptrdiff_t>(high));
-    const auto middle = around.begin() + static_cast<std::ptrdiff_t>(around.size() / 2);
-    std::nth_element(around.begin(), middle, around.end());
-    const double floor = *middle / std::numbers::ln2;
+    const double floor = median_of(around) / std::numbers::ln2;
     if (floor <= 0.0) continue;
     for (std::size_t i = from; i < std::min(power.size() - 1, from + kAround); ++i) {
       if (power[i] < power[i - 1] || power[i] < power[i + 1]) continue;

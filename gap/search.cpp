@@ -25,25 +25,6 @@ constexpr std::size_t kRefitsMax = 7;
 constexpr double kStepEvery_s = 2.0;
 constexpr double kLineLow_hz = 0.02;
 
-double derivative_step(const Effect& effect, std::size_t parameter) {
-  switch (effect.kind) {
-    case Kind::kDelay:
-      return 1e-4;
-    case Kind::kBandwidth:
-      return 1e-3 * effect.parameters[0];
-    case Kind::kClockSkew:
-      return 1.0;
-    case Kind::kWarmUp:
-      return parameter == 0 ? 1.0 : 1e-3 * effect.parameters[1];
-    case Kind::kLine:
-      return parameter == 0 ? 1e-6 : parameter == 1 ? 1.0 : 1e-4;
-    case Kind::kAngleHarmonic:
-      return parameter == 1 ? 1.0 : 1e-4;
-    default:
-      return 1.0;
-  }
-}
-
 void clamp_to_catalogue(Effect& effect) {
   const auto parameters = model::info(effect.kind).parameters;
   for (std::size_t i = 0; i < parameters.size(); ++i) {
@@ -108,6 +89,13 @@ void tidy_phase(Effect& effect) {
   effect.parameters[2] -= turn * std::floor(effect.parameters[2] / turn);
 }
 
+Eigen::Index free_count(const std::vector<Term>& terms) {
+  Eigen::Index count = 0;
+  for (const Term& term : terms)
+    count += static_cast<Eigen::Index>(term.free.size());
+  return count;
+}
+
 bool is_timing(Kind kind) {
   return kind == Kind::kDelay || kind == Kind::kBandwidth || kind == Kind::kClockSkew;
 }
@@ -155,27 +143,11 @@ std::vector<Term> Search::terms_of_problem(const std::vector<Term>& terms,
   return mine;
 }
 
-// d contribution / d parameter of the free ones.
 Matrix Search::columns_of(const Problem& problem, const Term& term) const {
   Matrix columns(problem.size(), static_cast<Eigen::Index>(term.free.size()));
-  for (std::size_t i = 0; i < term.free.size(); ++i) {
-    const std::size_t parameter = term.free[i];
-    const double step = derivative_step(term.effect, parameter);
-    Effect above = term.effect;
-    Effect below = term.effect;
-    if (is_linear(term.effect.kind, parameter)) {
-      above.parameters[parameter] = 1.0;
-      columns.col(static_cast<Eigen::Index>(i)) =
-          study_.contribution(problem, term.effect.gyro, {above});
-      continue;
-    }
-    above.parameters[parameter] += step;
-    below.parameters[parameter] -= step;
+  for (std::size_t i = 0; i < term.free.size(); ++i)
     columns.col(static_cast<Eigen::Index>(i)) =
-        (study_.contribution(problem, term.effect.gyro, {above}) -
-         study_.contribution(problem, term.effect.gyro, {below})) /
-        (2.0 * step);
-  }
+        derivative(study_, problem, term.effect, term.free[i]);
   return columns;
 }
 
@@ -192,6 +164,22 @@ Eigen::VectorXd Search::residual_of(std::size_t problem, const std::vector<Term>
   return residual;
 }
 
+// Residual of `terms`, then what the free parameters of `others` move, then `spare` columns of
+// zeros.
+Matrix Search::normal_columns(std::size_t problem, const std::vector<Term>& terms,
+                              const std::vector<Term>& others, Eigen::Index spare) const {
+  const Problem& data = study_.problems()[problem];
+  Matrix columns = Matrix::Zero(data.size(), 1 + free_count(others) + spare);
+  columns.col(0) = residual_of(problem, terms);
+  Eigen::Index at = 1;
+  for (const Term& term : others) {
+    const auto count = static_cast<Eigen::Index>(term.free.size());
+    if (count > 0) columns.middleCols(at, count) = columns_of(data, term);
+    at += count;
+  }
+  return columns;
+}
+
 // Gauss-Newton over the free parameters at given noise.
 void Search::improve(std::size_t problem, Fit& fit) const {
   const Problem& data = study_.problems()[problem];
@@ -201,17 +189,8 @@ void Search::improve(std::size_t problem, Fit& fit) const {
   if (fit.terms.empty()) return;
   double square = square_of(fit.terms);
   for (int step = 0; step < 8; ++step) {
-    Eigen::Index width = 1;
-    for (const Term& term : fit.terms)
-      width += static_cast<Eigen::Index>(term.free.size());
-    Matrix columns(data.size(), width);
-    columns.col(0) = residual_of(problem, fit.terms);
-    Eigen::Index at = 1;
-    for (const Term& term : fit.terms) {
-      const auto count = static_cast<Eigen::Index>(term.free.size());
-      if (count > 0) columns.middleCols(at, count) = columns_of(data, term);
-      at += count;
-    }
+    const Eigen::Index width = 1 + free_count(fit.terms);
+    const Matrix columns = normal_columns(problem, fit.terms, fit.terms, 0);
     const Matrix white = whitened(columns, data.layout, fit.noise);
     const Eigen::MatrixXd gram = white.transpose() * white;
     const Solution solution =
@@ -328,17 +307,8 @@ std::vector<Search::Score> Search::score(std::size_t problem, const Fit& null,
                                          const PairNoise& noise) const {
   const Problem& data = study_.problems()[problem];
   const Cached& cached = cached_[problem];
-  Eigen::Index nuisance = 0;
-  for (const Term& term : null.terms)
-    nuisance += static_cast<Eigen::Index>(term.free.size());
-  Matrix base(data.size(), 1 + nuisance);
-  base.col(0) = residual_of(problem, null.terms);
-  Eigen::Index at = 1;
-  for (const Term& term : null.terms) {
-    const auto count = static_cast<Eigen::Index>(term.free.size());
-    if (count > 0) base.middleCols(at, count) = columns_of(data, term);
-    at += count;
-  }
+  const Eigen::Index nuisance = free_count(null.terms);
+  const Matrix base = normal_columns(problem, null.terms, null.terms, 0);
   const Matrix white_base = whitened(base, data.layout, noise);
   const Matrix white = whitened(cached.columns, cached.means, data.layout, noise);
   // Project out what is estimated anyway.
@@ -395,31 +365,21 @@ std::vector<Search::Score> Search::score(std::size_t problem, const Fit& null,
     return std::count_if(null.terms.begin(), null.terms.end(),
                          [&](const Term& term) { return term.effect.kind == kind; }) >= most;
   };
-  if (!enough(Kind::kBiasStep, kStepsMax)) score_steps(problem, null, noise, scores);
-  if (!enough(Kind::kLine, kLinesMax)) score_lines(problem, null, noise, scores);
+  if (!enough(Kind::kBiasStep, kStepsMax)) score_steps(problem, base, noise, scores);
+  if (!enough(Kind::kLine, kLinesMax)) score_lines(problem, base.col(0), noise, scores);
   std::sort(scores.begin(), scores.end(),
             [](const Score& a, const Score& b) { return a.adjusted() > b.adjusted(); });
   return scores;
 }
 
 // Steps at places on an even grid, judged by the means of blocks.
-void Search::score_steps(std::size_t problem, const Fit& null, const PairNoise& noise,
+void Search::score_steps(std::size_t problem, const Matrix& base, const PairNoise& noise,
                          std::vector<Score>& scores) const {
   const Problem& data = study_.problems()[problem];
   const double seconds = study_.recording().seconds;
   const auto places = static_cast<Eigen::Index>(seconds / kStepEvery_s) - 1;
   if (places < 2) return;
-  Eigen::Index nuisance = 0;
-  for (const Term& term : null.terms)
-    nuisance += static_cast<Eigen::Index>(term.free.size());
-  Matrix base(data.size(), 1 + nuisance);
-  base.col(0) = residual_of(problem, null.terms);
-  Eigen::Index at = 1;
-  for (const Term& term : null.terms) {
-    const auto count = static_cast<Eigen::Index>(term.free.size());
-    if (count > 0) base.middleCols(at, count) = columns_of(data, term);
-    at += count;
-  }
+  const Eigen::Index nuisance = base.cols() - 1;
   Matrix white_base = block_means(base, data.layout);
   whiten_means(white_base, data.layout, noise, Part::kFit);
   const Eigen::MatrixXd base_gram = white_base.transpose() * white_base;
@@ -463,14 +423,13 @@ void Search::score_steps(std::size_t problem, const Fit& null, const PairNoise& 
 }
 
 // The highest peak of the periodogram of what is left, for each gyro that shows.
-void Search::score_lines(std::size_t problem, const Fit& null, const PairNoise& noise,
-                         std::vector<Score>& scores) const {
+void Search::score_lines(std::size_t problem, const Eigen::VectorXd& residual,
+                         const PairNoise& noise, std::vector<Score>& scores) const {
   const Problem& data = study_.problems()[problem];
   const double interval_s = data.holds[0] ? data.layout.interval_s[0] : data.layout.interval_s[1];
   const double seconds = study_.recording().seconds;
   const auto length =
       static_cast<std::size_t>(std::pow(2.0, std::ceil(std::log2(2.0 * seconds / interval_s))));
-  const Eigen::VectorXd residual = residual_of(problem, null.terms);
   std::vector<double> series(length, 0.0);
   // Less a running mean, which is drift and not a line.
   double drift = 0.0;
@@ -549,17 +508,9 @@ void Search::place_step(std::size_t problem, const Fit& null, Term& term, double
   const Problem& data = study_.problems()[problem];
   const double middle_s = term.effect.parameters[1];
   const auto places = static_cast<Eigen::Index>(2.0 * reach_s / step_s) + 1;
-  Eigen::Index nuisance = 0;
-  for (const Term& other : null.terms)
-    nuisance += static_cast<Eigen::Index>(other.free.size());
-  Matrix columns(data.size(), 1 + nuisance + places);
-  columns.col(0) = residual_of(problem, null.terms);
-  Eigen::Index at = 1;
-  for (const Term& other : null.terms) {
-    const auto count = static_cast<Eigen::Index>(other.free.size());
-    if (count > 0) columns.middleCols(at, count) = columns_of(data, other);
-    at += count;
-  }
+  const Eigen::Index nuisance = free_count(null.terms);
+  const Eigen::Index at = 1 + nuisance;
+  Matrix columns = normal_columns(problem, null.terms, null.terms, places);
   for (Eigen::Index i = 0; i < places; ++i) {
     Effect effect = term.effect;
     effect.parameters = {1.0, std::max(0.0, middle_s - reach_s + step_s * static_cast<double>(i))};
@@ -802,17 +753,8 @@ Search::Change Search::change_over_time(std::size_t index) const {
   }
   ends_s.resize(kParts, 1e300);
   ends_s.back() = 1e300;
-  Eigen::Index nuisance = 0;
-  for (const Term& other : others)
-    nuisance += static_cast<Eigen::Index>(other.free.size());
-  Matrix columns = Matrix::Zero(data.size(), 1 + nuisance + kParts * width);
-  columns.col(0) = residual_of(problem, terms);
-  Eigen::Index at = 1;
-  for (const Term& other : others) {
-    const auto count = static_cast<Eigen::Index>(other.free.size());
-    if (count > 0) columns.middleCols(at, count) = columns_of(data, other);
-    at += count;
-  }
+  const Eigen::Index at = 1 + free_count(others);
+  Matrix columns = normal_columns(problem, terms, others, kParts * width);
   for (Eigen::Index i = 0; i < data.size(); ++i) {
     const double t_s = data.t_s[static_cast<std::size_t>(i)];
     const auto part = std::lower_bound(ends_s.begin(), ends_s.end(), t_s) - ends_s.begin();
@@ -823,15 +765,6 @@ Search::Change Search::change_over_time(std::size_t index) const {
   const Eigen::Index all = gram.rows() - 1;
   const double with = solve(gram.bottomRightCorner(all, all), gram.col(0).tail(all)).gain;
   return {with, static_cast<double>((kParts - 1) * width)};
-}
-
-void Search::reject(const std::function<bool(std::size_t)>& is_wrong) {
-  std::vector<Found> kept;
-  const std::size_t before = found_.size();
-  for (std::size_t i = 0; i < found_.size(); ++i)
-    (is_wrong(i) ? rejected_ : kept).push_back(found_[i]);
-  found_ = std::move(kept);
-  if (found_.size() != before) settle();
 }
 
 // What is in the catalogue keeps its size throughout; what only resembles it does not.
@@ -876,7 +809,11 @@ void Search::reject_unsteady() {
     }
   }
   if (std::none_of(wrong.begin(), wrong.end(), [](bool one) { return one; })) return;
-  reject([&](std::size_t i) { return wrong[i]; });
+  std::vector<Found> kept;
+  for (std::size_t i = 0; i < found_.size(); ++i)
+    (wrong[i] ? rejected_ : kept).push_back(found_[i]);
+  found_ = std::move(kept);
+  settle();
 }
 
 // Noise beyond what the model says: one term of one gyro free at a time, the others as they are.

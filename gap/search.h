@@ -62,12 +62,6 @@ class Search {
   /// The noise that fits best, which may be less or more than the model's.
   [[nodiscard]] const PairNoise& fitted_noise() const { return noise_; }
 
-  struct Line {
-    double frequency_hz = 0.0;
-    double amplitude_dps = 0.0;
-    double statistic = 0.0;
-  };
-
  private:
   struct Score {
     Candidate candidate;
@@ -79,13 +73,16 @@ class Search {
   [[nodiscard]] std::vector<Term> terms_of_problem(const std::vector<Term>& terms,
                                                    std::size_t problem) const;
   Matrix columns_of(const Problem& problem, const Term& term) const;
+  Matrix normal_columns(std::size_t problem, const std::vector<Term>& terms,
+                        const std::vector<Term>& others, Eigen::Index spare) const;
   Eigen::VectorXd residual_of(std::size_t problem, const std::vector<Term>& terms) const;
   Fit fit(std::size_t problem, std::vector<Term> terms, const PairNoise& start) const;
   void improve(std::size_t problem, Fit& fit) const;
   std::vector<Score> score(std::size_t problem, const Fit& null, const PairNoise& noise) const;
-  void score_steps(std::size_t problem, const Fit& null, const PairNoise& noise,
+  /// `base`: residual and what is estimated anyway.
+  void score_steps(std::size_t problem, const Matrix& base, const PairNoise& noise,
                    std::vector<Score>& scores) const;
-  void score_lines(std::size_t problem, const Fit& null, const PairNoise& noise,
+  void score_lines(std::size_t problem, const Eigen::VectorXd& residual, const PairNoise& noise,
                    std::vector<Score>& scores) const;
   /// `start`: the noise that the fits begin with.
   std::vector<Found> refit_best(std::size_t problem, const Fit& null, const PairNoise& start,
@@ -104,7 +101,6 @@ class Search {
   };
   Change change_over_time(std::size_t index) const;
   void reject_unsteady();
-  void reject(const std::function<bool(std::size_t)>& is_wrong);
   void noise_rounds();
   void settle();
   void cache_candidates();

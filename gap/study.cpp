@@ -6,6 +6,7 @@
 
 #include <fmt/core.h>
 
+#include "gap/median.h"
 #include "model/catalogue.h"
 
 namespace vgyro::gap {
@@ -33,12 +34,6 @@ bool held_out(double t_s) {
   x = (x ^ (x >> 30U)) * 0xbf58476d1ce4e5b9ULL;
   x = (x ^ (x >> 27U)) * 0x94d049bb133111ebULL;
   return ((x ^ (x >> 31U)) % kHeldOutOneIn) == 0;
-}
-
-double median_of(std::vector<double>& values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 std::vector<Effect> of_gyro(const std::vector<Effect>& effects, std::size_t gyro) {

@@ -37,7 +37,6 @@ struct Problem {
 
 struct Excitation {
   double rate_max_dps = 0.0;
-  double rate_slope_max_dps_s = 0.0;
   double temperature_range_c = 0.0;
   double temperature_slope_range_c_s = 0.0;
   std::array<double, 3> acceleration_range_g{};
@@ -60,7 +59,6 @@ class Study {
   [[nodiscard]] const std::vector<std::string>& notes() const { return notes_; }
   [[nodiscard]] const Recording& recording() const { return recording_; }
   [[nodiscard]] std::size_t problem_of(std::size_t gyro) const;
-  [[nodiscard]] double rest_seconds() const { return rest_s_; }
 
   /// Without a reference: the rate anew, from both gyros less what `effects` say of them.
   void learn_motion(const std::vector<model::Effect>& effects);

@@ -6,6 +6,8 @@
 
 #include <fmt/core.h>
 
+#include "gap/median.h"
+
 namespace vgyro::gap {
 
 namespace {
@@ -22,12 +24,6 @@ constexpr double kChance = 1e-9;
 constexpr double kCoarse = 0.02;
 constexpr std::size_t kPlateauMin = 6;
 constexpr std::size_t kLostMin = 3;
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 bool knows(const std::vector<Effect>& effects, Kind kind) {
   return std::any_of(effects.begin(), effects.end(),
@@ -77,7 +73,8 @@ class Check {
     std::vector<double> steps_s;
     for (std::size_t i = 1; i < n_; ++i)
       steps_s.push_back(series_.t_s[i] - series_.t_s[i - 1]);
-    result_.interval_s = median(steps_s);
+    std::vector<double> unordered_s = steps_s;
+    result_.interval_s = median_of(unordered_s);
     number_.assign(n_, 0.0);
     const bool counted = series_.counter.size() == n_ && series_.counter_modulus > 1;
     for (std::size_t i = 1; i < n_; ++i) {

@@ -98,7 +98,6 @@ Expected<Result> find_gap(const Recording& recording, const model::Model& model,
   double gap = gap_of(data, now, floor, Part::kHeldOut);
   result.gap.before = gap;
   result.gap.band95 = floor.band95;
-  std::vector<std::vector<Effect>> versions{now};
   for (const Finding& finding : data.findings()) {
     NamedEffect named;
     named.effect = finding.effect;
@@ -113,7 +112,6 @@ Expected<Result> find_gap(const Recording& recording, const model::Model& model,
     gap = gap_of(data, now, floor, Part::kHeldOut);
     named.gap_after = gap;
     result.effects.push_back(std::move(named));
-    versions.push_back(now);
   }
   for (const Found& one : found) {
     NamedEffect named;
@@ -131,7 +129,6 @@ Expected<Result> find_gap(const Recording& recording, const model::Model& model,
     gap = gap_of(data, now, floor, Part::kHeldOut);
     named.gap_after = gap;
     result.effects.push_back(std::move(named));
-    versions.push_back(now);
   }
   result.gap.after = gap;
   result.unexplained = std::move(leftover);
