@@ -179,6 +179,8 @@ std::vector<Unexplained> leftovers(const Study& study, const Search& search,
   }
   // Noise that was named must leave innovations that are white and alike throughout.
   for (std::size_t gyro = 0; gyro < 2; ++gyro) {
+    // The rounding of slow readings is neither white nor alike throughout.
+    if (study.is_coarse(gyro)) continue;
     const Problem& problem = study.problems()[study.problem_of(gyro)];
     std::vector<model::Effect> effects = search.effects();
     const Judgement verdict = judge(study, problem, gyro, effects);

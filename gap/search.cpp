@@ -21,6 +21,7 @@ constexpr std::size_t kFoundMax = 10;
 constexpr std::ptrdiff_t kLinesMax = 3;
 constexpr std::ptrdiff_t kStepsMax = 3;
 constexpr Eigen::Index kParts = 6;
+constexpr double kCoarsePenalty = 1000.0;
 constexpr std::size_t kRefitsMax = 7;
 constexpr double kStepEvery_s = 2.0;
 constexpr double kLineLow_hz = 0.02;
@@ -271,6 +272,8 @@ void Search::cache_candidates() {
     for (std::size_t gyro = 0; gyro < 2; ++gyro) {
       if (!data.holds[gyro]) continue;
       for (Candidate& candidate : shaped_candidates(study_, gyro)) {
+        // Rounding of slow readings looks like any slow effect.
+        if (study_.is_coarse(gyro)) candidate.penalty += kCoarsePenalty;
         const Kind kind = candidate.term.effect.kind;
         const Eigen::Index width = kind == Kind::kAngleHarmonic ? 2 : 1;
         cached.first.push_back(cached.first.empty() ? 0
@@ -416,7 +419,8 @@ void Search::score_steps(std::size_t problem, const Matrix& base, const PairNois
           Effect{
               gyro, Kind::kBiasStep, {right / gram, kStepEvery_s * static_cast<double>(i + 1)}, 0},
           {0}};
-      best.candidate.penalty = 2.0 * std::log(static_cast<double>(places));
+      best.candidate.penalty = 2.0 * std::log(static_cast<double>(places)) +
+                               (study_.is_coarse(gyro) ? kCoarsePenalty : 0.0);
     }
     if (best.statistic > 0.0) scores.push_back(best);
   }
@@ -836,7 +840,7 @@ void Search::noise_rounds() {
         const bool unknown = std::any_of(rejected_.begin(), rejected_.end(), [&](const Found& one) {
           return one.term.effect.gyro == gyro || study_.problems().size() == 1;
         });
-        if (!data.holds[gyro] || unknown) continue;
+        if (!data.holds[gyro] || unknown || study_.is_coarse(gyro)) continue;
         for (const Kind kind :
              {Kind::kWhiteNoise, Kind::kRateNoise, Kind::kRateRandomWalk, Kind::kGaussMarkov}) {
           std::array<Freedom, 2> free;

@@ -21,6 +21,8 @@ constexpr double kRecordingMin_s = 30.0;
 constexpr std::size_t kSamplesMin = 500;
 constexpr double kReferenceShareMin = 0.95;
 constexpr double kRestMin_s = 10.0;
+/// Share of samples that repeat the last one.
+constexpr double kCoarseRepeats = 0.2;
 constexpr double kHeldOutCell_s = 1.0;
 constexpr unsigned kHeldOutOneIn = 4;
 constexpr double kSpikeSigmas = 8.0;
@@ -204,6 +206,10 @@ Expected<std::unique_ptr<Study>> Study::begin(const Recording& recording,
     study->learn_motion(effects);
   }
   return study;
+}
+
+bool Study::is_coarse(std::size_t gyro) const {
+  return transports_[gyro].lattice_dps > 0.0 && transports_[gyro].repeats > kCoarseRepeats;
 }
 
 std::size_t Study::problem_of(std::size_t gyro) const {

@@ -58,6 +58,8 @@ class Study {
   [[nodiscard]] const std::vector<Finding>& findings() const { return findings_; }
   [[nodiscard]] const std::vector<std::string>& notes() const { return notes_; }
   [[nodiscard]] const Recording& recording() const { return recording_; }
+  /// Its values are so far apart that rounding is no noise: only great effects can be judged.
+  [[nodiscard]] bool is_coarse(std::size_t gyro) const;
   [[nodiscard]] std::size_t problem_of(std::size_t gyro) const;
 
   /// Without a reference: the rate anew, from both gyros less what `effects` say of them.

@@ -294,6 +294,7 @@ class Check {
         std::clamp(repeats / static_cast<double>(n_), 1.0 / static_cast<double>(n_), 0.999);
     // A coarse sensor repeats itself at rest: there only a run beyond all others counts.
     std::vector<double> runs_s;
+    result_.repeats = chance;
     coarse_ = chance > kCoarse;
     if (coarse_) {
       for (std::size_t i = 0; i < n_;) {
