@@ -8,10 +8,6 @@
 
 namespace vgyro::gap {
 
-namespace {
-constexpr std::size_t kPoints = 6;
-}
-
 SampledCurve::SampledCurve(std::span<const double> t_s, std::span<const double> value) {
   t_s_.reserve(t_s.size());
   value_.reserve(t_s.size());
@@ -25,6 +21,7 @@ SampledCurve::SampledCurve(std::span<const double> t_s, std::span<const double> 
   for (std::size_t i = 0; i + 1 < t_s_.size(); ++i)
     steps_s[i] = t_s_[i + 1] - t_s_[i];
   interval_s_ = median_of(steps_s);
+  set_weights();
 }
 
 std::size_t SampledCurve::index_before(double t_s) const {
@@ -37,34 +34,77 @@ std::size_t SampledCurve::index_before(double t_s) const {
   return std::clamp<std::size_t>(index, 1, t_s_.size() - 1) - 1;
 }
 
-SampledCurve::Point SampledCurve::at(double t_s) const {
-  if (t_s <= t_s_.front()) return {value_.front(), 0.0, 1.0};
-  if (t_s >= t_s_.back()) return {value_.back(), 0.0, 1.0};
-  const std::size_t before = index_before(t_s);
+// The first of the points about an instant.
+std::size_t SampledCurve::first_about(double t_s) const {
   const std::size_t count = std::min(kPoints, t_s_.size());
-  std::size_t first = before + 1 > count / 2 ? before + 1 - count / 2 : 0;
-  first = std::min(first, t_s_.size() - count);
-  Point point{0.0, 0.0, 0.0};
-  // Lagrange's polynomials and their slopes; times from t_s in intervals keep the products small.
+  const std::size_t before = index_before(t_s);
+  const std::size_t first = before + 1 > count / 2 ? before + 1 - count / 2 : 0;
+  return std::min(first, t_s_.size() - count);
+}
+
+// Lagrange's polynomials; times in intervals keep the products small.
+SampledCurve::Point SampledCurve::at(double t_s) const {
+  if (t_s <= t_s_.front()) return {value_.front(), 0.0};
+  if (t_s >= t_s_.back()) return {value_.back(), 0.0};
+  const std::size_t count = std::min(kPoints, t_s_.size());
+  const std::size_t first = first_about(t_s);
   std::array<double, kPoints> x{};
   for (std::size_t i = 0; i < count; ++i)
-    x[i] = (t_s_[first + i] - t_s) / interval_s_;
+    x[i] = (t_s - t_s_[first + i]) / interval_s_;
+  const double* weight = &weights_[kPoints * first];
+  Point point{0.0, 0.0};
   for (std::size_t i = 0; i < count; ++i) {
-    double product = 1.0;
-    double slope = 0.0;  // d/dt of Π (t − x_j)/(x_i − x_j) at t = 0
+    double product = weight[i];
+    double slope = 0.0;
     for (std::size_t j = 0; j < count; ++j) {
       if (j == i) continue;
-      const double divisor = x[i] - x[j];
-      slope = slope * (-x[j] / divisor) + product / divisor;
-      product *= -x[j] / divisor;
+      slope = slope * x[j] + product;
+      product *= x[j];
     }
     const double value = value_[first + i];
     point.value += product * value;
     point.slope += slope * value;
-    point.gain += product * product;
   }
   point.slope /= interval_s_;
   return point;
+}
+
+SampledCurve::Weights SampledCurve::weights_at(double t_s) const {
+  Weights weights;
+  const std::size_t count = std::min(kPoints, t_s_.size());
+  if (t_s <= t_s_.front()) {
+    weights.value[0] = 1.0;
+    return weights;
+  }
+  if (t_s >= t_s_.back()) {
+    weights.first = t_s_.size() - count;
+    weights.value[count - 1] = 1.0;
+    return weights;
+  }
+  weights.first = first_about(t_s);
+  for (std::size_t i = 0; i < count; ++i) {
+    weights.value[i] = weights_[kPoints * weights.first + i];
+    for (std::size_t j = 0; j < count; ++j) {
+      if (j != i) weights.value[i] *= (t_s - t_s_[weights.first + j]) / interval_s_;
+    }
+  }
+  return weights;
+}
+
+// 1/Π (x_i − x_j) of the points from each place on.
+void SampledCurve::set_weights() {
+  const std::size_t count = std::min(kPoints, t_s_.size());
+  const std::size_t places = t_s_.size() - count + 1;
+  weights_.assign(kPoints * places, 0.0);
+  for (std::size_t first = 0; first < places; ++first) {
+    for (std::size_t i = 0; i < count; ++i) {
+      double product = 1.0;
+      for (std::size_t j = 0; j < count; ++j) {
+        if (j != i) product *= (t_s_[first + i] - t_s_[first + j]) / interval_s_;
+      }
+      weights_[kPoints * first + i] = 1.0 / product;
+    }
+  }
 }
 
 double SampledCurve::linear(double t_s) const {

@@ -3,6 +3,7 @@
 // A sampled quantity between its samples: local polynomials through the nearest samples, so that a
 // sine of a tenth of the sampling rate is met to 3e-4 of its amplitude, one of a thirtieth to 1e-6.
 
+#include <array>
 #include <span>
 #include <vector>
 
@@ -10,6 +11,7 @@ namespace vgyro::gap {
 
 class SampledCurve {
  public:
+  static constexpr std::size_t kPoints = 6;
   SampledCurve() = default;
   /// Times that do not increase are passed over. Memory: a copy.
   SampledCurve(std::span<const double> t_s, std::span<const double> value);
@@ -24,8 +26,13 @@ class SampledCurve {
   struct Point {
     double value = 0.0;
     double slope = 0.0;  ///< per second
-    double gain = 1.0;   ///< noise variance of `value` over that of a sample
   };
+  /// What the samples from `first` on count in the value at an instant.
+  struct Weights {
+    std::size_t first = 0;
+    std::array<double, kPoints> value{};
+  };
+  [[nodiscard]] Weights weights_at(double t_s) const;
   /// Beyond the ends the outermost value, slope 0.
   [[nodiscard]] Point at(double t_s) const;
   /// Straight between neighbours: for what steps.
@@ -35,10 +42,13 @@ class SampledCurve {
 
  private:
   [[nodiscard]] std::size_t index_before(double t_s) const;
+  [[nodiscard]] std::size_t first_about(double t_s) const;
+  void set_weights();
 
   std::vector<double> t_s_;
   std::vector<double> value_;
-  double interval_s_ = 0.0;  ///< median
+  std::vector<double> weights_;  ///< of the polynomials, by their first place
+  double interval_s_ = 0.0;      ///< median
 };
 
 }  // namespace vgyro::gap

@@ -158,7 +158,7 @@ Figure time_figure(const Subject& s) {
         std::min(kTimeBins - 1, static_cast<std::size_t>(std::max(0.0, block.t_s) / step_s));
     count[bin] += block.count;
     time[bin] += block.count * block.t_s;
-    variance[bin] += block.count * sample_variance(block, s.noise, s.problem.layout);
+    variance[bin] += block.count * block.count * mean_variance(block, s.noise, s.problem.layout);
     without[bin] += share * s.without.segment(block.first, block.count).sum();
     with[bin] += share * s.with.segment(block.first, block.count).sum();
   }

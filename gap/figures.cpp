@@ -81,7 +81,7 @@ std::array<Curve, 2> time_band(const Problem& problem, std::size_t gyro, Sight s
     if (its_cell != cell) add();
     cell = its_cell;
     t_s += block.count * block.t_s;
-    white += block.count * sample_variance(block, noise, problem.layout);
+    white += block.count * block.count * mean_variance(block, noise, problem.layout);
     count += block.count;
   }
   add();

@@ -88,16 +88,17 @@ PairNoise noise_of(const std::vector<model::Effect>& effects) {
   return noise;
 }
 
-double sample_variance(const Block& block, const PairNoise& noise, const Layout& layout) {
-  double variance = layout.reference_variance;
+namespace {
+
+double white_variance(const std::array<double, 3>& gain, double rate_square, const PairNoise& noise,
+                      const Layout& layout) {
+  double variance = gain[2] * layout.reference_variance;
   for (std::size_t gyro = 0; gyro < 2; ++gyro) {
-    if (block.gain[gyro] == 0.0) continue;
-    variance += block.gain[gyro] * noise[gyro].variance(block.rate_square, layout.interval_s[gyro]);
+    if (gain[gyro] == 0.0) continue;
+    variance += gain[gyro] * noise[gyro].variance(rate_square, layout.interval_s[gyro]);
   }
   return std::max(variance, kVarianceMin);
 }
-
-namespace {
 
 // Variance about its mean of a drift over `seconds`: of a walk K²T/6, of a correlated term its
 // variance less that of its mean.
@@ -126,6 +127,14 @@ double seconds_of(const Block& block, const Layout& layout) {
 }
 
 }  // namespace
+
+double sample_variance(const Block& block, const PairNoise& noise, const Layout& layout) {
+  return white_variance(block.within_gain, block.rate_square, noise, layout);
+}
+
+double mean_variance(const Block& block, const PairNoise& noise, const Layout& layout) {
+  return white_variance(block.mean_gain, block.rate_square, noise, layout);
+}
 
 double within_variance(const Block& block, const PairNoise& noise, const Layout& layout) {
   return sample_variance(block, noise, layout) +
@@ -173,7 +182,7 @@ double whiten_means(Matrix& means, const Layout& layout, const PairNoise& noise,
     }
     for (std::size_t i = 0; i < n; ++i)
       h[i] = share_of(block.channel, states.gyro[i]);
-    double s = sample_variance(block, noise, layout) / static_cast<double>(block.count);
+    double s = mean_variance(block, noise, layout);
     double* const innovation = means.data() + b * width;
     for (std::size_t i = 0; i < n; ++i) {
       ph[i] = 0.0;
@@ -230,13 +239,13 @@ std::vector<WithinBin> within_bins(const Eigen::VectorXd& residual, const Layout
     const double squares = (values.array() - values.mean()).square().sum();
     const int rate_class =
         block.rate_square < 1.0 ? 0 : 1 + static_cast<int>(2.0 * std::log2(block.rate_square));
-    const int gain_class = static_cast<int>(20.0 * (block.gain[0] + block.gain[1]));
+    const int gain_class = static_cast<int>(20.0 * (block.within_gain[0] + block.within_gain[1]));
     WithinBin& bin = bins[{static_cast<int>(block.channel), rate_class, gain_class}];
     const double freedom = static_cast<double>(block.count - 1);
     bin.channel = block.channel;
     bin.rate_square += freedom * block.rate_square;
-    bin.gain[0] += freedom * block.gain[0];
-    bin.gain[1] += freedom * block.gain[1];
+    for (std::size_t i = 0; i < bin.gain.size(); ++i)
+      bin.gain[i] += freedom * block.within_gain[i];
     bin.seconds += freedom * seconds_of(block, layout);
     bin.freedom += freedom;
     bin.squares += squares;
@@ -244,8 +253,8 @@ std::vector<WithinBin> within_bins(const Eigen::VectorXd& residual, const Layout
   std::vector<WithinBin> list;
   for (auto& [key, bin] : bins) {
     bin.rate_square /= bin.freedom;
-    bin.gain[0] /= bin.freedom;
-    bin.gain[1] /= bin.freedom;
+    for (double& gain : bin.gain)
+      gain /= bin.freedom;
     bin.seconds /= bin.freedom;
     list.push_back(bin);
   }
@@ -256,12 +265,8 @@ double within_log_likelihood(const std::vector<WithinBin>& bins, const PairNoise
                              const Layout& layout) {
   double sum = 0.0;
   for (const WithinBin& bin : bins) {
-    double variance = layout.reference_variance;
-    for (std::size_t gyro = 0; gyro < 2; ++gyro) {
-      if (bin.gain[gyro] == 0.0) continue;
-      variance += bin.gain[gyro] * noise[gyro].variance(bin.rate_square, layout.interval_s[gyro]);
-    }
-    variance = std::max(variance + drift_within(bin.channel, noise, bin.seconds), kVarianceMin);
+    const double variance = white_variance(bin.gain, bin.rate_square, noise, layout) +
+                            drift_within(bin.channel, noise, bin.seconds);
     sum -= 0.5 * (bin.freedom * std::log(variance) + bin.squares / variance);
   }
   return sum;

@@ -56,8 +56,11 @@ struct Block {
   Channel channel = Channel::kGyro1;
   std::uint32_t first = 0;  ///< of the samples
   std::uint32_t count = 0;
-  double rate_square = 0.0;      ///< mean, (deg/s)²
-  std::array<double, 2> gain{};  ///< variance of this sample over that of one of gyro 1, 2
+  double rate_square = 0.0;  ///< mean, (deg/s)²
+  /// What interpolation makes of the noise of gyro 1, of gyro 2 and of the reference: expected
+  /// scatter about the block's mean, and variance of that mean, over the variance of one sample.
+  std::array<double, 3> within_gain{};
+  std::array<double, 3> mean_gain{};
   bool held_out = false;
 };
 inline constexpr double kBlock_s = 0.1;
@@ -73,6 +76,8 @@ struct Layout {
 double within_variance(const Block& block, const PairNoise& noise, const Layout& layout);
 /// White noise alone.
 double sample_variance(const Block& block, const PairNoise& noise, const Layout& layout);
+/// White noise of the block's mean.
+double mean_variance(const Block& block, const PairNoise& noise, const Layout& layout);
 
 /// Which blocks count.
 enum class Part : std::uint8_t { kFit, kHeldOut, kAll };
@@ -95,7 +100,7 @@ double whiten_within(Matrix& columns, const Layout& layout, const PairNoise& noi
 struct WithinBin {
   Channel channel = Channel::kGyro1;
   double rate_square = 0.0;
-  std::array<double, 2> gain{};
+  std::array<double, 3> gain{};
   double seconds = 0.0;  ///< length of its blocks
   double freedom = 0.0;
   double squares = 0.0;

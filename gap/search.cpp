@@ -24,6 +24,7 @@ constexpr Eigen::Index kParts = 6;
 constexpr double kCoarsePenalty = 1000.0;
 constexpr std::size_t kRefitsMax = 7;
 constexpr double kStepEvery_s = 2.0;
+constexpr double kStepReach_s = 2.0;
 constexpr double kLineLow_hz = 0.02;
 
 void clamp_to_catalogue(Effect& effect) {
@@ -559,7 +560,7 @@ std::vector<Found> Search::refit_best(std::size_t problem, const Fit& null, cons
     if (again || score.statistic < 8.0) continue;
     Term term = score.candidate.term;
     if (term.effect.kind == Kind::kBiasStep) {
-      place_step(problem, null, term, 2.0, 0.25);
+      place_step(problem, null, term, kStepReach_s, 0.25);
       place_step(problem, null, term, 0.25, 0.02);
     }
     std::vector<Term> terms = null.terms;
@@ -582,12 +583,16 @@ bool Search::add_round() {
   for (const Found& found : found_)
     terms.push_back(found.term);
   std::optional<Found> best;
+  std::vector<Score> timing;
   for (std::size_t problem = 0; problem < study_.problems().size(); ++problem) {
     const Fit null = fit(problem, terms_of_problem(terms, problem), noise_);
     for (std::size_t gyro = 0; gyro < 2; ++gyro) {
       if (study_.problems()[problem].holds[gyro]) noise_[gyro] = null.noise[gyro];
     }
     std::vector<Score> scores = score(problem, null, null.noise);
+    for (const Score& one : scores) {
+      if (is_timing(one.candidate.term.effect.kind)) timing.push_back(one);
+    }
     if (scores.size() > kRefitsMax) scores.resize(3 * kRefitsMax);
     // Slow effects raise the fitted drift, which hides them: look with the model's noise too.
     PairNoise file = null.noise;
@@ -617,6 +622,8 @@ bool Search::add_round() {
     }
   }
   if (!best || best->margin() < 0.0) return false;
+  if (is_timing(best->term.effect.kind) && !study_.recording().has_reference)
+    best = judge_timing(terms, *best, timing);
   if (is_timing(best->term.effect.kind)) {
     // Interpolation leaves a thousandth of a great timing effect, which looks like another one.
     for (const Found& found : found_) {
@@ -625,10 +632,66 @@ bool Search::add_round() {
         return false;
       }
     }
+    // The same is left of lateness that was taken out.
+    for (const Finding& finding : study_.findings()) {
+      if (finding.effect.kind == Kind::kTimestampJitter &&
+          finding.effect.gyro == best->term.effect.gyro &&
+          best->statistic < 2e-2 * finding.statistic) {
+        return false;
+      }
+    }
   }
   found_.push_back(*best);
   settle();
+  if (best->term.effect.kind == Kind::kBiasStep) place_again();
   return true;
+}
+
+// Without a reference the rate is a mean of readings, late ones among them: what is late, and how,
+// is judged by the rate that each answer gives.
+Found Search::judge_timing(const std::vector<Term>& terms, Found best,
+                           const std::vector<Score>& scores) {
+  std::vector<Found> rivals;
+  std::vector<Reading> seen;
+  for (const Score& score : scores) {  // the likeliest of each reading comes first
+    const Effect& effect = score.candidate.term.effect;
+    const Reading reading{effect.kind, effect.gyro};
+    const bool again = std::any_of(seen.begin(), seen.end(), [&](const Reading& one) {
+      return one.kind == reading.kind && one.gyro == reading.gyro;
+    });
+    if (again || score.adjusted() < 0.2 * scores.front().adjusted()) continue;
+    seen.push_back(reading);
+    std::vector<Term> with = terms;
+    with.push_back(score.candidate.term);
+    Fit fitted;
+    for (int round = 0; round < 3; ++round) {
+      study_.learn_motion(known_and(with));
+      base_ = {study_.residual(study_.problems().front(), known_)};
+      fitted = fit(0, with, noise_);
+      with = fitted.terms;
+    }
+    Found rival = best;
+    rival.term = with.back();
+    rival.penalty = score.candidate.penalty;
+    rival.statistic = 2.0 * fitted.log_likelihood;
+    rivals.push_back(std::move(rival));
+  }
+  if (rivals.empty()) return best;
+  std::sort(rivals.begin(), rivals.end(), [](const Found& a, const Found& b) {
+    return a.statistic - a.penalty > b.statistic - b.penalty;
+  });
+  const double most = rivals.front().statistic - rivals.front().penalty;
+  const double gain = best.statistic - best.penalty;
+  best.term = rivals.front().term;
+  best.penalty = rivals.front().penalty;
+  for (const Found& rival : rivals) {
+    const Effect& effect = rival.term.effect;
+    if (&rival != &rivals.front() &&
+        rival.statistic - rival.penalty > most - kLead - kLeadShare * gain) {
+      best.ambiguous_with.push_back({effect.kind, effect.gyro});
+    }
+  }
+  return best;
 }
 
 // All found terms together, with their noise.
@@ -659,6 +722,27 @@ void Search::settle() {
   }
 }
 
+// A step's instant, now that the noise is known that is left with it. What was set aside about it
+// is needed to see it.
+void Search::place_again() {
+  bool any = false;
+  for (std::size_t i = 0; i < found_.size(); ++i) {
+    Effect& effect = found_[i].term.effect;
+    if (effect.kind != Kind::kBiasStep) continue;
+    const std::size_t problem = study_.problem_of(effect.gyro);
+    study_.use_for_fit(effect.parameters[1] - kStepReach_s, effect.parameters[1] + kStepReach_s);
+    std::vector<Term> others;
+    for (std::size_t j = 0; j < found_.size(); ++j) {
+      if (j != i) others.push_back(found_[j].term);
+    }
+    const Fit null{terms_of_problem(others, problem), noise_, 0.0, {}};
+    place_step(problem, null, found_[i].term, kStepReach_s, 0.25);
+    place_step(problem, null, found_[i].term, 0.25, 0.02);
+    any = true;
+  }
+  if (any) settle();
+}
+
 // Each found effect against all others in its place.
 void Search::replace_round() {
   for (std::size_t i = 0; i < found_.size(); ++i) {
@@ -674,6 +758,7 @@ void Search::replace_round() {
     const Fit own = fit(problem, with, noise_);
     const double statistic = 2.0 * (own.log_likelihood - null.log_likelihood);
     found_[i].statistic = statistic;
+    if (is_timing(found_[i].term.effect.kind) && !study_.recording().has_reference) continue;
     found_[i].ambiguous_with.clear();
     std::vector<Score> rivals;
     const Effect& effect = found_[i].term.effect;
@@ -943,6 +1028,7 @@ void Search::run() {
     if (found_.size() > 1) replace_round();
   }
   tell("weighing rivals", 0.75);
+  place_again();
   replace_round();
   delete_backward();
   reject_unsteady();

@@ -91,6 +91,8 @@ class Search {
   void place_step(std::size_t problem, const Fit& null, Term& term, double reach_s,
                   double step_s) const;
   bool add_round();
+  Found judge_timing(const std::vector<Term>& terms, Found best, const std::vector<Score>& scores);
+  void place_again();
   void replace_round();
   void delete_backward();
   /// How much better the effect fits with a size of its own in each part of the recording, as a

@@ -72,11 +72,50 @@ struct Sample {
   Channel channel;
   double observed_dps;
   double rate_dps;
-  std::array<double, 2> gain;
 };
 
+// Where samples of another curve stand in what was observed: gyro 2's in a difference, the
+// reference's everywhere.
+struct Interpolated {
+  const SampledCurve* curve = nullptr;
+  std::size_t slot = 0;  ///< of the gains
+};
+
+// Of the samples' own noise, and of what is interpolated at their instants.
+void set_gains(Block& block, std::span<const double> t_s, const Interpolated& other) {
+  const double count = block.count;
+  for (std::size_t gyro = 0; gyro < 2; ++gyro) {
+    const bool interpolated = other.slot == gyro && block.channel == Channel::kDifference;
+    if (share_of(block.channel, gyro) == 0.0 || interpolated) continue;
+    block.within_gain[gyro] = 1.0;
+    block.mean_gain[gyro] = 1.0 / count;
+  }
+  if (other.curve == nullptr || (other.slot < 2 && block.channel != Channel::kDifference)) return;
+  std::vector<double> sums;  // of each of its samples' weights
+  std::size_t first = 0;
+  double squares = 0.0;
+  for (const double at_s : t_s) {
+    const SampledCurve::Weights weights = other.curve->weights_at(at_s);
+    if (sums.empty()) first = weights.first;
+    if (weights.first < first) continue;  // times within a block increase
+    sums.resize(std::max(sums.size(), weights.first - first + weights.value.size()), 0.0);
+    for (std::size_t i = 0; i < weights.value.size(); ++i) {
+      sums[weights.first - first + i] += weights.value[i];
+      squares += weights.value[i] * weights.value[i];
+    }
+  }
+  double of_mean = 0.0;
+  for (const double sum : sums)
+    of_mean += sum / count * sum / count;
+  block.mean_gain[other.slot] = of_mean;
+  if (block.count > 1)
+    block.within_gain[other.slot] =
+        std::max(0.0, squares - count * of_mean) / static_cast<double>(block.count - 1);
+}
+
 // Samples of any order → blocks, in which a sample's place is its place in the columns.
-Problem assemble(std::vector<Sample> samples, std::array<double, 2> interval_s) {
+Problem assemble(std::vector<Sample> samples, std::array<double, 2> interval_s,
+                 const Interpolated& other) {
   Problem problem;
   problem.layout.interval_s = interval_s;
   const double block_s = std::max(kBlock_s, 5.0 * std::max(interval_s[0], interval_s[1]));
@@ -112,14 +151,11 @@ Problem assemble(std::vector<Sample> samples, std::array<double, 2> interval_s) 
     ++block.count;
     block.t_s += sample.t_s;
     block.rate_square += sample.rate_dps * sample.rate_dps;
-    block.gain[0] += sample.gain[0];
-    block.gain[1] += sample.gain[1];
   }
   for (Block& block : problem.layout.blocks) {
     block.t_s /= block.count;
     block.rate_square /= block.count;
-    block.gain[0] /= block.count;
-    block.gain[1] /= block.count;
+    set_gains(block, std::span(problem.t_s).subspan(block.first, block.count), other);
   }
   return problem;
 }
@@ -210,6 +246,21 @@ Expected<std::unique_ptr<Study>> Study::begin(const Recording& recording,
 
 bool Study::is_coarse(std::size_t gyro) const {
   return transports_[gyro].lattice_dps > 0.0 && transports_[gyro].repeats > kCoarseRepeats;
+}
+
+void Study::use_for_fit(double from_s, double to_s) {
+  for_fit_s_.push_back({from_s, to_s});
+  for (Problem& problem : problems_)
+    set_aside(problem);
+}
+
+void Study::set_aside(Problem& problem) const {
+  for (Block& block : problem.layout.blocks) {
+    const auto holds = [&](const std::array<double, 2>& span) {
+      return block.t_s >= span[0] && block.t_s <= span[1];
+    };
+    if (std::any_of(for_fit_s_.begin(), for_fit_s_.end(), holds)) block.held_out = false;
+  }
 }
 
 std::size_t Study::problem_of(std::size_t gyro) const {
@@ -433,13 +484,12 @@ Problem Study::build_against_reference(std::size_t gyro) {
     if (transport.t_s[i] < motion.curve().from_s() || transport.t_s[i] > motion.curve().to_s())
       continue;
     const double rate_dps = motion.rate(transport.t_s[i]).value;
-    std::array<double, 2> gain{};
-    gain[gyro] = 1.0;
     samples.push_back({transport.t_s[i], gyro == 0 ? Channel::kGyro1 : Channel::kGyro2,
-                       series.rate_dps[i] - rate_dps, rate_dps, gain});
+                       series.rate_dps[i] - rate_dps, rate_dps});
   }
   Problem problem =
-      assemble(std::move(samples), {transports_[0].interval_s, transports_[1].interval_s});
+      assemble(std::move(samples), {transports_[0].interval_s, transports_[1].interval_s},
+               {&motion.curve(), 2});
   problem.holds[gyro] = true;
   problem.layout.reference_variance = noise_variance(recording_.reference_dps);
   return problem;
@@ -456,26 +506,22 @@ Problem Study::build_pair() {
     const std::span<const double> t_s = readings_[gyro].times_s();
     for (std::size_t i = 0; i < t_s.size(); ++i) {
       if (!resting(t_s[i])) continue;
-      std::array<double, 2> gain{};
-      gain[gyro] = 1.0;
       samples.push_back({t_s[i], gyro == 0 ? Channel::kGyro1 : Channel::kGyro2,
                          readings_[gyro].values()[i] - recording_.rest_rate_dps,
-                         recording_.rest_rate_dps, gain});
+                         recording_.rest_rate_dps});
     }
   }
   const std::span<const double> t_s = readings_[0].times_s();
   const double reach_s = 1.5 * readings_[1].interval_s();
   for (std::size_t i = 0; i < t_s.size(); ++i) {
     if (resting(t_s[i]) || readings_[1].hole_at(t_s[i], reach_s)) continue;
-    const SampledCurve::Point other = readings_[1].at(t_s[i]);
-    samples.push_back({t_s[i],
-                       Channel::kDifference,
-                       readings_[0].values()[i] - other.value,
-                       motion.rate(t_s[i]).value,
-                       {1.0, other.gain}});
+    samples.push_back({t_s[i], Channel::kDifference,
+                       readings_[0].values()[i] - readings_[1].at(t_s[i]).value,
+                       motion.rate(t_s[i]).value});
   }
   Problem problem =
-      assemble(std::move(samples), {transports_[0].interval_s, transports_[1].interval_s});
+      assemble(std::move(samples), {transports_[0].interval_s, transports_[1].interval_s},
+               {&readings_[1], 1});
   problem.holds = {true, true};
   return problem;
 }
@@ -493,8 +539,10 @@ void Study::build() {
     problems_.push_back(build_pair());
   }
   excitations_ = {};
-  for (Problem& problem : problems_)
+  for (Problem& problem : problems_) {
     cache(problem);
+    set_aside(problem);
+  }
 }
 
 void Study::cache(Problem& problem) {

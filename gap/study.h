@@ -65,6 +65,9 @@ class Study {
   /// Without a reference: the rate anew, from both gyros less what `effects` say of them.
   void learn_motion(const std::vector<model::Effect>& effects);
 
+  /// What was set aside of these seconds is no longer.
+  void use_for_fit(double from_s, double to_s);
+
   /// Observed less what the effects say: of every sample of a problem.
   [[nodiscard]] Eigen::VectorXd residual(const Problem& problem,
                                          const std::vector<model::Effect>& effects) const;
@@ -79,6 +82,7 @@ class Study {
   void find_rest();
   void build();
   void cache(Problem& problem);
+  void set_aside(Problem& problem) const;
   Problem build_against_reference(std::size_t gyro);
   Problem build_pair();
 
@@ -98,6 +102,7 @@ class Study {
   std::array<SampledCurve, 2> readings_;  ///< unmasked samples
   std::vector<std::uint8_t> resting_;     ///< by whole seconds
   double rest_s_ = 0.0;
+  std::vector<std::array<double, 2>> for_fit_s_;
   std::vector<Problem> problems_;
   std::vector<Finding> findings_;
   std::vector<std::string> notes_;

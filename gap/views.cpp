@@ -230,9 +230,9 @@ Eigen::VectorXd simulate_residual(const Problem& problem, const PairNoise& noise
   std::stable_sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
     return problem.t_s[a] < problem.t_s[b];
   });
-  std::vector<std::array<double, 2>> gain(problem.t_s.size());
+  std::vector<std::array<double, 3>> gain(problem.t_s.size());
   for (const Block& block : problem.layout.blocks)
-    std::fill_n(gain.begin() + block.first, block.count, block.gain);
+    std::fill_n(gain.begin() + block.first, block.count, block.within_gain);
   std::array<double, 2> walk{};
   std::array<std::vector<double>, 2> markov;
   for (std::size_t gyro = 0; gyro < 2; ++gyro) {
@@ -245,7 +245,7 @@ Eigen::VectorXd simulate_residual(const Problem& problem, const PairNoise& noise
     const double step_s = std::max(0.0, problem.t_s[i] - last_s);
     last_s = std::max(last_s, problem.t_s[i]);
     double value = 0.0;
-    double variance = problem.layout.reference_variance;
+    double variance = gain[i][2] * problem.layout.reference_variance;
     for (std::size_t gyro = 0; gyro < 2; ++gyro) {
       if (!problem.holds[gyro]) continue;
       const NoiseTerms& terms = noise[gyro];

@@ -83,7 +83,9 @@ TEST(SampledCurve, SaysHowMuchNoiseInterpolationKeeps) {
   for (int i = 8; i < 39990; i += 8, ++count) {
     const SampledCurve::Point point = curve.at(kInterval_s * (i + 0.5));
     squares += point.value * point.value;
-    gain = point.gain;
+    gain = 0.0;
+    for (const double weight : curve.weights_at(kInterval_s * (i + 0.5)).value)
+      gain += weight * weight;
   }
   EXPECT_NEAR(squares / count / gain, 1.0, 5.0 * std::sqrt(2.0 / count));
 }

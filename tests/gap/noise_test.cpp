@@ -28,8 +28,10 @@ Layout some_layout(std::size_t blocks) {
     block.first = static_cast<std::uint32_t>(5 * b);
     block.count = 5;
     block.rate_square = 400.0;
-    block.gain = {block.channel == Channel::kGyro2 ? 0.0 : 1.0,
-                  block.channel == Channel::kGyro1 ? 0.0 : 1.0};
+    block.within_gain = {block.channel == Channel::kGyro2 ? 0.0 : 1.0,
+                         block.channel == Channel::kGyro1 ? 0.0 : 1.0, 1.0};
+    for (std::size_t i = 0; i < 3; ++i)
+      block.mean_gain[i] = block.within_gain[i] / block.count;
     layout.blocks.push_back(block);
   }
   layout.samples = 5 * blocks;
@@ -167,7 +169,8 @@ TEST(Noise, FitFindsWhatWasDrawn) {
   Layout layout = some_layout(1200);
   for (Block& block : layout.blocks) {
     block.channel = Channel::kGyro1;
-    block.gain = {1.0, 0.0};
+    block.within_gain = {1.0, 0.0, 0.0};
+    block.mean_gain = {1.0 / block.count, 0.0, 0.0};
   }
   layout.reference_variance = 0.0;
   PairNoise noise;
