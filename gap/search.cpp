@@ -25,6 +25,8 @@ constexpr double kCoarsePenalty = 1000.0;
 constexpr std::size_t kRefitsMax = 7;
 constexpr double kStepEvery_s = 2.0;
 constexpr double kStepReach_s = 2.0;
+constexpr double kTimingLeaves = 2e-3;
+constexpr double kJitterLeaves = 2e-2;
 constexpr double kLineLow_hz = 0.02;
 
 void clamp_to_catalogue(Effect& effect) {
@@ -578,6 +580,30 @@ std::vector<Found> Search::refit_best(std::size_t problem, const Fit& null, cons
   return list;
 }
 
+// Interpolation leaves a thousandth of a great timing effect, which looks like another one, and
+// without a reference, where the rate itself is made of late readings, like lines and noise too.
+bool Search::is_left_of_timing(const Found& one) const {
+  const Effect& effect = one.term.effect;
+  const bool knows_rate = study_.recording().has_reference;
+  const bool fast = is_timing(effect.kind) || effect.kind == Kind::kLine ||
+                    effect.kind == Kind::kWhiteNoise || effect.kind == Kind::kRateNoise;
+  if (knows_rate ? !is_timing(effect.kind) : !fast) return false;
+  for (const Found& found : found_) {
+    if (is_timing(found.term.effect.kind) &&
+        (!knows_rate || found.term.effect.gyro == effect.gyro) &&
+        one.statistic < kTimingLeaves * found.statistic) {
+      return true;
+    }
+  }
+  for (const Finding& finding : study_.findings()) {
+    if (is_timing(effect.kind) && finding.effect.kind == Kind::kTimestampJitter &&
+        finding.effect.gyro == effect.gyro && one.statistic < kJitterLeaves * finding.statistic) {
+      return true;
+    }
+  }
+  return false;
+}
+
 bool Search::add_round() {
   std::vector<Term> terms;
   for (const Found& found : found_)
@@ -624,23 +650,7 @@ bool Search::add_round() {
   if (!best || best->margin() < 0.0) return false;
   if (is_timing(best->term.effect.kind) && !study_.recording().has_reference)
     best = judge_timing(terms, *best, timing);
-  if (is_timing(best->term.effect.kind)) {
-    // Interpolation leaves a thousandth of a great timing effect, which looks like another one.
-    for (const Found& found : found_) {
-      if (is_timing(found.term.effect.kind) && found.term.effect.gyro == best->term.effect.gyro &&
-          best->statistic < 2e-3 * found.statistic) {
-        return false;
-      }
-    }
-    // The same is left of lateness that was taken out.
-    for (const Finding& finding : study_.findings()) {
-      if (finding.effect.kind == Kind::kTimestampJitter &&
-          finding.effect.gyro == best->term.effect.gyro &&
-          best->statistic < 2e-2 * finding.statistic) {
-        return false;
-      }
-    }
-  }
+  if (is_left_of_timing(*best)) return false;
   found_.push_back(*best);
   settle();
   if (best->term.effect.kind == Kind::kBiasStep) place_again();
@@ -999,6 +1009,7 @@ void Search::noise_rounds() {
       }
     }
     if (!best || best->statistic - best->penalty < kStatisticMin) return;
+    if (is_left_of_timing(*best)) return;
     for (const auto& [adjusted, reading] : rivals) {
       if (reading.kind == best->term.effect.kind && reading.gyro == best->term.effect.gyro)
         continue;

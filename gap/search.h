@@ -91,6 +91,7 @@ class Search {
   void place_step(std::size_t problem, const Fit& null, Term& term, double reach_s,
                   double step_s) const;
   bool add_round();
+  [[nodiscard]] bool is_left_of_timing(const Found& one) const;
   Found judge_timing(const std::vector<Term>& terms, Found best, const std::vector<Score>& scores);
   void place_again();
   void replace_round();

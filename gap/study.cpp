@@ -7,6 +7,7 @@
 #include <fmt/core.h>
 
 #include "gap/median.h"
+#include "gap/wiener.h"
 #include "model/catalogue.h"
 
 namespace vgyro::gap {
@@ -23,6 +24,8 @@ constexpr double kReferenceShareMin = 0.95;
 constexpr double kRestMin_s = 10.0;
 /// Share of samples that repeat the last one.
 constexpr double kCoarseRepeats = 0.2;
+constexpr int kMotionRounds = 16;
+constexpr double kMotionSame_dps = 2e-6;
 constexpr double kHeldOutCell_s = 1.0;
 constexpr unsigned kHeldOutOneIn = 4;
 constexpr double kSpikeSigmas = 8.0;
@@ -445,29 +448,32 @@ void Study::learn_motion(const std::vector<Effect>& effects) {
     const auto cell = static_cast<std::size_t>(std::max(0.0, at_s));
     return cell < resting_.size() && resting_[cell] != 0;
   };
-  // The first guess knows no errors; each further one takes off what the effects say at the last.
-  for (int round = 0; round < 3; ++round) {
-    std::vector<double> rate(t_s.size());
-    std::array<std::vector<double>, 2> correct;
+  // The first guess knows no errors; each further one takes off what the effects say at the last,
+  // until nothing changes. Late readings converge by half their phase.
+  const std::array<std::vector<Effect>, 2> mine{of_gyro(effects, 0), of_gyro(effects, 1)};
+  std::vector<double> rate;
+  for (int round = 0; round < kMotionRounds; ++round) {
+    std::vector<double> next(t_s.size(), 0.0);
     for (std::size_t gyro = 0; gyro < 2; ++gyro) {
-      correct[gyro].resize(t_s.size());
-      const bool first = round == 0;
       std::unique_ptr<Prediction> prediction;
-      const std::vector<Effect> mine = of_gyro(effects, gyro);
-      if (!first) prediction = std::make_unique<Prediction>(mine, signals_[gyro]);
+      if (round > 0) prediction = std::make_unique<Prediction>(mine[gyro], signals_[gyro]);
       for (std::size_t i = 0; i < t_s.size(); ++i) {
         double value = gyro == 0 ? readings_[0].values()[i] : readings_[1].at(t_s[i]).value;
         if (prediction) value -= prediction->at(t_s[i]) - signals_[gyro].motion.rate(t_s[i]).value;
-        correct[gyro][i] = value;
+        next[i] += weight[gyro] * value;
       }
     }
+    double change_dps = 0.0;
     for (std::size_t i = 0; i < t_s.size(); ++i) {
-      rate[i] = resting(t_s[i]) ? recording_.rest_rate_dps
-                                : weight[0] * correct[0][i] + weight[1] * correct[1][i];
+      if (resting(t_s[i])) next[i] = recording_.rest_rate_dps;
+      if (round > 0) change_dps = std::max(change_dps, std::abs(next[i] - rate[i]));
     }
-    const Motion motion{SampledCurve(t_s, rate)};
+    rate = std::move(next);
+    // Noise must not pass for motion, or what the effects make of it would come on top.
+    const Motion motion{without_noise(SampledCurve(t_s, rate))};
     for (Signals& signals : signals_)
       signals.motion = motion;
+    if (round > 0 && change_dps < kMotionSame_dps) break;
   }
   build();
 }
