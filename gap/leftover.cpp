@@ -1,8 +1,10 @@
 #include "gap/leftover.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <complex>
+#include <numeric>
 
 #include <fmt/core.h>
 #include <unsupported/Eigen/FFT>
@@ -17,10 +19,15 @@ using model::Kind;
 
 constexpr double kChunk_s = 10.0;
 constexpr double kFastSigmas = 7.0;
-constexpr double kSlowSigmas = 7.0;
-constexpr double kColourSigmas = 9.0;
-constexpr double kLowSigmas = 7.0;
-constexpr double kHeavySigmas = 10.0;
+constexpr double kSlowSigmas = 6.0;
+constexpr double kColourSigmas = 7.0;
+constexpr double kLowSigmas = 6.0;
+constexpr double kHeavySigmas = 6.0;
+constexpr double kSlopeSigmas = 4.5;
+constexpr double kQuickDrift_s = 3.0;
+
+// Blocks that are summed.
+constexpr std::array<std::size_t, 4> kSpans{1, 5, 20, 60};
 
 // (χ² − n) in standard deviations, by Wilson and Hilferty's cube root.
 double sigmas(double chi_square, double freedom) {
@@ -29,14 +36,55 @@ double sigmas(double chi_square, double freedom) {
   return (std::cbrt(chi_square / freedom) - (1.0 - spread)) / std::sqrt(spread);
 }
 
+// Excess of fourth powers over a Gaussian's, in standard deviations, by Anscombe and Glynn.
+double heaviness(const std::vector<double>& values) {
+  const double n = static_cast<double>(values.size());
+  double second = 0.0;
+  double fourth = 0.0;
+  for (const double value : values) {
+    const double square = value * value;
+    second += square;
+    fourth += square * square;
+  }
+  if (n < 30.0 || second <= 0.0) return 0.0;
+  const double kurtosis = n * fourth / (second * second);
+  const double mean = 3.0 * (n - 1.0) / (n + 1.0);
+  const double variance =
+      24.0 * n * (n - 2.0) * (n - 3.0) / ((n + 1.0) * (n + 1.0) * (n + 3.0) * (n + 5.0));
+  const double skew = 6.0 * (n * n - 5.0 * n + 2.0) / ((n + 7.0) * (n + 9.0)) *
+                      std::sqrt(6.0 * (n + 3.0) * (n + 5.0) / (n * (n - 2.0) * (n - 3.0)));
+  const double a = 6.0 + 8.0 / skew * (2.0 / skew + std::sqrt(1.0 + 4.0 / (skew * skew)));
+  const double x = (kurtosis - mean) / std::sqrt(variance);
+  const double root = 1.0 + x * std::sqrt(2.0 / (a - 4.0));
+  if (root <= 0.0) return -kHeavySigmas;
+  return (1.0 - 2.0 / (9.0 * a) - std::cbrt((1.0 - 2.0 / a) / root)) / std::sqrt(2.0 / (9.0 * a));
+}
+
+// Of white innovations, whose spectrum should not fall or rise: how far its lowest `count`
+// frequencies do, in standard deviations; negative where it falls.
+double slope_of(const std::vector<double>& power, std::size_t count) {
+  double mean = 0.0;
+  for (std::size_t i = 1; i <= count; ++i)
+    mean += std::log(static_cast<double>(i)) / static_cast<double>(count);
+  double sum = 0.0;
+  double squares = 0.0;
+  for (std::size_t i = 1; i <= count; ++i) {
+    const double weight = std::log(static_cast<double>(i)) - mean;
+    sum += weight * (power[i] - 1.0);
+    squares += weight * weight;
+  }
+  return sum / std::sqrt(squares);
+}
+
 struct Judgement {
   double fast = 0.0;  ///< worst stretch's excess of scatter within blocks
   Where fast_at;
   double slow = 0.0;  ///< worst stretch's excess of the drift filter's innovations
   Where slow_at;
   double colour = 0.0;  ///< of neighbouring samples
-  double heavy = 0.0;   ///< excess of the innovations' fourth powers over a Gaussian's
+  double heavy = 0.0;   ///< excess of fourth powers in sums of innovations over a Gaussian's
   double low = 0.0;     ///< excess of low frequencies in the innovations
+  double slope = 0.0;   ///< of the innovations' spectrum there
 };
 
 bool concerns(Channel channel, std::size_t gyro) {
@@ -58,8 +106,6 @@ Judgement judge(const Study& study, const Problem& problem, std::size_t gyro,
   double product = 0.0;
   double expected = 0.0;
   double pairs = 0.0;
-  double fourth = 0.0;
-  double second = 0.0;
   for (std::size_t b = 0; b < problem.layout.blocks.size(); ++b) {
     const Block& block = problem.layout.blocks[b];
     if (!concerns(block.channel, gyro)) continue;
@@ -72,9 +118,6 @@ Judgement judge(const Study& study, const Problem& problem, std::size_t gyro,
     slow[chunk] += innovation * innovation;
     slow_n[chunk] += 1.0;
     innovations.push_back(innovation);
-    const double square = innovation * innovation;
-    fourth += square * square;
-    second += square;
     // Interpolation colours a difference.
     if (block.channel == Channel::kDifference || block.count < 5) continue;
     const double scale = rows.squaredNorm() / static_cast<double>(block.count - 1);
@@ -100,9 +143,15 @@ Judgement judge(const Study& study, const Problem& problem, std::size_t gyro,
   }
   if (pairs > 0.0) verdict.colour = std::abs(product - expected) / std::sqrt(pairs);
   if (innovations.size() < 64) return verdict;
-  const double n = static_cast<double>(innovations.size());
-  // Scaled by their own variance; its standard error is √(24/n).
-  verdict.heavy = ((fourth / n) / (second / n * second / n) - 3.0) / std::sqrt(24.0 / n);
+  // What comes and goes shows in sums over the time that it takes.
+  for (const std::size_t span : kSpans) {
+    std::vector<double> sums;
+    for (std::size_t i = 0; i + span <= innovations.size(); i += span)
+      sums.push_back(std::accumulate(innovations.begin() + static_cast<std::ptrdiff_t>(i),
+                                     innovations.begin() + static_cast<std::ptrdiff_t>(i + span),
+                                     0.0));
+    verdict.heavy = std::max(verdict.heavy, heaviness(sums));
+  }
   Eigen::FFT<double> transform;
   std::vector<std::complex<double>> spectrum;
   std::size_t length = 1;
@@ -116,6 +165,13 @@ Judgement judge(const Study& study, const Problem& problem, std::size_t gyro,
     for (std::size_t i = 1; i <= most; ++i)
       power += 2.0 * std::norm(spectrum[i]) / static_cast<double>(length);
     verdict.low = std::max(verdict.low, std::abs(sigmas(power, 2.0 * static_cast<double>(most))));
+  }
+  std::vector<double> periodogram(length / 2);
+  for (std::size_t i = 0; i < periodogram.size(); ++i)
+    periodogram[i] = std::norm(spectrum[i]) / static_cast<double>(length);
+  for (const std::size_t count : {std::size_t{15}, std::size_t{40}, std::size_t{120}}) {
+    const double slope = slope_of(periodogram, std::min(count, periodogram.size() - 1));
+    if (std::abs(slope) > std::abs(verdict.slope)) verdict.slope = slope;
   }
   return verdict;
 }
@@ -197,12 +253,19 @@ std::vector<Unexplained> leftovers(const Study& study, const Search& search,
       found.erase(end, found.end());
       return any;
     };
-    if (verdict.fast > kFastSigmas || verdict.colour > kColourSigmas) {
+    // A drift of about a second's memory colours samples; its own variance within blocks says how
+    // much only to a tenth or so.
+    const bool quick_drift = std::any_of(found.begin(), found.end(), [&](const Found& one) {
+      return one.term.effect.gyro == gyro && one.term.effect.kind == Kind::kGaussMarkov &&
+             one.term.effect.parameters[1] < kQuickDrift_s;
+    });
+    const bool coloured = verdict.colour > (quick_drift ? 2.0 : 1.0) * kColourSigmas;
+    if (verdict.fast > kFastSigmas || coloured) {
       drop(true);
       Unexplained left;
       left.signature = "noise";
       left.gyro = gyro;
-      if (verdict.colour > kColourSigmas) {
+      if (coloured) {
         left.to_s = seconds;
         left.text = fmt::format(
             "neighbouring samples hang together, by {:.0f} standard errors: the "
@@ -219,7 +282,8 @@ std::vector<Unexplained> leftovers(const Study& study, const Search& search,
       }
       list.push_back(std::move(left));
     }
-    if (verdict.slow > kSlowSigmas || verdict.low > kLowSigmas || verdict.heavy > kHeavySigmas) {
+    if (verdict.slow > kSlowSigmas || verdict.low > kLowSigmas || verdict.heavy > kHeavySigmas ||
+        std::abs(verdict.slope) > kSlopeSigmas) {
       drop(false);
       Unexplained left;
       const bool bursts = verdict.slow > kSlowSigmas || verdict.heavy > kHeavySigmas;

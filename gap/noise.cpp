@@ -182,7 +182,10 @@ double whiten_means(Matrix& means, const Layout& layout, const PairNoise& noise,
     }
     for (std::size_t i = 0; i < n; ++i)
       h[i] = share_of(block.channel, states.gyro[i]);
-    double s = mean_variance(block, noise, layout);
+    // A mean's increments are less than those of the drift at its middle, by as much as the drift
+    // scatters within a block: then both variance and covariance of the means are right.
+    double s = mean_variance(block, noise, layout) -
+               drift_within(block.channel, noise, seconds_of(block, layout));
     double* const innovation = means.data() + b * width;
     for (std::size_t i = 0; i < n; ++i) {
       ph[i] = 0.0;
@@ -194,6 +197,7 @@ double whiten_means(Matrix& means, const Layout& layout, const PairNoise& noise,
       for (std::size_t c = 0; c < width; ++c)
         innovation[c] -= h[i] * state[c];
     }
+    s = std::max(s, kVarianceMin);
     for (std::size_t i = 0; i < n; ++i) {
       const double gain = ph[i] / s;
       double* const state = x.data() + i * width;

@@ -100,6 +100,10 @@ Eigen::Index free_count(const std::vector<Term>& terms) {
   return count;
 }
 
+bool is_drift(Kind kind) {
+  return kind == Kind::kRateRandomWalk || kind == Kind::kGaussMarkov;
+}
+
 bool is_timing(Kind kind) {
   return kind == Kind::kDelay || kind == Kind::kBandwidth || kind == Kind::kClockSkew;
 }
@@ -1027,6 +1031,45 @@ void Search::noise_rounds() {
   }
 }
 
+// Names that were taken because noise beyond the model's was no better: now that such noise has a
+// name beside them, they must stand by themselves.
+bool Search::reject_beside_noise() {
+  std::vector<Found> kept;
+  for (std::size_t i = 0; i < found_.size(); ++i) {
+    const Effect& effect = found_[i].term.effect;
+    const bool weak =
+        found_[i].needed < kStatisticMin &&
+        std::any_of(found_.begin(), found_.end(), [&](const Found& other) {
+          return other.term.effect.gyro == effect.gyro && is_drift(other.term.effect.kind);
+        });
+    if (!weak || statistic_beside(i) - found_[i].penalty >= kStatisticMin)
+      kept.push_back(found_[i]);
+  }
+  if (kept.size() == found_.size()) return false;
+  found_ = std::move(kept);
+  return true;
+}
+
+// Of one found effect, beside all others and the noise with what was named.
+double Search::statistic_beside(std::size_t index) const {
+  const std::size_t problem = study_.problem_of(found_[index].term.effect.gyro);
+  std::vector<Term> with;
+  std::vector<Term> without;
+  for (std::size_t i = 0; i < found_.size(); ++i) {
+    if (model::info(found_[i].term.effect.kind).nature == model::Nature::kNoise) continue;
+    if (study_.problem_of(found_[i].term.effect.gyro) != problem) continue;
+    with.push_back(found_[i].term);
+    if (i != index) without.push_back(found_[i].term);
+  }
+  const auto fitted = [&](std::vector<Term> terms) {
+    Fit fit{std::move(terms), file_noise_, 0.0, {}};
+    improve(problem, fit);
+    return log_likelihood(residual_of(problem, fit.terms), study_.problems()[problem].layout,
+                          fit.noise, Part::kFit);
+  };
+  return 2.0 * (fitted(std::move(with)) - fitted(std::move(without)));
+}
+
 void Search::run() {
   cache_candidates();
   const auto tell = [&](std::string_view what, double share) {
@@ -1044,7 +1087,19 @@ void Search::run() {
   delete_backward();
   reject_unsteady();
   tell("fitting the noise", 0.85);
+  const PairNoise model_noise = file_noise_;
   noise_rounds();
+  while (reject_beside_noise()) {
+    found_.erase(std::remove_if(found_.begin(), found_.end(),
+                                [](const Found& found) {
+                                  return model::info(found.term.effect.kind).nature ==
+                                         model::Nature::kNoise;
+                                }),
+                 found_.end());
+    file_noise_ = model_noise;
+    settle();
+    noise_rounds();
+  }
 }
 
 }  // namespace vgyro::gap

@@ -105,6 +105,8 @@ class Search {
   Change change_over_time(std::size_t index) const;
   void reject_unsteady();
   void noise_rounds();
+  bool reject_beside_noise();
+  [[nodiscard]] double statistic_beside(std::size_t index) const;
   void settle();
   void cache_candidates();
 

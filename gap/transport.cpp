@@ -47,6 +47,7 @@ class Check {
     find_stuck();
     find_saturation();
     find_dead_band();
+    count_repeats();
     return std::move(result_);
   }
 
@@ -66,6 +67,17 @@ class Check {
     finding.evidence = std::move(evidence);
     finding.figure = std::move(figure);
     result_.findings.push_back(std::move(finding));
+  }
+
+  void count_repeats() {
+    std::size_t good = 0;
+    std::size_t same = 0;
+    for (std::size_t i = 1; i < n_; ++i) {
+      if (result_.masked[i] + result_.masked[i - 1] > 0) continue;
+      ++good;
+      if (series_.rate_dps[i] == series_.rate_dps[i - 1]) ++same;
+    }
+    if (good > 0) result_.repeats = static_cast<double>(same) / static_cast<double>(good);
   }
 
   // Number of the sample on the even clock: by the alive counter where there is one.
@@ -294,7 +306,6 @@ class Check {
         std::clamp(repeats / static_cast<double>(n_), 1.0 / static_cast<double>(n_), 0.999);
     // A coarse sensor repeats itself at rest: there only a run beyond all others counts.
     std::vector<double> runs_s;
-    result_.repeats = chance;
     coarse_ = chance > kCoarse;
     if (coarse_) {
       for (std::size_t i = 0; i < n_;) {

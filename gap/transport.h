@@ -31,7 +31,7 @@ struct Transport {
   std::vector<double> late_s;        ///< of each stamp behind the even clock
   double interval_s = 0.0;           ///< of the even clock
   double lattice_dps = 0.0;          ///< least distance of the values
-  double repeats = 0.0;              ///< share of samples that repeat the last value
+  double repeats = 0.0;              ///< share of the samples to be used that repeat the last
   double lost_share = 0.0;           ///< frames that never came
   std::vector<Finding> findings;     ///< beyond what `known` says
   std::vector<std::string> notes;

@@ -82,7 +82,7 @@ double drift_about_mean(const Block& block, const PairNoise& noise, const Layout
   return at_one - at_two;
 }
 
-// In a block all samples share the drift at its middle; what drift moves about that is taken for
+// In a block all samples share the mean of the drift; what drift moves about that is taken for
 // white, and moves the mean by nothing.
 Eigen::MatrixXd dense_covariance(const Layout& layout, const PairNoise& noise) {
   const auto n = static_cast<Eigen::Index>(layout.samples);
@@ -94,7 +94,7 @@ Eigen::MatrixXd dense_covariance(const Layout& layout, const PairNoise& noise) {
     }
     const double moving = drift_about_mean(a, noise, layout);
     auto own = covariance.block(a.first, a.first, a.count, a.count);
-    own.array() -= moving / a.count;
+    own.array() -= moving / a.count + moving;
     for (std::uint32_t i = a.first; i < a.first + a.count; ++i)
       covariance(i, i) += variance_of(a, noise, layout) + moving;
   }
@@ -117,6 +117,30 @@ double dense_log_likelihood(const Eigen::VectorXd& residual, const Layout& layou
   const Eigen::LLT<Eigen::MatrixXd> factor(covariance);
   const Eigen::MatrixXd lower = factor.matrixL();
   return -lower.diagonal().array().log().sum() - 0.5 * residual.dot(factor.solve(residual));
+}
+
+// What the likelihood rests on: a mean's variance is that of the drift at its middle less its
+// scatter.
+TEST(Noise, MeanOfADriftScattersLessThanTheDriftByItsScatterWithinTheBlock) {
+  const PairNoise noise = some_noise();
+  const Layout layout = some_layout(6);
+  for (const Block& block : layout.blocks) {
+    const double length_s =
+        block.count * layout.interval_s[block.channel == Channel::kGyro2 ? 1 : 0];
+    constexpr int kParts = 400;
+    double of_mean = 0.0;
+    Block a = block;
+    Block b = block;
+    for (int i = 0; i < kParts; ++i) {
+      a.t_s = block.t_s + length_s * ((i + 0.5) / kParts - 0.5);
+      for (int j = 0; j < kParts; ++j) {
+        b.t_s = block.t_s + length_s * ((j + 0.5) / kParts - 0.5);
+        of_mean += drift_covariance(a, b, noise) / kParts / kParts;
+      }
+    }
+    const double at_middle = drift_covariance(block, block, noise);
+    EXPECT_NEAR(of_mean, at_middle - drift_about_mean(block, noise, layout), 1e-5 * at_middle);
+  }
 }
 
 TEST(Noise, LogLikelihoodIsThatOfADenseNormalUpToAConstant) {
