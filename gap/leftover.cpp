@@ -19,12 +19,14 @@ using model::Kind;
 
 constexpr double kChunk_s = 10.0;
 constexpr double kFastSigmas = 7.0;
-constexpr double kSlowSigmas = 6.0;
-constexpr double kColourSigmas = 7.0;
-constexpr double kLowSigmas = 6.0;
-constexpr double kHeavySigmas = 6.0;
-constexpr double kSlopeSigmas = 4.5;
+constexpr double kSlowSigmas = 5.5;
+constexpr double kColourSigmas = 6.5;
+constexpr double kLowSigmas = 5.0;
+constexpr double kHeavySigmas = 4.5;
+constexpr double kSlopeSigmas = 4.0;
 constexpr double kQuickDrift_s = 3.0;
+constexpr double kSpikySigmas = 8.0;
+constexpr double kSmallShare = 0.03;
 
 // Blocks that are summed.
 constexpr std::array<std::size_t, 4> kSpans{1, 5, 20, 60};
@@ -82,6 +84,7 @@ struct Judgement {
   double slow = 0.0;  ///< worst stretch's excess of the drift filter's innovations
   Where slow_at;
   double colour = 0.0;  ///< of neighbouring samples
+  double spiky = 0.0;   ///< excess of the samples' fourth powers over a Gaussian's
   double heavy = 0.0;   ///< excess of fourth powers in sums of innovations over a Gaussian's
   double low = 0.0;     ///< excess of low frequencies in the innovations
   double slope = 0.0;   ///< of the innovations' spectrum there
@@ -103,6 +106,7 @@ Judgement judge(const Study& study, const Problem& problem, std::size_t gyro,
   std::vector<double> fast(chunks, 0.0), fast_n(chunks, 0.0), slow(chunks, 0.0),
       slow_n(chunks, 0.0);
   std::vector<double> innovations;
+  std::vector<double> samples;
   double product = 0.0;
   double expected = 0.0;
   double pairs = 0.0;
@@ -120,6 +124,8 @@ Judgement judge(const Study& study, const Problem& problem, std::size_t gyro,
     innovations.push_back(innovation);
     // Interpolation colours a difference.
     if (block.channel == Channel::kDifference || block.count < 5) continue;
+    for (const double value : rows)
+      samples.push_back(value);
     const double scale = rows.squaredNorm() / static_cast<double>(block.count - 1);
     for (Eigen::Index i = 0; i + 1 < rows.size(); ++i)
       product += rows[i] * rows[i + 1];
@@ -142,6 +148,7 @@ Judgement judge(const Study& study, const Problem& problem, std::size_t gyro,
     if (slow_z > verdict.slow) verdict.slow = slow_z, verdict.slow_at = where;
   }
   if (pairs > 0.0) verdict.colour = std::abs(product - expected) / std::sqrt(pairs);
+  verdict.spiky = heaviness(samples);
   if (innovations.size() < 64) return verdict;
   // What comes and goes shows in sums over the time that it takes.
   for (const std::size_t span : kSpans) {
@@ -204,35 +211,38 @@ std::string_view signature_of(Kind kind) {
   }
 }
 
+Unexplained resembling(const Found& one, double seconds) {
+  const model::Effect& effect = one.term.effect;
+  Unexplained left;
+  left.signature = signature_of(effect.kind);
+  left.gyro = effect.gyro;
+  left.to_s = seconds;
+  if (effect.kind == Kind::kLine) {
+    left.frequency_hz = effect.parameters[0];
+    left.amplitude_dps = std::abs(effect.parameters[1]);
+    left.text = fmt::format("line near {:.4g} Hz, {:.2g} deg/s, not steady", effect.parameters[0],
+                            std::abs(effect.parameters[1]));
+  } else {
+    left.text = fmt::format("resembles {} ({}), but does not keep its size through the recording",
+                            model::info(effect.kind).name, model::parameters_text(effect));
+    if (effect.kind == Kind::kBiasStep) {
+      left.from_s = effect.parameters[1];
+      left.amplitude_dps = std::abs(effect.parameters[0]);
+      left.text = fmt::format("one of several steps: {:.3g} deg/s at {:.1f} s",
+                              effect.parameters[0], effect.parameters[1]);
+    }
+  }
+  return left;
+}
+
 }  // namespace
 
 std::vector<Unexplained> leftovers(const Study& study, const Search& search,
                                    std::vector<Found>& found) {
   std::vector<Unexplained> list;
   const double seconds = study.recording().seconds;
-  for (const Found& one : search.rejected()) {
-    const model::Effect& effect = one.term.effect;
-    Unexplained left;
-    left.signature = signature_of(effect.kind);
-    left.gyro = effect.gyro;
-    left.to_s = seconds;
-    if (effect.kind == Kind::kLine) {
-      left.frequency_hz = effect.parameters[0];
-      left.amplitude_dps = std::abs(effect.parameters[1]);
-      left.text = fmt::format("line near {:.4g} Hz, {:.2g} deg/s, not steady", effect.parameters[0],
-                              std::abs(effect.parameters[1]));
-    } else {
-      left.text = fmt::format("resembles {} ({}), but does not keep its size through the recording",
-                              model::info(effect.kind).name, model::parameters_text(effect));
-      if (effect.kind == Kind::kBiasStep) {
-        left.from_s = effect.parameters[1];
-        left.amplitude_dps = std::abs(effect.parameters[0]);
-        left.text = fmt::format("one of several steps: {:.3g} deg/s at {:.1f} s",
-                                effect.parameters[0], effect.parameters[1]);
-      }
-    }
-    list.push_back(std::move(left));
-  }
+  for (const Found& one : search.rejected())
+    list.push_back(resembling(one, seconds));
   // Noise that was named must leave innovations that are white and alike throughout.
   for (std::size_t gyro = 0; gyro < 2; ++gyro) {
     // The rounding of slow readings is neither white nor alike throughout.
@@ -247,11 +257,19 @@ std::vector<Unexplained> leftovers(const Study& study, const Search& search,
                   : kind == Kind::kRateRandomWalk || kind == Kind::kGaussMarkov;
     };
     const auto drop = [&](bool fast) {
-      const auto end = std::remove_if(found.begin(), found.end(),
-                                      [&](const Found& one) { return is_noise(one, fast); });
-      const bool any = end != found.end();
+      const auto end = std::stable_partition(
+          found.begin(), found.end(), [&](const Found& one) { return !is_noise(one, fast); });
+      double weight = 0.0;
+      for (auto one = end; one != found.end(); ++one)
+        weight += one->statistic;
       found.erase(end, found.end());
-      return any;
+      // What is small beside something unknown may be a part of it.
+      const auto small = std::stable_partition(found.begin(), found.end(), [&](const Found& one) {
+        return one.term.effect.gyro != gyro || one.statistic > kSmallShare * weight;
+      });
+      for (auto one = small; one != found.end(); ++one)
+        list.push_back(resembling(*one, seconds));
+      found.erase(small, found.end());
     };
     // A drift of about a second's memory colours samples; its own variance within blocks says how
     // much only to a tenth or so.
@@ -260,7 +278,7 @@ std::vector<Unexplained> leftovers(const Study& study, const Search& search,
              one.term.effect.parameters[1] < kQuickDrift_s;
     });
     const bool coloured = verdict.colour > (quick_drift ? 2.0 : 1.0) * kColourSigmas;
-    if (verdict.fast > kFastSigmas || coloured) {
+    if (verdict.fast > kFastSigmas || coloured || verdict.spiky > kSpikySigmas) {
       drop(true);
       Unexplained left;
       left.signature = "noise";
@@ -273,6 +291,13 @@ std::vector<Unexplained> leftovers(const Study& study, const Search& search,
             verdict.colour);
         // Coloured fast noise is no drift either.
         drop(false);
+      } else if (verdict.spiky > kSpikySigmas) {
+        left.to_s = seconds;
+        left.signature = "outliers";
+        left.text = fmt::format(
+            "single samples stand out of the noise, by {:.0f} standard errors of their fourth "
+            "power",
+            verdict.spiky);
       } else {
         left.from_s = verdict.fast_at.from_s;
         left.to_s = verdict.fast_at.to_s;

@@ -1,6 +1,7 @@
 #include "gap/signals.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 
@@ -14,7 +15,9 @@ using model::Kind;
 using model::Nature;
 
 constexpr double kDegree = std::numbers::pi / 180.0;
-constexpr double kTemperatureReach_s = 2.0;
+// The widest over which a parabola follows the temperature as well as over the narrowest.
+constexpr std::array kTemperatureReach_s{2.0, 4.0, 8.0, 16.0};
+constexpr double kFollows = 1.02;
 constexpr double kGridStep_s = 0.25;
 
 // Values at the quarters of each interval of a curve, kQuarters for each.
@@ -98,6 +101,26 @@ Parabola fit_parabola(std::span<const double> t_s, std::span<const double> y, do
   return {value, slope / reach_s};
 }
 
+double temperature_reach_s(const GyroSeries& gyro) {
+  constexpr std::size_t kProbes = 2000;
+  const std::size_t every = std::max<std::size_t>(1, gyro.t_s.size() / kProbes);
+  double best_s = kTemperatureReach_s.front();
+  double narrowest = -1.0;
+  for (const double reach_s : kTemperatureReach_s) {
+    double squares = 0.0;
+    for (std::size_t i = 0; i < gyro.t_s.size(); i += every) {
+      if (std::isnan(gyro.temperature_c[i])) continue;
+      const double off = gyro.temperature_c[i] -
+                         fit_parabola(gyro.t_s, gyro.temperature_c, gyro.t_s[i], reach_s).value;
+      if (!std::isnan(off)) squares += off * off;
+    }
+    if (narrowest < 0.0) narrowest = squares;
+    if (squares > kFollows * narrowest) break;
+    best_s = reach_s;
+  }
+  return best_s;
+}
+
 }  // namespace
 
 Motion::Motion(SampledCurve rate_dps) : rate_dps_(std::move(rate_dps)) {
@@ -152,12 +175,13 @@ model::Surroundings Signals::at(double t_s) const {
 void smooth_temperature(const GyroSeries& gyro, Signals& signals) {
   if (gyro.temperature_c.empty()) return;
   const double end_s = gyro.t_s.back();
+  const double reach_s = temperature_reach_s(gyro);
   std::vector<double> t_s;
   std::vector<double> value;
   std::vector<double> slope;
   for (double t = gyro.t_s.front(); t <= end_s + kGridStep_s; t += kGridStep_s) {
     const Parabola parabola =
-        fit_parabola(gyro.t_s, gyro.temperature_c, std::min(t, end_s), kTemperatureReach_s);
+        fit_parabola(gyro.t_s, gyro.temperature_c, std::min(t, end_s), reach_s);
     if (std::isnan(parabola.value)) continue;
     t_s.push_back(t);
     value.push_back(parabola.value);

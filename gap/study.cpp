@@ -24,11 +24,12 @@ constexpr double kReferenceShareMin = 0.95;
 constexpr double kRestMin_s = 10.0;
 /// Share of samples that repeat the last one.
 constexpr double kCoarseRepeats = 0.2;
+constexpr double kRestNear_dps = 2.0;
 constexpr int kMotionRounds = 16;
 constexpr double kMotionSame_dps = 2e-6;
 constexpr double kHeldOutCell_s = 1.0;
 constexpr unsigned kHeldOutOneIn = 4;
-constexpr double kSpikeSigmas = 8.0;
+constexpr double kSpikeSigmas = 6.5;
 constexpr std::size_t kSpikesMin = 3;
 constexpr double kRestBelow_dps = 0.15;
 constexpr double kRestSteady = 3.0;
@@ -387,15 +388,20 @@ void Study::find_rest() {
       const std::size_t cell = std::min(cells - 1, static_cast<std::size_t>(std::max(0.0, t_s[i])));
       sum[cell] += rate[i], squares[cell] += rate[i] * rate[i], count[cell] += 1.0;
     }
-    std::vector<double> deviations;
     std::vector<double> first;
     std::vector<double> deviation(cells, 1e300);
     for (std::size_t cell = 0; cell < cells; ++cell) {
       if (count[cell] < 5.0) continue;
       const double mean = sum[cell] / count[cell];
       deviation[cell] = std::sqrt(std::max(0.0, squares[cell] / count[cell] - mean * mean));
-      deviations.push_back(deviation[cell]);
       if (static_cast<double>(cell) < std::max(5.0, recording_.rest_s)) first.push_back(mean);
+    }
+    // A gyro at its limit is steadier than any at rest.
+    std::vector<double> deviations;
+    const double start = first.empty() ? 0.0 : median_of(first);
+    for (std::size_t cell = 0; cell < cells; ++cell) {
+      if (count[cell] >= 5.0 && std::abs(sum[cell] / count[cell] - start) < kRestNear_dps)
+        deviations.push_back(deviation[cell]);
     }
     if (deviations.size() < 10 || first.empty()) {
       resting_.assign(cells, 0);
@@ -404,7 +410,7 @@ void Study::find_rest() {
     std::sort(deviations.begin(), deviations.end());
     const double quiet =
         std::max(deviations[deviations.size() / 10], recording_.gyros[gyro].step_dps);
-    const double level = median_of(first);
+    const double level = start;
     for (std::size_t cell = 0; cell < cells; ++cell) {
       if (count[cell] < 5.0 || deviation[cell] > kRestSteady * quiet ||
           std::abs(sum[cell] / count[cell] - level) > kRestBelow_dps + 3.0 * quiet) {
