@@ -25,6 +25,7 @@ constexpr double kCoarsePenalty = 1000.0;
 constexpr std::size_t kRefitsMax = 7;
 constexpr double kStepEvery_s = 2.0;
 constexpr double kStepReach_s = 2.0;
+constexpr double kLineShare = 0.05;
 constexpr double kTimingLeaves = 2e-3;
 constexpr double kJitterLeaves = 2e-2;
 constexpr double kLineLow_hz = 0.02;
@@ -485,7 +486,7 @@ void Search::score_lines(std::size_t problem, const Eigen::VectorXd& residual,
   for (const Peak& peak : peaks) {
     // A quick look before the exact one: |Σ w e exp|² · 2/Σw is χ² with two degrees.
     const double statistic = 2.0 * peak.power / weight_sum;
-    const double penalty = 2.0 * std::log(0.5 * seconds / interval_s) + 2.0;
+    const double penalty = 2.0 * std::log(0.5 * seconds / interval_s) + 6.0;
     if (statistic < penalty) continue;
     for (std::size_t gyro = 0; gyro < 2; ++gyro) {
       if (!data.holds[gyro]) continue;
@@ -694,13 +695,17 @@ Found Search::judge_timing(const std::vector<Term>& terms, Found best,
   std::sort(rivals.begin(), rivals.end(), [](const Found& a, const Found& b) {
     return a.statistic - a.penalty > b.statistic - b.penalty;
   });
+  const Reading first{rivals.front().term.effect.kind, rivals.front().term.effect.gyro};
+  // Which of two clocks is the wrong one, no reading says.
+  if (first.kind == Kind::kClockSkew) best.ambiguous_with.push_back({first.kind, 1 - first.gyro});
   const double most = rivals.front().statistic - rivals.front().penalty;
   const double gain = best.statistic - best.penalty;
   best.term = rivals.front().term;
   best.penalty = rivals.front().penalty;
   for (const Found& rival : rivals) {
     const Effect& effect = rival.term.effect;
-    if (&rival != &rivals.front() &&
+    const bool other_clock = first.kind == Kind::kClockSkew && effect.kind == Kind::kClockSkew;
+    if (&rival != &rivals.front() && !other_clock &&
         rival.statistic - rival.penalty > most - kLead - kLeadShare * gain) {
       best.ambiguous_with.push_back({effect.kind, effect.gyro});
     }
@@ -1032,18 +1037,26 @@ void Search::noise_rounds() {
 }
 
 // Names that were taken because noise beyond the model's was no better: now that such noise has a
-// name beside them, they must stand by themselves.
+// name beside them, they must stand by themselves. A small line in much drift is a part of it.
 bool Search::reject_beside_noise() {
   std::vector<Found> kept;
   for (std::size_t i = 0; i < found_.size(); ++i) {
     const Effect& effect = found_[i].term.effect;
-    const bool weak =
-        found_[i].needed < kStatisticMin &&
-        std::any_of(found_.begin(), found_.end(), [&](const Found& other) {
-          return other.term.effect.gyro == effect.gyro && is_drift(other.term.effect.kind);
-        });
-    if (!weak || statistic_beside(i) - found_[i].penalty >= kStatisticMin)
+    double drift = 0.0;
+    for (const Found& other : found_) {
+      if (other.term.effect.gyro == effect.gyro && is_drift(other.term.effect.kind))
+        drift += other.statistic;
+    }
+    if (drift == 0.0 || found_[i].needed >= kStatisticMin) {
       kept.push_back(found_[i]);
+      continue;
+    }
+    const double statistic = statistic_beside(i);
+    if (effect.kind == Kind::kLine && statistic < kLineShare * drift) {
+      rejected_.push_back(found_[i]);
+    } else if (statistic - found_[i].penalty >= kStatisticMin) {
+      kept.push_back(found_[i]);
+    }
   }
   if (kept.size() == found_.size()) return false;
   found_ = std::move(kept);

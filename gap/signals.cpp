@@ -5,6 +5,10 @@
 #include <cmath>
 #include <numbers>
 
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+
+#include "gap/median.h"
 #include "model/catalogue.h"
 
 namespace vgyro::gap {
@@ -15,9 +19,9 @@ using model::Kind;
 using model::Nature;
 
 constexpr double kDegree = std::numbers::pi / 180.0;
-// The widest over which a parabola follows the temperature as well as over the narrowest.
-constexpr std::array kTemperatureReach_s{2.0, 4.0, 8.0, 16.0};
-constexpr double kFollows = 1.02;
+constexpr std::array kTemperatureReach_s{1.0, 2.0, 4.0, 8.0};
+// How much more than usual a temperature may scatter about a parabola that follows it.
+constexpr double kFollows = 1.2;
 constexpr double kGridStep_s = 0.25;
 
 // Values at the quarters of each interval of a curve, kQuarters for each.
@@ -66,59 +70,52 @@ SampledCurve low_pass(const SampledCurve& curve, const std::vector<double>& quar
 struct Parabola {
   double value = 0.0;
   double slope = 0.0;
+  double scatter = 0.0;  ///< mean square about it
 };
 
 Parabola fit_parabola(std::span<const double> t_s, std::span<const double> y, double at_s,
                       double reach_s) {
-  const double from_s = at_s - reach_s;
-  const double to_s = at_s + reach_s;
-  const auto first = std::lower_bound(t_s.begin(), t_s.end(), from_s) - t_s.begin();
-  const auto last = std::upper_bound(t_s.begin(), t_s.end(), to_s) - t_s.begin();
-  double s[5] = {};
-  double b[3] = {};
+  const auto first = std::lower_bound(t_s.begin(), t_s.end(), at_s - reach_s) - t_s.begin();
+  const auto last = std::upper_bound(t_s.begin(), t_s.end(), at_s + reach_s) - t_s.begin();
+  Eigen::Matrix3d gram = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d right = Eigen::Vector3d::Zero();
+  double squares = 0.0;
+  double origin = std::nan("");
   for (auto i = first; i < last; ++i) {
     const auto place = static_cast<std::size_t>(i);
     if (std::isnan(y[place])) continue;
+    if (std::isnan(origin)) origin = y[place];
     const double x = (t_s[place] - at_s) / reach_s;
-    double power = 1.0;
-    for (int k = 0; k < 5; ++k) {
-      s[k] += power;
-      if (k < 3) b[k] += power * y[place];
-      power *= x;
-    }
+    const Eigen::Vector3d powers(1.0, x, x * x);
+    gram += powers * powers.transpose();
+    right += powers * (y[place] - origin);
+    squares += (y[place] - origin) * (y[place] - origin);
   }
-  if (s[0] < 1.0) return {std::nan(""), std::nan("")};
-  const double a11 = s[0], a12 = s[1], a13 = s[2], a22 = s[2], a23 = s[3], a33 = s[4];
-  const double determinant =
-      a11 * (a22 * a33 - a23 * a23) - a12 * (a12 * a33 - a23 * a13) + a13 * (a12 * a23 - a22 * a13);
-  if (s[0] < 4.0 || determinant < 1e-9 * s[0] * s[0] * s[0]) return {b[0] / s[0], 0.0};
-  const double value = (b[0] * (a22 * a33 - a23 * a23) - a12 * (b[1] * a33 - a23 * b[2]) +
-                        a13 * (b[1] * a23 - a22 * b[2])) /
-                       determinant;
-  const double slope = (a11 * (b[1] * a33 - a23 * b[2]) - b[0] * (a12 * a33 - a23 * a13) +
-                        a13 * (a12 * b[2] - b[1] * a13)) /
-                       determinant;
-  return {value, slope / reach_s};
+  const double count = gram(0, 0);
+  if (count < 1.0) return {std::nan(""), std::nan(""), 0.0};
+  if (count < 4.0 || gram.determinant() < 1e-9 * count * count * count)
+    return {origin + right[0] / count, 0.0, 0.0};
+  const Eigen::Vector3d solution = gram.ldlt().solve(right);
+  return {origin + solution[0], solution[1] / reach_s,
+          std::max(0.0, squares - solution.dot(right)) / count};
 }
 
-double temperature_reach_s(const GyroSeries& gyro) {
-  constexpr std::size_t kProbes = 2000;
-  const std::size_t every = std::max<std::size_t>(1, gyro.t_s.size() / kProbes);
-  double best_s = kTemperatureReach_s.front();
-  double narrowest = -1.0;
-  for (const double reach_s : kTemperatureReach_s) {
-    double squares = 0.0;
-    for (std::size_t i = 0; i < gyro.t_s.size(); i += every) {
-      if (std::isnan(gyro.temperature_c[i])) continue;
-      const double off = gyro.temperature_c[i] -
-                         fit_parabola(gyro.t_s, gyro.temperature_c, gyro.t_s[i], reach_s).value;
-      if (!std::isnan(off)) squares += off * off;
-    }
-    if (narrowest < 0.0) narrowest = squares;
-    if (squares > kFollows * narrowest) break;
-    best_s = reach_s;
+// Of the parabolas about an instant the widest that scatters no more than sensor and frame do.
+Parabola widest_parabola(std::span<const double> t_s, std::span<const double> y, double at_s,
+                         double scatter_most) {
+  for (auto reach_s = kTemperatureReach_s.rbegin(); reach_s != kTemperatureReach_s.rend();
+       ++reach_s) {
+    const Parabola parabola = fit_parabola(t_s, y, at_s, *reach_s);
+    if (parabola.scatter <= scatter_most) return parabola;
   }
-  return best_s;
+  return fit_parabola(t_s, y, at_s, kTemperatureReach_s.front());
+}
+
+double usual_scatter(std::span<const double> t_s, std::span<const double> y) {
+  std::vector<double> scatter;
+  for (double at_s = t_s.front(); at_s < t_s.back(); at_s += kTemperatureReach_s.front())
+    scatter.push_back(fit_parabola(t_s, y, at_s, kTemperatureReach_s.front()).scatter);
+  return median_of(scatter);
 }
 
 }  // namespace
@@ -175,13 +172,13 @@ model::Surroundings Signals::at(double t_s) const {
 void smooth_temperature(const GyroSeries& gyro, Signals& signals) {
   if (gyro.temperature_c.empty()) return;
   const double end_s = gyro.t_s.back();
-  const double reach_s = temperature_reach_s(gyro);
+  const double scatter_most = kFollows * usual_scatter(gyro.t_s, gyro.temperature_c);
   std::vector<double> t_s;
   std::vector<double> value;
   std::vector<double> slope;
   for (double t = gyro.t_s.front(); t <= end_s + kGridStep_s; t += kGridStep_s) {
     const Parabola parabola =
-        fit_parabola(gyro.t_s, gyro.temperature_c, std::min(t, end_s), reach_s);
+        widest_parabola(gyro.t_s, gyro.temperature_c, std::min(t, end_s), scatter_most);
     if (std::isnan(parabola.value)) continue;
     t_s.push_back(t);
     value.push_back(parabola.value);
