@@ -2,6 +2,7 @@
 
 #include "cli/commands.h"
 #include "model/catalogue.h"
+#include "model/evidence.h"
 
 namespace vgyro::cli {
 
@@ -31,6 +32,10 @@ void print_kind(const model::KindInfo& kind) {
     fmt::print("    {:<26}{}{}\n", parameter.name, parameter.limits(),
                parameter.preset ? fmt::format("; {:g} unless given", *parameter.preset) : "");
   }
+  const model::Evidence& evidence = model::evidence(kind.kind);
+  fmt::print("    {:<26}{}\n", "shown by", evidence.shown_by);
+  if (!evidence.taken_for.empty())
+    fmt::print("    {:<26}{}\n", "may be taken for", evidence.taken_for);
 }
 
 }  // namespace

@@ -1017,7 +1017,7 @@ void Search::noise_rounds() {
         }
       }
     }
-    if (!best || best->statistic - best->penalty < kStatisticMin) return;
+    if (!best || best->statistic - best->penalty < kNoiseMin) return;
     if (is_left_of_timing(*best)) return;
     for (const auto& [adjusted, reading] : rivals) {
       if (reading.kind == best->term.effect.kind && reading.gyro == best->term.effect.gyro)

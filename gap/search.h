@@ -19,6 +19,8 @@ namespace vgyro::gap {
 
 /// Statistic less penalty that a name needs; docs/gap.md says what chance brings.
 inline constexpr double kStatisticMin = 18.0;
+/// What noise needs: weak noise of the wrong name would hide what grew it.
+inline constexpr double kNoiseMin = 24.0;
 /// What it needs where the noise must have grown beyond the model's to do without it: then one name
 /// or another is due, and the question is only which.
 inline constexpr double kStatisticMinAgainstNoise = 13.0;

@@ -2,6 +2,7 @@
 """`vgyro model list` and the model file on the command line."""
 
 import json
+import re
 import unittest
 
 import bench
@@ -15,6 +16,18 @@ class ModelList(bench.Bench):
             self.assertIn("\n  " + kind, text)
         for part in ("reference_c", "25 unless given", '"x", "y" or "z"', "above 0 and up to", "takes it back"):
             self.assertIn(part, text)
+
+    def test_says_of_every_kind_what_shows_it_and_names_only_kinds_it_may_be_taken_for(self):
+        lines = self.good("model", "list").stdout.decode().splitlines()
+        kinds = {line.split()[0] for line in lines if re.match(r"  \S", line)}
+        self.assertEqual(len(kinds), 30)
+        self.assertEqual(sum(line.startswith("    shown by ") for line in lines), 30)
+        kind = ""
+        for line in lines:
+            kind = line.split()[0] if re.match(r"  \S", line) else kind
+            if line.startswith("    may be taken for "):
+                others = set(line.removeprefix("    may be taken for ").strip().split(", "))
+                self.assertLessEqual(others, kinds - {kind})
 
     def test_lines_fit_a_terminal(self):
         for line in self.good("model", "list").stdout.decode().splitlines():
