@@ -985,30 +985,34 @@ void Search::noise_rounds() {
               break;
           }
           if (effect.parameters[0] <= 0.0) continue;
-          // Curvature of the likelihood over the density, by differences.
-          const auto at = [&](double factor, std::size_t parameter) {
+          // Curvature of the likelihood over the logarithms, by differences; a correlated term's
+          // size and memory go together.
+          const auto at = [&](double first, double second) {
             PairNoise trial = with.noise;
-            if (kind == Kind::kWhiteNoise) trial[gyro].white_dps_rthz *= factor;
-            if (kind == Kind::kRateNoise) trial[gyro].ratio_rthz *= factor;
-            if (kind == Kind::kRateRandomWalk) trial[gyro].walk_dps_rts *= factor;
-            if (kind == Kind::kGaussMarkov && parameter == 0)
-              trial[gyro].markov.back().sigma_dps *= factor;
-            if (kind == Kind::kGaussMarkov && parameter == 1)
-              trial[gyro].markov.back().tau_s *= factor;
+            if (kind == Kind::kWhiteNoise) trial[gyro].white_dps_rthz *= std::exp(first);
+            if (kind == Kind::kRateNoise) trial[gyro].ratio_rthz *= std::exp(first);
+            if (kind == Kind::kRateRandomWalk) trial[gyro].walk_dps_rts *= std::exp(first);
+            if (kind == Kind::kGaussMarkov) {
+              trial[gyro].markov.back().sigma_dps *= std::exp(first);
+              trial[gyro].markov.back().tau_s *= std::exp(second);
+            }
             return log_likelihood(residual, data.layout, trial, Part::kFit);
           };
-          const double top = at(1.0, 0);
-          for (std::size_t parameter = 0; parameter < (kind == Kind::kGaussMarkov ? 2U : 1U);
-               ++parameter) {
-            const double h = kind == Kind::kWhiteNoise ? 0.005 : 0.1;
-            const double curvature =
-                -(at(1.0 + h, parameter) - 2.0 * top + at(1.0 - h, parameter)) / (h * h);
-            const double relative = curvature > 0.0 ? 1.0 / std::sqrt(curvature) : 1.0;
-            const double value = parameter == 0 ? total : effect.parameters[1];
-            // d(beyond)/d(total) = total/beyond
-            found.sigma[parameter] =
-                relative * value * (parameter == 0 ? total / effect.parameters[0] : 1.0);
+          const double h = kind == Kind::kWhiteNoise ? 0.005 : 0.1;
+          const double top = at(0.0, 0.0);
+          const auto relative = [](double curvature) {
+            return curvature > 0.0 ? 1.0 / std::sqrt(curvature) : 1.0;
+          };
+          double of_first = -(at(h, 0.0) - 2.0 * top + at(-h, 0.0)) / (h * h);
+          if (kind == Kind::kGaussMarkov) {
+            const double of_second = -(at(0.0, h) - 2.0 * top + at(0.0, -h)) / (h * h);
+            const double of_both = -(at(h, h) - at(h, -h) - at(-h, h) + at(-h, -h)) / (4.0 * h * h);
+            const double determinant = of_first * of_second - of_both * of_both;
+            found.sigma[1] = relative(determinant / of_first) * effect.parameters[1];
+            of_first = determinant / of_second;
           }
+          // d(beyond)/d(total) = total/beyond
+          found.sigma[0] = relative(of_first) * total * total / effect.parameters[0];
           rivals.push_back({found.statistic - found.penalty, {kind, gyro}});
           if (!best || found.statistic - found.penalty > best->statistic - best->penalty) {
             best = found;
