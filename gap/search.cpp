@@ -723,7 +723,14 @@ void Search::settle() {
     cache_candidates();
   }
   for (std::size_t problem = 0; problem < study_.problems().size(); ++problem) {
-    const Fit all = fit(problem, terms_of_problem(terms, problem), noise_);
+    Fit all = fit(problem, terms_of_problem(terms, problem), noise_);
+    const PairNoise fitted = all.noise;
+    // A drift that happened to be small once is no smaller than the model says: values and their
+    // errors would seem surer than they are.
+    for (std::size_t gyro = 0; gyro < 2; ++gyro)
+      all.noise[gyro].walk_dps_rts =
+          std::max(all.noise[gyro].walk_dps_rts, file_noise_[gyro].walk_dps_rts);
+    improve(problem, all);
     std::size_t place = 0;
     Eigen::Index row = 0;
     for (Found& found : found_) {
@@ -736,7 +743,7 @@ void Search::settle() {
       }
     }
     for (std::size_t gyro = 0; gyro < 2; ++gyro) {
-      if (study_.problems()[problem].holds[gyro]) noise_[gyro] = all.noise[gyro];
+      if (study_.problems()[problem].holds[gyro]) noise_[gyro] = fitted[gyro];
     }
   }
 }
