@@ -101,6 +101,10 @@ Eigen::Index free_count(const std::vector<Term>& terms) {
   return count;
 }
 
+bool is_noise(const Found& found) {
+  return model::info(found.term.effect.kind).nature == model::Nature::kNoise;
+}
+
 bool is_drift(Kind kind) {
   return kind == Kind::kRateRandomWalk || kind == Kind::kGaussMarkov;
 }
@@ -936,8 +940,7 @@ void Search::noise_rounds() {
   for (int round = 0; round < 6; ++round) {
     std::vector<Term> terms;
     for (const Found& found : found_) {
-      if (model::info(found.term.effect.kind).nature != model::Nature::kNoise)
-        terms.push_back(found.term);
+      if (!is_noise(found)) terms.push_back(found.term);
     }
     std::optional<Found> best;
     std::vector<std::pair<double, Reading>> rivals;
@@ -1080,7 +1083,7 @@ double Search::statistic_beside(std::size_t index) const {
   std::vector<Term> with;
   std::vector<Term> without;
   for (std::size_t i = 0; i < found_.size(); ++i) {
-    if (model::info(found_[i].term.effect.kind).nature == model::Nature::kNoise) continue;
+    if (is_noise(found_[i])) continue;
     if (study_.problem_of(found_[i].term.effect.gyro) != problem) continue;
     with.push_back(found_[i].term);
     if (i != index) without.push_back(found_[i].term);
@@ -1114,12 +1117,7 @@ void Search::run() {
   const PairNoise model_noise = file_noise_;
   noise_rounds();
   while (reject_beside_noise()) {
-    found_.erase(std::remove_if(found_.begin(), found_.end(),
-                                [](const Found& found) {
-                                  return model::info(found.term.effect.kind).nature ==
-                                         model::Nature::kNoise;
-                                }),
-                 found_.end());
+    found_.erase(std::remove_if(found_.begin(), found_.end(), is_noise), found_.end());
     file_noise_ = model_noise;
     settle();
     noise_rounds();

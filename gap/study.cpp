@@ -410,10 +410,9 @@ void Study::find_rest() {
     std::sort(deviations.begin(), deviations.end());
     const double quiet =
         std::max(deviations[deviations.size() / 10], recording_.gyros[gyro].step_dps);
-    const double level = start;
     for (std::size_t cell = 0; cell < cells; ++cell) {
       if (count[cell] < 5.0 || deviation[cell] > kRestSteady * quiet ||
-          std::abs(sum[cell] / count[cell] - level) > kRestBelow_dps + 3.0 * quiet) {
+          std::abs(sum[cell] / count[cell] - start) > kRestBelow_dps + 3.0 * quiet) {
         resting_[cell] = 0;
       }
     }
@@ -436,6 +435,11 @@ void Study::find_rest() {
   resting_ = kept;
 }
 
+bool Study::rests_at(double t_s) const {
+  const auto cell = static_cast<std::size_t>(std::max(0.0, t_s));
+  return cell < resting_.size() && resting_[cell] != 0;
+}
+
 void Study::learn_motion(const std::vector<Effect>& effects) {
   if (recording_.has_reference) return;
   const PairNoise noise = noise_of(effects);
@@ -450,10 +454,6 @@ void Study::learn_motion(const std::vector<Effect>& effects) {
     weight = {first / (first + second), second / (first + second)};
   }
   const std::span<const double> t_s = readings_[0].times_s();
-  const auto resting = [&](double at_s) {
-    const auto cell = static_cast<std::size_t>(std::max(0.0, at_s));
-    return cell < resting_.size() && resting_[cell] != 0;
-  };
   // The first guess knows no errors; each further one takes off what the effects say at the last,
   // until nothing changes. Late readings converge by half their phase.
   const std::array<std::vector<Effect>, 2> mine{of_gyro(effects, 0), of_gyro(effects, 1)};
@@ -471,7 +471,7 @@ void Study::learn_motion(const std::vector<Effect>& effects) {
     }
     double change_dps = 0.0;
     for (std::size_t i = 0; i < t_s.size(); ++i) {
-      if (resting(t_s[i])) next[i] = recording_.rest_rate_dps;
+      if (rests_at(t_s[i])) next[i] = recording_.rest_rate_dps;
       if (round > 0) change_dps = std::max(change_dps, std::abs(next[i] - rate[i]));
     }
     rate = std::move(next);
@@ -510,14 +510,10 @@ Problem Study::build_against_reference(std::size_t gyro) {
 Problem Study::build_pair() {
   const Motion& motion = signals_[0].motion;
   std::vector<Sample> samples;
-  const auto resting = [&](double at_s) {
-    const auto cell = static_cast<std::size_t>(std::max(0.0, at_s));
-    return cell < resting_.size() && resting_[cell] != 0;
-  };
   for (std::size_t gyro = 0; gyro < 2; ++gyro) {
     const std::span<const double> t_s = readings_[gyro].times_s();
     for (std::size_t i = 0; i < t_s.size(); ++i) {
-      if (!resting(t_s[i])) continue;
+      if (!rests_at(t_s[i])) continue;
       samples.push_back({t_s[i], gyro == 0 ? Channel::kGyro1 : Channel::kGyro2,
                          readings_[gyro].values()[i] - recording_.rest_rate_dps,
                          recording_.rest_rate_dps});
@@ -526,7 +522,7 @@ Problem Study::build_pair() {
   const std::span<const double> t_s = readings_[0].times_s();
   const double reach_s = 1.5 * readings_[1].interval_s();
   for (std::size_t i = 0; i < t_s.size(); ++i) {
-    if (resting(t_s[i]) || readings_[1].hole_at(t_s[i], reach_s)) continue;
+    if (rests_at(t_s[i]) || readings_[1].hole_at(t_s[i], reach_s)) continue;
     samples.push_back({t_s[i], Channel::kDifference,
                        readings_[0].values()[i] - readings_[1].at(t_s[i]).value,
                        motion.rate(t_s[i]).value});

@@ -80,6 +80,7 @@ class Study {
   Expected<void> check() const;
   void find_spikes(const std::vector<model::Effect>& effects);
   void find_rest();
+  [[nodiscard]] bool rests_at(double t_s) const;
   void build();
   void cache(Problem& problem);
   void set_aside(Problem& problem) const;
