@@ -126,7 +126,7 @@ std::uint8_t crc8(const Frame& frame) {
   const auto add = [&crc](std::uint8_t byte) {
     crc ^= byte;
     for (int bit = 0; bit < 8; ++bit)
-      crc = static_cast<std::uint8_t>((crc & 0x80U) != 0 ? crc << 1U ^ 0x1DU : crc << 1U);
+      crc = static_cast<std::uint8_t>((crc * 2U) ^ ((crc & 0x80U) != 0 ? 0x1DU : 0U));
   };
   add(static_cast<std::uint8_t>(frame.id));
   add(0);
