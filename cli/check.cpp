@@ -21,11 +21,21 @@ void print_row(std::string_view role, const std::string& bus, const gateway::Fra
              quantity.layout);
 }
 
+void detail(std::string_view what, const std::string& text) {
+  fmt::print("    {:<12}{}\n", what, text);
+}
+
+void print_e2e(const gateway::E2ePlan& e2e) {
+  if (e2e.crc) detail("crc", fmt::format("{}, {}", e2e.crc->name, e2e.crc->kind));
+  if (!e2e.counter) return;
+  std::string text = fmt::format("{}, runs 0 to {}", e2e.counter->name, e2e.counter->modulus - 1);
+  if (e2e.counter->max_delta > 0)
+    text += fmt::format(", steps of at most {}", e2e.counter->max_delta);
+  detail("counter", text);
+}
+
 void print_gyro(const gateway::GyroPlan& gyro) {
   print_row("gyro " + gyro.name, gyro.bus, gyro.match, gyro.message, gyro.rate);
-  const auto detail = [](std::string_view what, const std::string& text) {
-    fmt::print("    {:<12}{}\n", what, text);
-  };
   detail("accepted", fmt::format("{:g} to {:g} {}{}", gyro.rate.minimum, gyro.rate.maximum,
                                  gyro.rate.unit, gyro.rate.scale < 0 ? ", sign flipped" : ""));
   if (gyro.sign) detail("sign", "from a signal of its own: 1 is negative");
@@ -33,10 +43,7 @@ void print_gyro(const gateway::GyroPlan& gyro) {
     detail("temperature", fmt::format("{} in {}, {}", gyro.temperature->name,
                                       gyro.temperature->unit, gyro.temperature->layout));
   }
-  if (gyro.counter) {
-    detail("counter",
-           fmt::format("{}, runs 0 to {}", gyro.counter->name, gyro.counter->modulus - 1));
-  }
+  print_e2e(gyro.e2e);
   if (gyro.valid) detail("valid when", gyro.valid->text);
 }
 
@@ -59,15 +66,18 @@ void print_plan(const gateway::Plan& plan) {
   if (plan.reference) {
     print_row("reference", plan.reference->bus, plan.reference->match, plan.reference->message,
               plan.reference->rate);
+    print_e2e(plan.reference->e2e);
   }
   if (plan.accelerometer) {
     for (const gateway::Quantity& axis : plan.accelerometer->axes) {
       print_row("accelerometer", plan.accelerometer->bus, plan.accelerometer->match,
                 plan.accelerometer->message, axis);
     }
+    print_e2e(plan.accelerometer->e2e);
   }
   if (plan.speed) {
     print_row("speed", plan.speed->bus, plan.speed->match, plan.speed->message, plan.speed->speed);
+    print_e2e(plan.speed->e2e);
   }
   fmt::print("  {:<14}", "calibration");
   if (plan.calibration.from_reference) {

@@ -7,6 +7,7 @@
 
 #include "cli/role_frames.h"
 #include "fusion/stamp_guard.h"
+#include "gateway/e2e_check.h"
 #include "gateway/gyro_input.h"
 #include "gateway/surroundings.h"
 
@@ -36,10 +37,12 @@ class Recorder {
       const gateway::GyroPlan& gyro = plan.gyros[i];
       gap::GyroSeries& series = recording_.gyros[i];
       series.name = gyro.name;
-      series.counter_modulus = gyro.counter ? gyro.counter->modulus : 0;
+      series.counter_modulus = gyro.e2e.counter ? gyro.e2e.counter->modulus : 0;
       series.step_dps = gyro.rate.step;
       series.limit_dps = limit_of(gyro.rate);
     }
+    if (plan.reference) reference_check_ = gateway::E2eCheck(plan.reference->e2e);
+    if (plan.accelerometer) accelerometer_check_ = gateway::E2eCheck(plan.accelerometer->e2e);
     recording_.has_reference = plan.reference.has_value();
     recording_.has_acceleration = plan.accelerometer.has_value();
     if (!plan.calibration.from_reference) recording_.rest_s = plan.calibration.rest_s;
@@ -94,7 +97,7 @@ class Recorder {
     const gateway::GyroInput::Result input = inputs_[i].decode(record.frame);
     if (input.reject) return;
     // A frame whose counter moved is a new one, whatever its stamp.
-    const auto& counter = plan_.gyros[i].counter;
+    const auto& counter = plan_.gyros[i].e2e.counter;
     const auto t_s = accepted(i, record.stamp, counter.has_value());
     if (!t_s) return;
     gap::GyroSeries& series = recording_.gyros[i];
@@ -106,6 +109,7 @@ class Recorder {
 
   void take_reference(const can::LogRecord& record) {
     double rate_dps = 0.0;
+    if (reference_check_.judge(record.frame)) return;
     if (gateway::decode_quantity(plan_.reference->rate, record.frame, rate_dps)) return;
     if (const auto t_s = accepted(kReferenceStream, record.stamp)) {
       recording_.reference_dps.t_s.push_back(*t_s);
@@ -114,6 +118,7 @@ class Recorder {
   }
 
   void take_acceleration(const can::LogRecord& record) {
+    if (accelerometer_check_.judge(record.frame)) return;
     std::array<double, 3> axes_g{};
     for (std::size_t axis = 0; axis < 3; ++axis) {
       if (gateway::decode_quantity(plan_.accelerometer->axes[axis], record.frame, axes_g[axis])) {
@@ -149,6 +154,8 @@ class Recorder {
 
   const gateway::Plan& plan_;
   std::array<gateway::GyroInput, 2> inputs_;
+  gateway::E2eCheck reference_check_;
+  gateway::E2eCheck accelerometer_check_;
   fusion::StampGuard guard_;
   gap::Recording recording_;
   bool begun_ = false;

@@ -104,6 +104,7 @@ class Recording {
   [[nodiscard]] bool lost(const Sender& sender) const;
   [[nodiscard]] can::Frame frame(const Sender& sender);
   void put(Part part, std::size_t n, can::Frame& frame);
+  [[nodiscard]] const gateway::E2ePlan& e2e_of(Part part) const;
   void add_temperature_pages();
   bool find_next(Sender& sender) const;
 
@@ -174,6 +175,7 @@ bool Recording::find_next(Sender& sender) const {
 void Recording::put(Part part, std::size_t n, can::Frame& frame) {
   if (part == kReference) {
     gateway::put_quantity(plan_.reference->rate, reference_[n].rate_dps, frame);
+    gateway::put_counter(plan_.reference->e2e, n, frame);
     return;
   }
   if (part == kAccelerometer) {
@@ -181,6 +183,7 @@ void Recording::put(Part part, std::size_t n, can::Frame& frame) {
       gateway::put_quantity(plan_.accelerometer->axes[axis], acceleration_[n].acceleration_g[axis],
                             frame);
     }
+    gateway::put_counter(plan_.accelerometer->e2e, n, frame);
     return;
   }
   const gateway::GyroPlan& gyro = plan_.gyros[part];
@@ -192,16 +195,23 @@ void Recording::put(Part part, std::size_t n, can::Frame& frame) {
   }
 }
 
+const gateway::E2ePlan& Recording::e2e_of(Part part) const {
+  if (part == kReference) return plan_.reference->e2e;
+  return part == kAccelerometer ? plan_.accelerometer->e2e : plan_.gyros[part].e2e;
+}
+
 can::Frame Recording::frame(const Sender& sender) {
   can::Frame frame = gateway::empty_frame(*sender.match);
   if (sender.temperature_page) {
     const Part part = sender.parts.front();
     const double t_s = gyros_[part][sender.next].t_s;
     gateway::put_quantity(*plan_.gyros[part].temperature, simulator_.temperature_c(t_s), frame);
-    return frame;
+  } else {
+    for (const Part part : sender.parts)
+      put(part, sender.next, frame);
   }
   for (const Part part : sender.parts)
-    put(part, sender.next, frame);
+    gateway::seal(e2e_of(part), frame);
   return frame;
 }
 

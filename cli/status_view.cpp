@@ -233,6 +233,15 @@ std::string sparkline(const std::vector<double>& values) {
   return text;
 }
 
+/// Frames of the inputs beside the gyros that were not used; empty where all were.
+std::string unused_inputs(const Json& counters) {
+  Json counts = Json::object();
+  for (const std::string name : {"reference", "accelerometer", "speed"})
+    counts[name] = count_of(counters, (name + "_rejected").c_str());
+  const std::string text = counts_text(counts);
+  return text == kNothing ? std::string() : "frames not used: " + text + '\n';
+}
+
 std::string status_table(const Json& status, const ViewOptions& options) {
   const Paint paint(options.colour);
   const Json counters = at(status, "counters");
@@ -243,6 +252,7 @@ std::string status_table(const Json& status, const ViewOptions& options) {
       count_of(counters, "frames_sent"), count_of(counters, "rates_valid"),
       count_of(counters, "rates"), count_of(counters, "frames_stale"),
       count_of(counters, "frames_overflowed"), count_of(counters, "frames_refused"));
+  text += unused_inputs(counters);
   text += paint(Mood::kQuiet, fmt::format("vgyrod {}, method {}, up {}", text_of(status, "version"),
                                           text_of(status, "method"),
                                           duration_text(number_of(status, "uptime_s")))) +

@@ -1,17 +1,73 @@
 #pragma once
 
-// AUTOSAR end-to-end protection of output frames: Profile 11 variant C (classic CAN) and
-// Profile 5 (CAN FD). Source: AUTOSAR E2E Protocol Specification, PRS_E2E profiles 11 and 5.
-// The state is the sender's counter; check() looks at one frame and leaves the watch for repeated
-// or lost frames to the receiver.
+// End-to-end protection of frames: the check value that a sender puts into its frames, for what the
+// gateway sends and for what it reads. AUTOSAR profiles 1 and 11 (variants A, B, C), 2 and 22, and
+// 5, and two that cars of before use. Source: AUTOSAR Foundation, "E2E Protocol Specification";
+// SAE J1850. Whether a frame is new is its counter's to tell, which the receiver watches.
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
+#include <string_view>
 
 namespace vgyro::dbc {
 
-/// Profile 11C header: byte 0 CRC-8 (poly 0x1D, init 0, no xor), bits 8…11 counter 0…14,
-/// bits 12…15 low nibble of the data ID's high byte.
+/// How the check value is made. "Header": the check value's byte and the one behind it, whose low
+/// nibble is the counter.
+enum class E2eKind : std::uint8_t {
+  kProfile1A,  ///< CRC-8 (0x1D) over both bytes of the data ID and the data; also profile 11 A
+  kProfile1B,  ///< the data ID's low byte for even counters, its high byte for odd ones
+  kProfile1C,  ///< its low byte; the high byte's low nibble stands in the header; also 11 C
+  kProfile2,   ///< CRC-8H2F (0x2F) over the data and one of 16 data IDs, by counter; also 22
+  kProfile5,   ///< CRC-16 (0x1021) over the data and the data ID, low byte first
+  kCrc8J1850,  ///< CRC-8 (0x1D, init and final xor 0xFF) over the data alone
+  kToyota      ///< sum of the CAN identifier's bytes, the length and the data
+};
+inline constexpr std::size_t kE2eDataIdsMost = 16;
+
+/// "profile_11c" and the like; both names of what is the same.
+std::optional<E2eKind> e2e_kind_from(std::string_view name);
+/// All names, for messages.
+std::span<const std::string_view> e2e_kind_names();
+
+class E2eProtection {
+ public:
+  struct Layout {
+    E2eKind kind = E2eKind::kProfile1C;
+    std::size_t crc_byte = 0;                               ///< of profile 5 the first of two
+    std::size_t bytes = 8;                                  ///< of the payload, that are protected
+    std::array<std::uint16_t, kE2eDataIdsMost> data_ids{};  ///< but for profile 2 only the first
+    std::uint32_t can_id = 0;                               ///< kToyota
+
+    friend bool operator==(const Layout&, const Layout&) = default;
+  };
+
+  /// Precondition: header and check value lie inside the protected bytes.
+  explicit E2eProtection(const Layout& layout) : layout_(layout) {}
+
+  /// Bytes from the check value on that the kind needs in a payload.
+  static std::size_t header_bytes(E2eKind kind);
+
+  [[nodiscard]] std::size_t bytes() const { return layout_.bytes; }
+  /// The check value that this payload should carry. Precondition, here and below: bytes().
+  [[nodiscard]] std::uint16_t value(std::span<const std::uint8_t> payload) const;
+  /// Check value and data ID nibble are right, and the counter is one that a sender can have.
+  [[nodiscard]] bool check(std::span<const std::uint8_t> payload) const;
+  /// Writes the check value and the data ID nibble. The counter must stand in the payload.
+  void seal(std::span<std::uint8_t> payload) const;
+
+  friend bool operator==(const E2eProtection&, const E2eProtection&) = default;
+
+ private:
+  [[nodiscard]] std::uint8_t header(std::span<const std::uint8_t> payload) const;
+  [[nodiscard]] std::uint16_t carried(std::span<const std::uint8_t> payload) const;
+
+  Layout layout_;
+};
+
+/// Sender of Profile 11C: byte 0 CRC-8, bits 8…11 counter 0…14, bits 12…15 data ID nibble.
 class E2eProfile11C {
  public:
   explicit E2eProfile11C(std::uint16_t data_id);
@@ -23,20 +79,22 @@ class E2eProfile11C {
   [[nodiscard]] bool check(std::span<const std::uint8_t, 8> payload) const;
 
  private:
-  std::uint16_t data_id_;
+  E2eProtection protection_;
   std::uint8_t counter_ = 0;
 };
 
-/// Profile 5 header: bytes 0…1 CRC-16 (poly 0x1021, init 0xFFFF; low byte first), byte 2 counter
-/// 0…255. Payloads have at least these three bytes; check() refuses shorter ones.
+/// Sender of Profile 5: bytes 0…1 CRC-16, byte 2 counter 0…255. Payloads have at least these three
+/// bytes, of any length; check() refuses shorter ones.
 class E2eProfile5 {
  public:
-  explicit E2eProfile5(std::uint16_t data_id);
+  explicit E2eProfile5(std::uint16_t data_id) : data_id_(data_id) {}
   void protect(std::span<std::uint8_t> payload);
   [[nodiscard]] std::uint16_t crc(std::span<const std::uint8_t> payload) const;
   [[nodiscard]] bool check(std::span<const std::uint8_t> payload) const;
 
  private:
+  [[nodiscard]] E2eProtection of_length(std::size_t bytes) const;
+
   std::uint16_t data_id_;
   std::uint8_t counter_ = 0;
 };

@@ -11,6 +11,7 @@
 #include "base/nearest.h"
 #include "base/toml_reader.h"
 #include "fusion/polynomial.h"
+#include "gateway/e2e_config.h"
 #include "gateway/model_plan.h"
 #include "gateway/signal_resolver.h"
 
@@ -91,36 +92,6 @@ void read_source_address(TomlReader& reader, const dbc::Message& message, FrameM
   match.mask |= 0xFFU;
 }
 
-// Helper signals are read from every frame, so they must stand on every page that has the rate.
-bool same_page(TomlReader& reader, std::string_view key, const dbc::Signal& helper,
-               const dbc::Signal& rate) {
-  if (!helper.condition || rate.condition) return true;
-  reader.complain(reader.where(key),
-                  fmt::format("{} is multiplexed and {} is not", helper.name, rate.name));
-  return false;
-}
-
-std::optional<AliveCounter> read_counter(TomlReader& reader, SignalResolver& resolver,
-                                         const dbc::Signal& rate) {
-  const dbc::Signal* signal = resolver.signal("counter", false);
-  if (signal == nullptr || !same_page(reader, "counter", *signal, rate)) return std::nullopt;
-  const auto codec = resolver.codec(*signal);
-  if (!codec) return std::nullopt;
-  const bool is_integer =
-      signal->type == dbc::ValueType::kSigned || signal->type == dbc::ValueType::kUnsigned;
-  if (!is_integer || signal->length_bits > 31 || signal->length_bits < 2) {
-    reader.complain(
-        reader.where("counter"),
-        fmt::format("{} is no alive counter: it has {} bits", signal->name, signal->length_bits),
-        "an integer signal of 2 to 31 bits");
-    return std::nullopt;
-  }
-  AliveCounter counter{signal->name, *codec, 1U << signal->length_bits};
-  // AUTOSAR counters leave the last value out; any other range is not about the counter.
-  if (signal->maximum == counter.modulus - 2.0) counter.modulus -= 1;
-  return counter;
-}
-
 std::optional<Condition> read_condition(TomlReader& reader, SignalResolver& resolver,
                                         const dbc::Signal& rate) {
   const auto text = reader.text("valid");
@@ -132,7 +103,7 @@ std::optional<Condition> read_condition(TomlReader& reader, SignalResolver& reso
     return std::nullopt;
   }
   const dbc::Signal* signal = resolver.signal_named(parsed->signal, "valid");
-  if (signal == nullptr || !same_page(reader, "valid", *signal, rate)) return std::nullopt;
+  if (signal == nullptr || !resolver.shares_page("valid", *signal, rate)) return std::nullopt;
   const auto codec = resolver.codec(*signal);
   if (!codec) return std::nullopt;
   return Condition{*codec, parsed->comparison, parsed->value, *text};
@@ -160,14 +131,14 @@ std::optional<GyroPlan> read_gyro(const toml::table& table, std::size_t index, C
                           .rate = *rate,
                           .sign = {},
                           .temperature = {},
-                          .counter = {},
+                          .e2e = {},
                           .valid = {},
                           .saturation_dps = {}});
     read_sign(reader, gyro->rate);
     read_source_address(reader, resolver.message(), gyro->match);
-    gyro->counter = read_counter(reader, resolver, *rate_signal);
+    gyro->e2e = read_e2e(reader, resolver, *rate_signal);
     gyro->valid = read_condition(reader, resolver, *rate_signal);
-    if (sign_signal != nullptr && same_page(reader, "sign_signal", *sign_signal, *rate_signal)) {
+    if (sign_signal != nullptr && resolver.shares_page("sign_signal", *sign_signal, *rate_signal)) {
       gyro->sign = resolver.codec(*sign_signal);
     }
     if (temperature_signal != nullptr) {
@@ -176,7 +147,8 @@ std::optional<GyroPlan> read_gyro(const toml::table& table, std::size_t index, C
     }
   } else {
     // Ask for the rest, so that a good key is not called unknown on top of the real trouble.
-    reader.forgive({"sign", "source_address", "counter", "valid"});
+    reader.forgive({"sign", "source_address", "valid"});
+    forgive_e2e(reader);
   }
   reader.finish();
   if (context.errors.size() > errors_before) return std::nullopt;
@@ -229,36 +201,49 @@ void read_optional(TomlReader& root, std::string_view key, Context& context, Rea
 void read_reference(TomlReader& reader, SignalResolver& resolver, Plan& plan) {
   const dbc::Signal* signal = resolver.signal("rate", true);
   const auto unit = reader.text("unit");
-  if (signal == nullptr) {
+  auto rate =
+      signal == nullptr ? std::nullopt : resolver.quantity(*signal, "rate", Dimension::kRate, unit);
+  if (!rate) {
     reader.forgive({"sign"});
+    forgive_e2e(reader);
     return;
   }
-  auto rate = resolver.quantity(*signal, "rate", Dimension::kRate, unit);
-  if (!rate) return;
   read_sign(reader, *rate);
-  plan.reference = ReferencePlan{resolver.bus(), resolver.message().name, resolver.match(), *rate};
+  plan.reference = ReferencePlan{resolver.bus(), resolver.message().name, resolver.match(), *rate,
+                                 read_e2e(reader, resolver, *signal)};
 }
 
-void read_accelerometer(TomlReader& /*reader*/, SignalResolver& resolver, Plan& plan) {
+void read_accelerometer(TomlReader& reader, SignalResolver& resolver, Plan& plan) {
   std::vector<Quantity> axes;
+  const dbc::Signal* last = nullptr;
   for (const char* key : {"x", "y", "z"}) {
     const dbc::Signal* signal = resolver.signal(key, true);
     if (signal == nullptr) continue;
     if (auto axis = resolver.quantity(*signal, key, Dimension::kAcceleration))
       axes.push_back(*axis);
+    last = signal;
   }
-  if (axes.size() != 3) return;
-  plan.accelerometer = AccelerometerPlan{
-      resolver.bus(), resolver.message().name, resolver.match(), {axes[0], axes[1], axes[2]}};
+  if (axes.size() != 3) {
+    forgive_e2e(reader);
+    return;
+  }
+  plan.accelerometer = AccelerometerPlan{resolver.bus(),
+                                         resolver.message().name,
+                                         resolver.match(),
+                                         {axes[0], axes[1], axes[2]},
+                                         read_e2e(reader, resolver, *last)};
 }
 
-void read_speed(TomlReader& /*reader*/, SignalResolver& resolver, Plan& plan) {
+void read_speed(TomlReader& reader, SignalResolver& resolver, Plan& plan) {
   const dbc::Signal* signal = resolver.signal("signal", true);
-  if (signal == nullptr) return;
-  const auto speed = resolver.quantity(*signal, "signal", Dimension::kSpeed);
-  if (speed) {
-    plan.speed = SpeedPlan{resolver.bus(), resolver.message().name, resolver.match(), *speed};
+  const auto speed =
+      signal == nullptr ? std::nullopt : resolver.quantity(*signal, "signal", Dimension::kSpeed);
+  if (!speed) {
+    forgive_e2e(reader);
+    return;
   }
+  plan.speed = SpeedPlan{resolver.bus(), resolver.message().name, resolver.match(), *speed,
+                         read_e2e(reader, resolver, *signal)};
 }
 
 // A number inside limits, or the default after a complaint.

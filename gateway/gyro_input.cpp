@@ -1,7 +1,6 @@
 #include "gateway/gyro_input.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <limits>
 
@@ -14,7 +13,7 @@ std::size_t bytes_of(const GyroPlan& plan) {
   if (plan.sign) bytes = std::max(bytes, plan.sign->bytes_needed());
   const bool same_page = plan.temperature && plan.temperature->presence.always();
   if (same_page) bytes = std::max(bytes, plan.temperature->codec.bytes_needed());
-  if (plan.counter) bytes = std::max(bytes, plan.counter->codec.bytes_needed());
+  if (plan.e2e.counter) bytes = std::max(bytes, plan.e2e.counter->codec.bytes_needed());
   if (plan.valid) bytes = std::max(bytes, plan.valid->codec.bytes_needed());
   return bytes;
 }
@@ -58,7 +57,8 @@ std::optional<Reject> decode_quantity(const Quantity& quantity, const can::Frame
   return convert(quantity, frame.payload(), value);
 }
 
-GyroInput::GyroInput(const GyroPlan& plan) : plan_(plan), bytes_needed_(bytes_of(plan)) {}
+GyroInput::GyroInput(const GyroPlan& plan)
+    : plan_(plan), bytes_needed_(bytes_of(plan)), e2e_(plan.e2e) {}
 
 double GyroInput::temperature_c() const {
   double temperature_c = 0.0;
@@ -67,30 +67,10 @@ double GyroInput::temperature_c() const {
   return known ? temperature_c : std::numeric_limits<double>::quiet_NaN();
 }
 
-bool GyroInput::count(std::span<const std::uint8_t> payload, std::uint32_t& missing) {
-  const std::uint32_t modulus = plan_.counter->modulus;
-  auto now = static_cast<std::uint32_t>(plan_.counter->codec.decode(payload).raw) &
-             (std::bit_ceil(modulus) - 1);
-  if (now >= modulus) now -= modulus;
-  const std::uint32_t step = now >= counter_ ? now - counter_ : now + modulus - counter_;
-  const bool known = counter_known_;
-  counter_ = now;
-  counter_known_ = true;
-  if (!known) {
-    counts_missing_ = true;
-    return true;
-  }
-  missing = step == 0 || !counts_missing_ ? 0 : step - 1;
-  if (step != 0) counts_missing_ = true;
-  return step != 0;
-}
-
 GyroInput::Result GyroInput::decode(const can::Frame& frame) {
   Result result;
-  if (!frame.is_data()) {
-    result.reject = Reject::kNotData;
-    return result;
-  }
+  result.reject = e2e_.verify(frame);
+  if (result.reject) return result;
   const auto payload = frame.payload();
   if (!plan_.rate.presence.always() && !plan_.rate.presence.holds(payload)) {
     keep_temperature(frame);
@@ -101,10 +81,8 @@ GyroInput::Result GyroInput::decode(const can::Frame& frame) {
     result.reject = Reject::kTruncated;
     return result;
   }
-  if (plan_.counter && !count(payload, result.missing)) {
-    result.reject = Reject::kCounterRepeated;
-    return result;
-  }
+  result.reject = e2e_.count(payload, result.missing);
+  if (result.reject) return result;
   if (plan_.valid && !holds(*plan_.valid, plan_.valid->codec.decode(payload).value)) {
     result.reject = Reject::kFlaggedInvalid;
     return result;

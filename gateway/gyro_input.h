@@ -1,13 +1,14 @@
 #pragma once
 
 // One gyro's frames → rates in deg/s, or the cause why a frame cannot be used. Checks what the
-// frame itself tells: length, `valid` comparison, alive counter, finite and in range. Stamps are
-// judged elsewhere.
+// frame itself tells: check value, length, alive counter, `valid` comparison, finite and in range.
+// Stamps are judged elsewhere.
 
 #include <cstdint>
 #include <optional>
 
 #include "can/frame.h"
+#include "gateway/e2e_check.h"
 #include "gateway/plan.h"
 #include "gateway/status.h"
 
@@ -24,28 +25,23 @@ class GyroInput {
   };
   Result decode(const can::Frame& frame);
 
-  /// After a silence the counter says nothing about how many frames are missing. The last frame
-  /// sent once more is still none that is new; of a healthy gyro that costs one frame now and then.
-  void fall_silent() { counts_missing_ = false; }
+  /// What the counter tells begins anew.
+  void fall_silent() { e2e_.fall_silent(); }
 
   /// As the newest frame that was used carried it.
-  [[nodiscard]] std::uint32_t counter() const { return counter_; }
+  [[nodiscard]] std::uint32_t counter() const { return e2e_.counter(); }
 
   /// Of the newest frame that was used or told nothing else; NaN when there is none. Decoded when
   /// asked for.
   [[nodiscard]] double temperature_c() const;
 
  private:
-  /// False when the counter stands still.
-  bool count(std::span<const std::uint8_t> payload, std::uint32_t& missing);
   void keep_temperature(const can::Frame& frame);
 
   const GyroPlan& plan_;
   std::size_t bytes_needed_;
   can::Frame newest_;  ///< that carried the temperature; length 0 before the first
-  std::uint32_t counter_ = 0;
-  bool counter_known_ = false;
-  bool counts_missing_ = false;  ///< the counter has not been interrupted since
+  E2eCheck e2e_;
 };
 
 /// Is the comparison true of this value?

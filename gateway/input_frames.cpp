@@ -52,7 +52,7 @@ void put_quantity(const Quantity& quantity, double value, can::Frame& frame) {
 void put_gyro(const GyroPlan& plan, double rate_dps, std::uint64_t count, can::Frame& frame) {
   const auto payload = payload_of(frame);
   if (plan.valid) put_valid(*plan.valid, payload);
-  if (plan.counter) plan.counter->codec.encode_raw(count % plan.counter->modulus, payload);
+  put_counter(plan.e2e, count, frame);
   if (!plan.sign) {
     put_quantity(plan.rate, rate_dps, frame);
     return;
@@ -60,6 +60,14 @@ void put_gyro(const GyroPlan& plan, double rate_dps, std::uint64_t count, can::F
   const bool negative = in_unit_of(plan.rate, rate_dps) < in_unit_of(plan.rate, 0.0);
   put_quantity(plan.rate, negative ? -rate_dps : rate_dps, frame);
   plan.sign->encode_raw(negative ? 1 : 0, payload);
+}
+
+void put_counter(const E2ePlan& e2e, std::uint64_t count, can::Frame& frame) {
+  if (e2e.counter) e2e.counter->codec.encode_raw(count % e2e.counter->modulus, payload_of(frame));
+}
+
+void seal(const E2ePlan& e2e, can::Frame& frame) {
+  if (e2e.crc) e2e.crc->protection.seal(payload_of(frame));
 }
 
 bool carries_temperature(const GyroPlan& plan, const can::Frame& frame) {

@@ -21,6 +21,12 @@ void put_quantity(const Quantity& quantity, double value, can::Frame& frame);
 /// Rate with its sign, alive counter, validity. `count` is the number of the frame.
 void put_gyro(const GyroPlan& plan, double rate_dps, std::uint64_t count, can::Frame& frame);
 
+/// The alive counter of frame number `count`, where there is one.
+void put_counter(const E2ePlan& e2e, std::uint64_t count, can::Frame& frame);
+
+/// The check value, when everything else stands in the frame.
+void seal(const E2ePlan& e2e, can::Frame& frame);
+
 /// Does the frame that put_gyro() filled have room for the temperature, or has that its own page?
 bool carries_temperature(const GyroPlan& plan, const can::Frame& frame);
 

@@ -11,6 +11,7 @@
 #include "fusion/compensation.h"
 #include "fusion/corrector.h"
 #include "fusion/stamp_guard.h"
+#include "gateway/e2e_check.h"
 #include "gateway/gyro_health.h"
 #include "gateway/gyro_input.h"
 #include "gateway/model_plan.h"
@@ -132,6 +133,7 @@ struct Pipeline::Impl {
   fusion::StampGuard guard;
   fusion::Aligner aligner;
   fusion::Calibrator calibrator;
+  E2eCheck reference_check;
   ReferenceCalibration reference;
   std::unique_ptr<fusion::Corrector> corrector;
   OutputEncoder encoder;
@@ -165,6 +167,7 @@ Pipeline::Impl::Impl(const Plan& the_plan, std::unique_ptr<fusion::Corrector> th
       calibrator(plan.corrector.order, plan.calibration.rest_s, plan.calibration.when_moving),
       corrector(std::move(the_corrector)),
       encoder(plan.output) {
+  if (plan.reference) reference_check = E2eCheck(plan.reference->e2e);
   calibrated = !corrector->needs_calibration();
   status.rate_dps = kNone;
   status.sigma_dps = kNone;
@@ -309,7 +312,8 @@ void Pipeline::Impl::receive_reference(const can::Frame& frame, TimePoint stamp,
   ++status.reference_frames;
   double rate_dps = 0.0;
   TimePoint t;
-  const bool usable = can_be_time(stamp) && !decode_quantity(plan.reference->rate, frame, rate_dps);
+  const bool usable = can_be_time(stamp) && !reference_check.judge(frame) &&
+                      !decode_quantity(plan.reference->rate, frame, rate_dps);
   const auto verdict = usable ? guard.check(kReferenceStream, whole_microseconds(stamp), t)
                               : fusion::StampGuard::Verdict::kUnconfirmed;
   if (verdict == fusion::StampGuard::Verdict::kUnconfirmed ||

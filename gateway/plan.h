@@ -11,6 +11,7 @@
 
 #include "can/frame.h"
 #include "dbc/codec.h"
+#include "dbc/e2e.h"
 #include "dbc/multiplex.h"
 #include "fusion/calibration.h"
 #include "fusion/gyro_parameters.h"
@@ -71,8 +72,25 @@ struct AliveCounter {
   std::string name;
   dbc::SignalCodec codec;
   std::uint32_t modulus = 256;  ///< values it runs through: 0 … modulus − 1
+  std::uint32_t max_delta = 0;  ///< a longer step is a wrong sequence; 0: any step is right
 
   friend bool operator==(const AliveCounter&, const AliveCounter&) = default;
+};
+
+struct CheckValue {
+  std::string name;  ///< of the signal
+  std::string kind;  ///< as configured: "profile_11c"
+  dbc::E2eProtection protection;
+
+  friend bool operator==(const CheckValue&, const CheckValue&) = default;
+};
+
+/// How a message proves that it is whole, from its sender and new, where it does.
+struct E2ePlan {
+  std::optional<CheckValue> crc;
+  std::optional<AliveCounter> counter;
+
+  friend bool operator==(const E2ePlan&, const E2ePlan&) = default;
 };
 
 struct GyroPlan {
@@ -83,7 +101,7 @@ struct GyroPlan {
   Quantity rate;
   std::optional<dbc::SignalCodec> sign;  ///< separate sign bit: 1 means negative
   std::optional<Quantity> temperature;
-  std::optional<AliveCounter> counter;
+  E2ePlan e2e = {};
   std::optional<Condition> valid;
   std::optional<double> saturation_dps = {};  ///< from the model file: it clips at ± this
   double dead_band_dps = 0.0;                 ///< likewise: it reads 0 below; 0: it has none
@@ -97,6 +115,7 @@ struct ReferencePlan {
   std::string message;
   FrameMatch match;
   Quantity rate;
+  E2ePlan e2e = {};
 
   friend bool operator==(const ReferencePlan&, const ReferencePlan&) = default;
 };
@@ -106,6 +125,7 @@ struct AccelerometerPlan {
   std::string message;
   FrameMatch match;
   std::array<Quantity, 3> axes;  ///< x, y, z
+  E2ePlan e2e = {};
 
   friend bool operator==(const AccelerometerPlan&, const AccelerometerPlan&) = default;
 };
@@ -115,6 +135,7 @@ struct SpeedPlan {
   std::string message;
   FrameMatch match;
   Quantity speed;
+  E2ePlan e2e = {};
 
   friend bool operator==(const SpeedPlan&, const SpeedPlan&) = default;
 };

@@ -136,6 +136,14 @@ std::string SignalResolver::signal_place(const dbc::Signal& signal) const {
   return at_line(dbc_path_, signal.line);
 }
 
+bool SignalResolver::shares_page(std::string_view key, const dbc::Signal& helper,
+                                 const dbc::Signal& main) {
+  if (!helper.condition || main.condition) return true;
+  reader_.complain(reader_.where(key),
+                   fmt::format("{} is multiplexed and {} is not", helper.name, main.name));
+  return false;
+}
+
 std::optional<dbc::SignalCodec> SignalResolver::codec(const dbc::Signal& signal) {
   auto made = dbc::SignalCodec::make(signal, message_->size_bytes, signal_place(signal));
   if (made) return *made;

@@ -46,6 +46,9 @@ class SignalResolver {
   const dbc::Signal* signal(std::string_view key, bool required);
   const dbc::Signal* signal_named(std::string_view name, std::string_view key);
 
+  /// Is `helper` on every page that has `main`? A complaint at `key` when it is not.
+  bool shares_page(std::string_view key, const dbc::Signal& helper, const dbc::Signal& main);
+
   std::optional<Quantity> quantity(const dbc::Signal& signal, std::string_view key,
                                    Dimension dimension,
                                    const std::optional<std::string>& unit = {});

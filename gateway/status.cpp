@@ -30,10 +30,10 @@ std::string_view to_string(Quality quality) {
 
 std::string_view to_string(Reject reject) {
   constexpr std::array<std::string_view, kRejectCount> kNames{
-      "not_data",   "other_page",   "truncated",        "flagged_invalid",
-      "not_finite", "out_of_range", "counter_repeated", "stamp_repeated",
-      "late",       "stamp_jump",   "saturated",        "stuck",
-      "dead_band",  "recovering"};
+      "not_data",     "other_page",       "truncated",      "flagged_invalid", "not_finite",
+      "out_of_range", "counter_repeated", "wrong_sequence", "crc_wrong",       "stamp_repeated",
+      "late",         "stamp_jump",       "saturated",      "stuck",           "dead_band",
+      "recovering"};
   return kNames[static_cast<std::size_t>(reject)];
 }
 

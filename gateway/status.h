@@ -43,6 +43,8 @@ enum class Reject : std::uint8_t {
   kNotFinite,        ///< NaN or infinity
   kOutOfRange,       ///< outside the DBC's range, or no rate that a gyro can have
   kCounterRepeated,  ///< the alive counter did not move
+  kWrongSequence,    ///< the alive counter moved further than it may
+  kCrcWrong,         ///< the check value is not that of this payload
   kStampRepeated,    ///< same stamp as the sample before
   kLate,             ///< older than a sample already used
   kStampJump,        ///< stamp far from its neighbours, not confirmed by the following ones
@@ -51,7 +53,7 @@ enum class Reject : std::uint8_t {
   kDeadBand,         ///< 0 of a sensor with a dead band, while the other gyro carries on
   kRecovering        ///< good again, but not for long enough after a fault
 };
-inline constexpr std::size_t kRejectCount = 14;
+inline constexpr std::size_t kRejectCount = 16;
 std::string_view to_string(Reject reject);
 
 /// What became of the biases that an earlier run had saved.

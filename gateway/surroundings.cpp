@@ -30,6 +30,8 @@ Surroundings::Surroundings(const Plan& plan)
       temperatures_{filter_of(plan.gyros[0]), filter_of(plan.gyros[1])},
       rate_dps_(plan.calibration.rate_dps) {
   acceleration_g_.fill(model::Surroundings::kUnknown);
+  if (plan.accelerometer) accelerometer_check_ = E2eCheck(plan.accelerometer->e2e);
+  if (plan.speed) speed_check_ = E2eCheck(plan.speed->e2e);
 }
 
 void Surroundings::set_zero(TimePoint t) {
@@ -59,6 +61,7 @@ void Surroundings::add_temperature(std::size_t gyro, TimePoint t, double tempera
 
 bool Surroundings::receive_acceleration(const can::Frame& frame, TimePoint raw,
                                         fusion::StampGuard& guard) {
+  if (accelerometer_check_.judge(frame)) return false;
   std::array<double, 3> acceleration_g{};
   for (std::size_t axis = 0; axis < 3; ++axis) {
     if (decode_quantity(plan_.accelerometer->axes[axis], frame, acceleration_g[axis])) return false;
@@ -72,6 +75,7 @@ bool Surroundings::receive_acceleration(const can::Frame& frame, TimePoint raw,
 
 bool Surroundings::receive_speed(const can::Frame& frame, TimePoint raw,
                                  fusion::StampGuard& guard) {
+  if (speed_check_.judge(frame)) return false;
   double speed_m_s = 0.0;
   const auto reject = decode_quantity(plan_.speed->speed, frame, speed_m_s);
   // The sensor says that it does not know: what it said before is worth no more.

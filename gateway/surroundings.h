@@ -14,6 +14,7 @@
 #include "fusion/moving_variance.h"
 #include "fusion/stamp_guard.h"
 #include "fusion/temperature_filter.h"
+#include "gateway/e2e_check.h"
 #include "gateway/plan.h"
 #include "model/effect.h"
 
@@ -67,6 +68,8 @@ class Surroundings {
   TimePoint angle_at_;
   double angle_rad_ = 0.0;
   double rate_dps_;
+  E2eCheck accelerometer_check_;
+  E2eCheck speed_check_;
   std::optional<TimePoint> speed_at_;
   double speed_m_s_ = 0.0;
 };

@@ -34,6 +34,8 @@ struct Sample {
     now.status.sigma_dps = 0.0005;
     now.status.bias_sigma_dps = 0.0001;
     now.status.pairs = 1ULL << 40U;
+    now.status.accelerometer_rejected = 4;
+    now.status.speed_rejected = 2;
     gateway::GyroStatus& left = now.status.gyros[0];
     left.heard = true;
     left.frames = 1000;
@@ -42,6 +44,7 @@ struct Sample {
     left.last_rate_dps = 50.283;
     left.temperature_c = 21.5;
     left.rejected[static_cast<std::size_t>(gateway::Reject::kCounterRepeated)] = 10;
+    left.rejected[static_cast<std::size_t>(gateway::Reject::kCrcWrong)] = 7;
     gateway::GyroStatus& right = now.status.gyros[1];
     right.fault = gateway::Fault::kStuck;
     right.faults[static_cast<std::size_t>(gateway::Fault::kStuck)].times = 2;

@@ -216,10 +216,11 @@ class OnTheBus(Bench):
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertNotIn("\x1b", done.stdout)
         self.assertRegex(done.stdout, r"(?m)^running  \+5\d\.\d{5} ± 0\.00050 deg/s  two_gyros$")
-        self.assertRegex(done.stdout, r'(?m)^left "one" \\  can0 +ok +\+118\.80 ± 0\.72 +\+50\.28300 +21\.5 +1000 +99\.0 % +0  counter repeated 10$')
+        self.assertRegex(done.stdout, r'(?m)^left "one" \\  can0 +ok +\+118\.80 ± 0\.72 +\+50\.28300 +21\.5 +1000 +99\.0 % +0  counter repeated 10, crc wrong 7$')
         self.assertRegex(done.stdout, r"(?m)^right +can1 +stuck +– ")
         self.assertRegex(done.stdout, r"(?m)^can0 +up +active +4321 +0 +0  bus off 3$")
         self.assertRegex(done.stdout, r"(?m)^can1 +not there ")
+        self.assertRegex(done.stdout, r"(?m)^frames not used: accelerometer 4, speed 2$")
         # Columns stand under each other, also beside characters of several bytes.
         lines = done.stdout.splitlines()
         at = next(i for i, line in enumerate(lines) if line.startswith("gyro "))

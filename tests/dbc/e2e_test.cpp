@@ -1,5 +1,6 @@
 #include "dbc/e2e.h"
 
+#include <algorithm>
 #include <array>
 #include <set>
 #include <vector>
@@ -96,6 +97,106 @@ TEST(E2eProfile5, RefusesPayloadsShorterThanItsHeader) {
   const std::vector<std::uint8_t> payload(2);
   EXPECT_FALSE(E2eProfile5(0).check(payload));
   EXPECT_FALSE(E2eProfile5(0).check({}));
+}
+
+using Payload = std::vector<std::uint8_t>;
+
+// 0, step, 2 · step, …
+std::vector<std::uint16_t> sixteen_ids(unsigned step) {
+  std::vector<std::uint16_t> ids;
+  for (unsigned i = 0; i < kE2eDataIdsMost; ++i)
+    ids.push_back(static_cast<std::uint16_t>(i * step));
+  return ids;
+}
+
+E2eProtection protection(E2eKind kind, std::vector<std::uint16_t> data_ids,
+                         std::size_t crc_byte = 0, std::size_t bytes = 8,
+                         std::uint32_t can_id = 0) {
+  E2eProtection::Layout layout{
+      .kind = kind, .crc_byte = crc_byte, .bytes = bytes, .can_id = can_id};
+  std::copy(data_ids.begin(), data_ids.end(), layout.data_ids.begin());
+  return E2eProtection(layout);
+}
+
+Payload sealed(const E2eProtection& how, Payload payload) {
+  how.seal(payload);
+  return payload;
+}
+
+// Data ID 0x123, eight zero bytes and the counter: what others' implementations of profile 1
+// publish for both bytes of the data ID, for one after the other, and for the nibble.
+TEST(E2eProtection, AgreesWithPublishedVectorsOfProfile1) {
+  const E2eProtection both = protection(E2eKind::kProfile1A, {0x123});
+  EXPECT_EQ(sealed(both, {0, 0, 0, 0, 0, 0, 0, 0}), (Payload{0xCC, 0, 0, 0, 0, 0, 0, 0}));
+  EXPECT_EQ(sealed(both, {0, 1, 0, 0, 0, 0, 0, 0}), (Payload{0x91, 1, 0, 0, 0, 0, 0, 0}));
+  const E2eProtection by_turns = protection(E2eKind::kProfile1B, {0x123});
+  EXPECT_EQ(sealed(by_turns, {0, 0, 0, 0, 0, 0, 0, 0}), (Payload{0xCE, 0, 0, 0, 0, 0, 0, 0}));
+  EXPECT_EQ(sealed(by_turns, {0, 1, 0, 0, 0, 0, 0, 0}), (Payload{0x02, 1, 0, 0, 0, 0, 0, 0}));
+  const E2eProtection nibble = protection(E2eKind::kProfile1C, {0x123});
+  EXPECT_EQ(sealed(nibble, {0, 0, 0, 0, 0, 0, 0, 0}), (Payload{0x2A, 0x10, 0, 0, 0, 0, 0, 0}));
+  EXPECT_EQ(sealed(nibble, {0, 1, 0, 0, 0, 0, 0, 0}), (Payload{0x77, 0x11, 0, 0, 0, 0, 0, 0}));
+}
+
+// Likewise of profile 2, whose data ID changes with the counter.
+TEST(E2eProtection, AgreesWithPublishedVectorsOfProfile2) {
+  const E2eProtection zeros = protection(E2eKind::kProfile2, sixteen_ids(0));
+  EXPECT_EQ(sealed(zeros, {0, 1, 0, 0, 0, 0, 0, 0}), (Payload{0x45, 1, 0, 0, 0, 0, 0, 0}));
+  const E2eProtection rising = protection(E2eKind::kProfile2, sixteen_ids(1));
+  EXPECT_EQ(sealed(rising, {0, 2, 2, 3, 4, 5, 6, 7}), (Payload{0xBC, 2, 2, 3, 4, 5, 6, 7}));
+  EXPECT_EQ(sealed(rising, {0, 1, 2, 3, 4, 5, 6, 7}), (Payload{0x61, 1, 2, 3, 4, 5, 6, 7}));
+}
+
+// Its check value of CRC-8/SAE-J1850 over "123456789" is 0x4B.
+TEST(E2eProtection, AgreesWithTheCatalogueOfCrcs) {
+  const Payload digits = {0, '1', '2', '3', '4', '5', '6', '7', '8', '9'};
+  EXPECT_EQ(protection(E2eKind::kCrc8J1850, {}, 0, 10).value(digits), 0x4B);
+}
+
+// By hand: 0x24 + 8 + 1 + 2 + … + 7 = 0x48, and a carry falls away.
+TEST(E2eProtection, AddsUpAsToyotaDoes) {
+  const E2eProtection how = protection(E2eKind::kToyota, {}, 7, 8, 0x024);
+  EXPECT_EQ(how.value(Payload{1, 2, 3, 4, 5, 6, 7, 0}), 0x48);
+  EXPECT_EQ(how.value(Payload{0xFF, 0xFF, 0, 0, 0, 0, 0, 0}), 0x2A);
+  EXPECT_EQ(protection(E2eKind::kToyota, {}, 7, 8, 0x2C1).value(Payload(8, 0)), 0xCB);
+}
+
+// Wherever the check value stands, every kind takes what it has made itself and no wrong bit of
+// what it protects.
+TEST(E2eProtection, NoticesEverySingleWrongBitWhereverTheCheckValueStands) {
+  for (const E2eKind kind :
+       {E2eKind::kProfile1A, E2eKind::kProfile1B, E2eKind::kProfile1C, E2eKind::kProfile2,
+        E2eKind::kProfile5, E2eKind::kCrc8J1850, E2eKind::kToyota}) {
+    for (std::size_t byte = 0; byte + E2eProtection::header_bytes(kind) <= 8; ++byte) {
+      SCOPED_TRACE(testing::Message() << "kind " << static_cast<int>(kind) << ", byte " << byte);
+      const E2eProtection how = protection(kind, sixteen_ids(7), byte, 8, 0x123);
+      Payload payload = {0x12, 0x34, 0x56, 0x78, 0x9A, 0xBC, 0xD6, 0xF1};
+      how.seal(payload);
+      EXPECT_TRUE(how.check(payload));
+      for (std::size_t bit = 0; bit < 64; ++bit) {
+        Payload wrong = payload;
+        wrong[bit / 8] = static_cast<std::uint8_t>(wrong[bit / 8] ^ 1U << bit % 8);
+        EXPECT_FALSE(how.check(wrong)) << bit;
+      }
+    }
+  }
+}
+
+// What lies behind the protected bytes is not asked: a frame padded by a gateway is the same frame.
+TEST(E2eProtection, PassesOverBytesBehindTheMessage) {
+  const E2eProtection how = protection(E2eKind::kProfile1A, {0x123}, 0, 5);
+  Payload payload = {0, 1, 2, 3, 4, 0, 0, 0};
+  how.seal(payload);
+  payload[6] = 0xFF;
+  EXPECT_TRUE(how.check(payload));
+}
+
+// Every name of a kind is known, and nothing else is.
+TEST(E2eProtection, KnowsTheNamesOfTheKinds) {
+  for (const std::string_view name : e2e_kind_names())
+    EXPECT_TRUE(e2e_kind_from(name)) << name;
+  EXPECT_EQ(e2e_kind_from("profile_11c"), E2eKind::kProfile1C);
+  EXPECT_EQ(e2e_kind_from("profile_22"), E2eKind::kProfile2);
+  EXPECT_FALSE(e2e_kind_from("profile_7"));
 }
 
 }  // namespace

@@ -150,7 +150,7 @@ gateway::Plan plan_of(std::uint8_t choice) {
   plan.buses = {"can0", "can1"};
   plan.gyros = {gyro(a, 0), gyro(b, 1)};
   plan.gyros[0].temperature = quantity(a, "Temp", 200.0);
-  plan.gyros[0].counter = gateway::AliveCounter{"Counter", codec(a, "Counter"), 15};
+  plan.gyros[0].e2e.counter = gateway::AliveCounter{"Counter", codec(a, "Counter"), 15};
   plan.gyros[0].valid =
       gateway::Condition{codec(a, "Status"), gateway::Comparison::kLess, 9.0, "Status < 9"};
   plan.gyros[1].sign = codec(b, "Negative");

@@ -20,6 +20,7 @@ BO_ 257 GYRO_A: 8 RIG
  SG_ Temp : 32|16@1- (0.01,0) [-40|125] "degC" RIG
  SG_ Counter : 48|4@1+ (1,0) [0|14] "" RIG
  SG_ Status : 52|4@1+ (1,0) [0|15] "" RIG
+ SG_ Crc : 56|8@1+ (1,0) [0|255] "" RIG
 
 BO_ 258 GYRO_B: 8 RIG
  SG_ RateZ : 7|16@0- (0.001,0) [-30|30] "rad/s" RIG
@@ -27,9 +28,12 @@ BO_ 258 GYRO_B: 8 RIG
  SG_ Flag : 63|1@1+ (1,0) [0|1] "" RIG
  SG_ Volt : 16|16@1+ (0.001,0) [0|65] "V" RIG
  SG_ Odd : 32|8@1+ (1,-125) [0|250] "deg/s" RIG
+ SG_ Crc : 40|8@1+ (1,0) [0|255] "" RIG
 
 BO_ 259 TABLE: 8 RIG
  SG_ TableRate : 0|32@1- (1E-006,0) [0|0] "deg/s" RIG
+ SG_ Crc : 32|16@1+ (1,0) [0|0] "" RIG
+ SG_ Counter : 48|8@1+ (1,0) [0|0] "" RIG
 
 BO_ 260 ACCEL: 6 RIG
  SG_ AccX : 0|16@1- (0.001,0) [-30|30] "g" RIG
@@ -38,6 +42,7 @@ BO_ 260 ACCEL: 6 RIG
 
 BO_ 261 WHEEL: 8 RIG
  SG_ Speed : 0|16@1+ (0.01,0) [0|300] "km/h" RIG
+ SG_ Checksum : 63|8@0+ (1,0) [0|255] "" RIG
 
 BO_ 2364549694 ARI: 8 RIG
  SG_ YawRate : 32|16@1+ (0.0078125,-250) [-250|250.992] "deg/s" RIG
@@ -214,14 +219,14 @@ TEST_F(Config, ResolvesSignals) {
   EXPECT_DOUBLE_EQ(left.rate.minimum, -2000.0);
   EXPECT_DOUBLE_EQ(left.rate.maximum, 2000.0);
   EXPECT_EQ(left.rate.unit, "deg/s");
-  ASSERT_TRUE(left.temperature && left.counter && left.valid);
-  EXPECT_EQ(left.counter->modulus, 15U) << "a range of [0|14] is AUTOSAR's counter";
+  ASSERT_TRUE(left.temperature && left.e2e.counter && left.valid);
+  EXPECT_EQ(left.e2e.counter->modulus, 15U) << "a range of [0|14] is AUTOSAR's counter";
   EXPECT_EQ(left.valid->comparison, Comparison::kEqual);
   EXPECT_FALSE(left.sign);
   EXPECT_NEAR(right.rate.scale, -57.29577951308232, 1e-12);
   EXPECT_DOUBLE_EQ(right.rate.minimum, -30.0);
   EXPECT_DOUBLE_EQ(right.rate.maximum, 30.0);
-  EXPECT_EQ(right.counter->modulus, 256U);
+  EXPECT_EQ(right.e2e.counter->modulus, 256U);
   EXPECT_TRUE(right.sign);
   EXPECT_FALSE(right.temperature || right.valid);
 }
@@ -510,6 +515,82 @@ TEST_F(Config, RefusesConditionsThatAreNoComparison) {
 TEST_F(Config, RefusesCountersThatCannotCount) {
   expect_error("sign = -1\ncounter = \"Counter\"", "sign = -1\ncounter = \"Flag\"",
                "counter = \"Flag\"", {"Flag is no alive counter", "2 to 31 bits"});
+}
+
+constexpr const char* kRightCounter = "sign = -1\ncounter = \"Counter\"";
+constexpr const char* kTwoIds = "data_id = [0, 1]";
+
+std::string right_with(const std::string& keys) {
+  return kRightCounter + std::string("\n") + keys;
+}
+
+// Check values and counters of every input arrive in the plan, each at its byte.
+TEST_F(Config, ReadsHowMessagesProveThemselves) {
+  std::string text = replaced(kGood, kRightCounter,
+                              right_with("max_delta_counter = 3\ncrc = \"Crc\"\n"
+                                         "e2e = \"profile_1a\"\ndata_id = 0x1234"));
+  text = replaced(text, "rate = \"TableRate\"",
+                  "rate = \"TableRate\"\ncounter = \"Counter\"\ncrc = \"Crc\"\n"
+                  "e2e = \"profile_5\"\ndata_id = 7");
+  text = replaced(text, "signal = \"Speed\"",
+                  "signal = \"Speed\"\ncrc = \"Checksum\"\ne2e = \"toyota\"");
+  const Plan plan = plan_of(text);
+  ASSERT_EQ(plan.gyros.size(), 2U);
+  EXPECT_FALSE(plan.gyros[0].e2e.crc);
+  EXPECT_EQ(plan.gyros[0].e2e.counter->max_delta, 0U);
+  EXPECT_EQ(plan.gyros[1].e2e.counter->max_delta, 3U);
+  using dbc::E2eKind;
+  using dbc::E2eProtection;
+  EXPECT_EQ(plan.gyros[1].e2e.crc->name, "Crc");
+  EXPECT_EQ(plan.gyros[1].e2e.crc->protection,
+            E2eProtection({.kind = E2eKind::kProfile1A, .crc_byte = 5, .data_ids = {0x1234}}));
+  EXPECT_EQ(plan.reference->e2e.crc->protection,
+            E2eProtection({.kind = E2eKind::kProfile5, .crc_byte = 4, .data_ids = {7}}));
+  EXPECT_EQ(plan.reference->e2e.counter->modulus, 256U);
+  EXPECT_EQ(plan.speed->e2e.crc->protection,
+            E2eProtection({.kind = E2eKind::kToyota, .crc_byte = 7, .can_id = 261}));
+  EXPECT_FALSE(plan.accelerometer->e2e.crc || plan.accelerometer->e2e.counter);
+}
+
+// A protection that is only half said is an error that asks for the other half.
+TEST_F(Config, RefusesProtectionsThatAreHalfSaid) {
+  expect_error(kRightCounter, right_with("crc = \"Crc\""),
+               "crc = ", {"nothing says how", "profile_1a", "toyota"});
+  expect_error(kRightCounter, right_with("e2e = \"crc8_j1850\""),
+               "e2e = ", {"without a check value", "crc = \"NAME\""});
+  expect_error(kRightCounter, right_with("e2e = \"profile_1a\"\ncrc = \"Crc\""),
+               "e2e = ", {"needs a data_id", "data_id = 0x123"});
+  expect_error(kRightCounter, right_with("data_id = 1"), "data_id = ", {"data_id without e2e"});
+  expect_error("signal = \"Speed\"", "signal = \"Speed\"\nmax_delta_counter = 2",
+               "max_delta_counter", {"without a counter"});
+}
+
+// Names, places and numbers that a protection cannot have.
+TEST_F(Config, RefusesProtectionsThatCannotBe) {
+  const auto with = [](const std::string& kind, const std::string& crc, const std::string& id) {
+    return right_with("e2e = \"" + kind + "\"\ncrc = \"" + crc + "\"" +
+                      (id.empty() ? "" : "\n" + id));
+  };
+  expect_error(kRightCounter, with("profile_1d", "Crc", "data_id = 1"),
+               "e2e = ", {"no protection \"profile_1d\"", "did you mean \"profile_1"});
+  expect_error(kRightCounter, with("crc8_j1850", "Crk", ""),
+               "crc = ", {"no signal \"Crk\"", "did you mean \"Crc\""});
+  expect_error(kRightCounter, with("crc8_j1850", "Volt", ""),
+               "crc = ", {"16 bits from bit 16", "one whole byte"});
+  expect_error(kRightCounter, with("profile_5", "Crc", "data_id = 1"),
+               "crc = ", {"two whole bytes, Intel"});
+  expect_error(kRightCounter, with("toyota", "Crc", "data_id = 1"),
+               "data_id = ", {"toyota has no data ID"});
+  expect_error(kRightCounter, with("profile_1c", "Crc", "data_id = 0x1000"),
+               "data_id = ", {"0x1000", "0 to 0xfff"});
+  expect_error(kRightCounter, with("profile_2", "Crc", kTwoIds), kTwoIds,
+               {"2 data IDs", "16 values"});
+  expect_error("counter = \"Counter\"\nvalid",
+               "crc = \"Crc\"\ne2e = \"profile_1a\"\n"
+               "data_id = 1\ncounter = \"Counter\"\nvalid",
+               "crc = ", {"no byte that holds the counter", "GYRO_A has 8 bytes"});
+  expect_error(kRightCounter, right_with("max_delta_counter = 255"), "max_delta_counter",
+               {"max_delta_counter is 255", "1 (none may be lost) to 254"});
 }
 
 // The truth of the calibration is said once.

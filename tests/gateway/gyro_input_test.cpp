@@ -28,7 +28,7 @@ GyroPlan small_plan() {
 
 GyroPlan counted_plan(std::uint16_t bits, std::uint32_t modulus) {
   GyroPlan plan = small_plan();
-  plan.counter = AliveCounter{
+  plan.e2e.counter = AliveCounter{
       "Counter", codec_of(signal_of(16, bits, 1.0, 0.0, ValueType::kUnsigned)), modulus};
   return plan;
 }
@@ -304,6 +304,24 @@ TEST(GyroInput, KeepsTheRateWhenTheTemperatureIsOutOfRange) {
   GyroInput input(plan);
   EXPECT_FALSE(input.decode(frame_of(kIdA, {0, 0, 255})).reject);
   EXPECT_TRUE(std::isnan(input.temperature_c()));
+}
+
+// A spoilt frame gives neither rate nor temperature, and the counter does not notice it.
+TEST(GyroInput, UsesNothingOfAFrameWithAWrongCheckValue) {
+  GyroPlan plan = counted_plan(8, 256);
+  plan.temperature = quantity_of(signal_of(24, 8, 1.0), 200.0);
+  plan.e2e.crc =
+      CheckValue{"Sum", "toyota",
+                 dbc::E2eProtection({.kind = dbc::E2eKind::kToyota, .crc_byte = 4, .bytes = 5})};
+  GyroInput input(plan);
+  EXPECT_FALSE(input.decode(frame_of(kIdA, {0x64, 0x00, 1, 20, 0x7E})).reject);
+  EXPECT_EQ(input.decode(frame_of(kIdA, {0x64, 0x00, 2, 99, 0x7E})).reject, Reject::kCrcWrong);
+  EXPECT_EQ(input.decode(frame_of(kIdA, {0x64, 0x00, 2, 99})).reject, Reject::kTruncated);
+  EXPECT_DOUBLE_EQ(input.temperature_c(), 20.0);
+  const GyroInput::Result good = input.decode(frame_of(kIdA, {0x65, 0x00, 2, 20, 0x80}));
+  EXPECT_FALSE(good.reject);
+  EXPECT_EQ(good.missing, 0U);
+  EXPECT_DOUBLE_EQ(good.rate_dps, 1.01);
 }
 
 }  // namespace

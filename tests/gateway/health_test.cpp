@@ -42,7 +42,7 @@ Plan plan_of_gyros() {
     gyro.valid =
         Condition{rig::codec_of(rig::signal_of(32, 8, 1.0, 0.0, dbc::ValueType::kUnsigned)),
                   Comparison::kEqual, 0.0, "S == 0"};
-    gyro.counter = AliveCounter{
+    gyro.e2e.counter = AliveCounter{
         "C", rig::codec_of(rig::signal_of(48, 8, 1.0, 0.0, dbc::ValueType::kUnsigned)), 256};
   }
   return plan;

@@ -57,7 +57,7 @@ Plan hostile_plan(std::uint32_t seed) {
     gyro.rate.minimum = -3000.0;
     gyro.rate.maximum = 3000.0;
   }
-  plan.gyros[0].counter = AliveCounter{
+  plan.gyros[0].e2e.counter = AliveCounter{
       "C", rig::codec_of(rig::signal_of(48, 4, 1.0, 0.0, dbc::ValueType::kUnsigned)), 15};
   plan.gyros[1].temperature = rig::quantity_of(rig::signal_of(32, 16));
   plan.gyros[1].valid =
@@ -134,6 +134,68 @@ TEST(Hostile, GoodGyrosAreNotDisturbedByOthers) {
       pipeline.receive(event.bus, event.frame, event.stamp, out);
     }
     EXPECT_EQ(out.with_id(0x610), expected.with_id(0x610));
+  }
+}
+
+Plan protected_plan() {
+  Plan plan = rig::two_gyros();
+  for (GyroPlan& gyro : plan.gyros) {
+    gyro.e2e.counter = AliveCounter{
+        "C", rig::codec_of(rig::signal_of(48, 4, 1.0, 0.0, dbc::ValueType::kUnsigned)), 15, 3};
+    gyro.e2e.crc = CheckValue{
+        "Crc", "crc8_j1850",
+        dbc::E2eProtection({.kind = dbc::E2eKind::kCrc8J1850, .crc_byte = 7, .bytes = 8})};
+  }
+  return plan;
+}
+
+// Somebody sends on the gyros' own identifiers, at the right time and in the right form, but does
+// not know how the check value is made, or not how the counter runs: every frame of his is counted,
+// and the output is that of the true gyros, byte for byte.
+TEST(Hostile, AnImpostorChangesNothingWhereFramesAreProtected) {
+  const Plan plan = protected_plan();
+  rig::Recording good = rig::merge({rig::stream_a(rig::ms(0), rig::ms(4000), rig::constant(0.1)),
+                                    rig::stream_b(rig::ms(0), rig::ms(4000), rig::constant(0.2))});
+  std::array<unsigned, 2> counts{};
+  for (rig::Event& event : good) {
+    const std::size_t gyro = event.frame.id == rig::kIdA ? 0 : 1;
+    event.frame.length = 8;
+    event.frame.data[6] = static_cast<std::uint8_t>(counts[gyro]++ % 15);
+    plan.gyros[gyro].e2e.crc->protection.seal({event.frame.data.data(), 8});
+  }
+  Pipeline alone(plan);
+  rig::Collector expected;
+  rig::play(alone, good, expected);
+  ASSERT_GT(alone.status().rates_out_valid, 200U);
+  for (std::uint32_t seed = 0; seed < 20; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    rig::Dice dice(seed);
+    Pipeline pipeline(plan);
+    rig::Collector out;
+    std::array<std::uint64_t, 2> forged{};
+    for (const rig::Event& event : good) {
+      pipeline.receive(event.bus, event.frame, event.stamp, out);
+      can::Frame forgery = event.frame;
+      const std::size_t gyro = forgery.id == rig::kIdA ? 0 : 1;
+      forgery.data[2] = static_cast<std::uint8_t>(dice.below(256));
+      if (seed % 2 == 0) {
+        plan.gyros[gyro].e2e.crc->protection.seal({forgery.data.data(), 8});
+        forgery.data[7] = static_cast<std::uint8_t>(forgery.data[7] ^ (1U + dice.below(255)));
+      } else {
+        forgery.data[6] = static_cast<std::uint8_t>((forgery.data[6] + 5 + dice.below(7)) % 15);
+        plan.gyros[gyro].e2e.crc->protection.seal({forgery.data.data(), 8});
+      }
+      ++forged[gyro];
+      pipeline.receive(event.bus, forgery, event.stamp + rig::ms(1), out);
+    }
+    EXPECT_EQ(out.with_id(0x610), expected.with_id(0x610));
+    const Reject cause = seed % 2 == 0 ? Reject::kCrcWrong : Reject::kWrongSequence;
+    for (std::size_t gyro = 0; gyro < 2; ++gyro) {
+      const GyroStatus& status = pipeline.status().gyros[gyro];
+      EXPECT_GT(forged[gyro], 300U);
+      EXPECT_EQ(status.rejected[static_cast<std::size_t>(cause)], forged[gyro]);
+      EXPECT_FALSE(status.fault);
+    }
   }
 }
 

@@ -63,7 +63,7 @@ TEST(InputFrames, TurnUnitAndSignBack) {
 
 TEST(InputFrames, CountTheFrames) {
   GyroPlan plan = small_plan();
-  plan.counter =
+  plan.e2e.counter =
       AliveCounter{"C", codec_of(signal_of(16, 4, 1.0, 0.0, ValueType::kUnsigned), 4), 15};
   EXPECT_EQ(gyro_frame(plan, 0.0, 14).data[2], 14);
   EXPECT_EQ(gyro_frame(plan, 0.0, 15).data[2], 0);

@@ -68,7 +68,7 @@ inline GyroPlan gyro_plan(can::BusIndex bus, std::uint32_t id, const std::string
                   .rate = quantity_of(signal_of(0, 32, kInputStep_dps)),
                   .sign = {},
                   .temperature = {},
-                  .counter = {},
+                  .e2e = {},
                   .valid = {},
                   .saturation_dps = {}};
 }

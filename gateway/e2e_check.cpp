@@ -1,0 +1,67 @@
+#include "gateway/e2e_check.h"
+
+#include <bit>
+
+namespace vgyro::gateway {
+
+const E2ePlan E2eCheck::kNothing;
+
+std::optional<Reject> E2eCheck::verify(const can::Frame& frame) const {
+  if (!frame.is_data()) return Reject::kNotData;
+  if (!plan_->crc) return std::nullopt;
+  const dbc::E2eProtection& protection = plan_->crc->protection;
+  if (frame.length < protection.bytes()) return Reject::kTruncated;
+  if (!protection.check(frame.payload())) return Reject::kCrcWrong;
+  return std::nullopt;
+}
+
+std::uint32_t E2eCheck::read(std::span<const std::uint8_t> payload) const {
+  const std::uint32_t modulus = plan_->counter->modulus;
+  const auto now = static_cast<std::uint32_t>(plan_->counter->codec.decode(payload).raw) &
+                   (std::bit_ceil(modulus) - 1);
+  return now >= modulus ? now - modulus : now;
+}
+
+std::uint32_t E2eCheck::step(std::uint32_t from, std::uint32_t to) const {
+  return to >= from ? to - from : to + plan_->counter->modulus - from;
+}
+
+std::optional<Reject> E2eCheck::count(std::span<const std::uint8_t> payload,
+                                      std::uint32_t& missing) {
+  missing = 0;
+  if (!plan_->counter) return std::nullopt;
+  const std::uint32_t now = read(payload);
+  const std::uint32_t most = plan_->counter->max_delta;
+  const std::uint32_t moved = step(counter_, now);
+  if (known_ && moved == 0) return Reject::kCounterRepeated;
+  if (known_ && counts_missing_) {
+    if (most == 0 || moved <= most) {
+      missing = moved - 1;
+    } else {
+      // Two that follow each other are a sender that began anew. Among frames of another one, the
+      // true sender's own come in between and the series never begins.
+      const std::uint32_t since = out_of_sequence_ ? step(*out_of_sequence_, now) : 0;
+      out_of_sequence_ = now;
+      if (since == 0 || since > most) return Reject::kWrongSequence;
+    }
+  }
+  counter_ = now;
+  known_ = true;
+  counts_missing_ = true;
+  out_of_sequence_.reset();
+  return std::nullopt;
+}
+
+std::optional<Reject> E2eCheck::judge(const can::Frame& frame) {
+  if (const auto reject = verify(frame)) return reject;
+  if (plan_->counter && !plan_->counter->codec.fits(frame.length)) return Reject::kTruncated;
+  std::uint32_t missing = 0;
+  return count(frame.payload(), missing);
+}
+
+void E2eCheck::fall_silent() {
+  counts_missing_ = false;
+  out_of_sequence_.reset();
+}
+
+}  // namespace vgyro::gateway

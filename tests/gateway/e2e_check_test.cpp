@@ -1,0 +1,130 @@
+#include "gateway/e2e_check.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/gateway/rig.h"
+
+namespace vgyro::gateway {
+namespace {
+
+using rig::codec_of;
+using rig::frame_of;
+using rig::signal_of;
+
+constexpr std::uint32_t kId = 0x101;
+
+// Counter 0…14 in byte 1, CRC in byte 0: profile 1 A of data ID 0x123.
+E2ePlan plan_of(std::uint32_t max_delta, bool crc) {
+  E2ePlan plan;
+  plan.counter = AliveCounter{
+      "Counter", codec_of(signal_of(8, 4, 1.0, 0.0, dbc::ValueType::kUnsigned)), 15, max_delta};
+  if (crc) {
+    plan.crc =
+        CheckValue{"Crc", "profile_1a",
+                   dbc::E2eProtection({.kind = dbc::E2eKind::kProfile1A, .data_ids = {0x123}})};
+  }
+  return plan;
+}
+
+can::Frame counted(unsigned counter) {
+  return frame_of(kId, {0, static_cast<std::uint8_t>(counter), 0, 0, 0, 0, 0, 0});
+}
+
+std::optional<Reject> judge(E2eCheck& check, unsigned counter) {
+  return check.judge(counted(counter));
+}
+
+TEST(E2eCheck, AsksNothingThatNobodyNamed) {
+  E2eCheck check;
+  for (int i = 0; i < 3; ++i)
+    EXPECT_FALSE(check.judge(counted(5)));
+}
+
+TEST(E2eCheck, TakesNoFrameThatHoldsNoData) {
+  E2eCheck check;
+  can::Frame remote = counted(1);
+  remote.flags |= can::kRemote;
+  EXPECT_EQ(check.judge(remote), Reject::kNotData);
+}
+
+TEST(E2eCheck, TakesOnlyTheRightCheckValue) {
+  const E2ePlan plan = plan_of(0, true);
+  E2eCheck check(plan);
+  EXPECT_EQ(check.judge(counted(0)), Reject::kCrcWrong);
+  EXPECT_FALSE(check.judge(frame_of(kId, {0xCC, 0, 0, 0, 0, 0, 0, 0})));
+  EXPECT_FALSE(check.judge(frame_of(kId, {0x91, 1, 0, 0, 0, 0, 0, 0})));
+  EXPECT_EQ(check.judge(frame_of(kId, {0x91, 1, 0, 0, 0, 0, 0, 1})), Reject::kCrcWrong);
+}
+
+TEST(E2eCheck, TakesNoFrameTooShortToBeProtected) {
+  const E2ePlan plan = plan_of(0, true);
+  E2eCheck check(plan);
+  EXPECT_EQ(check.judge(frame_of(kId, {0xCC, 0, 0})), Reject::kTruncated);
+}
+
+// Or a spoilt frame would make the good one behind it look repeated.
+TEST(E2eCheck, DoesNotCountAFrameThatIsSpoilt) {
+  const E2ePlan plan = plan_of(0, true);
+  E2eCheck check(plan);
+  EXPECT_FALSE(check.judge(frame_of(kId, {0xCC, 0, 0, 0, 0, 0, 0, 0})));
+  EXPECT_EQ(check.judge(frame_of(kId, {0x00, 1, 0, 0, 0, 0, 0, 0})), Reject::kCrcWrong);
+  EXPECT_FALSE(check.judge(frame_of(kId, {0x91, 1, 0, 0, 0, 0, 0, 0})));
+  EXPECT_EQ(check.counter(), 1U);
+}
+
+TEST(E2eCheck, TakesStepsUpToTheLongestAllowed) {
+  const E2ePlan plan = plan_of(3, false);
+  E2eCheck check(plan);
+  EXPECT_FALSE(judge(check, 13));
+  EXPECT_FALSE(judge(check, 14));
+  EXPECT_FALSE(judge(check, 2));  // over the end: 14, 0, 1, 2
+  EXPECT_EQ(judge(check, 2), Reject::kCounterRepeated);
+  EXPECT_EQ(judge(check, 6), Reject::kWrongSequence);
+  EXPECT_FALSE(judge(check, 5));
+}
+
+TEST(E2eCheck, CountsWhatIsMissingInLongSteps) {
+  const E2ePlan plan = plan_of(3, false);
+  E2eCheck check(plan);
+  std::uint32_t missing = 0;
+  EXPECT_FALSE(check.count(counted(1).payload(), missing));
+  EXPECT_FALSE(check.count(counted(4).payload(), missing));
+  EXPECT_EQ(missing, 2U);
+  EXPECT_EQ(check.count(counted(9).payload(), missing), Reject::kWrongSequence);
+  EXPECT_EQ(missing, 0U);
+}
+
+// Two frames that follow each other are a sender that began anew.
+TEST(E2eCheck, FollowsASenderThatBeganAnew) {
+  const E2ePlan plan = plan_of(2, false);
+  E2eCheck check(plan);
+  EXPECT_FALSE(judge(check, 7));
+  EXPECT_EQ(judge(check, 0), Reject::kWrongSequence);
+  EXPECT_FALSE(judge(check, 1));
+  EXPECT_FALSE(judge(check, 2));
+}
+
+// Somebody else counts on the same identifier: as long as the true sender speaks, none of that is
+// taken and nothing of its own is lost.
+TEST(E2eCheck, ASecondSenderDoesNotPushTheFirstOut) {
+  const E2ePlan plan = plan_of(2, false);
+  E2eCheck check(plan);
+  EXPECT_FALSE(judge(check, 0));
+  for (unsigned n = 1; n < 100; ++n) {
+    EXPECT_EQ(judge(check, (n + 7) % 15), Reject::kWrongSequence) << n;
+    EXPECT_FALSE(judge(check, n % 15)) << n;
+  }
+}
+
+TEST(E2eCheck, AnythingNewIsRightAfterASilence) {
+  const E2ePlan plan = plan_of(1, false);
+  E2eCheck check(plan);
+  EXPECT_FALSE(judge(check, 3));
+  check.fall_silent();
+  EXPECT_EQ(judge(check, 3), Reject::kCounterRepeated);
+  EXPECT_FALSE(judge(check, 11));
+  EXPECT_EQ(judge(check, 13), Reject::kWrongSequence);
+}
+
+}  // namespace
+}  // namespace vgyro::gateway
