@@ -60,26 +60,28 @@ gateway::Plan plan() {
   gateway::Plan plan;
   plan.buses = {"can0", "can1"};
   for (std::size_t k = 0; k < 2; ++k) {
-    plan.gyros.push_back({.name = k == 0 ? "a" : "b",
-                          .bus = plan.buses[k],
-                          .message = "GYRO",
-                          .match = {static_cast<can::BusIndex>(k), kIds[k], 0x7FF, false},
-                          .rate = {.name = "Rate",
-                                   .unit = "deg/s",
-                                   .codec = codec(0, 32, 1e-6, true),
-                                   .presence = {},
-                                   .scale = 1.0,
-                                   .shift = 0.0,
-                                   .minimum = -kLimit_dps,
-                                   .maximum = kLimit_dps,
-                                   .layout = {},
-                                   .step = 1e-6},
-                          .sign = {},
-                          .temperature = {},
-                          .counter = gateway::AliveCounter{"Counter", codec(48, 4, 1.0, false), 16},
-                          .valid = gateway::Condition{codec(52, 4, 1.0, false),
-                                                      gateway::Comparison::kEqual, 0.0, "S == 0"},
-                          .saturation_dps = {}});
+    plan.gyros.push_back(
+        {.name = k == 0 ? "a" : "b",
+         .bus = plan.buses[k],
+         .message = "GYRO",
+         .match = {static_cast<can::BusIndex>(k), kIds[k], 0x7FF, false},
+         .rate = {.name = "Rate",
+                  .unit = "deg/s",
+                  .codec = codec(0, 32, 1e-6, true),
+                  .presence = {},
+                  .scale = 1.0,
+                  .shift = 0.0,
+                  .minimum = -kLimit_dps,
+                  .maximum = kLimit_dps,
+                  .layout = {},
+                  .step = 1e-6},
+         .sign = {},
+         .temperature = {},
+         .e2e = {.crc = {},
+                 .counter = gateway::AliveCounter{"Counter", codec(48, 4, 1.0, false), 16}},
+         .valid = gateway::Condition{codec(52, 4, 1.0, false), gateway::Comparison::kEqual, 0.0,
+                                     "S == 0"},
+         .saturation_dps = {}});
   }
   plan.calibration.rest_s = kRest_s;
   return plan;

@@ -114,7 +114,7 @@ gateway::GyroPlan gyro(const dbc::Message& message, can::BusIndex bus) {
           .rate = quantity(message, "Rate", 1000.0),
           .sign = {},
           .temperature = {},
-          .counter = {},
+          .e2e = {},
           .valid = {}};
 }
 
@@ -128,6 +128,12 @@ void add_surroundings(gateway::Plan& plan, const dbc::Database& database) {
       {quantity(accel, "X", 1e5), quantity(accel, "Y", 1e5), quantity(accel, "Z", 1e5)}};
   plan.speed = gateway::SpeedPlan{
       "can0", "WHEEL", {0, wheel.id, wheel.id_mask(), false}, quantity(wheel, "Speed", 100.0)};
+  plan.speed->e2e.crc =
+      gateway::CheckValue{"Sum", "toyota",
+                          dbc::E2eProtection({.kind = dbc::E2eKind::kToyota,
+                                              .crc_byte = std::size_t{wheel.size_bytes} - 1,
+                                              .bytes = wheel.size_bytes,
+                                              .can_id = wheel.id})};
 }
 
 void add_model(gateway::Plan& plan) {
