@@ -13,6 +13,7 @@ import zlib
 from pathlib import Path
 
 import numpy as np
+import timekeeping
 import verdicts
 from verdicts import require
 
@@ -22,7 +23,7 @@ sys.path.insert(0, str(SOURCE / "tests/twin"))
 import make_twin  # noqa: E402
 
 RSS_MOST_KB = 12 * 1024
-REST_S, RUN_S, RAMP_S = 3.0, 6.0, make_twin.RAMP_S
+REST_S, RUN_S, RAMP_S = 2.0, 3.0, make_twin.RAMP_S
 # A player that stalls brings the motion nearer: none of it may reach into the calibration.
 STILL_S = REST_S + 1.0
 TURN_DPS = 50.0
@@ -69,6 +70,7 @@ class Twin:
     bus_b: str = "can0"
     bus_out: str = "can0"
     fd: bool = False
+    still_s: float = STILL_S
     run_s: float = RUN_S
     silent_s: tuple = ()  # from, to: gyro B sends nothing
 
@@ -80,7 +82,7 @@ class Twin:
         (folder / "vgyro.toml").write_text(CONFIG.format(
             bus_a=self.bus_a, bus_b=self.bus_b, bus_out=self.bus_out, fd=str(self.fd).lower(),
             rest_s=REST_S, rate_dps=make_twin.EARTH_DPS), encoding="utf-8")
-        options = make_twin.Options(scenario="turn", rest_s=STILL_S, run_s=self.run_s, turn_dps=TURN_DPS)
+        options = make_twin.Options(scenario="turn", rest_s=self.still_s, run_s=self.run_s, turn_dps=TURN_DPS)
         twin = make_twin.simulate(options)
         lines = []
         for stream, bus, fd in zip(twin.streams, (self.bus_a, self.bus_b), (self.fd, False)):
@@ -234,7 +236,7 @@ class SlowBusCase:
     patience_us = 20_000
 
     def __init__(self):
-        self.twin = Twin(bus_out="can1", run_s=2.0)
+        self.twin = Twin(bus_out="can1", run_s=0.0)
 
     def prepare(self, folder):
         self.twin.prepare(folder)
@@ -275,16 +277,17 @@ class LinkFaultsCase:
     says = "links down and up, deleted and made anew: no restart, no stale burst"
 
     def __init__(self):
-        self.twin = Twin(bus_out="can1", run_s=0.0)
+        self.twin = Twin(bus_out="can1", still_s=0.5, run_s=0.0)
 
     def prepare(self, folder):
         self.twin.prepare(folder)
         log = ["play", str(folder / "played.log")]
         batch = folder / "links"
         batch.write_text("link del can0\nlink add can0 mtu 16 type vcan\nlink set can0 up\n", encoding="ascii")
-        steps = [log, ["wait", 1.0], ["run", ["ip", "link", "set", "can1", "down"]], log,
-                 ["run", ["ip", "link", "set", "can1", "up"]], ["wait", 1.5], log,
-                 ["run", ["ip", "-batch", str(batch)]], ["wait", 2.5], log]
+        pause = ["wait", 0.5]
+        steps = [log, pause, ["run", ["ip", "link", "set", "can1", "down"]], log,
+                 ["run", ["ip", "link", "set", "can1", "up"]], ["until_said", "can1: link is up again"], pause, log,
+                 ["run", ["ip", "-batch", str(batch)]], ["until_said", "can0: open again"], pause, log]
         return {"links": self.twin.links(), "steps": steps,
                 "command": [str(BIN / "vgyrod"), "--config", str(folder / "vgyro.toml")]}
 
@@ -299,13 +302,13 @@ class LinkFaultsCase:
         require(len(begins) >= 4, f"{len(begins)} plays seen")
         rates = np.array([line.us for line in run.of(0x610)])
         per_play = [int(((rates >= a) & (rates < b)).sum()) for a, b in zip(begins, [*begins[1:], 1 << 62])]
-        require(min(per_play[0], *per_play[2:]) > 1500, f"rates in each play: {per_play}")
+        require(min(per_play[0], *per_play[2:]) > 600, f"rates in each play: {per_play}")
         require(per_play[1] < 30, f"{per_play[1]} rates out of a link that was down")
         for can_id in run.ids:
             for line in run.of(can_id):
                 verdicts.check_crc(line, can_id)
         stale = int(re.search(r"(\d+) stale", run.said).group(1))
-        require(stale > 1500, f"{stale} frames dropped as stale while the link was down")
+        require(stale > 600, f"{stale} frames dropped as stale while the link was down")
         return f"rates in the four plays: {per_play}, {stale} dropped as stale, {describe(run)}"
 
 
@@ -316,7 +319,7 @@ class AbsentCase:
     says = "interfaces that come seconds after the start: waits, then as the replay"
 
     def __init__(self):
-        self.twin = Twin(bus_b="can1", bus_out="can2", run_s=1.0)
+        self.twin = Twin(bus_b="can1", bus_out="can2", run_s=0.0)
 
     def prepare(self, folder):
         self.twin.prepare(folder)
@@ -324,7 +327,8 @@ class AbsentCase:
         batch = folder / "links"
         batch.write_text("".join(f"link add {link['name']} mtu 16 type vcan\nlink set {link['name']} up\n"
                                  for link in links), encoding="ascii")
-        steps = [["wait", 2.5], ["run", ["ip", "-batch", str(batch)]], ["wait", 2.0], ["play", str(folder / "played.log")]]
+        steps = [["wait", 2.5], ["run", ["ip", "-batch", str(batch)]],
+                 *(["until_said", f"{link['name']}: bound"] for link in links), ["play", str(folder / "played.log")]]
         return {"links": links, "steps": steps,
                 "command": [str(BIN / "vgyrod"), "--config", str(folder / "vgyro.toml")]}
 
@@ -350,7 +354,7 @@ class DeadBusCase:
 
     name = "dead_bus"
     says = "an output that is down and an input that is not there: no busy loop"
-    seconds = 10.0
+    seconds = 6.0
 
     def prepare(self, folder):
         twin = Twin(bus_a="can0", bus_b="can1", bus_out="can1")
@@ -411,7 +415,7 @@ class ReloadCase:
     more = ["--method", "optimal"]
 
     def prepare(self, folder):
-        twin = Twin(run_s=1.0)
+        twin = Twin(run_s=0.0)
         twin.prepare(folder)
         config = folder / "vgyro.toml"
         text = config.read_text(encoding="utf-8")
@@ -421,9 +425,11 @@ class ReloadCase:
         (folder / "good.toml").write_text(text, encoding="utf-8")
         def take(name):
             return ["run", ["cp", str(folder / name), str(config)]]
-        log = ["play", str(folder / "played.log")]
-        pause = ["wait", 0.6]
-        steps = [["play_and_reload", [log[1], 5.0]], pause, take("bad.toml"), ["reload", None], log, pause,
+        whole, rest = folder / "played.log", folder / "rest.log"
+        lines = whole.read_text(encoding="ascii").splitlines(keepends=True)
+        rest.write_text("".join(lines[:int(len(lines) * REST_S / (STILL_S + RAMP_S))]), encoding="ascii")
+        log, pause = ["play", str(rest)], ["wait", 0.6]
+        steps = [["play_and_reload", [str(whole), STILL_S]], pause, take("bad.toml"), ["reload", None], log, pause,
                  take("other.toml"), ["reload", None], log, take("good.toml")]
         return {"links": twin.links(), "steps": steps,
                 "command": [str(BIN / "vgyrod"), "--config", str(config), *self.more]}
@@ -461,7 +467,7 @@ class ReloadCase:
             resting = (t > begin * 1e-6 + 0.1) & (t < begin * 1e-6 + REST_S - 0.2)
             require(np.isfinite(rate[resting]).all() and set(state[resting]) == {2}, "not valid after a reload")
             errors.append(float((rate[resting] - make_twin.EARTH_DPS).mean()))
-        # The bias of three seconds of rest, and the noise of the better gyro at 500 Hz.
+        # The bias of two seconds of rest, and the noise of the better gyro at 500 Hz.
         require(max(map(abs, errors)) < 1e-3, f"mean errors {errors} deg/s")
         return f"{missed} rates missed amid traffic, valid from the first pair after each, mean errors {[f'{e * 3600:+.1f}' for e in errors]} deg/h, {describe(run)}"
 
@@ -479,11 +485,11 @@ class RestartCase:
     more = ["--method", "optimal"]
 
     def prepare(self, folder):
-        twin = Twin(run_s=2.0)
+        twin = Twin(run_s=0.0)
         twin.prepare(folder)
         state, kept = folder / "state.toml", folder / "kept.toml"
         log = ["play", str(folder / "played.log")]
-        steps = [log, ["wait", 1.5], ["kill_and_restart", None], ["run", ["cp", str(state), str(kept)]], log]
+        steps = [log, ["wait", 0.5], ["kill_and_restart", None], ["run", ["cp", str(state), str(kept)]], log]
         return {"links": twin.links(), "steps": steps,
                 "command": [str(BIN / "vgyrod"), "--config", str(folder / "vgyro.toml"), *self.more, "--state", str(state)]}
 
@@ -501,7 +507,7 @@ class RestartCase:
         require(np.isfinite(rate).all() and set(state) == {2}, "a rate that is not valid after the restart")
         resting = t - run.inputs[0].us * 1e-6 < REST_S
         error = rate[resting] - make_twin.EARTH_DPS
-        # The bias of the first three seconds of rest, and the noise of the better gyro at 500 Hz.
+        # The bias of the first two seconds of rest, and the noise of the better gyro at 500 Hz.
         require(abs(error.mean()) < 1e-3, f"mean error {error.mean():.5f} deg/s after the restart")
         self.check_file(folder / "state.toml")
         require(not (folder / "state.toml.new").exists(), "the writer left something behind")
@@ -517,7 +523,7 @@ class RestartCase:
         require(path.stat().st_mode & 0o777 == 0o600, f"{path.name}: mode {path.stat().st_mode:o}")
         # Six standard errors of the noisier gyro's mean over the calibration.
         truth = [gyro.bias_dps for gyro in make_twin.GYROS]
-        require(np.allclose(read["drift"]["bias_dps"], truth, rtol=0, atol=1e-3), f"biases {read['drift']['bias_dps']}")
+        require(np.allclose(read["drift"]["bias_dps"], truth, rtol=0, atol=1.3e-3), f"biases {read['drift']['bias_dps']}")
         return read
 
 
@@ -572,6 +578,7 @@ class CarCase:
 
     name = "car"
     says = "real car traffic around the gyros, at real time"
+    seconds = 22.0  # ten of them calibrate, ten are the first window
 
     def __init__(self, recordings):
         self.source = recordings / "car_rav4"
@@ -581,7 +588,10 @@ class CarCase:
         for path in self.source.glob("*.dbc"):
             (folder / path.name).write_bytes(path.read_bytes())
         log = lzma.decompress((self.source / "measured.log.xz").read_bytes()).decode("ascii")
-        (folder / "played.log").write_text(log, encoding="ascii")
+        lines = log.splitlines(keepends=True)
+        since_s = [float(line[1:line.index(")")]) for line in lines]
+        lines = [line for line, at_s in zip(lines, since_s) if at_s < since_s[0] + self.seconds]
+        (folder / "played.log").write_text("".join(lines), encoding="ascii")
         used = {int(text, 16) for text in re.findall(r" ([0-9A-F]{3})#", log)}
         free = (i for i in range(0x620, 0x800) if i not in used)
         self.ids = tuple(next(free) if i in used else i for i in self.ids)
@@ -610,8 +620,8 @@ def all_cases(recordings):
         TwinCase("twin", "rate-table twin on one bus", Twin()),
         TwinCase("two_buses", "a bus for each gyro, a third for the output",
                  Twin(bus_b="can1", bus_out="can2")),
-        TwinCase("silent_gyro", "one gyro silent for two seconds, then back",
-                 Twin(bus_b="can1", silent_s=(STILL_S + RAMP_S + 1.0, STILL_S + RAMP_S + 3.0)),
+        TwinCase("silent_gyro", "one gyro silent for a second, then back",
+                 Twin(bus_b="can1", silent_s=(STILL_S + RAMP_S + 1.0, STILL_S + RAMP_S + 2.0)),
                  check_more=check_silent),
         TwinCase("fd", "CAN FD in and out", Twin(fd=True), dbc="dbc/vgyro_fd.dbc", check_more=check_fd),
         SlowBusCase(),
@@ -633,12 +643,14 @@ def all_cases(recordings):
     return cases
 
 
-def judge(case, folder):
-    """(passed, text)"""
+def judge(case, folder, orders):
+    """Passed or not, the longest stall in microseconds (0 where nothing played in real time), and a text."""
     path = folder / "result.json"
     if not path.exists():
-        return False, "did not run"
+        return False, 0, "did not run"
+    result, stall_us = json.loads(path.read_text(encoding="utf-8")), 0
     try:
-        return True, case.judge(folder, json.loads(path.read_text(encoding="utf-8")))
+        stall_us = timekeeping.longest_stall_us(folder, orders.get("steps", []), result)
+        return True, stall_us, case.judge(folder, result)
     except verdicts.Failure as failure:
-        return False, str(failure)
+        return False, stall_us, str(failure)

@@ -30,6 +30,17 @@ exec {python} -c 'import ctypes; ctypes.CDLL(None).reboot(0x4321FEDC)'
 """
 
 
+def foremost():
+    """What plays in real time goes before what the host computes meanwhile, where it may: by its own priority, and by its
+    session's, which Linux weighs first."""
+    try:
+        os.nice(-10)
+        os.setsid()
+        Path("/proc/self/autogroup").write_text("-10", encoding="ascii")
+    except OSError:
+        pass
+
+
 class Native:
     name = "natively"
 
@@ -38,7 +49,7 @@ class Native:
 
     def run(self, folder, seconds, inside=HERE / "inside.py"):
         done = subprocess.run([*self.unshare, PYTHON, str(inside), str(folder), str(folder)],
-                              stdout=sys.stderr, timeout=seconds, check=False)
+                              stdout=sys.stderr, timeout=seconds, check=False, preexec_fn=foremost)
         return done.returncode
 
 
@@ -59,7 +70,7 @@ class UserModeLinux:
                    "con=null", "con0=fd:0,fd:1"]
         with open(folder / "guest.console", "wb") as console:
             subprocess.run(command, stdin=subprocess.DEVNULL, stdout=console, stderr=console, timeout=seconds,
-                           check=False)
+                           check=False, preexec_fn=foremost)
         code = folder / "guest.exit"
         return int(code.read_text()) if code.exists() else 1
 

@@ -13,7 +13,10 @@ import sys
 import time
 
 READY_WITHIN_S = 30.0
+NAP_S = 0.01
+STALL_NOTED_S = 0.02
 STOP_WITHIN_S = 20.0
+SAID_WITHIN_S = 20.0
 WATCHDOG_USEC = 2_000_000
 
 
@@ -95,6 +98,41 @@ class Daemon:
         return code
 
 
+class StallWatch:
+    """A process that naps again and again, and notes when it overslept: the daemon had no processor then either."""
+
+    def __init__(self, path):
+        self.path = path
+        with open(path, "wb"):
+            pass
+        parent = os.getpid()
+        self.child = os.fork()
+        if self.child == 0:
+            try:
+                self.watch(parent)
+            finally:
+                os._exit(1)  # without what the parent would still write
+
+    def watch(self, parent):
+        with open(self.path, "ab", buffering=0) as notes:
+            before = time.monotonic()
+            while os.getppid() == parent:
+                time.sleep(NAP_S)
+                now = time.monotonic()
+                if now - before > NAP_S + STALL_NOTED_S:
+                    notes.write(b"%d %d\n" % (time.time_ns() // 1000, (now - before - NAP_S) * 1e6))
+                before = now
+
+    def stop(self):
+        """What it saw: when each stall ended, on the clock of the frames, and its length, in microseconds."""
+        os.kill(self.child, signal.SIGKILL)
+        os.waitpid(self.child, 0)
+        with open(self.path, encoding="ascii") as notes:
+            seen = [[int(number) for number in line.split()] for line in notes]
+        os.unlink(self.path)
+        return seen
+
+
 def stop_quietly(process):
     process.send_signal(signal.SIGTERM)
     try:
@@ -114,19 +152,29 @@ def wait_until_still(path):
             return
 
 
-def make_links(case, verb):
+def run_program(command, **options):
+    done = subprocess.run(command, stderr=subprocess.PIPE, check=False, **options)
+    if done.returncode != 0:
+        raise OSError(f"{' '.join(command)}: exit {done.returncode}: {done.stderr.decode(errors='replace').strip()}")
+
+
+def make_links(case):
     lines = []
     for link in case["links"]:
-        if verb == "add":
-            if link.get("absent"):  # a step will make it
-                continue
+        if not link.get("absent"):  # a step will make it
             lines += [f"link add {link['name']} mtu {link.get('mtu', 16)} type vcan", f"link set {link['name']} up"]
-        else:
-            lines.append(f"link del {link['name']}")
-    subprocess.run(["ip", "-batch", "-"], input="\n".join(lines).encode(), check=verb == "add")
-    if verb == "add":
-        for command in case.get("after_links", []):
-            subprocess.run(command, check=True)
+    if lines:
+        run_program(["ip", "-batch", "-"], input="\n".join(lines).encode())
+    for command in case.get("after_links", []):
+        run_program(command)
+
+
+def remove_links(case):
+    """Those that are there: ip ends a batch at the first that is not, and the next case would find the others."""
+    there = {name for _, name in socket.if_nameindex()}
+    lines = [f"link del {link['name']}" for link in case["links"] if link["name"] in there]
+    if lines:
+        run_program(["ip", "-batch", "-"], input="\n".join(lines).encode())
 
 
 def play(log, daemon, folder, reload_after_s=None):
@@ -142,12 +190,25 @@ def play(log, daemon, folder, reload_after_s=None):
         raise OSError(f"canplayer {log}: exit {player.returncode}")
 
 
+def wait_until_said(text, daemon, seconds):
+    """By the daemon, to people."""
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        with open(daemon.stderr_path, encoding="utf-8", errors="replace") as file:
+            if text in file.read():
+                return
+        daemon.listen(0.1)
+    raise OSError(f"not said within {seconds:g} s: {text}")
+
+
 def take_steps(steps, daemon, folder):
     for verb, what in steps:
         if verb == "play":
             play(what, daemon, folder)
         elif verb == "wait":
             daemon.listen(what)
+        elif verb == "until_said":
+            wait_until_said(what, daemon, SAID_WITHIN_S)
         elif verb == "kill_and_restart":
             daemon.kill_and_restart()
         elif verb == "play_and_reload":
@@ -155,18 +216,19 @@ def take_steps(steps, daemon, folder):
         elif verb == "reload":
             daemon.reload()
         else:
-            subprocess.run(what, check=True)
+            run_program(what)
 
 
-def run_case(case, folder, memory):
-    result = {"name": case["name"]}
-    make_links(case, "add")
+def run_case(case, folder, memory, result):
     # A memory file system keeps the capture from waiting for a disk.
     capture_path = os.path.join(memory, "capture.tmp")
+    watch = dump = daemon = None
     try:
+        make_links(case)
         with open(capture_path, "wb") as capture, open(os.path.join(folder, "candump.err"), "wb") as errors:
             dump = subprocess.Popen(["candump", "-L", "-D", "-r", "8000000", "any"], stdout=capture, stderr=errors)
             time.sleep(0.5)
+            watch = StallWatch(os.path.join(memory, "stalls.tmp"))
             daemon = Daemon(case["command"], folder)
             result["ready"] = daemon.listen(READY_WITHIN_S, "READY=1")
             if result["ready"]:
@@ -183,17 +245,21 @@ def run_case(case, folder, memory):
         with open(capture_path, "rb") as capture, open(os.path.join(folder, "capture.log"), "wb") as out:
             out.write(capture.read())
     finally:
+        if watch is not None:
+            result["stalls_us"] = watch.stop()
+        for process in (dump, daemon.process if daemon else None):
+            if process is not None and process.poll() is None:
+                process.kill()
         if os.path.exists(capture_path):
             os.unlink(capture_path)
-        make_links(case, "del")
-    return result
+        remove_links(case)
 
 
-def run_command(case, folder, _memory):
+def run_command(case, folder, _memory, result):
     """A program that tests something by itself."""
     with open(os.path.join(folder, "output.txt"), "wb") as out:
         done = subprocess.run(case["command"], stdout=out, stderr=subprocess.STDOUT, check=False)
-    return {"name": case["name"], "exit": done.returncode}
+    result["exit"] = done.returncode
 
 
 def main():
@@ -202,10 +268,11 @@ def main():
         plan = json.load(file)
     for case in plan["cases"]:
         case_folder = os.path.join(folder, case["name"])
+        result = {"name": case["name"]}
         try:
-            result = (run_case if "links" in case else run_command)(case, case_folder, memory)
+            (run_case if "links" in case else run_command)(case, case_folder, memory, result)
         except (OSError, subprocess.SubprocessError) as error:
-            result = {"name": case["name"], "failure": str(error)}
+            result["failure"] = str(error)
         with open(os.path.join(case_folder, "result.json"), "w", encoding="utf-8") as file:
             json.dump(result, file)
         print(f"vcan: {case['name']} ran", file=sys.stderr, flush=True)

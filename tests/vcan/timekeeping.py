@@ -1,0 +1,33 @@
+"""Whether the machine kept time while a case played in real time. Only then is a failure the product's: a host
+that stands still fires time-outs for frames that it would have brought in time."""
+
+import verdicts
+
+# Half of the shortest time-out of a gyro.
+STALL_MOST_US = 50_000
+
+
+def longest_stall_us(folder, steps, result):
+    """Of the whole guest, as its watch saw it, or of the player alone, as the capture tells."""
+    return max([length for _, length in result.get("stalls_us", [])] + [player_lateness_us(folder, steps)])
+
+
+def player_lateness_us(folder, steps):
+    """How late a frame was captured, by the log that was played; the earliest of each play counts as in time. 0 where
+    frames are missing, which no stall of the player explains."""
+    plays = [verdicts.read_log(what if verb == "play" else what[0]) for verb, what in steps if verb.startswith("play")]
+    if not plays or not (folder / "capture.log").exists():
+        return 0
+    seen = verdicts.read_log(folder / "capture.log")
+    played_ids = {(line.bus, line.name) for play in plays for line in play}
+    worst = [0]
+    for bus in {bus for bus, _ in played_ids}:
+        captured = [line for line in seen if line.bus == bus and (bus, line.name) in played_ids]
+        for play in plays:
+            sent = [line for line in play if line.bus == bus]
+            late = [got.us - line.us for got, line in zip(captured, sent) if got.content == line.content]
+            if len(late) != len(sent):
+                return 0
+            captured = captured[len(sent):]
+            worst.append(max(late) - min(late) if late else 0)
+    return max(worst)
