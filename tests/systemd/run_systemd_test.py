@@ -16,8 +16,9 @@ from pathlib import Path
 HERE = Path(__file__).resolve().parent
 SOURCE = Path(os.environ.get("VGYRO_SOURCE", HERE.parents[1]))
 BIN = Path(os.environ.get("VGYRO_BIN", SOURCE / "build/release/bin")).resolve()
-sys.path[:0] = [str(HERE), str(SOURCE / "tests/vcan")]
+sys.path[:0] = [str(HERE), str(HERE.parent / "vcan")]
 import checks  # noqa: E402
+import ground  # noqa: E402
 import image  # noqa: E402
 import verdicts  # noqa: E402
 
@@ -106,7 +107,8 @@ def boot(folder, disk):
     command = [kernel, "mem=512M", f"ubd0={folder}/changes,{disk}", "root=/dev/ubda", "rw", "quiet",
                "init=/lib/systemd/systemd", "systemd.show_status=false", "con=null", "con0=fd:0,fd:1", f"proof={folder}"]
     with open(folder / "console.txt", "wb") as console:
-        subprocess.run(command, stdin=subprocess.DEVNULL, stdout=console, stderr=console, timeout=SECONDS_MOST, check=False)
+        subprocess.run(command, stdin=subprocess.DEVNULL, stdout=console, stderr=console, timeout=SECONDS_MOST, check=False,
+                       preexec_fn=ground.foremost)
 
 
 def main():

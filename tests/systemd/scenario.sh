@@ -21,8 +21,22 @@ show() { systemctl show vgyrod -p ActiveState,SubState,Result,MainPID,NRestarts,
 says() { [[ $(systemctl show vgyrod -p "$1" --value) == $2 ]]; }
 pid() { systemctl show vgyrod -p MainPID --value; }
 journal() { journalctl -u vgyrod --no-pager -o short-unix --since "@$1"; }
-other_pid() { says ActiveState active && says MainPID '[1-9]*' && ! says MainPID "$1"; }
+other_pid() {  # at one look: between two, the process may go
+    local shown; shown=$(systemctl show vgyrod -p ActiveState,MainPID)
+    [[ $shown == *ActiveState=active* && $shown =~ MainPID=([1-9][0-9]*) && ${BASH_REMATCH[1]} != "$1" ]]
+}
+said() { (($(journal "$since" | grep -c -e "$1") >= ${2-1})); }  # said TEXT [TIMES]: since $since
 play() { canplayer -I "$here/$1.log"; }
+watch_time() {  # notes when a nap of 20 ms took 50 ms more: when it ended and how long, in microseconds
+    local before=${EPOCHREALTIME/./} now never
+    exec {never}<><(:)
+    while :; do
+        read -rt 0.02 -u $never
+        now=${EPOCHREALTIME/./}
+        ((now - before < 70000)) || echo "$now $((now - before - 20000))"
+        before=$now
+    done
+}
 mkdir -p /run/modules
 mount -t hostfs none /run/modules -o "$(cat $here/modules.path)"
 for module in can can-raw can-dev vcan; do insmod "$(find /run/modules -name "$module.ko*")"; done 2>"$out/modules.txt"
@@ -39,9 +53,13 @@ systemctl stop systemd-networkd
 
 candump -L -D -r 4000000 vcan0,610:7FC >/run/capture.log &
 dump=$!
+watch_time >/run/stalls.txt &
+watch=$!
 
 # Installed, not configured.
+since=0
 step install dpkg -i $here/vgyro.deb
+step unconfigured_said within 30 said 'names no gyros yet'
 step unconfigured show
 step unconfigured_journal journal 0
 step unconfigured_failed systemctl list-units --failed --no-legend
@@ -50,7 +68,7 @@ cp /run/capture.log $out/unconfigured.log
 # Badly configured.
 echo '[[gyro]]' >/etc/vgyro/vgyro.toml
 step bad_start systemctl start vgyrod
-sleep 3
+sleep 3  # it must not try again
 step bad_started show
 
 # Configured.
@@ -90,7 +108,7 @@ step save busctl call "${gateway[@]}" org.vgyro.Gateway1 SaveState
 # Killed without warning, and back with what it knew.
 since=$(date +%s)
 kill -9 $main
-step killed within 20 other_pid $main
+step killed within 60 other_pid $main
 step killed_show show
 step killed_play play rest
 step killed_journal journal $since
@@ -100,22 +118,24 @@ main=$(pid)
 since=$(date +%s)
 sed 's/^rest_s/resst_s/' $here/vgyro.toml >/etc/vgyro/vgyro.toml
 step reload_bad systemctl reload vgyrod
-sleep 1
+step reload_bad_said within 30 said 'configuration is refused'
+within 30 says ActiveState active
 step reload_bad_show show
 tac $here/vgyro.toml | sed '0,/^bus = /s//bias_id = 0x613\n&/' | tac >/etc/vgyro/vgyro.toml
 step reload_good systemctl reload vgyrod
-sleep 1
+step reload_good_said within 30 said 'the new configuration is in use'
 step reload_play play rest
 cp $here/vgyro.toml /etc/vgyro/vgyro.toml
 step reload_back systemctl reload vgyrod
-sleep 1
+step reload_back_said within 30 said 'the new configuration is in use' 2
+within 30 says ActiveState active
 step reload_show show
 step reload_journal journal $since
 
 # Stopped by somebody: the watchdog ends it.
 since=$(date +%s)
 kill -STOP $main
-step watchdog within 40 other_pid $main
+step watchdog within 90 other_pid $main
 step watchdog_show show
 step watchdog_play play rest
 step watchdog_journal journal $since
@@ -124,10 +144,10 @@ main=$(pid)
 # The link goes and comes.
 since=$(date +%s)
 ip link set vcan0 down
-sleep 1.5
+step link_down within 30 said 'vcan0: link went down'
+sleep 1  # of frames that must not come out afterwards
 ip link set vcan0 up
-sleep 1.5
-cp /run/capture.log $out/before_link_play.log
+step link_up within 30 said 'vcan0: link is up again'
 step link_play play rest
 step link_show show
 step link_journal journal $since
@@ -155,8 +175,8 @@ step purge dpkg -P vgyro
 step purged_left find / -xdev '(' -path /usr/local -o -path /proc -o -path /var/lib/dpkg -o -path /run ')' -prune -o -name '*vgyro*' -print
 step purged_failed systemctl list-units --failed --no-legend
 
-kill $dump
+kill $watch $dump
 wait $dump
-cp /run/capture.log $out/capture.log
+cp /run/capture.log /run/stalls.txt $out/
 step journal journalctl -b --no-pager -p warning
 cat /proc/uptime >$out/uptime.txt
