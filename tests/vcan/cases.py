@@ -371,8 +371,9 @@ class DeadBusCase:
         used, wake_ups = (result["resources"][what] - result["resources_at_start"][what] for what in ("cpu_s", "wake_ups"))
         # Ten heartbeats a second that nothing takes, each dropped when it is stale, and the clockwork of each second.
         require(wake_ups <= 40 * self.seconds, f"woke up {wake_ups} times in {self.seconds:g} s")
-        # A busy loop takes all. Guests pay twenty times as much for a system call, and for what their host is busy with.
-        require(used <= 0.03 * self.seconds, f"{used:.2f} s of processor time in {self.seconds:g} s")
+        # A busy loop takes all. Guests pay twenty times as much for a system call, and for what their host is busy with:
+        # each wake-up may take what is a millisecond there.
+        require(used <= 0.1 * self.seconds, f"{used:.2f} s of processor time in {self.seconds:g} s")
         return f"{wake_ups / self.seconds:.0f} wake-ups a second, {used / self.seconds:.1%} of a processor, {describe(run)}"
 
 

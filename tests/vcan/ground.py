@@ -31,12 +31,10 @@ exec {python} -c 'import ctypes; ctypes.CDLL(None).reboot(0x4321FEDC)'
 
 
 def foremost():
-    """What plays in real time goes before what the host computes meanwhile, where it may: by its own priority, and by its
-    session's, which Linux weighs first."""
+    """What plays in real time goes before what the host computes meanwhile, where it may. A guest is many processes that
+    wait for each other: at a common priority each would wait for the end of a neighbour's turn."""
     try:
-        os.nice(-10)
-        os.setsid()
-        Path("/proc/self/autogroup").write_text("-10", encoding="ascii")
+        os.sched_setscheduler(0, os.SCHED_RR, os.sched_param(1))
     except OSError:
         pass
 

@@ -34,6 +34,7 @@ class Daemon:
         self.stderr_path = os.path.join(folder, "vgyrod.err")
         self.restarts_us = []  # on the clock of the frames
         self.reloads_us = []
+        self.listened_us = []  # from, to: what this harness does in between, starting programs, takes the processor too
         self.start()
 
     def start(self):
@@ -57,6 +58,13 @@ class Daemon:
 
     def listen(self, seconds, until=None):
         """Collects notices for some time, or until one of them starts with `until`."""
+        begin_us = time.time_ns() // 1000
+        try:
+            return self.collect(seconds, until)
+        finally:
+            self.listened_us.append([begin_us, time.time_ns() // 1000])
+
+    def collect(self, seconds, until):
         end = time.monotonic() + seconds
         while (left := end - time.monotonic()) > 0:
             self.listener.settimeout(min(left, 0.1))
@@ -247,6 +255,7 @@ def run_case(case, folder, memory, result):
     finally:
         if watch is not None:
             result["stalls_us"] = watch.stop()
+            result["listened_us"] = daemon.listened_us if daemon else []
         for process in (dump, daemon.process if daemon else None):
             if process is not None and process.poll() is None:
                 process.kill()

@@ -99,7 +99,7 @@ def main():
             if not void:
                 break
             print(f"vcan: void, for the machine stood still: {', '.join(case.name for case in void)}")
-    note = f"; {voids} runs of a case were void, for the machine stood still" if voids else ""
+    note = f", beside {voids} void run{'s' * (voids > 1)} of a case while the machine stood still" if voids else ""
     if void:
         print(f"vcan: the machine never kept time in {RUNS_MOST} runs: {', '.join(case.name for case in void)}")
     if failed or void:

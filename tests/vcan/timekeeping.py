@@ -8,8 +8,14 @@ STALL_MOST_US = 50_000
 
 
 def longest_stall_us(folder, steps, result):
-    """Of the whole guest, as its watch saw it, or of the player alone, as the capture tells."""
-    return max([length for _, length in result.get("stalls_us", [])] + [player_lateness_us(folder, steps)])
+    """Of the whole guest, as its watch saw it while nothing but daemon and player should run, or of the player alone, as
+    the capture tells."""
+    seen = [overlap_us(end - length, end, result["listened_us"]) for end, length in result.get("stalls_us", [])]
+    return max([*seen, player_lateness_us(folder, steps)])
+
+
+def overlap_us(begin, end, spans):
+    return sum(max(0, min(end, until) - max(begin, since)) for since, until in spans)
 
 
 def player_lateness_us(folder, steps):
