@@ -488,11 +488,11 @@ class RestartCase:
     def prepare(self, folder):
         twin = Twin(run_s=0.0)
         twin.prepare(folder)
-        state, kept = folder / "state.toml", folder / "kept.toml"
+        state, kept = "{memory}/state.toml", folder / "kept.toml"
         log = ["play", str(folder / "played.log")]
-        steps = [log, ["wait", 0.5], ["kill_and_restart", None], ["run", ["cp", str(state), str(kept)]], log]
+        steps = [log, ["wait", 0.5], ["kill_and_restart", None], ["run", ["cp", state, str(kept)]], log]
         return {"links": twin.links(), "steps": steps,
-                "command": [str(BIN / "vgyrod"), "--config", str(folder / "vgyro.toml"), *self.more, "--state", str(state)]}
+                "command": [str(BIN / "vgyrod"), "--config", str(folder / "vgyro.toml"), *self.more, "--state", state]}
 
     def judge(self, folder, result):
         run = read_run(folder, result)
@@ -517,6 +517,7 @@ class RestartCase:
 
     def check_file(self, path):
         """Its checksum and its form, by Python's own readers."""
+        require(path.exists(), f"{path.name} was not written")
         data = path.read_bytes()
         content, _, _ = data.rpartition(b"\n[checksum]\n")
         read = tomllib.loads(data.decode("ascii"))

@@ -227,6 +227,14 @@ def take_steps(steps, daemon, folder):
             run_program(what)
 
 
+def keep_files(memory, folder):
+    """What the daemon writes is in memory meanwhile: where the folder is the host's, the whole guest waits for its disk."""
+    for name in os.listdir(memory):
+        if name.startswith(("state.toml", "vgyrod.err")):
+            run_program(["cp", "-p", os.path.join(memory, name), folder])
+            os.unlink(os.path.join(memory, name))
+
+
 def run_case(case, folder, memory, result):
     # A memory file system keeps the capture from waiting for a disk.
     capture_path = os.path.join(memory, "capture.tmp")
@@ -237,7 +245,7 @@ def run_case(case, folder, memory, result):
             dump = subprocess.Popen(["candump", "-L", "-D", "-r", "8000000", "any"], stdout=capture, stderr=errors)
             time.sleep(0.5)
             watch = StallWatch(os.path.join(memory, "stalls.tmp"))
-            daemon = Daemon(case["command"], folder)
+            daemon = Daemon(case["command"], memory)
             result["ready"] = daemon.listen(READY_WITHIN_S, "READY=1")
             if result["ready"]:
                 result["resources_at_start"] = daemon.resources()
@@ -259,8 +267,10 @@ def run_case(case, folder, memory, result):
         for process in (dump, daemon.process if daemon else None):
             if process is not None and process.poll() is None:
                 process.kill()
+                process.wait()
         if os.path.exists(capture_path):
             os.unlink(capture_path)
+        keep_files(memory, folder)
         remove_links(case)
 
 
@@ -274,7 +284,7 @@ def run_command(case, folder, _memory, result):
 def main():
     folder, memory = sys.argv[1:]
     with open(os.path.join(folder, "plan.json"), encoding="utf-8") as file:
-        plan = json.load(file)
+        plan = json.loads(file.read().replace("{memory}", memory))
     for case in plan["cases"]:
         case_folder = os.path.join(folder, case["name"])
         result = {"name": case["name"]}
