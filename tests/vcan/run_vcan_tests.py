@@ -1,7 +1,8 @@
 #!/usr/bin/python3
 """Runs the real vgyrod on a real vcan, and holds what it sent against `vgyro replay` of what it
 received. Natively where the host's kernel has vcan, else inside User Mode Linux. Never skips: exits
-with 1 when a case fails or nothing could run."""
+with 1 when a case fails or nothing could run. A case that fails while the machine stood still is void
+and run again; see timekeeping.py."""
 
 import argparse
 import json
