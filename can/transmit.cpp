@@ -7,6 +7,15 @@ namespace vgyro::can {
 TransmitQueue::TransmitQueue(const TransmitLimits& limits)
     : limits_(limits), ring_(std::max<std::size_t>(limits.capacity, 1)) {}
 
+// What the kernel refuses is tried once more by drain(), which keeps the books of refusals.
+bool TransmitQueue::send_at_once(const Frame& frame, Sender& sender) {
+  if (size_ > 0 || awaits_writable_ || wait_ != Duration{}) return false;
+  if (sender.send(frame) != SendResult::kSent) return false;
+  link_down_ = false;
+  ++counts_.sent;
+  return true;
+}
+
 void TransmitQueue::push(const Frame& frame, TimePoint send_by) {
   if (size_ == ring_.size()) {
     pop();

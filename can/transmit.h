@@ -32,6 +32,10 @@ class TransmitQueue {
  public:
   explicit TransmitQueue(const TransmitLimits& limits = {});
 
+  /// Sends at once, where nothing waits and nothing holds back, which is nearly always; needs no
+  /// time. False when it has not gone out: push() it.
+  bool send_at_once(const Frame& frame, Sender& sender);
+
   /// Last in the order of sending. Dropped when not sent by `send_by`.
   void push(const Frame& frame, TimePoint send_by);
 

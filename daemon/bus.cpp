@@ -4,8 +4,13 @@
 
 namespace vgyro::daemon {
 
-Bus::Bus(std::string name, std::vector<can::Filter> filters, can::SocketOptions options, Log& log)
-    : name_(std::move(name)), filters_(std::move(filters)), options_(options), log_(&log) {}
+Bus::Bus(std::string name, std::vector<can::Filter> filters, can::SocketOptions options,
+         TurnClock& clock, Log& log)
+    : name_(std::move(name)),
+      filters_(std::move(filters)),
+      options_(options),
+      turn_clock_(&clock),
+      log_(&log) {}
 
 Expected<void> Bus::open() {
   Expected<can::Socket> socket = can::Socket::open(name_, filters_, options_);
@@ -44,7 +49,7 @@ Arrival Bus::peek() {
   }
   const can::Received& received = batch_.frames[next_];
   if (stamped_ == next_) {  // each stamp goes through the clock once
-    const TimePoint software = received.stamp == TimePoint{} ? now_ : received.stamp;
+    const TimePoint software = received.stamp == TimePoint{} ? turn_clock_->wall() : received.stamp;
     next_stamp_ = clock_.host_time(software, received.hardware);
     ++stamped_;
   }

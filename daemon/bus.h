@@ -15,6 +15,7 @@
 #include "can/socket.h"
 #include "can/stamp_clock.h"
 #include "daemon/bus_status.h"
+#include "daemon/host_time.h"
 #include "daemon/line_budget.h"
 #include "daemon/log.h"
 
@@ -27,18 +28,17 @@ struct Arrival {
 
 class Bus final : public can::Sender {
  public:
-  /// Without filters the bus is only written to.
-  Bus(std::string name, std::vector<can::Filter> filters, can::SocketOptions options, Log& log);
+  /// Without filters the bus is only written to. The clock stands in where the kernel gives no
+  /// stamp.
+  Bus(std::string name, std::vector<can::Filter> filters, can::SocketOptions options,
+      TurnClock& clock, Log& log);
 
   /// Binds a new socket, filters included. An interface that is not there yet is no error: it is
   /// told once, and is_open() stays false.
   Expected<void> open();
 
   /// Poll reported something: read again when peek() runs dry, but not without end.
-  void begin_reading(TimePoint now) {
-    reads_left_ = kReadsPerCycle;
-    now_ = now;
-  }
+  void begin_reading() { reads_left_ = kReadsPerCycle; }
 
   /// The oldest frame not yet taken; its frame is null when there is none for now. Error frames are
   /// kept here.
@@ -57,7 +57,7 @@ class Bus final : public can::Sender {
 
   /// Throws away what the kernel holds.
   void discard() {
-    for (begin_reading({}); peek().frame != nullptr;)
+    for (begin_reading(); peek().frame != nullptr;)
       take();
   }
 
@@ -87,6 +87,7 @@ class Bus final : public can::Sender {
   std::string name_;
   std::vector<can::Filter> filters_;
   can::SocketOptions options_;
+  TurnClock* turn_clock_;
   Log* log_;
   LineBudget lines_;
   std::optional<can::Socket> socket_;
@@ -96,7 +97,6 @@ class Bus final : public can::Sender {
   std::size_t next_ = 0;
   TimePoint next_stamp_;
   std::size_t stamped_ = 0;  ///< frames of the batch whose stamp has been worked out
-  TimePoint now_;            ///< stands in where the kernel gave no stamp
   int reads_left_ = 0;
   bool more_ = false;
   bool down_ = false;

@@ -15,8 +15,8 @@ namespace vgyro::daemon {
 namespace {
 
 constexpr std::uint32_t kEventsTag = 0xFFFFFFFF;
+constexpr std::uint32_t kTimerTag = 0xFFFFFFFE;
 constexpr std::uint64_t kSecondUsec = 1'000'000;
-constexpr int kPollMostMs = 1000;
 
 // A process that was stopped must not send its backlog.
 constexpr Duration kAgeMost = std::chrono::milliseconds(250);
@@ -25,9 +25,10 @@ constexpr Duration kAgeMost = std::chrono::milliseconds(250);
 // is dropped when it is stale; from the kernel it would come out in a burst.
 constexpr int kSendBufferBytes = 1;
 
-TimePoint read_clock(clockid_t clock) {
+template <clockid_t Clock>
+TimePoint read_clock() {
   timespec now{};
-  ::clock_gettime(clock, &now);
+  ::clock_gettime(Clock, &now);
   return time_from_ns(static_cast<std::int64_t>(now.tv_sec) * 1'000'000'000 + now.tv_nsec);
 }
 
@@ -39,15 +40,9 @@ std::vector<can::Filter> filters_of(const gateway::Plan& plan, std::size_t bus) 
   return filters;
 }
 
-int milliseconds_until(TimePoint deadline, TimePoint now) {
-  if (deadline <= now) return 0;
-  if (deadline > now + std::chrono::milliseconds(kPollMostMs)) return kPollMostMs;
-  return static_cast<int>(std::chrono::ceil<std::chrono::milliseconds>(deadline - now).count());
-}
-
 }  // namespace
 
-GatewayLoop::Setup::Setup(gateway::Plan the_plan, Log& log)
+GatewayLoop::Setup::Setup(gateway::Plan the_plan, TurnClock& clock, Log& log)
     : plan(std::move(the_plan)),
       reporter(std::make_unique<Reporter>(std::array{plan.gyros[0].name, plan.gyros[1].name},
                                           plan.calibration.rest_s, log)),
@@ -56,7 +51,7 @@ GatewayLoop::Setup::Setup(gateway::Plan the_plan, Log& log)
   for (std::size_t i = 0; i < plan.buses.size(); ++i) {
     can::SocketOptions options;
     options.send_buffer_bytes = kSendBufferBytes;
-    buses.emplace_back(plan.buses[i], filters_of(plan, i), options, log);
+    buses.emplace_back(plan.buses[i], filters_of(plan, i), options, clock, log);
   }
 }
 
@@ -66,7 +61,8 @@ GatewayLoop::GatewayLoop(gateway::Plan plan, Loader loader, StateKeeper* keeper,
       keeper_(keeper),
       metrics_(metrics),
       log_(log),
-      setup_(std::make_unique<Setup>(std::move(plan), log)) {}
+      clock_(&read_clock<CLOCK_REALTIME>, &read_clock<CLOCK_MONOTONIC>),
+      setup_(std::make_unique<Setup>(std::move(plan), clock_, log)) {}
 
 GatewayLoop::~GatewayLoop() {
   if (epoll_fd_ >= 0) ::close(epoll_fd_);
@@ -105,10 +101,14 @@ Expected<void> GatewayLoop::poll_buses() {
 }
 
 bool GatewayLoop::poll_bus(std::size_t index) {
+  return poll_readable(setup_->buses[index].socket().fd(), static_cast<std::uint32_t>(index));
+}
+
+bool GatewayLoop::poll_readable(int fd, std::uint32_t tag) const {
   epoll_event event{};
   event.events = EPOLLIN;
-  event.data.u32 = static_cast<std::uint32_t>(index);
-  return ::epoll_ctl(epoll_fd_, EPOLL_CTL_ADD, setup_->buses[index].socket().fd(), &event) == 0;
+  event.data.u32 = tag;
+  return ::epoll_ctl(epoll_fd_, EPOLL_CTL_ADD, fd, &event) == 0;
 }
 
 void GatewayLoop::take_up_state() {
@@ -145,19 +145,17 @@ Expected<void> GatewayLoop::start_events() {
   }
   if (result < 0) return fail("sd-event", system_reason(-result));
 
-  epoll_event event{};
-  event.events = EPOLLIN;
-  event.data.u32 = kEventsTag;
-  if (::epoll_ctl(epoll_fd_, EPOLL_CTL_ADD, sd_event_get_fd(events), &event) != 0) {
+  if (!poll_readable(sd_event_get_fd(events), kEventsTag)) {
     return fail("sd-event", system_reason(errno));
   }
+  if (Expected<void> opened = timer_.open(); !opened) return opened;
+  if (!poll_readable(timer_.fd(), kTimerTag)) return fail("timerfd", system_reason(errno));
   return {};
 }
 
 Expected<void> GatewayLoop::run() {
   std::array<epoll_event, 16> ready{};
-  read_clocks();
-  started_ = steady_now_;
+  started_ = clock_.steady();
   control_.emplace(events_.get(),
                    Control::Gateway{.snapshot = [this]() -> const Snapshot& { return snapshot(); },
                                     .recalibrate = [this] { recalibration_wanted_ = true; },
@@ -165,14 +163,13 @@ Expected<void> GatewayLoop::run() {
                    log_);
   if (Expected<void> armed = serve_events(false); !armed) return armed;
   notify_ready(status_line());
+  set_alarm(true);
   while (!stopping_) {
-    const int count =
-        ::epoll_wait(epoll_fd_, ready.data(), static_cast<int>(ready.size()), timeout_ms());
+    const int count = ::epoll_wait(epoll_fd_, ready.data(), static_cast<int>(ready.size()), -1);
     if (count < 0 && errno != EINTR) return fail("epoll", system_reason(errno));
     const std::span<const epoll_event> events{ready.data(),
                                               static_cast<std::size_t>(std::max(count, 0))};
-    if (Expected<void> done = cycle(events); !done) return done;
-    if (Expected<void> done = do_what_was_asked(); !done) return done;
+    if (Expected<void> done = turn(events); !done) return done;
   }
   notify_stopping();
   if (keeper_ != nullptr) keeper_->finish(setup_->pipeline.memory());
@@ -191,42 +188,61 @@ Expected<void> GatewayLoop::serve_events(bool armed) {
   }
 }
 
-void GatewayLoop::read_clocks() {
-  now_ = read_clock(CLOCK_REALTIME);
-  steady_now_ = read_clock(CLOCK_MONOTONIC);
-  pipeline_now_ = forward_.update(now_, steady_now_);
-}
-
-Expected<void> GatewayLoop::cycle(std::span<const epoll_event> ready) {
-  read_clocks();
+Expected<void> GatewayLoop::turn(std::span<const epoll_event> ready) {
+  clock_.begin_turn();
   bool events_ready = false;
+  bool rang = false;
   for (const epoll_event& event : ready) {
     if (event.data.u32 == kEventsTag) {
       events_ready = true;
-      continue;
+    } else if (event.data.u32 == kTimerTag) {
+      rang = true;
+    } else {
+      if ((event.events & EPOLLOUT) != 0) queue_.on_writable();
+      if ((event.events & ~std::uint32_t{EPOLLOUT}) != 0)
+        setup_->buses[event.data.u32].begin_reading();
     }
-    if ((event.events & EPOLLOUT) != 0) queue_.on_writable();
-    if ((event.events & ~std::uint32_t{EPOLLOUT}) != 0)
-      setup_->buses[event.data.u32].begin_reading(now_);
   }
   hand_on_arrivals();
-  if (pipeline_now_ >= setup_->pipeline.next_deadline()) {
-    // Frames that came before now_ but after poll had looked count before the time-out does.
-    for (Bus& bus : setup_->buses)
-      bus.begin_reading(now_);
-    hand_on_arrivals();
-    if (all_drained()) setup_->pipeline.advance(pipeline_now_, *this);
-  }
+  if (rang) look_at_time();
   flush();
   if (std::exchange(has_spoken_, false)) look_at_status();
-  return events_ready ? serve_events(true) : Expected<void>{};
+  if (events_ready) {
+    if (Expected<void> done = serve_events(true); !done) return done;
+    if (Expected<void> done = do_what_was_asked(); !done) return done;
+  }
+  set_alarm(rang);
+  return {};
+}
+
+// The present on the clock of the frames' stamps, without its backward steps.
+TimePoint GatewayLoop::pipeline_now() {
+  return forward_.update(clock_.wall(), clock_.steady());
+}
+
+// Frames tell the time by themselves; this is for when none comes.
+void GatewayLoop::look_at_time() {
+  const TimePoint now = pipeline_now();
+  if (now < setup_->pipeline.next_deadline()) return;
+  // Frames that came before now but after poll had looked count before the time-out does.
+  for (Bus& bus : setup_->buses)
+    bus.begin_reading();
+  hand_on_arrivals();
+  if (all_drained()) setup_->pipeline.advance(now, *this);
+}
+
+void GatewayLoop::set_alarm(bool rang) {
+  const TimePoint due = setup_->pipeline.next_deadline();
+  const TimePoint queue_due = queue_.next_deadline().value_or(TimePoint::max());
+  if (!rang && !alarm_.is_late_for(due, queue_due)) return;
+  timer_.set(alarm_.set(due, pipeline_now(), queue_due, clock_.steady()));
 }
 
 void GatewayLoop::look_at_status() {
   const gateway::Status& status = setup_->pipeline.status();
   setup_->reporter->check_state(status);
   const std::uint64_t samples = status.gyros[0].samples + status.gyros[1].samples;
-  if (std::exchange(samples_, samples) != samples) forward_.sample_came();
+  if (std::exchange(samples_, samples) != samples) forward_.sample_came(clock_.wall());
 }
 
 void GatewayLoop::hand_on_arrivals() {
@@ -254,14 +270,18 @@ Bus* GatewayLoop::earliest(Arrival& arrival) {
 
 void GatewayLoop::put(const can::Frame& frame, TimePoint stamp) {
   if (frame.id == setup_->plan.output.rate_id) patience_.rate_at(stamp);
-  queue_.push(frame, steady_now_ + std::min(patience_.value(), stamp + kAgeMost - now_));
+  const Duration left = stamp + kAgeMost - clock_.wall();
+  const bool timely = left >= Duration{};
+  if (!timely || !queue_.send_at_once(frame, setup_->buses[setup_->plan.output.bus])) {
+    queue_.push(frame, clock_.steady() + std::min(patience_.value(), left));
+  }
   has_spoken_ = true;
   ++put_out_;
 }
 
 void GatewayLoop::flush() {
   if (queue_.size() == 0) return;
-  queue_.drain(steady_now_, setup_->buses[setup_->plan.output.bus]);
+  queue_.drain(clock_.steady(), setup_->buses[setup_->plan.output.bus]);
   if (queue_.wants_writable() != polls_writable_) poll_writable(!polls_writable_);
 }
 
@@ -274,14 +294,6 @@ void GatewayLoop::poll_writable(bool wanted) {
   if (::epoll_ctl(epoll_fd_, EPOLL_CTL_MOD, output.socket().fd(), &event) == 0) {
     polls_writable_ = wanted;
   }
-}
-
-// Never zero: a deadline that somehow stays in the past must not turn into a busy loop.
-int GatewayLoop::timeout_ms() const {
-  const int pipeline_ms = milliseconds_until(setup_->pipeline.next_deadline(), pipeline_now_);
-  const int queue_ms =
-      milliseconds_until(queue_.next_deadline().value_or(TimePoint::max()), steady_now_);
-  return std::max(std::min(pipeline_ms, queue_ms), 1);
 }
 
 bool GatewayLoop::all_drained() const {
@@ -359,14 +371,14 @@ Expected<void> GatewayLoop::save_state() {
   return {};
 }
 
-// Once in a cycle: a request for all properties asks for each of them.
+// Once in a turn: a request for all properties asks for each of them.
 const Snapshot& GatewayLoop::snapshot() {
-  if (std::exchange(snapshot_at_, steady_now_) == steady_now_ && snapshot_.plan != nullptr)
+  if (std::exchange(snapshot_at_, clock_.steady()) == clock_.steady() && snapshot_.plan != nullptr)
     return snapshot_;
   snapshot_.plan = &setup_->plan;
   snapshot_.status = setup_->pipeline.status();
   snapshot_.traffic = traffic();
-  snapshot_.uptime_s = to_seconds(steady_now_ - started_);
+  snapshot_.uptime_s = to_seconds(clock_.steady() - started_);
   snapshot_.config_refused = reload_refused_;
   snapshot_.bias_sigma_dps.fill(std::numeric_limits<double>::quiet_NaN());
   if (const std::optional<gateway::SavedState> memory = setup_->pipeline.memory()) {
@@ -388,18 +400,18 @@ Expected<void> GatewayLoop::reload() {
     log_.tell(Severity::kError, {.cause = "config_refused"},
               "the new configuration is refused; the old one goes on");
   }
-  read_clocks();
+  clock_.begin_turn();
   notify_ready(status_line());
   return {};
 }
 
 Expected<void> GatewayLoop::replace_setup(gateway::Plan plan, bool keep) {
-  auto next = std::make_unique<Setup>(std::move(plan), log_);
+  auto next = std::make_unique<Setup>(std::move(plan), clock_, log_);
   if (Expected<void> opened = open_buses(*next); !opened) return opened;
   // The old pipeline takes what has come so far, also through the sockets of the new one.
-  read_clocks();
+  clock_.begin_turn();
   for (Bus& bus : setup_->buses)
-    bus.begin_reading(now_);
+    bus.begin_reading();
   hand_on_arrivals();
   for (Bus& bus : next->buses)
     bus.discard();
@@ -452,7 +464,7 @@ int GatewayLoop::on_second(sd_event_source* source, std::uint64_t, void* self) {
 
 int GatewayLoop::on_watchdog(sd_event_source* source, std::uint64_t, void* self) {
   auto& loop = *static_cast<GatewayLoop*>(self);
-  if (loop.life_.has_moved(loop.steady_now_, loop.put_out_)) notify_alive();
+  if (loop.life_.has_moved(loop.clock_.steady(), loop.put_out_)) notify_alive();
   sd_event_source_set_time_relative(source, loop.watchdog_half_usec_);
   return sd_event_source_set_enabled(source, SD_EVENT_ONESHOT);
 }

@@ -18,6 +18,7 @@
 #include "can/transmit.h"
 #include "daemon/bus.h"
 #include "daemon/control.h"
+#include "daemon/deadline_timer.h"
 #include "daemon/host_time.h"
 #include "daemon/log.h"
 #include "daemon/metrics.h"
@@ -54,7 +55,7 @@ class GatewayLoop final : private gateway::FrameSink {
 
   /// What one configuration makes; replaced as a whole.
   struct Setup {
-    Setup(gateway::Plan the_plan, Log& log);
+    Setup(gateway::Plan the_plan, TurnClock& clock, Log& log);
     gateway::Plan plan;
     std::unique_ptr<Reporter> reporter;
     gateway::Pipeline pipeline;
@@ -69,9 +70,12 @@ class GatewayLoop final : private gateway::FrameSink {
   static Expected<void> check_output(const Setup& setup);
   Expected<void> poll_buses();
   bool poll_bus(std::size_t index);
+  [[nodiscard]] bool poll_readable(int fd, std::uint32_t tag) const;
   Expected<void> serve_events(bool armed);
-  Expected<void> cycle(std::span<const epoll_event> ready);
-  void read_clocks();
+  Expected<void> turn(std::span<const epoll_event> ready);
+  TimePoint pipeline_now();
+  void look_at_time();
+  void set_alarm(bool rang);
   void hand_on_arrivals();
   Bus* earliest(Arrival& arrival);
   void flush();
@@ -88,7 +92,6 @@ class GatewayLoop final : private gateway::FrameSink {
   std::string hand_over(Setup& next);
   std::string begin_anew(Setup& next);
   const Snapshot& snapshot();
-  [[nodiscard]] int timeout_ms() const;
   [[nodiscard]] Traffic traffic() const;
   [[nodiscard]] bool all_drained() const;
   [[nodiscard]] std::string status_line();
@@ -102,14 +105,17 @@ class GatewayLoop final : private gateway::FrameSink {
   StateKeeper* keeper_;
   MetricsFile* metrics_;
   Log& log_;
+  TurnClock clock_;
   std::unique_ptr<Setup> setup_;
   can::TransmitQueue queue_;
   EventPointer events_{nullptr, &sd_event_unref};
   std::optional<Control> control_;
   Snapshot snapshot_;
   int epoll_fd_ = -1;
+  DeadlineTimer timer_;
+  Alarm alarm_;
   bool polls_writable_ = false;
-  bool has_spoken_ = false;  ///< in this cycle; no state changes without an output frame
+  bool has_spoken_ = false;  ///< in this turn; no state changes without an output frame
   bool stopping_ = false;
   bool reload_wanted_ = false;
   bool recalibration_wanted_ = false;
@@ -120,10 +126,7 @@ class GatewayLoop final : private gateway::FrameSink {
   std::uint64_t samples_ = 0;  ///< of both gyros, when last looked at
   Patience patience_;
   ForwardTime forward_;
-  TimePoint now_;           ///< the host's clock when the present cycle began
-  TimePoint pipeline_now_;  ///< the same without its backward steps
-  TimePoint steady_now_;    ///< the same on a clock that nobody sets
-  TimePoint started_;       ///< likewise
+  TimePoint started_;  ///< on the steady clock
   TimePoint snapshot_at_;
 };
 

@@ -5,10 +5,41 @@
 // not.
 
 #include <algorithm>
+#include <optional>
 
 #include "base/time.h"
 
 namespace vgyro::daemon {
+
+/// The host's clocks as one turn of the loop sees them: each is read when it is first asked for,
+/// and then stands still. Most turns ask for none: under User Mode Linux, and wherever the kernel
+/// has no quick way, reading one costs as much as reading a frame.
+class TurnClock {
+ public:
+  using Read = TimePoint (*)();
+  TurnClock(Read read_wall, Read read_steady) : read_wall_(read_wall), read_steady_(read_steady) {}
+
+  void begin_turn() {
+    wall_.reset();
+    steady_.reset();
+  }
+  /// The clock of the frames' stamps, which may be set.
+  TimePoint wall() {
+    if (!wall_) wall_ = read_wall_();
+    return *wall_;
+  }
+  /// One that nobody sets.
+  TimePoint steady() {
+    if (!steady_) steady_ = read_steady_();
+    return *steady_;
+  }
+
+ private:
+  Read read_wall_;
+  Read read_steady_;
+  std::optional<TimePoint> wall_;
+  std::optional<TimePoint> steady_;
+};
 
 /// The stamps' clock, without its backward steps: nobody would notice a silence until it had caught
 /// up. Where samples come, the pipeline takes a step out of their stamps; then it is forgotten
@@ -17,21 +48,28 @@ class ForwardTime {
  public:
   TimePoint update(TimePoint wall, TimePoint steady) {
     if (begun_) {
-      const TimePoint expected = wall_ + (steady - steady_);
+      // A sample came since the last update, when on the steady clock nobody asked.
+      const TimePoint expected = sampled_ ? wall_ : wall_ + (steady - steady_);
       if (wall < expected - kStepLeast) set_back_ += expected - wall;
     }
     begun_ = true;
+    sampled_ = false;
     wall_ = wall;
     steady_ = steady;
     return wall + set_back_;
   }
-  void sample_came() { set_back_ = {}; }
+  void sample_came(TimePoint wall) {
+    begun_ = sampled_ = true;
+    wall_ = wall;
+    set_back_ = {};
+  }
 
  private:
-  // Slewing does not reach this between two turns of the loop.
+  // Slewing does not reach this between two updates.
   static constexpr Duration kStepLeast = std::chrono::milliseconds(100);
 
   bool begun_ = false;
+  bool sampled_ = false;  ///< wall_ is of the newest sample, and steady_ older
   TimePoint wall_;
   TimePoint steady_;
   Duration set_back_{};

@@ -54,6 +54,40 @@ TEST(TransmitQueue, SendsInTheOrderOfPushing) {
   EXPECT_EQ(queue.next_deadline(), std::nullopt);
 }
 
+TEST(TransmitQueue, SendsAtOnceWhereNothingWaits) {
+  TransmitQueue queue;
+  FakeSender sender;
+  EXPECT_TRUE(queue.send_at_once(numbered(1), sender));
+  EXPECT_EQ(sender.taken, (Ids{1}));
+  EXPECT_EQ(queue.counts().sent, 1U);
+  EXPECT_EQ(queue.size(), 0U);
+}
+
+TEST(TransmitQueue, SendsNothingPastWhatWaits) {
+  TransmitQueue queue;
+  FakeSender sender;
+  queue.push(numbered(1), at(10ms));
+  EXPECT_FALSE(queue.send_at_once(numbered(2), sender));
+  EXPECT_EQ(sender.attempts, 0);
+}
+
+// A refusal is met in one place, with its reason: the frame is kept and tried again in its time.
+TEST(TransmitQueue, WhatIsRefusedAtOnceIsPushed) {
+  TransmitQueue queue;
+  FakeSender sender;
+  sender.answers = {SendResult::kNoBuffer, SendResult::kNoBuffer};
+  EXPECT_FALSE(queue.send_at_once(numbered(1), sender));
+  EXPECT_EQ(queue.counts().sent, 0U);
+  queue.push(numbered(1), at(50ms));
+  queue.drain(at(0ms), sender);
+  EXPECT_FALSE(queue.send_at_once(numbered(2), sender)) << "not past a back-off";
+  EXPECT_EQ(sender.attempts, 2);
+  queue.push(numbered(2), at(50ms));
+  queue.drain(at(1ms), sender);
+  EXPECT_EQ(sender.taken, (Ids{1, 2}));
+  EXPECT_EQ(queue.counts().sent, 2U);
+}
+
 TEST(TransmitQueue, KeepsTheFrameAndBacksOffWhenTheDeviceQueueIsFull) {
   TransmitQueue queue({.capacity = 8, .first_retry = 1ms, .last_retry = 4ms});
   FakeSender sender;

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "daemon/deadline_timer.h"
 #include "daemon/service.h"
 
 namespace vgyro::daemon {
@@ -36,8 +37,27 @@ TEST(ForwardTime, IsTheWallClockAgainWhenASampleHasToldOfIt) {
   ForwardTime time;
   time.update(at(0s), steady(0s));
   time.update(at(-1h), steady(1s));
-  time.sample_came();
+  time.sample_came(at(-1h + 500ms));
   EXPECT_EQ(time.update(at(-1h + 1s), steady(2s)), at(-1h + 1s));
+}
+
+// While samples come the clock is not looked at; set back in the silence behind them, it is noticed
+// all the same.
+TEST(ForwardTime, GoesOnFromTheLastSampleWhenTheClockIsSetBackBehindIt) {
+  ForwardTime time;
+  time.update(at(0s), steady(0s));
+  time.sample_came(at(30s));
+  EXPECT_EQ(time.update(at(30s - 1h), steady(31s)), at(30s));
+  EXPECT_EQ(time.update(at(31s - 1h), steady(32s)), at(31s));
+}
+
+// And set back among them, it is their stamps' to tell.
+TEST(ForwardTime, LeavesAStepBetweenSamplesToTheirStamps) {
+  ForwardTime time;
+  time.update(at(0s), steady(0s));
+  time.sample_came(at(30s));
+  time.sample_came(at(-1h + 31s));
+  EXPECT_EQ(time.update(at(-1h + 32s), steady(32s)), at(-1h + 32s));
 }
 
 TEST(ForwardTime, LetsAClockBeSlewed) {
@@ -45,6 +65,52 @@ TEST(ForwardTime, LetsAClockBeSlewed) {
   time.update(at(0s), steady(0s));
   for (int i = 1; i < 100; ++i)
     EXPECT_EQ(time.update(at(i * 999ms), steady(i * 1000ms)), at(i * 999ms));
+}
+
+int readings = 0;
+TimePoint next_second() {
+  return at(std::chrono::seconds(++readings));
+}
+
+TEST(TurnClock, ReadsOnceATurnAndOnlyWhenAsked) {
+  readings = 0;
+  TurnClock clock(&next_second, &next_second);
+  clock.begin_turn();
+  EXPECT_EQ(readings, 0);
+  EXPECT_EQ(clock.wall(), at(1s));
+  EXPECT_EQ(clock.steady(), at(2s));
+  EXPECT_EQ(clock.wall(), at(1s));
+  EXPECT_EQ(clock.steady(), at(2s));
+  clock.begin_turn();
+  EXPECT_EQ(clock.steady(), at(3s));
+}
+
+TEST(Alarm, GoesOffForTheEarlierDeadline) {
+  Alarm alarm;
+  EXPECT_TRUE(alarm.is_late_for(at(40ms), steady(0s)));
+  EXPECT_EQ(alarm.set(at(40ms), at(0ms), steady(300ms), steady(0ms)), Duration(40ms));
+  EXPECT_EQ(alarm.set(at(400ms), at(0ms), steady(30ms), steady(0ms)), Duration(30ms));
+  EXPECT_EQ(alarm.set(at(400ms), at(0ms), TimePoint::max(), steady(0ms)), Duration(400ms));
+}
+
+// What moves to a later time leaves it alone; it goes off and is set again.
+TEST(Alarm, IsLateOnlyForADeadlineThatCameNearer) {
+  Alarm alarm;
+  alarm.set(at(40ms), at(0ms), TimePoint::max(), steady(0ms));
+  EXPECT_FALSE(alarm.is_late_for(at(40ms), TimePoint::max()));
+  EXPECT_FALSE(alarm.is_late_for(at(90ms), steady(50ms)));
+  EXPECT_TRUE(alarm.is_late_for(at(39ms), TimePoint::max()));
+  EXPECT_TRUE(alarm.is_late_for(at(40ms), steady(39ms)));
+  EXPECT_TRUE(alarm.is_late_for(at(-1h), TimePoint::max())) << "the clock was set back";
+}
+
+// Neither a busy loop nor a sleep that outlasts a change of the clock.
+TEST(Alarm, WaitsForAMillisecondAtLeastAndASecondAtMost) {
+  Alarm alarm;
+  EXPECT_EQ(alarm.set(at(-5s), at(0s), TimePoint::max(), steady(0s)), Alarm::kLeast);
+  EXPECT_EQ(alarm.set(TimePoint::max(), at(0s), TimePoint::min(), steady(0s)), Alarm::kLeast);
+  EXPECT_EQ(alarm.set(TimePoint::max(), at(0s), TimePoint::max(), steady(0s)), Alarm::kMost);
+  EXPECT_EQ(alarm.set(at(1h), at(0s), steady(2s), steady(0s)), Alarm::kMost);
 }
 
 TEST(Patience, IsTwoPeriodsOfTheRate) {
