@@ -48,6 +48,9 @@ class Bus final : public can::Sender {
     ++received_;
   }
 
+  /// So many came at once: nobody had looked for a while.
+  [[nodiscard]] bool is_behind() const { return batch_.frames.size() > kFewFrames; }
+
   /// Nothing is left in the kernel as far as is known.
   [[nodiscard]] bool drained() const { return !more_; }
 
@@ -73,6 +76,7 @@ class Bus final : public can::Sender {
  private:
   // 1024 frames: more than a second of a busy bus, so the other buses do not starve.
   static constexpr int kReadsPerCycle = 16;
+  static constexpr std::size_t kFewFrames = 4;
 
   bool refill();
   void link_went_down();

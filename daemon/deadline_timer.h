@@ -19,6 +19,9 @@ class Alarm {
   /// A clock that is set may bring a deadline nearer without anybody noticing.
   static constexpr Duration kMost = std::chrono::seconds(1);
 
+  /// While it has not gone off, the present is before this, on the clock of the frames' stamps.
+  [[nodiscard]] TimePoint latest_now() const { return stamped_; }
+
   /// It would go off too late for one of these deadlines.
   [[nodiscard]] bool is_late_for(TimePoint stamped, TimePoint steady) const {
     return stamped < stamped_ || steady < steady_;

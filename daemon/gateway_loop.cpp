@@ -163,7 +163,7 @@ Expected<void> GatewayLoop::run() {
                    log_);
   if (Expected<void> armed = serve_events(false); !armed) return armed;
   notify_ready(status_line());
-  set_alarm(true);
+  set_alarm();
   while (!stopping_) {
     const int count = ::epoll_wait(epoll_fd_, ready.data(), static_cast<int>(ready.size()), -1);
     if (count < 0 && errno != EINTR) return fail("epoll", system_reason(errno));
@@ -191,12 +191,12 @@ Expected<void> GatewayLoop::serve_events(bool armed) {
 Expected<void> GatewayLoop::turn(std::span<const epoll_event> ready) {
   clock_.begin_turn();
   bool events_ready = false;
-  bool rang = false;
+  rang_ = false;
   for (const epoll_event& event : ready) {
     if (event.data.u32 == kEventsTag) {
       events_ready = true;
     } else if (event.data.u32 == kTimerTag) {
-      rang = true;
+      rang_ = true;
     } else {
       if ((event.events & EPOLLOUT) != 0) queue_.on_writable();
       if ((event.events & ~std::uint32_t{EPOLLOUT}) != 0)
@@ -204,14 +204,14 @@ Expected<void> GatewayLoop::turn(std::span<const epoll_event> ready) {
     }
   }
   hand_on_arrivals();
-  if (rang) look_at_time();
+  if (rang_) look_at_time();
   flush();
   if (std::exchange(has_spoken_, false)) look_at_status();
   if (events_ready) {
     if (Expected<void> done = serve_events(true); !done) return done;
     if (Expected<void> done = do_what_was_asked(); !done) return done;
   }
-  set_alarm(rang);
+  set_alarm();
   return {};
 }
 
@@ -231,10 +231,10 @@ void GatewayLoop::look_at_time() {
   if (all_drained()) setup_->pipeline.advance(now, *this);
 }
 
-void GatewayLoop::set_alarm(bool rang) {
+void GatewayLoop::set_alarm() {
   const TimePoint due = setup_->pipeline.next_deadline();
   const TimePoint queue_due = queue_.next_deadline().value_or(TimePoint::max());
-  if (!rang && !alarm_.is_late_for(due, queue_due)) return;
+  if (!rang_ && !alarm_.is_late_for(due, queue_due)) return;
   timer_.set(alarm_.set(due, pipeline_now(), queue_due, clock_.steady()));
 }
 
@@ -242,13 +242,17 @@ void GatewayLoop::look_at_status() {
   const gateway::Status& status = setup_->pipeline.status();
   setup_->reporter->check_state(status);
   const std::uint64_t samples = status.gyros[0].samples + status.gyros[1].samples;
-  if (std::exchange(samples_, samples) != samples) forward_.sample_came(clock_.wall());
+  if (std::exchange(samples_, samples) != samples) {
+    // No stamp from nowhere may pass for the present.
+    forward_.sample_came(std::min(newest_stamp_, alarm_.latest_now()));
+  }
 }
 
 void GatewayLoop::hand_on_arrivals() {
   Arrival arrival;
   while (Bus* bus = earliest(arrival)) {
     const auto index = static_cast<can::BusIndex>(bus - setup_->buses.data());
+    newest_stamp_ = arrival.stamp;
     setup_->pipeline.receive(index, *arrival.frame, arrival.stamp, *this);
     bus->take();
     flush();
@@ -270,13 +274,23 @@ Bus* GatewayLoop::earliest(Arrival& arrival) {
 
 void GatewayLoop::put(const can::Frame& frame, TimePoint stamp) {
   if (frame.id == setup_->plan.output.rate_id) patience_.rate_at(stamp);
-  const Duration left = stamp + kAgeMost - clock_.wall();
-  const bool timely = left >= Duration{};
-  if (!timely || !queue_.send_at_once(frame, setup_->buses[setup_->plan.output.bus])) {
+  if (!is_timely(stamp) || !queue_.send_at_once(frame, setup_->buses[setup_->plan.output.bus])) {
+    const Duration left = stamp + kAgeMost - clock_.wall();
     queue_.push(frame, clock_.steady() + std::min(patience_.value(), left));
   }
   has_spoken_ = true;
   ++put_out_;
+}
+
+// A process that was stopped finds its timer gone off, or many frames at once where it was about to
+// look. So the first answer of a turn without either is young enough where it is when the timer is
+// due, and nobody has to ask for the time.
+bool GatewayLoop::is_timely(TimePoint stamp) {
+  const bool nothing_odd = !rang_ && !has_spoken_ &&
+                           std::none_of(setup_->buses.begin(), setup_->buses.end(),
+                                        [](const Bus& bus) { return bus.is_behind(); });
+  if (nothing_odd && alarm_.latest_now() - stamp <= kAgeMost) return true;
+  return clock_.wall() - stamp <= kAgeMost;
 }
 
 void GatewayLoop::flush() {

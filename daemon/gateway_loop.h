@@ -75,7 +75,8 @@ class GatewayLoop final : private gateway::FrameSink {
   Expected<void> turn(std::span<const epoll_event> ready);
   TimePoint pipeline_now();
   void look_at_time();
-  void set_alarm(bool rang);
+  void set_alarm();
+  bool is_timely(TimePoint stamp);
   void hand_on_arrivals();
   Bus* earliest(Arrival& arrival);
   void flush();
@@ -114,6 +115,8 @@ class GatewayLoop final : private gateway::FrameSink {
   int epoll_fd_ = -1;
   DeadlineTimer timer_;
   Alarm alarm_;
+  bool rang_ = true;        ///< the timer, in this turn
+  TimePoint newest_stamp_;  ///< of the frame handed on last
   bool polls_writable_ = false;
   bool has_spoken_ = false;  ///< in this turn; no state changes without an output frame
   bool stopping_ = false;

@@ -312,6 +312,45 @@ class LinkFaultsCase:
         return f"rates in the four plays: {per_play}, {stale} dropped as stale, {describe(run)}"
 
 
+class FrozenCase:
+    """The process is stopped amid traffic and let go: what has come meanwhile is no news, and does not go out."""
+
+    name = "frozen"
+    says = "stopped amid traffic and let go: no frame goes out for an input that is long past"
+    frozen_s = 0.6
+    # What may still go out is 250 ms old at most; the rest is the harness's, which sends the signals.
+    late_most_us = 250_000 + 30_000
+
+    def prepare(self, folder):
+        twin = Twin()
+        twin.prepare(folder)
+        return {"links": twin.links(),
+                "steps": [["play_and_freeze", [str(folder / "played.log"), STILL_S + RAMP_S + 1.0, self.frozen_s]]],
+                "command": [str(BIN / "vgyrod"), "--config", str(folder / "vgyro.toml")]}
+
+    def judge(self, folder, result):
+        run = read_run(folder, result)
+        check_service(run)
+        check_played(run)
+        begin_us, end_us = result["frozen_us"]
+        live, replayed = run.of(0x610), [line for line in run.replay() if line.name == "610"]
+        require(not [line for line in live if begin_us + 50_000 < line.us < end_us], "it was not stopped")
+        waiting = iter(replayed)
+        late_us = []
+        for line in live:
+            cause = next((other for other in waiting if other.content == line.content), None)
+            require(cause is not None, f"not in the replay, or not in this order: {line.text}")
+            late_us.append(line.us - cause.us)
+        worst_us = max(late_us)
+        require(worst_us < self.late_most_us, f"a rate went out {worst_us / 1000:.0f} ms after the frame that caused it")
+        dropped = len(replayed) - len(live)
+        least = 0.8 * (self.frozen_s - 0.25) * len(replayed) / (STILL_S + RAMP_S + RUN_S)
+        require(dropped > least, f"{dropped} rates dropped")
+        stale = int(re.search(r"(\d+) stale", run.said).group(1))
+        require(stale >= dropped, f"{stale} told as stale")
+        return f"{dropped} rates dropped as stale, the oldest sent after {worst_us / 1000:.0f} ms, {describe(run)}"
+
+
 class AbsentCase:
     """Started before its interfaces are there: waits, and needs no restart when they come."""
 
@@ -628,6 +667,7 @@ def all_cases(recordings):
         TwinCase("fd", "CAN FD in and out", Twin(fd=True), dbc="dbc/vgyro_fd.dbc", check_more=check_fd),
         SlowBusCase(),
         LinkFaultsCase(),
+        FrozenCase(),
         AbsentCase(),
         DeadBusCase(),
         ErrorFramesCase(),

@@ -34,6 +34,7 @@ class Daemon:
         self.stderr_path = os.path.join(folder, "vgyrod.err")
         self.restarts_us = []  # on the clock of the frames
         self.reloads_us = []
+        self.frozen_us = []  # from, to
         self.listened_us = []  # from, to: what this harness does in between, starting programs, takes the processor too
         self.start()
 
@@ -55,6 +56,14 @@ class Daemon:
         self.process.send_signal(signal.SIGHUP)
         if not self.listen(READY_WITHIN_S, "RELOADING=1") or not self.listen(READY_WITHIN_S, "READY=1"):
             raise OSError("no RELOADING and READY after SIGHUP")
+
+    def freeze(self, seconds):
+        """Stopped, as by a debugger or a host that is suspended, and let go."""
+        self.process.send_signal(signal.SIGSTOP)
+        self.frozen_us.append(time.time_ns() // 1000)
+        self.listen(seconds)
+        self.frozen_us.append(time.time_ns() // 1000)
+        self.process.send_signal(signal.SIGCONT)
 
     def listen(self, seconds, until=None):
         """Collects notices for some time, or until one of them starts with `until`."""
@@ -185,13 +194,13 @@ def remove_links(case):
         run_program(["ip", "-batch", "-"], input="\n".join(lines).encode())
 
 
-def play(log, daemon, folder, reload_after_s=None):
-    """Recorded traffic onto the buses, in its own time; a reload in the midst of it."""
+def play(log, daemon, folder, after_s=None, what=None):
+    """Recorded traffic onto the buses, in its own time; something else in the midst of it."""
     with open(os.path.join(folder, "canplayer.err"), "ab") as stderr:
         player = subprocess.Popen(["canplayer", "-I", log], stderr=stderr)
-    if reload_after_s is not None:
-        daemon.listen(reload_after_s)
-        daemon.reload()
+    if what is not None:
+        daemon.listen(after_s)
+        what()
     while player.poll() is None:
         daemon.listen(0.2)
     if player.returncode != 0:
@@ -220,7 +229,9 @@ def take_steps(steps, daemon, folder):
         elif verb == "kill_and_restart":
             daemon.kill_and_restart()
         elif verb == "play_and_reload":
-            play(what[0], daemon, folder, what[1])
+            play(what[0], daemon, folder, what[1], daemon.reload)
+        elif verb == "play_and_freeze":
+            play(what[0], daemon, folder, what[1], lambda seconds=what[2]: daemon.freeze(seconds))
         elif verb == "reload":
             daemon.reload()
         else:
@@ -256,6 +267,7 @@ def run_case(case, folder, memory, result):
             result["notices"] = daemon.notices
             result["restarts_us"] = daemon.restarts_us
             result["reloads_us"] = daemon.reloads_us
+            result["frozen_us"] = daemon.frozen_us
             wait_until_still(capture_path)
             stop_quietly(dump)
         with open(capture_path, "rb") as capture, open(os.path.join(folder, "capture.log"), "wb") as out:
