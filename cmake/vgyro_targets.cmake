@@ -28,8 +28,8 @@ if(VGYRO_FUZZERS)
   target_compile_options(vgyro_flags INTERFACE -fsanitize=fuzzer-no-link)
 endif()
 
-# A frame crosses every layer in some tens of nanoseconds: the programs of a release are optimised
-# across them. Tests link the same objects' ordinary code.
+# A frame crosses every layer in some tens of nanoseconds: in a release the sources that it goes through,
+# a layer's FRAME_PATH, are optimised across layers. Tests link the same objects' ordinary code.
 if(CMAKE_BUILD_TYPE STREQUAL "Release" AND CMAKE_CXX_COMPILER_ID STREQUAL GNU)
   set(VGYRO_WHOLE_PROGRAM ON)
 endif()
@@ -40,12 +40,31 @@ function(vgyro_whole_program target)
   endif()
 endfunction()
 
-# vgyro_layer(NAME SOURCES ... LINKS ...): a static library vgyro_NAME.
+# What many sources include of other people's headers is parsed once for all: STL here, and with it Eigen,
+# JSON or GoogleTest. A source still includes what it uses; CMAKE_DISABLE_PRECOMPILE_HEADERS, which the
+# debug preset sets, shows what is missing.
+function(vgyro_precompiled name)
+  add_library(vgyro_${name}_pch OBJECT ${PROJECT_SOURCE_DIR}/cmake/precompiled.cpp)
+  target_link_libraries(vgyro_${name}_pch PRIVATE vgyro_flags fmt::fmt)
+  target_precompile_headers(vgyro_${name}_pch PRIVATE <algorithm> <array> <cmath> <cstdint> <functional> <limits> <map> <memory>
+    <optional> <span> <string> <string_view> <utility> <vector> <fmt/format.h> <tl/expected.hpp> ${ARGN})
+endfunction()
+vgyro_precompiled(stl)
+vgyro_precompiled(eigen <Eigen/Dense> <unsupported/Eigen/FFT>)
+target_link_libraries(vgyro_eigen_pch PRIVATE Eigen3::Eigen)
+vgyro_precompiled(json <nlohmann/json.hpp>)
+target_link_libraries(vgyro_json_pch PRIVATE nlohmann_json::nlohmann_json)
+
+# vgyro_layer(NAME SOURCES ... FRAME_PATH ... LINKS ... PRECOMPILED stl|eigen|json): a static library vgyro_NAME.
 function(vgyro_layer name)
-  cmake_parse_arguments(ARG "" "" "SOURCES;LINKS" ${ARGN})
-  add_library(vgyro_${name} STATIC ${ARG_SOURCES})
+  cmake_parse_arguments(ARG "" "PRECOMPILED" "SOURCES;FRAME_PATH;LINKS" ${ARGN})
+  add_library(vgyro_${name} STATIC ${ARG_SOURCES} ${ARG_FRAME_PATH})
   target_link_libraries(vgyro_${name} PUBLIC vgyro_flags ${ARG_LINKS})
+  if(NOT ARG_PRECOMPILED)
+    set(ARG_PRECOMPILED stl)
+  endif()
+  target_precompile_headers(vgyro_${name} REUSE_FROM vgyro_${ARG_PRECOMPILED}_pch)
   if(VGYRO_WHOLE_PROGRAM)
-    target_compile_options(vgyro_${name} PRIVATE -flto=auto -ffat-lto-objects)
+    set_property(SOURCE ${ARG_FRAME_PATH} APPEND PROPERTY COMPILE_OPTIONS -flto=auto -ffat-lto-objects)
   endif()
 endfunction()
