@@ -16,6 +16,10 @@ target_compile_options(vgyro_flags INTERFACE
   -ffp-contract=off
   # Nobody reads errno after mathematics; without it rounding is one instruction.
   -fno-math-errno)
+if(CMAKE_BUILD_TYPE STREQUAL "Release")
+  # A frame on the bus can be anything: what a mistake of ours would let it overwrite is noticed.
+  target_compile_options(vgyro_flags INTERFACE -fstack-protector-strong -D_FORTIFY_SOURCE=2)
+endif()
 if(VGYRO_SANITIZE)
   target_compile_options(vgyro_flags INTERFACE -fsanitize=${VGYRO_SANITIZE} -fno-sanitize-recover=all -fno-omit-frame-pointer)
   target_link_options(vgyro_flags INTERFACE -fsanitize=${VGYRO_SANITIZE})

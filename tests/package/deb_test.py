@@ -51,6 +51,18 @@ class Deb(unittest.TestCase):
             mode, owner, _, _, _, name = line.split(None, 5)
             cls.members[name.split(" -> ")[0].removeprefix(".")] = (mode, owner)
 
+    def test_the_programs_are_hardened(self):
+        # Anywhere in memory, with guarded stacks, and with nothing that can be overwritten and then called.
+        with tempfile.TemporaryDirectory() as folder:
+            output_of("dpkg-deb", "--extract", self.deb, folder)
+            for name in ("vgyro", "vgyrod"):
+                seen = output_of("readelf", "--wide", "--file-header", "--dynamic", "--segments", "--dyn-syms", f"{folder}/usr/bin/{name}")
+                self.assertRegex(seen, r"Type: +DYN")
+                self.assertRegex(seen, r"FLAGS_1.* NOW .*PIE")
+                self.assertRegex(seen, r"GNU_RELRO")
+                self.assertRegex(seen, r"GNU_STACK .* RW +0x")
+                self.assertIn("__stack_chk_fail", seen)
+
     def test_holds_every_file_where_debian_expects_it(self):
         missing = [name for name in EXPECTED if name not in self.members]
         self.assertEqual(missing, [])
