@@ -12,6 +12,17 @@ namespace {
 
 using Bytes8 = std::array<std::uint8_t, 8>;
 
+/// `is_right` of a payload that is, and of none that differs from it in one bit.
+template <class Bytes, class Check>
+void expect_every_wrong_bit_noticed(const Bytes& payload, Check is_right) {
+  ASSERT_TRUE(is_right(payload));
+  for (std::size_t bit = 0; bit < payload.size() * 8; ++bit) {
+    Bytes wrong = payload;
+    wrong[bit / 8] = static_cast<std::uint8_t>(wrong[bit / 8] ^ 1U << bit % 8);
+    EXPECT_FALSE(is_right(wrong)) << bit;
+  }
+}
+
 // The published vectors of the nibble variant: data ID 0x123, eight zero bytes, two frames.
 TEST(E2eProfile11C, AgreesWithThePublishedVectors) {
   E2eProfile11C profile(0x123);
@@ -39,12 +50,7 @@ TEST(E2eProfile11C, NoticesEverySingleWrongBit) {
   E2eProfile11C profile(0x610);
   Bytes8 payload = {0, 0, 0x12, 0x34, 0x56, 0x78, 0x9A, 0xBC};
   profile.protect(payload);
-  ASSERT_TRUE(profile.check(payload));
-  for (std::size_t bit = 0; bit < 64; ++bit) {
-    Bytes8 wrong = payload;
-    wrong[bit / 8] = static_cast<std::uint8_t>(wrong[bit / 8] ^ 1U << bit % 8);
-    EXPECT_FALSE(profile.check(wrong)) << bit;
-  }
+  expect_every_wrong_bit_noticed(payload, [&](const Bytes8& seen) { return profile.check(seen); });
   EXPECT_FALSE(E2eProfile11C(0x611).check(payload));
   EXPECT_FALSE(E2eProfile11C(0x710).check(payload));
 }
@@ -84,11 +90,8 @@ TEST(E2eProfile5, NoticesEverySingleWrongBit) {
   E2eProfile5 profile(0x610);
   std::vector<std::uint8_t> payload(32, 0xA5);
   profile.protect(payload);
-  for (std::size_t bit = 0; bit < payload.size() * 8; ++bit) {
-    std::vector<std::uint8_t> wrong = payload;
-    wrong[bit / 8] = static_cast<std::uint8_t>(wrong[bit / 8] ^ 1U << bit % 8);
-    EXPECT_FALSE(profile.check(wrong)) << bit;
-  }
+  expect_every_wrong_bit_noticed(
+      payload, [&](const std::vector<std::uint8_t>& seen) { return profile.check(seen); });
   EXPECT_FALSE(E2eProfile5(0x710).check(payload));
 }
 
@@ -171,12 +174,7 @@ TEST(E2eProtection, NoticesEverySingleWrongBitWhereverTheCheckValueStands) {
       const E2eProtection how = protection(kind, sixteen_ids(7), byte, 8, 0x123);
       Payload payload = {0x12, 0x34, 0x56, 0x78, 0x9A, 0xBC, 0xD6, 0xF1};
       how.seal(payload);
-      EXPECT_TRUE(how.check(payload));
-      for (std::size_t bit = 0; bit < 64; ++bit) {
-        Payload wrong = payload;
-        wrong[bit / 8] = static_cast<std::uint8_t>(wrong[bit / 8] ^ 1U << bit % 8);
-        EXPECT_FALSE(how.check(wrong)) << bit;
-      }
+      expect_every_wrong_bit_noticed(payload, [&](const Payload& seen) { return how.check(seen); });
     }
   }
 }
