@@ -1,7 +1,8 @@
 /* Two gyros at any rate, for bench/faults: bus_load BUS_A BUS_B PAIRS_PER_S SECONDS [OTHERS]
    Frames as examples/twin.dbc describes them. Intervals are random about their mean, so that nothing falls into step with
-   a kernel's clock ticks; with OTHERS they are even, and so many frames of other identifiers follow each gyro's. Prints
-   the gyros' frames, all frames, and by how many seconds the last was late. */
+   a kernel's clock ticks; with OTHERS pairs come evenly, and so many frames of other identifiers stand back to back with
+   each gyro's: one system call for a bus, or under User Mode Linux sending would be what fills the machine. Prints the
+   gyros' frames, all frames, and by how many seconds the last was late. */
 
 #define _GNU_SOURCE
 #include <errno.h>
@@ -16,6 +17,8 @@
 #include <sys/socket.h>
 #include <time.h>
 #include <unistd.h>
+
+enum { MOST = 64 };
 
 static uint64_t state = 88172645463325252u;
 
@@ -44,6 +47,30 @@ static void wait_until(int64_t ns) {
   }
 }
 
+static void send_all(int fd, struct can_frame *frames, unsigned count) {
+  struct iovec parts[MOST];
+  struct mmsghdr messages[MOST] = {0};
+  for (unsigned i = 0; i < count; ++i) {
+    parts[i] = (struct iovec){&frames[i], sizeof frames[i]};
+    messages[i].msg_hdr.msg_iov = &parts[i];
+    messages[i].msg_hdr.msg_iovlen = 1;
+  }
+  for (unsigned sent = 0; sent < count;) {
+    const int done = sendmmsg(fd, messages + sent, count - sent, 0);
+    if (done > 0) sent += (unsigned)done;
+    else usleep(100);
+  }
+}
+
+static struct can_frame gyro_frame(int gyro, long number) {
+  const int32_t raw = (gyro == 0 ? 33000 : -7400) + (int32_t)(dice() % 4096) - 2048;
+  struct can_frame frame = {.can_id = gyro == 0 ? 0x101 : 0x102, .can_dlc = 8};
+  for (int byte = 0; byte < 4; ++byte)
+    frame.data[gyro == 0 ? byte : 3 - byte] = (uint8_t)((uint32_t)raw >> (8 * byte));
+  frame.data[6] = (uint8_t)number;
+  return frame;
+}
+
 static void send_frame(int fd, const struct can_frame *frame) {
   while (write(fd, frame, sizeof *frame) != sizeof *frame) usleep(100);
 }
@@ -52,29 +79,29 @@ int main(int argc, char **argv) {
   if (argc < 5) return 2;
   const int fds[2] = {open_bus(argv[1]), open_bus(argv[2])};
   const double rate = atof(argv[3]);
-  const int steady = argc > 5;
-  const int others = steady ? atoi(argv[5]) : 0;
-  const int64_t half = (int64_t)(0.5e9 / rate) / (1 + others);
+  const int others = argc > 5 ? atoi(argv[5]) : 0;
+  if (others < 0 || others >= MOST) return 2;
+  const int64_t half = (int64_t)(0.5e9 / rate);
   const long pairs = (long)(rate * atof(argv[4]));
   struct timespec now;
   clock_gettime(CLOCK_MONOTONIC, &now);
   int64_t due = (int64_t)now.tv_sec * 1000000000 + now.tv_nsec;
   for (long i = 0; i < pairs; ++i) {
-    for (int gyro = 0; gyro < 2; ++gyro) {
-      const int32_t raw = (gyro == 0 ? 33000 : -7400) + (int32_t)(dice() % 4096) - 2048;
-      struct can_frame frame = {.can_id = gyro == 0 ? 0x101 : 0x102, .can_dlc = 8};
-      for (int byte = 0; byte < 4; ++byte)
-        frame.data[gyro == 0 ? byte : 3 - byte] = (uint8_t)((uint32_t)raw >> (8 * byte));
-      frame.data[6] = (uint8_t)i;
-      due += steady ? half : half / 2 + (int64_t)(dice() % (uint32_t)half);
+    if (argc > 5) {
+      due += 2 * half;
       wait_until(due);
-      send_frame(fds[gyro], &frame);
     }
-    for (int other = 0; other < 2 * others; ++other) {
-      const struct can_frame frame = {.can_id = 0x300 + (uint32_t)other, .can_dlc = 8};
-      due += half;
-      wait_until(due);
-      send_frame(fds[other % 2], &frame);
+    for (int gyro = 0; gyro < 2; ++gyro) {
+      struct can_frame frames[MOST] = {gyro_frame(gyro, i)};
+      for (int other = 1; other <= others; ++other)
+        frames[other] = (struct can_frame){.can_id = 0x300 + (uint32_t)other, .can_dlc = 8};
+      if (argc == 5) {
+        due += half / 2 + (int64_t)(dice() % (uint32_t)half);
+        wait_until(due);
+        send_frame(fds[gyro], &frames[0]);
+      } else {
+        send_all(fds[gyro], frames, 1 + (unsigned)others);
+      }
     }
   }
   clock_gettime(CLOCK_MONOTONIC, &now);
