@@ -83,9 +83,10 @@ std::uint8_t profile_2(unsigned id, const Data& data) {
 
 std::uint16_t profile_5(unsigned id, const Data& data) {
   std::uint16_t crc = 0xFFFF;
-  for (const Bytes part : {data.before, data.after})
+  for (const Bytes part : {data.before, data.after}) {
     for (const std::uint8_t byte : part)
       crc = crc16_step(crc, byte);
+  }
   return crc16_step(crc16_step(crc, low_byte(id)), high_byte(id));
 }
 
@@ -100,9 +101,10 @@ std::uint8_t toyota(std::uint32_t can_id, unsigned length, const Data& data) {
   unsigned sum = length;
   for (; can_id != 0; can_id >>= 8U)
     sum += low_byte(can_id);
-  for (const Bytes part : {data.before, data.after})
+  for (const Bytes part : {data.before, data.after}) {
     for (const std::uint8_t byte : part)
       sum += byte;
+  }
   return static_cast<std::uint8_t>(low_byte(sum));
 }
 

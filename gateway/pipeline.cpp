@@ -718,7 +718,7 @@ Expected<void> Pipeline::resume(const SavedState& state) {
     return fail({}, "is of no use to this method: only `optimal` takes up saved biases",
                 "set `method = \"optimal\"` under [corrector] to use it");
   }
-  if (const Expected<void> same = check_devices(state, impl_->plan); !same) return same;
+  if (Expected<void> same = check_devices(state, impl_->plan); !same) return same;
   impl_->saved = state;
   impl_->status.restored = Restored::kOffered;
   return {};
