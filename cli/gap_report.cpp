@@ -318,6 +318,7 @@ std::vector<NotTold> not_told(const GapSubject& subject, const gap::Result& resu
     add_once(group->kinds, std::string(model::info(kind.kind).name));
   }
   std::vector<NotTold> result_lines;
+  result_lines.reserve(groups.size());
   for (const Group& group : groups) {
     result_lines.push_back(
         {fmt::format("{}: {}", fmt::join(group.gyros, ", "), fmt::join(group.kinds, ", ")),

@@ -30,7 +30,7 @@ class Gatherer {
   }
 
   [[nodiscard]] std::optional<Error> complaint(const std::string& log) const {
-    if (const auto missing = frames_.missing_gyro(log, samples_)) return missing;
+    if (auto missing = frames_.missing_gyro(log, samples_)) return missing;
     if (pairs_ > 0) return std::nullopt;
     return Error{log,
                  fmt::format("the gyros {} and {} never spoke at the same time, or too shortly",

@@ -33,7 +33,8 @@ struct Options {
 
 // systemd names the directory that it made for the service; of several the first.
 std::string default_state() {
-  const char* directories = std::getenv("STATE_DIRECTORY");
+  const char* directories =
+      std::getenv("STATE_DIRECTORY");  // NOLINT(concurrency-mt-unsafe): at start
   if (directories == nullptr || *directories == '\0') return {};
   const std::string_view all(directories);
   return std::string(all.substr(0, all.find(':'))) + "/state.toml";
