@@ -127,9 +127,10 @@ std::vector<Candidate> shaped_candidates(const Study& study, std::size_t gyro) {
   list.push_back(plain(gyro, Kind::kClockSkew, {0.0}));
   for (const double cutoff_hz : kCutoff_hz)
     list.push_back(plain(gyro, Kind::kBandwidth, {cutoff_hz}, 2.0));
-  for (int harmonic = 1; harmonic <= kHarmonicMax; ++harmonic)
+  for (int harmonic = 1; harmonic <= kHarmonicMax; ++harmonic) {
     list.push_back(
         plain(gyro, Kind::kAngleHarmonic, {static_cast<double>(harmonic), 1.0, 0.0}, 7.0));
+  }
   return list;
 }
 

@@ -153,10 +153,11 @@ Judgement judge(const Study& study, const Problem& problem, std::size_t gyro,
   // What comes and goes shows in sums over the time that it takes.
   for (const std::size_t span : kSpans) {
     std::vector<double> sums;
-    for (std::size_t i = 0; i + span <= innovations.size(); i += span)
+    for (std::size_t i = 0; i + span <= innovations.size(); i += span) {
       sums.push_back(std::accumulate(innovations.begin() + static_cast<std::ptrdiff_t>(i),
                                      innovations.begin() + static_cast<std::ptrdiff_t>(i + span),
                                      0.0));
+    }
     verdict.heavy = std::max(verdict.heavy, heaviness(sums));
   }
   Eigen::FFT<double> transform;

@@ -158,9 +158,10 @@ std::vector<Term> Search::terms_of_problem(const std::vector<Term>& terms,
 
 Matrix Search::columns_of(const Problem& problem, const Term& term) const {
   Matrix columns(problem.size(), static_cast<Eigen::Index>(term.free.size()));
-  for (std::size_t i = 0; i < term.free.size(); ++i)
+  for (std::size_t i = 0; i < term.free.size(); ++i) {
     columns.col(static_cast<Eigen::Index>(i)) =
         derivative(study_, problem, term.effect, term.free[i]);
+  }
   return columns;
 }
 
@@ -170,6 +171,7 @@ Eigen::VectorXd Search::residual_of(std::size_t problem, const std::vector<Term>
   for (std::size_t gyro = 0; gyro < 2; ++gyro) {
     if (!data.holds[gyro]) continue;
     std::vector<Effect> effects;
+    effects.reserve(terms.size());
     for (const Term& term : terms)
       effects.push_back(term.effect);
     if (!effects.empty()) residual -= study_.contribution(data, gyro, effects);
@@ -731,9 +733,10 @@ void Search::settle() {
     const PairNoise fitted = all.noise;
     // A drift that happened to be small once is no smaller than the model says: values and their
     // errors would seem surer than they are.
-    for (std::size_t gyro = 0; gyro < 2; ++gyro)
+    for (std::size_t gyro = 0; gyro < 2; ++gyro) {
       all.noise[gyro].walk_dps_rts =
           std::max(all.noise[gyro].walk_dps_rts, file_noise_[gyro].walk_dps_rts);
+    }
     improve(problem, all);
     std::size_t place = 0;
     Eigen::Index row = 0;

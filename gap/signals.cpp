@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <ranges>
 
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
@@ -103,9 +104,8 @@ Parabola fit_parabola(std::span<const double> t_s, std::span<const double> y, do
 // Of the parabolas about an instant the widest that scatters no more than sensor and frame do.
 Parabola widest_parabola(std::span<const double> t_s, std::span<const double> y, double at_s,
                          double scatter_most) {
-  for (auto reach_s = kTemperatureReach_s.rbegin(); reach_s != kTemperatureReach_s.rend();
-       ++reach_s) {
-    const Parabola parabola = fit_parabola(t_s, y, at_s, *reach_s);
+  for (const double reach_s : std::ranges::reverse_view(kTemperatureReach_s)) {
+    const Parabola parabola = fit_parabola(t_s, y, at_s, reach_s);
     if (parabola.scatter <= scatter_most) return parabola;
   }
   return fit_parabola(t_s, y, at_s, kTemperatureReach_s.front());
@@ -113,6 +113,7 @@ Parabola widest_parabola(std::span<const double> t_s, std::span<const double> y,
 
 double usual_scatter(std::span<const double> t_s, std::span<const double> y) {
   std::vector<double> scatter;
+  // NOLINTNEXTLINE(clang-analyzer-security.FloatLoopCounter): a time
   for (double at_s = t_s.front(); at_s < t_s.back(); at_s += kTemperatureReach_s.front())
     scatter.push_back(fit_parabola(t_s, y, at_s, kTemperatureReach_s.front()).scatter);
   return median_of(scatter);
@@ -176,6 +177,7 @@ void smooth_temperature(const GyroSeries& gyro, Signals& signals) {
   std::vector<double> t_s;
   std::vector<double> value;
   std::vector<double> slope;
+  // NOLINTNEXTLINE(clang-analyzer-security.FloatLoopCounter): a time
   for (double t = gyro.t_s.front(); t <= end_s + kGridStep_s; t += kGridStep_s) {
     const Parabola parabola =
         widest_parabola(gyro.t_s, gyro.temperature_c, std::min(t, end_s), scatter_most);

@@ -112,9 +112,10 @@ void set_gains(Block& block, std::span<const double> t_s, const Interpolated& ot
   for (const double sum : sums)
     of_mean += sum / count * sum / count;
   block.mean_gain[other.slot] = of_mean;
-  if (block.count > 1)
+  if (block.count > 1) {
     block.within_gain[other.slot] =
         std::max(0.0, squares - count * of_mean) / static_cast<double>(block.count - 1);
+  }
 }
 
 // Samples of any order → blocks, in which a sample's place is its place in the columns.

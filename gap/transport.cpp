@@ -248,6 +248,7 @@ class Check {
     if (step < 3.5 * std::max(series_.step_dps, 1e-12)) return;
     // Refine: every level is a whole number of steps; the number is sure near zero first.
     std::vector<double> sizes;
+    sizes.reserve(levels.size());
     for (const double level : levels)
       sizes.push_back(std::abs(level));
     std::sort(sizes.begin(), sizes.end());
@@ -369,10 +370,11 @@ class Check {
       std::size_t near = 0;  // as far again inside as the lattice or half a per cent reaches
       const double reach = std::max(3.0 * lattice_dps_, 0.001 * std::abs(level));
       for (const double value : y) {
-        if (value == level)
+        if (value == level) {
           ++at;
-        else if (std::abs(value - level) <= reach)
+        } else if (std::abs(value - level) <= reach) {
           ++near;
+        }
       }
       const double expected =
           lattice_dps_ > 0.0 ? static_cast<double>(near) * lattice_dps_ / reach : 0.0;
@@ -418,10 +420,11 @@ class Check {
     std::size_t zeros = 0;
     std::vector<double> sizes;
     for (const double value : y) {
-      if (std::abs(value) <= 0.25 * series_.step_dps)
+      if (std::abs(value) <= 0.25 * series_.step_dps) {
         ++zeros;
-      else
+      } else {
         sizes.push_back(std::abs(value));
+      }
     }
     for (const Effect& effect : known_) {
       if (effect.kind != Kind::kDeadBand) continue;

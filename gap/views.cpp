@@ -159,6 +159,7 @@ Curve allan_curve(const EvenSeries& series, std::string label) {
     count[i + 1] = count[i] + series.present[i];
   }
   std::size_t last = 0;
+  // NOLINTNEXTLINE(clang-analyzer-security.FloatLoopCounter): it grows by a factor
   for (double wish = 1.0; wish <= static_cast<double>(n) / 3.0; wish *= std::sqrt(2.0)) {
     const auto m = static_cast<std::size_t>(std::lround(wish));
     if (m == last) continue;

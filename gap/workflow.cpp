@@ -17,7 +17,6 @@ namespace vgyro::gap {
 namespace {
 
 using model::Effect;
-using model::Kind;
 
 double chi_square_tail(double statistic) {
   return std::erfc(std::sqrt(0.5 * std::max(0.0, statistic)));
