@@ -46,6 +46,9 @@ struct Signal {
   unsigned line = 0;
 
   [[nodiscard]] const std::string* label(std::int64_t raw) const;
+  [[nodiscard]] bool is_integer() const {
+    return type == ValueType::kSigned || type == ValueType::kUnsigned;
+  }
 };
 
 struct Message {

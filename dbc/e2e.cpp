@@ -31,14 +31,22 @@ constexpr auto kCrc16 = crc_table<std::uint16_t>(0x1021);
 
 using Bytes = std::span<const std::uint8_t>;
 
+/// What is protected: all bytes but those of the check value.
+struct Data {
+  Bytes before;
+  Bytes after;
+};
+
 class Crc8 {
  public:
   Crc8(const std::array<std::uint8_t, 256>& table, std::uint8_t begin)
       : table_(table), crc_(begin) {}
   void add(unsigned byte) { crc_ = table_[(crc_ ^ byte) & 0xFFU]; }
-  void add(Bytes bytes) {
-    for (const std::uint8_t byte : bytes)
-      add(byte);
+  void add(const Data& data) {
+    for (const Bytes part : {data.before, data.after}) {
+      for (const std::uint8_t byte : part)
+        add(byte);
+    }
   }
   [[nodiscard]] std::uint8_t value() const { return crc_; }
 
@@ -58,25 +66,17 @@ unsigned high_byte(unsigned word) {
   return word >> 8U & 0xFFU;
 }
 
-/// What is protected: all bytes but those of the check value.
-struct Data {
-  Bytes before;
-  Bytes after;
-};
-
 std::uint8_t profile_1(std::initializer_list<unsigned> id_bytes, const Data& data) {
   Crc8 crc(kCrc8, 0);
   for (const unsigned byte : id_bytes)
     crc.add(byte);
-  crc.add(data.before);
-  crc.add(data.after);
+  crc.add(data);
   return crc.value();
 }
 
 std::uint8_t profile_2(unsigned id, const Data& data) {
   Crc8 crc(kCrc8H2f, 0xFF);
-  crc.add(data.before);
-  crc.add(data.after);
+  crc.add(data);
   crc.add(low_byte(id));
   return crc.value() ^ 0xFFU;
 }
@@ -92,8 +92,7 @@ std::uint16_t profile_5(unsigned id, const Data& data) {
 
 std::uint8_t crc8_j1850(const Data& data) {
   Crc8 crc(kCrc8, 0xFF);
-  crc.add(data.before);
-  crc.add(data.after);
+  crc.add(data);
   return crc.value() ^ 0xFFU;
 }
 

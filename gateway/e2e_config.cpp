@@ -18,10 +18,6 @@ constexpr std::int64_t kDataIdMostList = 0xFF;  // profile 2: a byte for each co
 
 using DataIds = std::array<std::uint16_t, dbc::kE2eDataIdsMost>;
 
-bool is_integer(const dbc::Signal& signal) {
-  return signal.type == dbc::ValueType::kSigned || signal.type == dbc::ValueType::kUnsigned;
-}
-
 std::optional<AliveCounter> read_counter(TomlReader& reader, SignalResolver& resolver,
                                          const dbc::Signal& main) {
   const auto max_delta = reader.integer("max_delta_counter");
@@ -33,7 +29,7 @@ std::optional<AliveCounter> read_counter(TomlReader& reader, SignalResolver& res
   if (signal == nullptr || !resolver.shares_page("counter", *signal, main)) return std::nullopt;
   const auto codec = resolver.codec(*signal);
   if (!codec) return std::nullopt;
-  if (!is_integer(*signal) || signal->length_bits > 31 || signal->length_bits < 2) {
+  if (!signal->is_integer() || signal->length_bits > 31 || signal->length_bits < 2) {
     reader.complain(
         reader.where("counter"),
         fmt::format("{} is no alive counter: it has {} bits", signal->name, signal->length_bits),
@@ -62,7 +58,7 @@ std::optional<std::size_t> crc_byte(TomlReader& reader, const dbc::Signal& signa
   const unsigned bits = wide ? 16 : 8;
   const bool intel = signal.byte_order == dbc::ByteOrder::kIntel;
   const unsigned first = signal.start_bit % 8U;
-  const bool whole = is_integer(signal) && signal.length_bits == bits &&
+  const bool whole = signal.is_integer() && signal.length_bits == bits &&
                      (intel ? first == 0 : first == 7) && (intel || !wide);
   if (!whole) {
     reader.complain(

@@ -173,16 +173,15 @@ std::optional<Quantity> SignalResolver::quantity(const dbc::Signal& signal, std:
                      remedy);
   }
   if (!bits || !presence || !conversion) return std::nullopt;
-  const bool is_integer =
-      signal.type == dbc::ValueType::kSigned || signal.type == dbc::ValueType::kUnsigned;
-  Quantity quantity{.name = signal.name,
-                    .unit = spelling,
-                    .codec = *bits,
-                    .presence = *presence,
-                    .scale = conversion->scale,
-                    .shift = conversion->shift,
-                    .layout = layout_of(signal),
-                    .step = is_integer ? std::abs(signal.factor) * conversion->scale : 0.0};
+  Quantity quantity{
+      .name = signal.name,
+      .unit = spelling,
+      .codec = *bits,
+      .presence = *presence,
+      .scale = conversion->scale,
+      .shift = conversion->shift,
+      .layout = layout_of(signal),
+      .step = signal.is_integer() ? std::abs(signal.factor) * conversion->scale : 0.0};
   set_limits(quantity, signal, dimension);
   return quantity;
 }
