@@ -4,6 +4,7 @@
 // which make a block. White noise survives averaging, so blocks hold all that drift, stops and
 // scale factors are learned from, while the samples themselves are forgotten. O(1) a sample.
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -131,9 +132,10 @@ class CellBuilder {
       cell.mean_dps[gyro] = origin_[gyro] + sum_[gyro] / count_;
       cell.noise_gain[gyro] = gain_[gyro] / count_;
     }
-    cell.scatter = {square_[0] - sum_[0] * sum_[0] / count_,
+    // Rounding may leave the sum of squares of equal values below zero.
+    cell.scatter = {std::max(square_[0] - sum_[0] * sum_[0] / count_, 0.0),
                     square_[1] - sum_[0] * sum_[1] / count_,
-                    square_[2] - sum_[1] * sum_[1] / count_};
+                    std::max(square_[2] - sum_[1] * sum_[1] / count_, 0.0)};
     block_.to_s = to_s;
     begin_cell(to_s);
   }

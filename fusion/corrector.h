@@ -27,6 +27,7 @@ struct VirtualRate {
   double rate_dps = 0.0;
   double sigma_dps = 0.0;                 ///< NaN where the method makes no statement
   std::array<double, 2> corrected_dps{};  ///< each gyro less its own drift
+  bool usable = true;  ///< false: what it rests on is contradicted, and nothing else is there
 };
 
 struct Drift {
@@ -44,13 +45,32 @@ struct WindowCounts {
 /// What a wheel-speed signal says of the vehicle.
 enum class Wheels : std::uint8_t { kUnknown, kStanding, kRolling };
 
+/// What may be the case, each with its probability.
+enum class Hypothesis : std::uint8_t {
+  kStanding,       ///< in a steady stretch: the platform stands
+  kTurning,        ///< in a steady stretch: it turns at a constant rate
+  kGyro1Stepped,   ///< its bias has jumped, and nothing has settled it yet
+  kGyro2Stepped,
+  kGyro1Blind,     ///< it feels no rotation
+  kGyro2Blind,
+  kWarmingUp,      ///< the biases have slopes that die away
+  kOwnSlopes,      ///< the biases have slopes that come and go, each its own
+  kAlikeSlopes     ///< the same, both alike
+};
+inline constexpr std::size_t kHypotheses = 9;
+
 /// What the method does at present, for people and for VG_Bias.
 struct Condition {
   bool stopped = false;             ///< standing still: the common drift is being learned
+  bool ambiguous = false;           ///< two readings of the data are likely, and far apart
+  std::array<bool, 2> blind{};      ///< this gyro feels no rotation, as it seems
+  std::array<double, kHypotheses> probability{};
   bool disagree = false;            ///< the gyros contradict each other; which is wrong is open
   std::array<bool, 2> noisy{};      ///< the noise of this gyro is far above what it was
   std::uint64_t stops = 0;          ///< stops learned from
-  std::uint64_t stops_refused = 0;  ///< steady, but both gyros had moved together
+  std::uint64_t stops_refused = 0;  ///< steady, but a turn was likelier
+  std::uint64_t stops_open = 0;     ///< steady stretches that ended with both readings likely
+  std::uint64_t restarts = 0;       ///< times that the estimate was not finite and began anew
   std::uint64_t disagreements = 0;  ///< times that `disagree` began
 };
 
@@ -77,6 +97,12 @@ class Corrector {
   virtual VirtualRate update_alone(std::size_t gyro, const RatePair& pair) = 0;
   /// What the wheels say from now on.
   virtual void set_wheels(Wheels /*wheels*/) {}
+  /// The gyros' temperatures from now on, degC; NaN where they are not known.
+  virtual void set_temperature(const std::array<double, 2>& /*temperature_c*/) {}
+  /// The smallest step that this gyro's values have shown, deg/s.
+  virtual void set_resolution(std::size_t /*gyro*/, double /*step_dps*/) {}
+  /// Variance of the specific force's magnitude from now on, g²; NaN where it is not known.
+  virtual void set_vibration(double /*variance_g2*/) {}
 
   [[nodiscard]] virtual Drift drift(double t_s) const = 0;
   [[nodiscard]] virtual WindowCounts windows() const = 0;

@@ -18,6 +18,34 @@ constexpr double kRatioSpreadLog10 = 0.7;
 constexpr double kRunToRunWhite = 3.0;
 constexpr double kRunToRunAge_s = 60.0;
 
+/// Slopes go with a sensor's class, as N does: σ in units of N.
+struct DriftKind {
+  double prior;
+  double begin_per_s;   ///< σ of the slope at the start over N
+  double steady_per_s;  ///< in the long run
+  double tau_s;
+  double correlation;
+  bool alike;  ///< both gyros' slopes are of the quieter one's size
+  /// Every how many of kWalkRatios_per_s it is tried with, and how many are left out at each end.
+  std::size_t stride;
+  std::size_t margin;
+};
+constexpr std::array<DriftKind, kDriftKinds> kKinds{{
+    {0.87, 0.0, 0.0, 1.0, 0.0, false, 2, 0},
+    {0.10, 0.4, 0.05, 600.0, 0.0, false, 2, 2},
+    {0.02, 0.0, 0.1, 300.0, 0.0, false, 2, 2},
+    {0.01, 0.0, 0.1, 300.0, 0.98, true, 2, 2},
+}};
+
+// A coefficient before anything is known of it, in units of N per kelvin.
+constexpr double kCoefficientWhite_per_k = 1.5;
+// What a bias does with temperature besides: bends and hysteresis, a walk over kelvins.
+constexpr double kBendWhite_per_rtk = 0.05;
+
+// Parts that weigh less are left out of the sums.
+constexpr double kWeightMin = 1e-9;
+constexpr double kHalfLogTwoPi = 0.918938533204672741780;
+
 double log_prior(double ratio_per_s) {
   const double away = (std::log10(ratio_per_s) - kUsualRatioLog10) / kRatioSpreadLog10;
   return -0.5 * away * away;
@@ -39,34 +67,128 @@ struct WalkChoice {
   std::size_t place = 0;
 };
 
-}  // namespace
+/// The values of K that a kind of drift is tried with.
+struct WalkChoices {
+  std::array<WalkChoice, kWalkRatios_per_s.size()> choice{};
+  std::size_t count = 0;
+};
 
-DriftBank::DriftBank(const std::array<GyroParameters, 2>& gyros) : gyros_(gyros) {
-  hypotheses_.reserve(kWalkPairs);
+WalkChoices walk_choices(const DriftKind& kind, const GyroParameters& gyro, double white) {
+  WalkChoices all;
+  if (gyro.walk_dps_rts) {
+    all.choice[all.count++] = {*gyro.walk_dps_rts, 0.0, 0};
+    return all;
+  }
+  double sum = 0.0;
+  for (std::size_t i = kind.margin; i < kWalkRatios_per_s.size() - kind.margin; i += kind.stride) {
+    all.choice[all.count++] = {kWalkRatios_per_s[i] * white, log_prior(kWalkRatios_per_s[i]), i};
+    sum += std::exp(log_prior(kWalkRatios_per_s[i]));
+  }
+  for (std::size_t i = 0; i < all.count; ++i)
+    all.choice[i].log_weight -= std::log(sum);
+  return all;
 }
 
-void DriftBank::make(const std::array<double, 2>& white_dps_rthz,
-                     const DriftFilter::Observables& mean,
-                     const DriftFilter::Covariance& covariance) {
-  hypotheses_.clear();
-  const std::size_t ratios = kWalkRatios_per_s.size();
-  const auto choice = [&](std::size_t gyro, std::size_t i) -> WalkChoice {
-    if (gyros_[gyro].walk_dps_rts) return {*gyros_[gyro].walk_dps_rts, 0.0, 0};
-    return {kWalkRatios_per_s[i] * white_dps_rthz[gyro], log_prior(kWalkRatios_per_s[i]), i};
-  };
-  const std::size_t first_choices = gyros_[0].walk_dps_rts ? 1 : ratios;
-  const std::size_t second_choices = gyros_[1].walk_dps_rts ? 1 : ratios;
+SlopeModel slopes_of(const DriftKind& kind, const std::array<double, 2>& white_dps_rthz) {
+  SlopeModel slopes{.tau_s = kind.tau_s, .correlation = kind.correlation};
+  for (std::size_t gyro = 0; gyro < 2; ++gyro) {
+    const double white = kind.alike ? std::min(white_dps_rthz[0], white_dps_rthz[1])
+                                    : white_dps_rthz[gyro];
+    slopes.begin_dps_s[gyro] = kind.begin_per_s * white;
+    slopes.steady_dps_s[gyro] = kind.steady_per_s * white;
+  }
+  return slopes;
+}
+
+/// The share that a weight of DriftMemory::walk_weight at place `from` gives to a kind's place
+/// `to`: places in between are shared out, those beyond the ends go to the ends.
+double share_of_place(const DriftKind& kind, std::size_t from, std::size_t to) {
+  const auto last = static_cast<double>(kWalkRatios_per_s.size() - 1 - kind.margin);
+  const double at =
+      std::clamp(static_cast<double>(from), static_cast<double>(kind.margin), last);
+  const double away = std::abs(at - static_cast<double>(to)) / static_cast<double>(kind.stride);
+  return std::max(1.0 - away, 0.0);
+}
+
+using Moments = Eigen::Matrix<double, 6, 1>;
+using MomentSquare = Eigen::Matrix<double, 6, 6>;
+
+Moments moments_of(const DriftEstimate& estimate) {
+  Moments all;
+  all << estimate.mean, estimate.slope;
+  return all;
+}
+
+MomentSquare square_of(const DriftEstimate& estimate) {
+  MomentSquare all = MomentSquare::Zero();
+  all.topLeftCorner<4, 4>() = estimate.covariance;
+  all.bottomRightCorner<2, 2>() = estimate.slope_covariance;
+  all.block<2, 2>(0, 4) = estimate.slope_with_bias;
+  all.block<2, 2>(4, 0) = estimate.slope_with_bias.transpose();
+  return all;
+}
+
+}  // namespace
+
+void EstimateMixer::add(double weight, const DriftEstimate& part) {
+  if (!any_) origin_ = part;
+  any_ = true;
+  const Moments away = moments_of(part) - moments_of(origin_);
+  first_ += weight * away;
+  second_ += weight * (square_of(part) + away * away.transpose());
+  for (std::size_t gyro = 0; gyro < 2; ++gyro) {
+    sum_.growth[gyro] += weight * part.growth[gyro];
+    sum_.scale[gyro] += weight * part.scale[gyro];
+    sum_.blame[gyro] += weight * part.blame[gyro];
+    sum_.drift_share[gyro] += weight * part.drift_share[gyro];
+  }
+  scale_square_[0] += weight * (part.scale_covariance[0] + part.scale[0] * part.scale[0]);
+  scale_square_[1] += weight * (part.scale_covariance[1] + part.scale[0] * part.scale[1]);
+  scale_square_[2] += weight * (part.scale_covariance[2] + part.scale[1] * part.scale[1]);
+  for (std::size_t kind = 0; kind < kDriftKinds; ++kind)
+    sum_.kind_weight[kind] += weight * part.kind_weight[kind];
+}
+
+DriftEstimate EstimateMixer::result() const {
+  DriftEstimate all = sum_;
+  const Moments mean = moments_of(origin_) + first_;
+  const MomentSquare square = second_ - first_ * first_.transpose();
+  all.mean = mean.head<4>();
+  all.slope = mean.tail<2>();
+  all.covariance = square.topLeftCorner<4, 4>();
+  all.slope_covariance = square.bottomRightCorner<2, 2>();
+  all.slope_with_bias = square.block<2, 2>(0, 4);
+  all.scale_covariance = {scale_square_[0] - all.scale[0] * all.scale[0],
+                          scale_square_[1] - all.scale[0] * all.scale[1],
+                          scale_square_[2] - all.scale[1] * all.scale[1]};
+  return all;
+}
+
+DriftBank::DriftBank(const std::array<GyroParameters, 2>& gyros) : gyros_(gyros) {
+  constexpr std::size_t kHypothesesMax = 25 + 3 * 9;
+  hypotheses_.reserve(kHypothesesMax);
+}
+
+void DriftBank::make_kind(std::size_t kind, const std::array<double, 2>& white_dps_rthz,
+                          const DriftFilter::Observables& mean,
+                          const DriftFilter::Covariance& covariance) {
+  const DriftKind& which = kKinds[kind];
+  const WalkChoices firsts = walk_choices(which, gyros_[0], white_dps_rthz[0]);
+  const WalkChoices seconds = walk_choices(which, gyros_[1], white_dps_rthz[1]);
   DriftModel model;
+  model.slopes = slopes_of(which, white_dps_rthz);
   for (std::size_t gyro = 0; gyro < 2; ++gyro) {
     model.gauss_markov[gyro] = gyros_[gyro].gauss_markov;
     model.gauss_markov_count[gyro] = gyros_[gyro].gauss_markov_count;
+    if (gyros_[gyro].learns_temperature)
+      model.temperature_dps_k[gyro] = kCoefficientWhite_per_k * white_dps_rthz[gyro];
   }
-  for (std::size_t i = 0; i < first_choices; ++i) {
-    for (std::size_t j = 0; j < second_choices; ++j) {
-      const WalkChoice first = choice(0, i);
-      const WalkChoice second = choice(1, j);
+  for (std::size_t i = 0; i < firsts.count; ++i) {
+    for (std::size_t j = 0; j < seconds.count; ++j) {
+      const WalkChoice& first = firsts.choice[i];
+      const WalkChoice& second = seconds.choice[j];
       model.walk_dps_rts = {first.walk_dps_rts, second.walk_dps_rts};
-      const double log_weight = first.log_weight + second.log_weight;
+      const double log_weight = std::log(which.prior) + first.log_weight + second.log_weight;
       DriftFilter filter(model, mean, covariance);
       const auto growth = filter.growth_per_s();
       const double quality_1 = white_dps_rthz[0] * std::sqrt(growth[0]);
@@ -74,9 +196,18 @@ void DriftBank::make(const std::array<double, 2>& white_dps_rthz,
       const double scale_share =
           quality_1 + quality_2 > 0.0 ? quality_1 / (quality_1 + quality_2) : 0.5;
       hypotheses_.push_back({std::move(filter), scale_share, log_weight, log_weight,
-                             first.place * ratios + second.place});
+                             first.place * kWalkRatios_per_s.size() + second.place, kind});
     }
   }
+}
+
+void DriftBank::make(const std::array<double, 2>& white_dps_rthz,
+                     const DriftFilter::Observables& mean,
+                     const DriftFilter::Covariance& covariance) {
+  hypotheses_.clear();
+  white_dps_rthz_ = white_dps_rthz;
+  for (std::size_t kind = 0; kind < kDriftKinds; ++kind)
+    make_kind(kind, white_dps_rthz, mean, covariance);
   normalize();
 }
 
@@ -95,10 +226,9 @@ void DriftBank::resume(const DriftMemory& memory, double age_s) {
   mean << memory.bias_dps[0], memory.bias_dps[1], memory.scale_difference, memory.skew_s;
   make(white, mean,
        doubt_of(memory.bias_covariance, memory.scale_difference_sigma, memory.skew_sigma_s));
-  for (Hypothesis& one : hypotheses_) {
-    if (hypotheses_.size() == kWalkPairs)
-      one.log_weight = std::log(std::max(memory.walk_weight[one.place], 1e-12));
-  }
+  weigh_as(memory);
+  take_slopes(memory);
+  take_coefficients(memory);
   normalize();
   predict(age_s);
   const double share = std::min(age_s / kRunToRunAge_s, 1.0);
@@ -109,18 +239,68 @@ void DriftBank::resume(const DriftMemory& memory, double age_s) {
   widen(spread(0), 0.0, spread(1));
 }
 
+void DriftBank::weigh_as(const DriftMemory& memory) {
+  constexpr double kNever = 1e-12;
+  const std::size_t ratios = kWalkRatios_per_s.size();
+  double kinds = 0.0;
+  for (const double weight : memory.kind_weight)
+    kinds += weight;
+  const bool walks_are_known = !gyros_[0].walk_dps_rts && !gyros_[1].walk_dps_rts;
+  for (Hypothesis& one : hypotheses_) {
+    const DriftKind& kind = kKinds[one.kind];
+    double weight = kinds > 0.0 ? memory.kind_weight[one.kind] / kinds : kind.prior;
+    if (walks_are_known) {
+      double walk = 0.0;
+      for (std::size_t place = 0; place < kWalkPairs; ++place) {
+        walk += memory.walk_weight[place] *
+                share_of_place(kind, place / ratios, one.place / ratios) *
+                share_of_place(kind, place % ratios, one.place % ratios);
+      }
+      weight *= walk;
+    } else {
+      weight *= std::exp(one.log_prior) / kind.prior;
+    }
+    one.log_weight = std::log(std::max(weight, kNever));
+  }
+}
+
+void DriftBank::take_slopes(const DriftMemory& memory) {
+  if (!(memory.slope_sigma_dps_s[0] > 0.0 && memory.slope_sigma_dps_s[1] > 0.0)) return;
+  const Eigen::Vector2d mean(memory.slope_dps_s[0], memory.slope_dps_s[1]);
+  Eigen::Matrix2d covariance = Eigen::Matrix2d::Zero();
+  covariance(0, 0) = squared(memory.slope_sigma_dps_s[0]);
+  covariance(1, 1) = squared(memory.slope_sigma_dps_s[1]);
+  for (Hypothesis& one : hypotheses_) {
+    if (one.filter.has_slopes()) one.filter.set_slopes(mean, covariance);
+  }
+}
+
+// The biases were known where the temperature was; from there on the coefficient counts.
+void DriftBank::take_coefficients(const DriftMemory& memory) {
+  for (std::size_t gyro = 0; gyro < 2; ++gyro) {
+    if (!gyros_[gyro].learns_temperature || !memory.has_temperature[gyro]) continue;
+    reference_c_[gyro] = memory.temperature_c[gyro];
+    has_reference_[gyro] = true;
+    const double sigma = memory.coefficient_sigma_dps_k[gyro];
+    if (!(sigma > 0.0)) continue;
+    for (Hypothesis& one : hypotheses_)
+      one.filter.set_coefficient(gyro, memory.coefficient_dps_k[gyro], squared(sigma));
+  }
+}
+
 void DriftBank::predict(double length_s) {
   for (Hypothesis& one : hypotheses_)
     one.filter.predict(length_s);
 }
 
-void DriftBank::learn(double length_s, const DriftMeasurement& measurement) {
+double DriftBank::learn(double length_s, const DriftMeasurement& measurement) {
   const double kept = std::exp(-length_s / kMemory_s);
-  for (Hypothesis& one : hypotheses_) {
-    one.log_weight = one.log_prior + kept * (one.log_weight - one.log_prior) +
-                     one.filter.update(length_s, measurement);
-  }
+  for (Hypothesis& one : hypotheses_)
+    one.log_weight = one.log_prior + kept * (one.log_weight - one.log_prior);
   normalize();
+  for (Hypothesis& one : hypotheses_)
+    one.log_weight += one.filter.update(length_s, measurement);
+  return normalize() - kHalfLogTwoPi * static_cast<double>(measurement.values.size());
 }
 
 void DriftBank::widen(double variance_1, double covariance_12, double variance_2) {
@@ -128,7 +308,44 @@ void DriftBank::widen(double variance_1, double covariance_12, double variance_2
     one.filter.widen(variance_1, covariance_12, variance_2);
 }
 
-void DriftBank::normalize() {
+void DriftBank::shift(std::size_t gyro, double by_dps, double variance) {
+  for (Hypothesis& one : hypotheses_)
+    one.filter.shift(gyro, by_dps, variance);
+}
+
+void DriftBank::set_temperature(const std::array<double, 2>& temperature_c) {
+  bool changed = false;
+  std::array<double, 2> bend{};
+  for (std::size_t gyro = 0; gyro < 2; ++gyro) {
+    if (!gyros_[gyro].learns_temperature || !std::isfinite(temperature_c[gyro])) continue;
+    if (!has_reference_[gyro]) {
+      reference_c_[gyro] = temperature_c[gyro];
+      has_reference_[gyro] = true;
+    }
+    const double away_k = temperature_c[gyro] - reference_c_[gyro];
+    changed = changed || away_k != away_k_[gyro];
+    bend[gyro] = squared(kBendWhite_per_rtk * white_dps_rthz_[gyro]) *
+                 std::abs(away_k - away_k_[gyro]);
+    away_k_[gyro] = away_k;
+  }
+  if (!changed) return;
+  for (Hypothesis& one : hypotheses_) {
+    one.filter.set_temperature(away_k_);
+    one.filter.widen(bend[0], 0.0, bend[1]);
+  }
+}
+
+void DriftBank::observe_at(const std::array<double, 2>& temperature_c) {
+  std::array<double, 2> away_k = away_k_;
+  for (std::size_t gyro = 0; gyro < 2; ++gyro) {
+    if (has_reference_[gyro] && std::isfinite(temperature_c[gyro]))
+      away_k[gyro] = temperature_c[gyro] - reference_c_[gyro];
+  }
+  for (Hypothesis& one : hypotheses_)
+    one.filter.set_temperature(away_k);
+}
+
+double DriftBank::normalize() {
   double greatest = hypotheses_.front().log_weight;
   for (const Hypothesis& one : hypotheses_)
     greatest = std::max(greatest, one.log_weight);
@@ -138,68 +355,68 @@ void DriftBank::normalize() {
   const double log_sum = greatest + std::log(sum);
   for (Hypothesis& one : hypotheses_)
     one.log_weight -= log_sum;
+  return log_sum;
 }
 
 DriftEstimate DriftBank::estimate() const {
-  DriftEstimate all;
-  // Second moments about the first filter's values: all filters are close together.
-  const DriftFilter::Observables origin = hypotheses_.front().filter.mean();
-  DriftFilter::Observables first = DriftFilter::Observables::Zero();
-  DriftFilter::Covariance second = DriftFilter::Covariance::Zero();
-  std::array<double, 2> scale{};
-  Symmetric scale_square{};
+  EstimateMixer mixer;
   for (const Hypothesis& one : hypotheses_) {
     const double weight = std::exp(one.log_weight);
-    if (weight < 1e-9) continue;
-    const DriftFilter::Observables away = one.filter.mean() - origin;
-    const DriftFilter::Covariance covariance = one.filter.covariance();
-    first += weight * away;
-    second += weight * (covariance + away * away.transpose());
-    const auto growth = one.filter.growth_per_s();
-    const double drift = growth[0] + growth[1];
-    all.drift_share[0] += weight * (drift > 0.0 ? growth[0] / drift : 0.5);
-    const double share = one.scale_share;
-    all.growth[0] += weight * growth[0];
-    all.growth[1] += weight * growth[1];
+    if (weight < kWeightMin) continue;
+    DriftEstimate part;
+    part.mean = one.filter.mean();
+    part.covariance = one.filter.covariance();
+    const DriftFilter::Slopes slopes = one.filter.slopes();
+    part.slope = slopes.mean;
+    part.slope_covariance = slopes.covariance;
+    part.slope_with_bias = slopes.with_drift;
+    part.growth = one.filter.growth_per_s();
+    const double drift = part.growth[0] + part.growth[1];
+    part.drift_share[0] = drift > 0.0 ? part.growth[0] / drift : 0.5;
+    part.drift_share[1] = 1.0 - part.drift_share[0];
     // s₁ = share·s, s₂ = −(1 − share)·s. What both have in common stays open: had one gyro been off
     // by all of s, the other's share of it would be wrong.
-    const double s = origin(kScale) + away(kScale);
-    const double variance = covariance(kScale, kScale);
+    const double share = one.scale_share;
     const double rest = 1.0 - share;
+    const double s = part.mean(kScale);
+    const double variance = part.covariance(kScale, kScale);
     const double blamed = share * share / (share * share + rest * rest);
-    all.blame[0] += weight * blamed;
     const double common =
         (blamed * rest * rest + (1.0 - blamed) * share * share) * std::max(s * s - variance, 0.0);
-    scale[0] += weight * share * s;
-    scale[1] -= weight * rest * s;
-    scale_square[0] += weight * (share * share * (s * s + variance) + common);
-    scale_square[1] += weight * (-share * rest * (s * s + variance) + common);
-    scale_square[2] += weight * (rest * rest * (s * s + variance) + common);
+    part.blame = {blamed, 1.0 - blamed};
+    part.scale = {share * s, -rest * s};
+    part.scale_covariance = {share * share * variance + common, -share * rest * variance + common,
+                             rest * rest * variance + common};
+    part.kind_weight[one.kind] = 1.0;
+    mixer.add(weight, part);
   }
-  all.drift_share[1] = 1.0 - all.drift_share[0];
-  all.blame[1] = 1.0 - all.blame[0];
-  all.mean = origin + first;
-  all.covariance = second - first * first.transpose();
-  all.scale = scale;
-  all.scale_covariance = {scale_square[0] - scale[0] * scale[0],
-                          scale_square[1] - scale[0] * scale[1],
-                          scale_square[2] - scale[1] * scale[1]};
-  return all;
+  return mixer.result();
 }
 
 void DriftBank::save(DriftMemory& memory) const {
-  const DriftEstimate now = estimate();
-  memory.bias_dps = {now.mean(kBias1), now.mean(kBias2)};
-  memory.bias_covariance = {now.covariance(kBias1, kBias1), now.covariance(kBias1, kBias2),
-                            now.covariance(kBias2, kBias2)};
-  memory.scale_difference = now.mean(kScale);
-  memory.scale_difference_sigma = std::sqrt(now.covariance(kScale, kScale));
-  memory.skew_s = now.mean(kSkew);
-  memory.skew_sigma_s = std::sqrt(now.covariance(kSkew, kSkew));
   memory.walk_weight.fill(1.0 / static_cast<double>(kWalkPairs));
-  if (hypotheses_.size() != kWalkPairs) return;
-  for (const Hypothesis& one : hypotheses_)
-    memory.walk_weight[one.place] = std::exp(one.log_weight);
+  const bool walks_are_known = gyros_[0].walk_dps_rts || gyros_[1].walk_dps_rts;
+  if (!walks_are_known) memory.walk_weight.fill(0.0);
+  memory.kind_weight.fill(0.0);
+  std::array<double, 2> coefficient_square{};
+  for (const Hypothesis& one : hypotheses_) {
+    const double weight = std::exp(one.log_weight);
+    memory.kind_weight[one.kind] += weight;
+    if (!walks_are_known) memory.walk_weight[one.place] += weight;
+    for (std::size_t gyro = 0; gyro < 2; ++gyro) {
+      if (!has_reference_[gyro]) continue;
+      const auto [mean, variance] = one.filter.coefficient(gyro);
+      memory.coefficient_dps_k[gyro] += weight * mean;
+      coefficient_square[gyro] += weight * (variance + mean * mean);
+    }
+  }
+  for (std::size_t gyro = 0; gyro < 2; ++gyro) {
+    if (!has_reference_[gyro]) continue;
+    memory.has_temperature[gyro] = true;
+    memory.temperature_c[gyro] = reference_c_[gyro] + away_k_[gyro];
+    memory.coefficient_sigma_dps_k[gyro] =
+        std::sqrt(std::max(coefficient_square[gyro] - squared(memory.coefficient_dps_k[gyro]), 0.0));
+  }
 }
 
 }  // namespace vgyro::fusion

@@ -1,9 +1,10 @@
 #pragma once
 
-// What is known of the drifts when K, the drift's own size, is not: one filter for each pair of
-// values that K₁ and K₂ may have, weighed by how well it foretold the data (Magill's adaptive
-// estimator). Where the model gives K there is one filter. The spread between the filters is part
-// of the covariance, so doubt of K is doubt of the bias.
+// What is known of the drifts when neither their size nor their kind is: one filter for each kind
+// of drift and each pair of values that K₁ and K₂ may have, weighed by how well it foretold the data
+// (Magill's adaptive estimator). The kinds: a walk alone; a gyro that warms up; slopes that come and
+// go, in each gyro by itself or in both alike. Where the model gives K there is one filter a kind.
+// The spread between the filters is part of the covariance, so doubt of K is doubt of the bias.
 //
 // A scale-factor difference is shared out in proportion to N·K: the gyro that is quieter and drifts
 // less is the one that is believed, but a vague K does not decide all.
@@ -28,6 +29,27 @@ struct DriftEstimate {
   /// Which gyro is likely the cause where the two differ about a turn: (N·K)² over the sum.
   std::array<double, 2> blame{};
   std::array<double, 2> drift_share{};  ///< K_k² over K₁² + K₂²
+  /// Slopes of the biases, deg/s², their covariance, and that with the biases (row: bias).
+  Eigen::Vector2d slope = Eigen::Vector2d::Zero();
+  Eigen::Matrix2d slope_covariance = Eigen::Matrix2d::Zero();
+  Eigen::Matrix2d slope_with_bias = Eigen::Matrix2d::Zero();
+  std::array<double, kDriftKinds> kind_weight{};  ///< probability of each kind of drift
+};
+
+/// Moments of a mixture: adds up what each part says, in proportion to its weight.
+class EstimateMixer {
+ public:
+  /// Σ of weights must come to 1.
+  void add(double weight, const DriftEstimate& part);
+  [[nodiscard]] DriftEstimate result() const;
+
+ private:
+  bool any_ = false;
+  DriftEstimate origin_;
+  DriftEstimate sum_;  ///< moments about the first part's
+  Eigen::Matrix<double, 6, 1> first_ = Eigen::Matrix<double, 6, 1>::Zero();
+  Eigen::Matrix<double, 6, 6> second_ = Eigen::Matrix<double, 6, 6>::Zero();
+  Symmetric scale_square_{};
 };
 
 class DriftBank {
@@ -48,11 +70,19 @@ class DriftBank {
   void resume(const DriftMemory& memory, double age_s);
 
   void predict(double length_s);
-  void learn(double length_s, const DriftMeasurement& measurement);
+  /// Returns the log density of the measurement's values.
+  double learn(double length_s, const DriftMeasurement& measurement);
   void widen(double variance_1, double covariance_12, double variance_2);
+  /// One gyro's drift has jumped.
+  void shift(std::size_t gyro, double by_dps, double variance);
+  /// The gyros' temperatures: the coefficients are learned from the first one on. A NaN is passed
+  /// over.
+  void set_temperature(const std::array<double, 2>& temperature_c);
+  /// The temperatures of the next measurement, where they are not quite the present ones.
+  void observe_at(const std::array<double, 2>& temperature_c);
 
   [[nodiscard]] DriftEstimate estimate() const;
-  [[nodiscard]] bool single() const { return hypotheses_.size() == 1; }
+  [[nodiscard]] bool few() const { return hypotheses_.size() <= kDriftKinds; }
   [[nodiscard]] bool empty() const { return hypotheses_.empty(); }
   void save(DriftMemory& memory) const;
 
@@ -63,12 +93,23 @@ class DriftBank {
     double log_prior = 0.0;
     double log_weight = 0.0;
     std::size_t place = 0;  ///< in DriftMemory::walk_weight
+    std::size_t kind = 0;   ///< in DriftMemory::kind_weight
   };
   void make(const std::array<double, 2>& white_dps_rthz, const DriftFilter::Observables& mean,
             const DriftFilter::Covariance& covariance);
-  void normalize();
+  void make_kind(std::size_t kind, const std::array<double, 2>& white_dps_rthz,
+                 const DriftFilter::Observables& mean, const DriftFilter::Covariance& covariance);
+  void weigh_as(const DriftMemory& memory);
+  void take_slopes(const DriftMemory& memory);
+  void take_coefficients(const DriftMemory& memory);
+  /// Returns the logarithm of the sum that the weights had.
+  double normalize();
 
   std::array<GyroParameters, 2> gyros_;
+  std::array<double, 2> white_dps_rthz_{};
+  std::array<double, 2> reference_c_{};  ///< temperature at which the coefficients begin
+  std::array<bool, 2> has_reference_{};
+  std::array<double, 2> away_k_{};
   std::vector<Hypothesis> hypotheses_;
 };
 

@@ -5,6 +5,8 @@
 
 #include <Eigen/Cholesky>
 
+#include "fusion/quadratic.h"
+
 namespace vgyro::fusion {
 
 namespace {
@@ -46,33 +48,48 @@ Term gauss_markov(const GaussMarkov& term, double length_s) {
 DriftFilter::DriftFilter(const DriftModel& model, const Observables& mean,
                          const Covariance& covariance)
     : model_(model) {
-  const auto terms = static_cast<int>(model.gauss_markov_count[0] + model.gauss_markov_count[1]);
-  const int states = kObservables + terms;
+  int states = kObservables;
+  if (model.slopes.any()) {
+    slopes_at_ = states;
+    states += 2;
+  }
+  if (model.temperature_dps_k[0] + model.temperature_dps_k[1] > 0.0) {
+    temperature_at_ = states;
+    states += 2;
+  }
+  int place = states;
+  states += static_cast<int>(model.gauss_markov_count[0] + model.gauss_markov_count[1]);
   observe_ = Observe::Zero(kObservables, states);
   observe_.leftCols<kObservables>().setIdentity();
   state_ = State::Zero(states);
   state_.head<kObservables>() = mean;
   covariance_ = Square::Zero(states, states);
   covariance_.topLeftCorner<kObservables, kObservables>() = covariance;
-  int place = kObservables;
-  for (std::size_t gyro = 0; gyro < 2; ++gyro) {
-    const auto bias = static_cast<int>(gyro);
-    for (std::size_t i = 0; i < model.gauss_markov_count[gyro]; ++i, ++place) {
-      observe_(bias, place) = 1.0;
+  for (int gyro = 0; gyro < 2; ++gyro) {
+    const auto k = static_cast<std::size_t>(gyro);
+    if (slopes_at_ >= 0) {
+      covariance_(slopes_at_ + gyro, slopes_at_ + gyro) = squared(model.slopes.begin_dps_s[k]);
+    }
+    if (temperature_at_ >= 0) {
+      const int at = temperature_at_ + gyro;
+      covariance_(at, at) = squared(model.temperature_dps_k[k]);
+    }
+    for (std::size_t i = 0; i < model.gauss_markov_count[k]; ++i, ++place) {
+      observe_(gyro, place) = 1.0;
       // The bias was seen as a whole: what the term holds the walk does not.
-      const double sigma = model.gauss_markov[gyro][i].sigma_dps;
-      const double variance = sigma * sigma;
+      const double variance = squared(model.gauss_markov[k][i].sigma_dps);
       covariance_(place, place) += variance;
-      covariance_(bias, place) -= variance;
-      covariance_(place, bias) -= variance;
-      covariance_(bias, bias) += variance;
+      covariance_(gyro, place) -= variance;
+      covariance_(place, gyro) -= variance;
+      covariance_(gyro, gyro) += variance;
     }
   }
 }
 
 DriftFilter::Motion DriftFilter::motion(double length_s) const {
   const auto states = state_.size();
-  Motion all{State(states), State(states), State(states), State(states), State(states)};
+  Motion all{State::Ones(states), State::Ones(states), State::Zero(states), State::Zero(states),
+             State::Zero(states)};
   const auto put = [&all](int place, const Term& term) {
     all.carry(place) = term.carry;
     all.carry_mean(place) = term.carry_mean;
@@ -85,6 +102,15 @@ DriftFilter::Motion DriftFilter::motion(double length_s) const {
   put(kScale, walk(kScaleWalk_rts, length_s));
   put(kSkew, walk(kSkewWalk_s_rts, length_s));
   int place = kObservables;
+  if (slopes_at_ >= 0) {
+    const double tau_s = model_.slopes.tau_s;
+    const double gone = -std::expm1(-length_s / tau_s);
+    all.slope_end_s = tau_s * gone;
+    all.slope_mean_s = tau_s * (1.0 - gone * tau_s / length_s);
+    all.carry.segment<2>(slopes_at_).setConstant(1.0 - gone);
+    place += 2;
+  }
+  if (temperature_at_ >= 0) place += 2;
   for (std::size_t gyro = 0; gyro < 2; ++gyro) {
     for (std::size_t i = 0; i < model_.gauss_markov_count[gyro]; ++i)
       put(place++, gauss_markov(model_.gauss_markov[gyro][i], length_s));
@@ -92,27 +118,69 @@ DriftFilter::Motion DriftFilter::motion(double length_s) const {
   return all;
 }
 
+// A slope that wanders by itself: what it gains in a window, and what that has added to the drift.
+void DriftFilter::add_slope_noise(double length_s, Square& walked) const {
+  const SlopeModel& slopes = model_.slopes;
+  const double tau_s = slopes.tau_s;
+  const double a = length_s / tau_s;
+  const double gone = -std::expm1(-a);
+  const double slope_gain = -std::expm1(-2.0 * a);
+  const double cross_s = tau_s * gone * gone;
+  // ½·variance of the integral, as a series where rounding would leave nothing of it.
+  const double integral_s2 =
+      tau_s * tau_s *
+      (a < kShort ? 2.0 / 3.0 * a * a * a : std::max(2.0 * (a - gone) - gone * gone, 0.0));
+  for (int i = 0; i < 2; ++i) {
+    for (int j = 0; j < 2; ++j) {
+      const double both = slopes.steady_dps_s[static_cast<std::size_t>(i)] *
+                          slopes.steady_dps_s[static_cast<std::size_t>(j)] *
+                          (i == j ? 1.0 : slopes.correlation);
+      walked(slopes_at_ + i, slopes_at_ + j) += both * slope_gain;
+      walked(kBias1 + i, slopes_at_ + j) += both * cross_s;
+      walked(slopes_at_ + j, kBias1 + i) += both * cross_s;
+      walked(kBias1 + i, kBias1 + j) += both * integral_s2;
+    }
+  }
+}
+
 void DriftFilter::predict(double length_s) {
+  if (!(length_s > 0.0)) return;
   const Motion m = motion(length_s);
-  state_ = m.carry.cwiseProduct(state_);
-  covariance_ = m.carry.asDiagonal() * covariance_ * m.carry.asDiagonal();
-  covariance_.diagonal() += m.end_variance;
+  Square flow = m.carry.asDiagonal();
+  Square walked = m.end_variance.asDiagonal();
+  if (slopes_at_ >= 0) {
+    for (int gyro = 0; gyro < 2; ++gyro)
+      flow(kBias1 + gyro, slopes_at_ + gyro) = m.slope_end_s;
+    add_slope_noise(length_s, walked);
+  }
+  state_ = (flow * state_).eval();
+  covariance_ = (flow * covariance_ * flow.transpose() + walked).eval();
 }
 
 // Without Gauss–Markov terms, as always where the parameters are estimated, all sizes are known to
 // the compiler: several times faster.
 double DriftFilter::update(double length_s, const DriftMeasurement& measurement) {
-  const bool small = state_.size() == kObservables;
+  const bool terms = model_.gauss_markov_count[0] + model_.gauss_markov_count[1] > 0;
+  if (terms) return update_of<Eigen::Dynamic>(length_s, measurement);
+  switch (state_.size()) {
+    case kObservables:
+      return update_of<kObservables>(length_s, measurement);
+    case kObservables + 2:
+      return update_of<kObservables + 2>(length_s, measurement);
+    default:
+      return update_of<kObservables + 4>(length_s, measurement);
+  }
+}
+
+template <int States>
+double DriftFilter::update_of(double length_s, const DriftMeasurement& measurement) {
   switch (measurement.values.size()) {
     case 1:
-      return small ? update_sized<kObservables, 1>(length_s, measurement)
-                   : update_sized<Eigen::Dynamic, 1>(length_s, measurement);
+      return update_sized<States, 1>(length_s, measurement);
     case 2:
-      return small ? update_sized<kObservables, 2>(length_s, measurement)
-                   : update_sized<Eigen::Dynamic, 2>(length_s, measurement);
+      return update_sized<States, 2>(length_s, measurement);
     default:
-      return small ? update_sized<kObservables, 3>(length_s, measurement)
-                   : update_sized<Eigen::Dynamic, 3>(length_s, measurement);
+      return update_sized<States, 3>(length_s, measurement);
   }
 }
 
@@ -128,7 +196,6 @@ double DriftFilter::update_sized(double length_s, const DriftMeasurement& measur
 
   const Motion motion_of_all = motion(length_s);
   const StateVector carry = motion_of_all.carry;
-  const StateVector carry_mean = motion_of_all.carry_mean;
   const StateVector end_variance = motion_of_all.end_variance;
   const StateVector lead = motion_of_all.lead;
   const StateVector mean_variance = motion_of_all.mean_variance;
@@ -141,12 +208,32 @@ double DriftFilter::update_sized(double length_s, const DriftMeasurement& measur
   } else {
     h = measurement.rows * observe_;
   }
-  const Map h_mean = h * carry_mean.asDiagonal();
+  Map h_mean = h * motion_of_all.carry_mean.asDiagonal();
   const Map h_lead = h * lead.asDiagonal();
+  StateVector end = carry.cwiseProduct(state);
+  if (slopes_at_ >= 0) {
+    for (int gyro = 0; gyro < 2; ++gyro) {
+      h_mean.col(slopes_at_ + gyro) += motion_of_all.slope_mean_s * h.col(kBias1 + gyro);
+      end(kBias1 + gyro) += motion_of_all.slope_end_s * state(slopes_at_ + gyro);
+    }
+  }
+  // Only a slope's own walk is correlated with another state's.
+  const bool slopes_walk = slopes_at_ >= 0;
+  StateSquare walk_covariance;
+  if (slopes_walk) {
+    Square all = motion_of_all.end_variance.asDiagonal();
+    add_slope_noise(length_s, all);
+    walk_covariance = all;
+  }
 
   const Gain spread = before * h_mean.transpose();
-  const Gain led = end_variance.asDiagonal() * h_lead.transpose();
-  const Gain cross = carry.asDiagonal() * spread + led;
+  Gain led = end_variance.asDiagonal() * h_lead.transpose();
+  if (slopes_walk) led = walk_covariance * h_lead.transpose();
+  Gain cross = carry.asDiagonal() * spread + led;
+  if (slopes_at_ >= 0) {
+    for (int gyro = 0; gyro < 2; ++gyro)
+      cross.row(kBias1 + gyro) += motion_of_all.slope_end_s * spread.row(slopes_at_ + gyro);
+  }
   const Gain wandered = mean_variance.asDiagonal() * h.transpose();
   RowSquare noise = measurement.noise;
   noise.noalias() += h * wandered;
@@ -157,16 +244,21 @@ double DriftFilter::update_sized(double length_s, const DriftMeasurement& measur
   const Eigen::LLT<RowSquare> factor(innovation_covariance);
   const Gain gain = factor.solve(cross.transpose()).transpose();
   const RowVector innovation = measurement.values - h_mean * state;
-  state_ = carry.cwiseProduct(state) + gain * innovation;
+  state_ = end + gain * innovation;
 
   // x₁ − x̂₁ = (F − G·H_mean)(x₀ − x̂₀) + (I − G·H_lead)·w − G·(H·r + n): independent parts.
   StateSquare start = -gain * h_mean;
   start.diagonal() += carry;
+  if (slopes_at_ >= 0) {
+    for (int gyro = 0; gyro < 2; ++gyro)
+      start(kBias1 + gyro, slopes_at_ + gyro) += motion_of_all.slope_end_s;
+  }
   StateSquare walked = -gain * h_lead;
   walked.diagonal().array() += 1.0;
   const StateSquare started = start * before;
   StateSquare next = started * start.transpose();
-  const StateSquare scaled = walked * end_variance.asDiagonal();
+  StateSquare scaled = walked * end_variance.asDiagonal();
+  if (slopes_walk) scaled.noalias() = walked * walk_covariance;
   next.noalias() += scaled * walked.transpose();
   const Gain noisy = gain * noise;
   next.noalias() += noisy * gain.transpose();
@@ -181,6 +273,45 @@ void DriftFilter::widen(double variance_1, double covariance_12, double variance
   covariance_(kBias2, kBias2) += variance_2;
   covariance_(kBias1, kBias2) += covariance_12;
   covariance_(kBias2, kBias1) += covariance_12;
+}
+
+void DriftFilter::shift(std::size_t gyro, double by_dps, double variance) {
+  const int bias = gyro == 0 ? kBias1 : kBias2;
+  state_(bias) += by_dps;
+  covariance_(bias, bias) += variance;
+}
+
+void DriftFilter::set_temperature(const std::array<double, 2>& away_k) {
+  if (temperature_at_ < 0) return;
+  observe_(kBias1, temperature_at_) = away_k[0];
+  observe_(kBias2, temperature_at_ + 1) = away_k[1];
+}
+
+void DriftFilter::set_slopes(const Eigen::Vector2d& mean_dps_s, const Eigen::Matrix2d& covariance) {
+  state_.segment<2>(slopes_at_) = mean_dps_s;
+  covariance_.block<2, 2>(slopes_at_, slopes_at_) = covariance;
+}
+
+void DriftFilter::set_coefficient(std::size_t gyro, double mean_dps_k, double variance) {
+  const int at = temperature_at_ + static_cast<int>(gyro);
+  state_(at) = mean_dps_k;
+  covariance_(at, at) = variance;
+}
+
+DriftFilter::Slopes DriftFilter::slopes() const {
+  Slopes found;
+  if (slopes_at_ < 0) return found;
+  found.mean = state_.segment<2>(slopes_at_);
+  found.covariance = covariance_.block<2, 2>(slopes_at_, slopes_at_);
+  const Eigen::Matrix<double, kObservables, 2> with =
+      observe_ * covariance_.middleCols<2>(slopes_at_);
+  found.with_drift = with.topRows<2>();
+  return found;
+}
+
+std::array<double, 2> DriftFilter::coefficient(std::size_t gyro) const {
+  const int at = temperature_at_ + static_cast<int>(gyro);
+  return {state_(at), covariance_(at, at)};
 }
 
 std::array<double, 2> DriftFilter::growth_per_s() const {

@@ -26,6 +26,7 @@ struct GyroParameters {
   double rate_noise_rthz = 0.0;  ///< white noise of density rate_noise_rthz · |Ω|, on top of N
   double resolution_dps = 0.0;   ///< step of the values, 0 when unknown
   std::optional<double> max_bias_dps = {};  ///< largest bias that this gyro can have
+  bool learns_temperature = false;  ///< its temperature is known, what it does to the bias is not
 
   friend bool operator==(const GyroParameters&, const GyroParameters&) = default;
 };

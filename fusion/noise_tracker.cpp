@@ -25,7 +25,32 @@ constexpr double kOneBlockMax = 22.0;
 // A sensor that says nothing of its resolution still has some noise, (deg/s)²/Hz.
 constexpr double kDensityMin = 1e-14;
 
+// What motion shares between the gyros never explains all of one's noise: scale factors differ, and
+// the difference of the two is noise that neither can be without.
+constexpr double kOwnShareMin = 0.05;
+
 }  // namespace
+
+void NoiseTracker::clear() {
+  const std::array<double, 2> step_dps = step_dps_;
+  *this = NoiseTracker(gyros_);
+  step_dps_ = step_dps;
+}
+
+double NoiseTracker::step_dps(std::size_t gyro) const {
+  return std::max(gyros_[gyro].resolution_dps, step_dps_[gyro]);
+}
+
+// The mean of a rounded value is off by (step/π)·sin(…)·exp(−2π²σ²/step²) to first order: its square
+// over all places between two steps, which noise of half a step makes vanish.
+double NoiseTracker::rounding_variance(std::size_t gyro) const {
+  const double step = step_dps(gyro);
+  if (!(step > 0.0)) return 0.0;
+  const double square = step * step;
+  const double noise = std::max(sample_[2 * gyro] - square / 12.0, 0.0);
+  constexpr double kFourPiSquare = 39.47841760435743;
+  return square / 12.0 * std::exp(-kFourPiSquare * noise / square);
+}
 
 void NoiseTracker::measure(const Block& block, bool moving) {
   shared_is_motion_ = shared_is_motion_ || moving;
@@ -60,6 +85,9 @@ void NoiseTracker::measure(const Block& block, bool moving) {
 
 void NoiseTracker::settle(double interval_s) {
   if (cells_ == 0.0) return;
+  const auto own_part = [](const Symmetric& squares, std::size_t k, double shared_part) {
+    return std::max(squares[k] - shared_part, kOwnShareMin * of_difference(squares));
+  };
   const auto shared = [&](const Symmetric& squares, double count) {
     const double significant =
         kRealCorrelation * std::sqrt(squares[0] * squares[2] / std::max(count, 1.0));
@@ -76,13 +104,13 @@ void NoiseTracker::settle(double interval_s) {
   for (std::size_t gyro = 0; gyro < 2; ++gyro) {
     const std::size_t k = 2 * gyro;
     const GyroParameters& given = gyros_[gyro];
-    const double rounding = given.resolution_dps * given.resolution_dps / 12.0;
-    const double measured = (cell_squares_[k] - (sways ? cell_shared : 0.0)) / cells_;
+    const double rounding = squared(step_dps(gyro)) / 12.0;
+    const double measured = own_part(cell_squares_, k, sways ? cell_shared : 0.0) / cells_;
     density_[k] = given.white_dps_rthz ? *given.white_dps_rthz * *given.white_dps_rthz : measured;
     density_[k] = std::max({density_[k], rounding * interval_s, kDensityMin});
     // Gyros slower than a cell have one sample in each.
     sample_[k] = samples_ > cells_
-                     ? (sample_squares_[k] - (shakes ? sample_shared : 0.0)) / gain_[gyro]
+                     ? own_part(sample_squares_, k, shakes ? sample_shared : 0.0) / gain_[gyro]
                      : density_[k] / interval_s;
     sample_[k] = std::max({sample_[k], rounding, kDensityMin});
   }
@@ -123,13 +151,14 @@ void NoiseTracker::watch(const Block& block) {
   // What the gyros share is motion. It does not fall out of one gyro's sum of squares exactly: the
   // doubt grows with the motion, and with the other gyro's noise.
   // What is late shows with opposite signs, and is no more noise than both have together.
-  const double both = of_difference(squares);
+  // Rounding leaves a difference of squares below zero where both step alike.
+  const double both = std::max(of_difference(squares), 0.0);
   const std::array<double, 2> own{std::clamp(squares[0] - squares[1], 0.0, both),
                                   std::clamp(squares[2] - squares[1], 0.0, both)};
   const double both_expected = expected[0] + expected[1];
   std::array<double, 2> rise{};
   for (std::size_t gyro = 0; gyro < 2; ++gyro) {
-    const double spread = std::sqrt(squares[2 * gyro] * both / freedom);
+    const double spread = std::sqrt(std::max(squares[2 * gyro], 0.0) * both / freedom);
     rise[gyro] = std::max((own[gyro] - kSureSigma * spread) / expected[gyro], 1.0);
   }
   const double explained = rise[0] * expected[0] + rise[1] * expected[1];

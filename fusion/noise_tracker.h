@@ -20,7 +20,8 @@ class NoiseTracker {
 
   explicit NoiseTracker(const std::array<GyroParameters, 2>& gyros) : gyros_(gyros) {}
 
-  void clear() { *this = NoiseTracker(gyros_); }
+  /// Forgets all but the resolutions.
+  void clear();
   /// A block whose true rate is constant: its cells differ by noise alone. With `moving` only what
   /// the gyros do not share counts as noise.
   void measure(const Block& block, bool moving);
@@ -28,6 +29,11 @@ class NoiseTracker {
   void watch(const Block& block);
   /// The present rise was none, or is of no use any more.
   void forget_rise();
+  /// The smallest step that a gyro's values have shown.
+  void set_resolution(std::size_t gyro, double step_dps) { step_dps_[gyro] = step_dps; }
+  /// By how much a gyro's mean is off where its values stand between two steps, (deg/s)²: noise
+  /// that is small against the step does not average it out.
+  [[nodiscard]] double rounding_variance(std::size_t gyro) const;
   /// Make density() and sample_variance() of what was measured.
   void settle(double interval_s);
   void resume(const Symmetric& density, const std::array<double, 2>& sample_variance);
@@ -45,7 +51,10 @@ class NoiseTracker {
  private:
   void apply_rise();
 
+  [[nodiscard]] double step_dps(std::size_t gyro) const;
+
   std::array<GyroParameters, 2> gyros_;
+  std::array<double, 2> step_dps_{};
   Symmetric cell_squares_{};  ///< Σ ½Δ²·length of neighbouring cells
   double cells_ = 0.0;
   Symmetric sample_squares_{};    ///< Σ of squares about the cells' means

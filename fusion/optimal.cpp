@@ -1,20 +1,24 @@
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <limits>
 
 #include <Eigen/Cholesky>
 
+#include "fusion/calibration_blocks.h"
 #include "fusion/cells.h"
+#include "fusion/coherence.h"
 #include "fusion/corrector.h"
-#include "fusion/drift_bank.h"
+#include "fusion/difference_window.h"
 #include "fusion/noise_tracker.h"
 #include "fusion/quadratic.h"
+#include "fusion/readings.h"
 #include "fusion/stop_detector.h"
 
-// Samples → cells (0.1 s) → blocks (0.5 s) → windows → the bank of drift filters. A window holds
-// either the difference of the gyros, regressed on rate and its derivative, or, at a stop, both
-// gyros against the known rate. Between windows a sample costs two subtractions, two weights and
-// its share in a cell. docs/optimal.md derives weights and σ.
+// Samples → cells (0.1 s) → blocks (0.5 s) → windows → the readings of what they mean, each a bank
+// of drift filters. A window holds either the difference of the gyros, regressed on rate and its
+// derivative, or, while both are steady, both gyros against the known rate. Between windows a sample
+// costs two subtractions, two weights and its share in a cell. docs/optimal.md derives weights and σ.
 
 namespace vgyro::fusion {
 
@@ -27,23 +31,18 @@ constexpr double kSmooth_s = 0.05;
 // Instants closer together than this are the same.
 constexpr double kRounding_s = 1e-6;
 
-// Calibration keeps at most so many means; when they are full, neighbours are merged.
-constexpr std::size_t kCalibrationBlocks = 64;
-
-// Windows at a stop: white noise read there is heading until it is learned. Longer where every
-// window costs many filters.
+// Windows of a steady run: white noise read there is heading until it is learned. The first one
+// decides between stop and turn, so it is not too short; later ones grow to this, and further where
+// every window costs many filters.
+constexpr double kFirstStopWindow_s = 1.0;
 constexpr double kStopWindow_s = 2.0;
 constexpr double kStopWindowOfMany_s = 4.0;
 
-// Blocks of a stop until it is sure, and one more.
+// Blocks of a steady run until it is sure, and one more.
 constexpr std::size_t kHeldMax = 8;
 
 // Windows are short against every Gauss–Markov term.
 constexpr double kShareOfTau = 0.1;
-
-// A cell's rate or its derivative counts as a regressor when it is this far above its own noise:
-// the noise of a regressor would be taken for knowledge.
-constexpr double kExcited = 5.0;
 
 // The difference of the gyros, averaged over some samples, is watched on every sample …
 constexpr double kFastGain = 0.125;
@@ -55,27 +54,50 @@ constexpr double kJumpSigma = 6.0;
 constexpr double kTurnTolerance = 0.02;
 constexpr double kTurnTolerance_s = 0.02;  ///< the same of its derivative
 constexpr double kTurning_dps = 1.0;
-// Within a cell the two gyros need not have met an acceleration at quite the same time.
-constexpr double kTimingDoubt_s = 0.0005;
 // Who jumped cannot be seen; neither gyro is above suspicion.
 constexpr double kShareMin = 0.1;
 
 // A window that contradicts the filter by this much, per row, is believed less.
 constexpr double kContradiction = 9.0;
 
+// From here on a gyro counts as blind; below the other probability nothing is said of it.
+constexpr double kBlind = 0.5;
+constexpr double kBlindMin = 1e-3;
+
+// A steady stretch was a stop, or was not, from this probability on.
+constexpr double kDecided = 0.5;
+
+// The temperature moves the biases at once when it has changed by this much.
+constexpr double kTemperatureStep_k = 0.05;
+
+// The specific force's variance at a stop against that at other stops: a spread of ± 0.7 in its
+// logarithm; on the road it is twelve times more, give or take a factor of five. What it may tell is
+// bounded: a ferry and a smooth road are as still as a stop.
+constexpr double kStillSpread = 0.7;
+constexpr double kMovingLog = 2.5;
+constexpr double kMovingSpread = 1.6;
+constexpr double kVibrationMost = 4.0;
+constexpr double kVibrationLeast = -1.0;
+constexpr double kVibrationGain = 0.05;
+constexpr double kVibrationFloor_g2 = 1e-8;
+
+// An estimate that is not finite begins anew at the last good one, this much less sure.
+constexpr double kRestartDoubt = 100.0;
+
 Symmetric biases_of(const DriftFilter::Covariance& covariance) {
   return {covariance(kBias1, kBias1), covariance(kBias1, kBias2), covariance(kBias2, kBias2)};
 }
 
-/// Both gyros against the known rate, over `length_s` seconds.
+/// Both gyros against the known rate, over `length_s` seconds; `shared` is what both are off by.
 DriftMeasurement excess_of_both(const std::array<double, 2>& excess_dps, const Symmetric& density,
-                                double length_s) {
+                                double length_s, double shared) {
   DriftMeasurement measurement(2);
   measurement.rows(0, kBias1) = 1.0;
   measurement.rows(1, kBias2) = 1.0;
   measurement.values << excess_dps[0], excess_dps[1];
   measurement.noise << density[0], density[1], density[1], density[2];
   measurement.noise /= length_s;
+  measurement.noise.array() += shared;
   return measurement;
 }
 
@@ -92,75 +114,39 @@ bool is_variance(double value) {
   return std::isfinite(value) && value > 0.0;
 }
 
-/// Whatever kept it may have spoilt it.
-bool is_sound(const DriftMemory& memory) {
-  const auto& weights = memory.walk_weight;
-  return is_covariance(memory.bias_covariance) && is_covariance(memory.white_density) &&
-         is_variance(memory.sample_variance[0]) && is_variance(memory.sample_variance[1]) &&
-         is_finite(memory.bias_dps[0]) && is_finite(memory.bias_dps[1]) &&
-         is_finite(memory.scale_difference) && is_variance(memory.scale_difference_sigma) &&
-         is_finite(memory.skew_s) && is_variance(memory.skew_sigma_s) &&
-         std::all_of(weights.begin(), weights.end(),
-                     [](double weight) { return std::isfinite(weight) && weight >= 0.0; });
+template <class Values>
+bool are_weights(const Values& values) {
+  return std::all_of(values.begin(), values.end(),
+                     [](double value) { return std::isfinite(value) && value >= 0.0; });
 }
 
-/// Means of the calibration, each over some seconds.
-class CalibrationBlocks {
- public:
-  struct Mean {
-    double from_s = 0.0;
-    double to_s = 0.0;
-    double length_s = 0.0;  ///< covered by samples
-    std::array<double, 2> excess_dps{};
-  };
+template <class Values>
+bool are_finite(const Values& values) {
+  return std::all_of(values.begin(), values.end(), is_finite);
+}
 
-  void clear() {
-    count_ = 0;
-    merge_ = 1;
-    gathered_ = 0;
-  }
-  void add(const Block& block) {
-    const Mean mean{
-        block.from_s, block.to_s, block.length_s(), {block.mean_dps(0), block.mean_dps(1)}};
-    if (gathered_ == 0) {
-      if (count_ == kCalibrationBlocks) halve();
-      means_[count_++] = mean;
-    } else {
-      means_[count_ - 1] = merged(means_[count_ - 1], mean);
-    }
-    gathered_ = (gathered_ + 1) % merge_;
-  }
-  [[nodiscard]] std::size_t count() const { return count_; }
-  [[nodiscard]] const Mean& operator[](std::size_t i) const { return means_[i]; }
+/// Whatever kept it may have spoilt it.
+bool is_sound(const DriftMemory& memory) {
+  return is_covariance(memory.bias_covariance) && is_covariance(memory.white_density) &&
+         is_variance(memory.sample_variance[0]) && is_variance(memory.sample_variance[1]) &&
+         are_finite(memory.bias_dps) && is_finite(memory.scale_difference) &&
+         is_variance(memory.scale_difference_sigma) && is_finite(memory.skew_s) &&
+         is_variance(memory.skew_sigma_s) && are_weights(memory.walk_weight) &&
+         are_weights(memory.kind_weight) && are_finite(memory.slope_dps_s) &&
+         are_weights(memory.slope_sigma_dps_s) && are_finite(memory.coefficient_dps_k) &&
+         are_weights(memory.coefficient_sigma_dps_k) && are_finite(memory.temperature_c);
+}
 
- private:
-  static Mean merged(const Mean& a, const Mean& b) {
-    Mean both{a.from_s, b.to_s, a.length_s + b.length_s, {}};
-    for (std::size_t gyro = 0; gyro < 2; ++gyro) {
-      both.excess_dps[gyro] =
-          (a.excess_dps[gyro] * a.length_s + b.excess_dps[gyro] * b.length_s) / both.length_s;
-    }
-    return both;
-  }
-  void halve() {
-    for (std::size_t i = 0; i < kCalibrationBlocks / 2; ++i)
-      means_[i] = merged(means_[2 * i], means_[2 * i + 1]);
-    count_ = kCalibrationBlocks / 2;
-    merge_ *= 2;
-  }
-
-  std::array<Mean, kCalibrationBlocks> means_;
-  std::size_t count_ = 0;
-  std::size_t merge_ = 1;     ///< blocks in each mean
-  std::size_t gathered_ = 0;  ///< in the last one
-};
+std::size_t index_of(Hypothesis hypothesis) {
+  return static_cast<std::size_t>(hypothesis);
+}
 
 class OptimalCorrector final : public Corrector {
  public:
   explicit OptimalCorrector(const OptimalSettings& settings)
       : settings_(settings),
         window_s_(settings.window_s),
-        bank_(settings.gyros),
+        readings_(settings.gyros),
         noise_(settings.gyros) {
     for (const GyroParameters& gyro : settings.gyros) {
       for (std::size_t i = 0; i < gyro.gauss_markov_count; ++i)
@@ -173,6 +159,7 @@ class OptimalCorrector final : public Corrector {
   void calibrate(const RatePair& pair, double true_rate_dps) override {
     const std::array<double, 2> excess{pair.rate_dps[0] - true_rate_dps,
                                        pair.rate_dps[1] - true_rate_dps};
+    follow_still_vibration();
     if (cells_.add(pair.t_s, excess, pair.noise_gain, Present::kBoth)) take_calibration();
   }
 
@@ -181,6 +168,7 @@ class OptimalCorrector final : public Corrector {
     calibration_.clear();
     noise_.clear();
     held_count_ = 0;
+    still_vibration_g2_ = kNone;
   }
 
   void start(const Calibration& calibration) override;
@@ -188,23 +176,28 @@ class OptimalCorrector final : public Corrector {
   VirtualRate update(const RatePair& pair) override;
   VirtualRate update_alone(std::size_t gyro, const RatePair& pair) override;
   void set_wheels(Wheels wheels) override { wheels_ = wheels; }
+  void set_temperature(const std::array<double, 2>& temperature_c) override {
+    temperature_c_ = temperature_c;
+  }
+  void set_resolution(std::size_t gyro, double step_dps) override {
+    noise_.set_resolution(gyro, step_dps);
+  }
+  void set_vibration(double variance_g2) override { vibration_g2_ = variance_g2; }
 
   [[nodiscard]] Drift drift(double t_s) const override {
-    if (bank_.empty()) return {{kNone, kNone}, kNone, kNone, kNone};
-    return {bias_, kNone, std::sqrt(drift_variance(t_s)), kNone};
+    if (readings_.empty()) return {{kNone, kNone}, kNone, kNone, kNone};
+    return {{bias(0, t_s), bias(1, t_s)},
+            weight_[0] * slope_[0] + weight_[1] * slope_[1],
+            std::sqrt(drift_variance(t_s)),
+            std::sqrt(std::max(slope_variance_, 0.0))};
   }
   [[nodiscard]] WindowCounts windows() const override { return windows_; }
-  [[nodiscard]] Condition condition() const override {
-    Condition now = condition_;
-    now.noisy = {noise_.noisy(0), noise_.noisy(1)};
-    return now;
-  }
+  [[nodiscard]] Condition condition() const override;
   [[nodiscard]] std::optional<DriftMemory> memory(double t_s) const override;
 
  private:
-  enum class Kind : std::uint8_t { kNothing, kDifference, kStop };
-  using Matrix3 = Eigen::Matrix3d;
-  using Vector3 = Eigen::Vector3d;
+  enum class Kind : std::uint8_t { kNothing, kDifference, kSteady };
+  enum class Run : std::uint8_t { kMoving, kStop, kTurn };
 
   /// What has been gathered since the filters were last updated.
   struct Window {
@@ -212,81 +205,107 @@ class OptimalCorrector final : public Corrector {
     Present present = Present::kBoth;
     double from_s = 0.0;
     double to_s = 0.0;
-    Matrix3 normal = Matrix3::Zero();  ///< of the difference on (1, Ω, dΩ/dt), over its noise
-    Vector3 right = Vector3::Zero();
-    double covered_s = 0.0;  ///< of a stop
+    double covered_s = 0.0;  ///< of a steady one
     double sway_s = 0.0;     ///< Σ of its variance · seconds
     std::array<double, 2> excess_s{};
+    std::array<double, 2> temperature_c_s{};
+    double temperature_s = 0.0;
   };
 
+  // Calibration.
   void take_calibration();
   void begin_in_motion(const std::array<double, 2>& white, const Symmetric& density);
   void run(double t_s);
+
+  // Blocks.
   void close_block(const Block& block);
-  void learn_from(const Block& block, bool stop);
-  void open_window(const Block& block, Kind kind);
-  void add_difference(const Block& block);
-  void regress();
-  void add_stop(const Block& block);
+  void judge_coherence(const Block& block);
+  [[nodiscard]] Present trusted(const Block& block) const;
+  void learn_from(const Block& block, bool steady);
   bool has_jumped(const Block& block);
+  void end_steady();
+  void note_run(Run run);
+
+  // Windows.
+  void open_window(const Block& block, Kind kind, Present present);
+  void add_difference(const Block& block, Present present);
+  void add_steady(const Block& block, Present present);
   void close_window();
-  [[nodiscard]] DriftMeasurement measure_difference() const;
-  [[nodiscard]] DriftMeasurement measure_stop() const;
+  void learn_difference(double length_s);
+  void learn_steady(double length_s);
+  [[nodiscard]] DriftMeasurement standing_measurement() const;
+  [[nodiscard]] DriftMeasurement turning_measurement() const;
+  [[nodiscard]] SteadyWindow steady_window();
   void doubt_contradiction(DriftMeasurement& measurement, double length_s) const;
+
+  // What samples need.
   void refresh();
+  void begin_anew();
+  void set_weights(Present present);
   [[nodiscard]] BlockLevel level_of(const Block& block) const;
-  [[nodiscard]] double cell_rate(const Cell& cell, Present present) const;
+  [[nodiscard]] double cell_rate(const Cell& cell, double t_s, Present present) const;
+  [[nodiscard]] double bias(std::size_t gyro, double t_s) const {
+    return bias_[gyro] + slope_[gyro] * std::max(t_s - learned_until_s_, 0.0);
+  }
   [[nodiscard]] double rate_density(std::size_t gyro, double rate_dps) const {
     return squared(settings_.gyros[gyro].rate_noise_rthz * rate_dps);
   }
   [[nodiscard]] double drift_variance(double t_s) const {
-    return doubt_ + doubt_growth_ * std::max(t_s - learned_until_s_, 0.0);
+    const double late_s = std::max(t_s - learned_until_s_, 0.0);
+    return doubt_ + (doubt_growth_ + 2.0 * doubt_with_slope_ + slope_variance_ * late_s) * late_s;
   }
   /// How likely it is gyro 1 where the two contradict each other and nothing tells which is wrong.
   [[nodiscard]] double suspicion_of_first() const {
     return std::clamp(estimate_.drift_share[0], kShareMin, 1.0 - kShareMin);
   }
-  void set_weights(Present present);
+  [[nodiscard]] VirtualRate with_blindness(const VirtualRate& rate,
+                                           const std::array<double, 2>& noise) const;
   double acceleration_square(double rate_dps, double t_s);
+  void apply_temperature();
+  void follow_still_vibration();
+  [[nodiscard]] double log_turning_by_vibration() const;
 
   OptimalSettings settings_;
   double window_s_;
   CellBuilder cells_;
   CalibrationBlocks calibration_;
-  DriftBank bank_;
+  Readings readings_;
   NoiseTracker noise_;
   StopDetector detector_;
+  Coherence coherence_;
+  DifferenceWindow difference_;
   Wheels wheels_ = Wheels::kUnknown;
+  std::array<double, 2> temperature_c_{kNone, kNone};
+  std::array<double, 2> applied_temperature_c_{kNone, kNone};
+  double vibration_g2_ = kNone;
+  double still_vibration_g2_ = kNone;  ///< at stops
 
   Window window_;
   double learned_until_s_ = 0.0;  ///< the filters stand here
-  double stop_length_s_ = 0.0;    ///< of the next window at this stop: short at first
-  /// Blocks that wait for the verdict: the last one, and while a stop is not sure all of its
-  /// blocks so far.
+  double stop_length_s_ = kFirstStopWindow_s;  ///< of the next window of this steady run
+  /// Blocks that wait for the verdict: the last one, and while a run is not sure all of its blocks
+  /// so far.
   std::array<Block, kHeldMax> held_;
   std::size_t held_count_ = 0;
-  struct RecentCell {
-    double rate_dps = 0.0;
-    double difference_dps = 0.0;
-    double length_s = 0.0;
-  };
-  std::array<RecentCell, 5> recent_;  ///< of the difference, without a gap
-  std::size_t recent_count_ = 0;
   double recent_until_s_ = 0.0;
   bool held_steady_ = false;
   bool held_begins_ = false;  ///< the first of them begins a run of steady ones
-  bool refused_ = false;
   bool jump_suspected_ = false;
   double suspected_jump_dps_ = 0.0;
+  Run run_ = Run::kMoving;
+  bool run_open_ = false;  ///< both readings of the run are likely
 
   // What a sample needs, made by refresh().
   DriftEstimate estimate_;
   std::array<double, 2> bias_{};
+  std::array<double, 2> slope_{};
   std::array<double, 2> gain_{1.0, 1.0};  ///< 1/(1 + scale)
   Present weights_for_ = Present::kBoth;
   std::array<double, 2> weight_{0.5, 0.5};
-  double doubt_ = 0.0;          ///< variance of the weighted drift
-  double doubt_growth_ = 0.0;   ///< per second
+  double doubt_ = 0.0;             ///< variance of the weighted drift
+  double doubt_growth_ = 0.0;      ///< per second
+  double doubt_with_slope_ = 0.0;  ///< its covariance with the weighted slope
+  double slope_variance_ = 0.0;
   double scale_doubt_ = 0.0;    ///< variance per (deg/s)² of rate
   double timing_doubt_ = 0.0;   ///< variance per (deg/s²)² of acceleration
   double smooth_rate_ = 0.0;    ///< of the virtual rate, over kSmooth_s
@@ -295,6 +314,7 @@ class OptimalCorrector final : public Corrector {
   double fast_noise_ = 0.0;  ///< of the smoothed difference
   double fast_difference_ = 0.0;
   double blame_ = 0.0;  ///< variance of the virtual rate per squared excess difference
+  std::array<double, 2> blind_{};
 
   WindowCounts windows_;
   Condition condition_;
@@ -326,7 +346,7 @@ void OptimalCorrector::start(const Calibration& calibration) {
   held_count_ = 0;
   if (calibration_.count() == 0) {
     // Too short for a single block: the calibration's own means are all there is.
-    bank_.begin(
+    readings_.begin(
         {1.0, 1.0},
         {calibration.bias_dps(0, calibration.end_s), calibration.bias_dps(1, calibration.end_s)},
         {1.0, 0.0, 1.0});
@@ -340,18 +360,19 @@ void OptimalCorrector::start(const Calibration& calibration) {
     begin_in_motion(white, density);
     return;
   }
+  const double sway = calibration_.sway_variance(density);
   for (std::size_t i = 0; i < calibration_.count(); ++i) {
     const CalibrationBlocks::Mean& mean = calibration_[i];
+    const DriftMeasurement measured =
+        excess_of_both(mean.excess_dps, density, mean.length_s, sway);
     if (i == 0) {
-      bank_.begin(
-          white, mean.excess_dps,
-          {density[0] / mean.length_s, density[1] / mean.length_s, density[2] / mean.length_s});
+      readings_.begin(white, mean.excess_dps,
+                      {measured.noise(0, 0), measured.noise(0, 1), measured.noise(1, 1)});
       learned_until_s_ = mean.to_s;
       continue;
     }
-    if (mean.from_s > learned_until_s_) bank_.predict(mean.from_s - learned_until_s_);
-    bank_.learn(mean.to_s - std::max(mean.from_s, learned_until_s_),
-                excess_of_both(mean.excess_dps, density, mean.length_s));
+    if (mean.from_s > learned_until_s_) readings_.predict(mean.from_s - learned_until_s_);
+    readings_.learn(mean.to_s - std::max(mean.from_s, learned_until_s_), measured);
     learned_until_s_ = mean.to_s;
   }
   run(learned_until_s_);
@@ -375,7 +396,7 @@ void OptimalCorrector::begin_in_motion(const std::array<double, 2>& white,
   mean[0] /= length;
   mean[1] /= length;
   const double swing = std::max(square / length - squared(0.5 * (mean[0] + mean[1])), 0.0);
-  bank_.begin(
+  readings_.begin(
       white, mean,
       {density[0] / length + swing, density[1] / length + swing, density[2] / length + swing});
   run(learned_until_s_);
@@ -384,18 +405,30 @@ void OptimalCorrector::begin_in_motion(const std::array<double, 2>& white,
 bool OptimalCorrector::resume(const DriftMemory& memory, double age_s, double t_s) {
   if (!is_sound(memory) || !(age_s >= 0.0) || !std::isfinite(age_s)) return false;
   noise_.resume(memory.white_density, memory.sample_variance);
-  bank_.resume(memory, age_s);
+  readings_.resume(memory, age_s);
   run(t_s);
   return true;
 }
 
 std::optional<DriftMemory> OptimalCorrector::memory(double t_s) const {
-  if (bank_.empty()) return std::nullopt;
+  if (readings_.empty()) return std::nullopt;
   DriftMemory memory;
-  bank_.save(memory);
+  readings_.save(memory);
   const double late_s = std::max(t_s - learned_until_s_, 0.0);
-  memory.bias_covariance[0] += estimate_.growth[0] * late_s;
-  memory.bias_covariance[2] += estimate_.growth[1] * late_s;
+  const Eigen::Matrix2d with = estimate_.slope_with_bias * late_s;
+  const Eigen::Matrix2d covariance = estimate_.covariance.topLeftCorner<2, 2>() + with +
+                                     with.transpose() +
+                                     estimate_.slope_covariance * (late_s * late_s);
+  memory.bias_dps = {bias(0, t_s), bias(1, t_s)};
+  memory.bias_covariance = {covariance(0, 0) + estimate_.growth[0] * late_s, covariance(0, 1),
+                            covariance(1, 1) + estimate_.growth[1] * late_s};
+  memory.scale_difference = estimate_.mean(kScale);
+  memory.scale_difference_sigma = std::sqrt(estimate_.covariance(kScale, kScale));
+  memory.skew_s = estimate_.mean(kSkew);
+  memory.skew_sigma_s = std::sqrt(estimate_.covariance(kSkew, kSkew));
+  memory.slope_dps_s = slope_;
+  memory.slope_sigma_dps_s = {std::sqrt(std::max(estimate_.slope_covariance(0, 0), 0.0)),
+                              std::sqrt(std::max(estimate_.slope_covariance(1, 1), 0.0))};
   memory.white_density = noise_.usual_density();
   memory.sample_variance = {noise_.usual_sample_variance()[0], noise_.usual_sample_variance()[2]};
   return memory;
@@ -405,8 +438,13 @@ void OptimalCorrector::run(double t_s) {
   learned_until_s_ = t_s;
   cells_.clear();
   held_count_ = 0;
-  stop_length_s_ = 0.0;
+  stop_length_s_ = kFirstStopWindow_s;
+  window_.kind = Kind::kNothing;
   detector_.reset();
+  coherence_.clear();
+  difference_.break_off();
+  readings_.set_temperature(temperature_c_);
+  applied_temperature_c_ = temperature_c_;
   refresh();
 }
 
@@ -417,8 +455,8 @@ VirtualRate OptimalCorrector::update(const RatePair& pair) {
     close_block(cells_.last());
   if (weights_for_ != Present::kBoth) set_weights(Present::kBoth);
 
-  const double first = (pair.rate_dps[0] - bias_[0]) * gain_[0];
-  const double second = (pair.rate_dps[1] - bias_[1]) * gain_[1];
+  const double first = (pair.rate_dps[0] - bias(0, pair.t_s)) * gain_[0];
+  const double second = (pair.rate_dps[1] - bias(1, pair.t_s)) * gain_[1];
   const double rate = weight_[0] * first + weight_[1] * second;
 
   const Symmetric& sample = noise_.sample_variance();
@@ -437,7 +475,30 @@ VirtualRate OptimalCorrector::update(const RatePair& pair) {
       squared(kFastSigma) *
       (fast_noise_ + kFastNoise * (rate_density(0, rate) + rate_density(1, rate)) / interval);
   if (contradiction > allowed) variance += blame_ * (contradiction - allowed);
-  return {rate, std::sqrt(variance), {first, second}};
+  const VirtualRate out{rate, std::sqrt(variance), {first, second}};
+  if (blind_[0] + blind_[1] < kBlindMin) return out;
+  return with_blindness(out, {noise_1, noise_2});
+}
+
+// Three cases: both feel the rotation, only gyro 2 does, only gyro 1 does.
+VirtualRate OptimalCorrector::with_blindness(const VirtualRate& rate,
+                                             const std::array<double, 2>& noise) const {
+  const double both = std::max(1.0 - blind_[0] - blind_[1], 0.0);
+  const double sum = both + blind_[0] + blind_[1];
+  const std::array<double, 3> share{both / sum, blind_[0] / sum, blind_[1] / sum};
+  const std::array<double, 3> value{rate.rate_dps, rate.corrected_dps[1], rate.corrected_dps[0]};
+  const std::array<double, 3> variance{squared(rate.sigma_dps),
+                                       noise[1] + estimate_.covariance(kBias2, kBias2),
+                                       noise[0] + estimate_.covariance(kBias1, kBias1)};
+  VirtualRate mixed = rate;
+  mixed.rate_dps = 0.0;
+  for (std::size_t i = 0; i < 3; ++i)
+    mixed.rate_dps += share[i] * value[i];
+  double square = 0.0;
+  for (std::size_t i = 0; i < 3; ++i)
+    square += share[i] * (variance[i] + squared(value[i] - mixed.rate_dps));
+  mixed.sigma_dps = std::sqrt(square);
+  return mixed;
 }
 
 // Squared dΩ/dt as far as it rises above the noise of the smoothed rate.
@@ -466,21 +527,23 @@ VirtualRate OptimalCorrector::update_alone(std::size_t gyro, const RatePair& pai
   }
   fast_difference_ = 0.0;
 
-  VirtualRate out{(pair.rate_dps[gyro] - bias_[gyro]) * gain_[gyro], kNone, {kNone, kNone}};
+  VirtualRate out{
+      (pair.rate_dps[gyro] - bias(gyro, pair.t_s)) * gain_[gyro], kNone, {kNone, kNone}};
   out.corrected_dps[gyro] = out.rate_dps;
   const double interval = std::max(cells_.interval_s(), 1e-6);
   const double noise =
       noise_.sample_variance()[2 * gyro] + rate_density(gyro, out.rate_dps) / interval;
   out.sigma_dps = std::sqrt(noise * pair.noise_gain[gyro] + drift_variance(pair.t_s) +
                             scale_doubt_ * squared(out.rate_dps));
+  out.usable = blind_[gyro] < kBlind;
   return out;
 }
 
 // --- blocks --------------------------------------------------------------------------------------
 
-double OptimalCorrector::cell_rate(const Cell& cell, Present present) const {
-  const double first = (cell.mean_dps[0] - bias_[0]) * gain_[0];
-  const double second = (cell.mean_dps[1] - bias_[1]) * gain_[1];
+double OptimalCorrector::cell_rate(const Cell& cell, double t_s, Present present) const {
+  const double first = (cell.mean_dps[0] - bias(0, t_s)) * gain_[0];
+  const double second = (cell.mean_dps[1] - bias(1, t_s)) * gain_[1];
   if (present == Present::kGyro1) return first;
   if (present == Present::kGyro2) return second;
   return weight_[0] * first + weight_[1] * second;
@@ -490,174 +553,152 @@ BlockLevel OptimalCorrector::level_of(const Block& block) const {
   BlockLevel level;
   level.length_s = block.length_s();
   level.cells = static_cast<double>(block.count);
-  level.bias_dps = bias_;
+  level.bias_dps = {bias(0, block.to_s), bias(1, block.to_s)};
   level.weight = weight_;
   level.doubt_variance = drift_variance(block.to_s);
   const Symmetric& density = noise_.density();
   for (std::size_t gyro = 0; gyro < 2; ++gyro) {
     level.excess_dps[gyro] = block.mean_dps(gyro) - *settings_.stop_rate_dps;
-    level.excess_variance[gyro] = density[2 * gyro] / level.length_s;
+    level.excess_variance[gyro] =
+        density[2 * gyro] / level.length_s + noise_.rounding_variance(gyro);
   }
   double sum = 0.0;
   double cell_s = 0.0;
   for (std::size_t i = 0; i < block.count; ++i) {
-    sum += cell_rate(block.cells[i], block.present);
+    sum += cell_rate(block.cells[i], block.to_s, weights_for_);
     cell_s += block.cells[i].length_s;
   }
   const double mean = sum / level.cells;
   double squares = 0.0;
   for (std::size_t i = 0; i < block.count; ++i)
-    squares += squared(cell_rate(block.cells[i], block.present) - mean);
+    squares += squared(cell_rate(block.cells[i], block.to_s, weights_for_) - mean);
   level.cell_variance = squares / std::max(level.cells - 1.0, 1.0);
   level.noise_variance = weighted(weight_, density) * level.cells / cell_s;
   return level;
 }
 
+/// A gyro that is blind has no say.
+Present OptimalCorrector::trusted(const Block& block) const {
+  if (block.present != Present::kBoth) return block.present;
+  if (blind_[0] >= kBlind) return Present::kGyro2;
+  return blind_[1] >= kBlind ? Present::kGyro1 : Present::kBoth;
+}
+
+void OptimalCorrector::judge_coherence(const Block& block) {
+  if (block.present != Present::kBoth) {
+    coherence_.break_off();
+    return;
+  }
+  const double middle_s = 0.5 * (block.from_s + block.to_s);
+  const std::array<double, 2> mean{(block.mean_dps(0) - bias(0, middle_s)) * gain_[0],
+                                   (block.mean_dps(1) - bias(1, middle_s)) * gain_[1]};
+  // A time skew shows where the rate's own slope changes within the block.
+  double bend = 0.0;
+  for (std::size_t i = 1; i < block.count; ++i) {
+    for (std::size_t gyro = 0; gyro < 2; ++gyro) {
+      const double step = block.cells[i].mean_dps[gyro] - block.cells[i - 1].mean_dps[gyro];
+      bend = std::max(bend, std::abs(step) / CellBuilder::kCell_s);
+    }
+  }
+  coherence_.judge(mean, block.from_s, block.to_s, noise_.density(),
+                   std::max(kTurnTolerance_s, 3.0 * std::abs(estimate_.mean(kSkew))) * bend);
+  blind_ = {coherence_.blind(0), coherence_.blind(1)};
+}
+
 // A block is used when the next one has been judged: motion begins before it is seen.
 void OptimalCorrector::close_block(const Block& block) {
-  if (block.present != weights_for_) set_weights(block.present);
+  judge_coherence(block);
+  const Present present = trusted(block);
+  if (present != weights_for_) set_weights(present);
   noise_.watch(block);
+  apply_temperature();
   auto verdict = StopDetector::Verdict::kMoving;
   if (settings_.stop_rate_dps) verdict = detector_.judge(level_of(block), wheels_);
-  const bool stop =
-      verdict == StopDetector::Verdict::kStop || verdict == StopDetector::Verdict::kRelearn;
-  // All held blocks but the last belong to a stop that has just become sure, or to none.
-  const bool waits = verdict == StopDetector::Verdict::kSteady && held_count_ < kHeldMax;
+  const bool steady = verdict == StopDetector::Verdict::kSteady;
+  // All held blocks but the last belong to a run that has just become sure, or to none.
+  const bool waits = verdict == StopDetector::Verdict::kUnsure && held_count_ < kHeldMax;
   if (!waits || detector_.run_begins()) {
     for (std::size_t i = 0; i < held_count_; ++i) {
-      const bool still = stop && held_steady_ && held_[i].present == block.present;
+      const bool still = steady && held_steady_ && held_[i].present == block.present;
       learn_from(held_[i], still && !(i == 0 && held_begins_));
     }
     held_count_ = 0;
     // The first steady block may hold the end of the motion.
     held_begins_ = detector_.run_begins();
   }
-  if (verdict == StopDetector::Verdict::kRelearn) {
-    close_window();
-    const double variance = squared(detector_.run_level_dps());
-    bank_.widen(variance, variance, variance);
-    refresh();
-  }
-  if (stop && !condition_.stopped) ++condition_.stops;
-  if (verdict == StopDetector::Verdict::kRefused && !refused_) ++condition_.stops_refused;
-  refused_ = verdict == StopDetector::Verdict::kRefused;
-  condition_.stopped = stop;
+  if (!steady && run_ != Run::kMoving) end_steady();
   held_[held_count_++] = block;
-  held_steady_ = stop || verdict == StopDetector::Verdict::kSteady;
+  held_steady_ = verdict != StopDetector::Verdict::kMoving;
 }
 
-void OptimalCorrector::learn_from(const Block& block, bool stop) {
-  if (stop) {
-    noise_.measure(block, false);
-    noise_.settle(cells_.interval_s());
+void OptimalCorrector::learn_from(const Block& block, bool steady) {
+  const Present present = trusted(block);
+  if (steady) {
+    if (readings_.standing() > kDecided) {
+      noise_.measure(block, false);
+      noise_.settle(cells_.interval_s());
+    }
     jump_suspected_ = false;
-    add_stop(block);
+    add_steady(block, present);
     return;
   }
-  if (block.present == Present::kBoth && has_jumped(block)) return;
-  add_difference(block);
+  if (present == Present::kBoth && (coherence_.contradict() || has_jumped(block))) return;
+  add_difference(block, present);
 }
 
-void OptimalCorrector::open_window(const Block& block, Kind kind) {
-  const bool goes_on = window_.kind == kind && window_.present == block.present &&
-                       block.from_s <= window_.to_s + kRounding_s;
-  if (!goes_on) {
-    close_window();
-    if (block.from_s > learned_until_s_) {
-      bank_.predict(block.from_s - learned_until_s_);
-      learned_until_s_ = block.from_s;
-    }
-    window_ = Window{.kind = kind,
-                     .present = block.present,
-                     .from_s = learned_until_s_,
-                     .to_s = learned_until_s_};
-  }
-  window_.to_s = std::max(block.to_s, window_.to_s);
+// Stop or turn, as it seems now; a stretch is counted once, as what it was held for last.
+void OptimalCorrector::note_run(Run run) {
+  if (run_ == run) return;
+  if (run_ == Run::kStop) --condition_.stops;
+  if (run_ == Run::kTurn) --condition_.stops_refused;
+  if (run == Run::kStop) ++condition_.stops;
+  if (run == Run::kTurn) ++condition_.stops_refused;
+  run_ = run;
 }
 
-void OptimalCorrector::add_difference(const Block& block) {
-  stop_length_s_ = 0.0;
-  if (block.from_s > recent_until_s_ + kRounding_s || block.present != Present::kBoth)
-    recent_count_ = 0;
-  open_window(block, Kind::kDifference);
-  if (block.present == Present::kBoth) {
-    for (std::size_t i = 0; i < block.count; ++i) {
-      if (recent_count_ == recent_.size()) {
-        std::move(recent_.begin() + 1, recent_.end(), recent_.begin());
-        --recent_count_;
-      }
-      const Cell& cell = block.cells[i];
-      recent_[recent_count_++] = {cell_rate(cell, block.present),
-                                  cell.mean_dps[0] - cell.mean_dps[1], cell.length_s};
-      if (recent_count_ == recent_.size()) regress();
-    }
-  }
-  recent_until_s_ = block.to_s;
-  // A turn that tells much about scale factor or skew is used at once.
-  const bool tells = window_.normal(1, 1) * estimate_.covariance(kScale, kScale) > 1.0 ||
-                     window_.normal(2, 2) * estimate_.covariance(kSkew, kSkew) > 1.0;
-  if (tells || window_.to_s - window_.from_s >= window_s_) close_window();
-}
-
-// The middle one of the recent cells; its neighbours give the mean of dΩ/dt over it, to fourth
-// order: a skew of milliseconds shows in the smallest accelerations, and so would their error.
-void OptimalCorrector::regress() {
-  const auto& [first, before, cell, after, last] = recent_;
-  const Symmetric& density = noise_.density();
-  const double span_s = 12.0 * cell.length_s;
-  const double slope =
-      (8.0 * (after.rate_dps - before.rate_dps) - (last.rate_dps - first.rate_dps)) / span_s;
-  const double rate_variance = weighted(weight_, density) / cell.length_s;
-  const double slope_variance = 130.0 * rate_variance / squared(span_s);
-  const bool turns = squared(cell.rate_dps) > squared(kExcited) * rate_variance;
-  const bool accelerates = squared(slope) > squared(kExcited) * slope_variance;
-  const Vector3 regressor{1.0, turns ? cell.rate_dps : 0.0, accelerates ? slope : 0.0};
-  const double noise =
-      (of_difference(density) + rate_density(0, cell.rate_dps) + rate_density(1, cell.rate_dps)) /
-          cell.length_s +
-      squared(kTimingDoubt_s * slope);
-  window_.normal += regressor * regressor.transpose() / noise;
-  window_.right += regressor * (cell.difference_dps / noise);
-}
-
-void OptimalCorrector::add_stop(const Block& block) {
-  open_window(block, Kind::kStop);
-  const double length = block.length_s();
-  for (std::size_t gyro = 0; gyro < 2; ++gyro) {
-    window_.excess_s[gyro] += (block.mean_dps(gyro) - *settings_.stop_rate_dps) * length;
-  }
-  window_.covered_s += length;
-  window_.sway_s += detector_.sway_variance() * length;
-  // At the beginning of a stop every second counts; later the windows grow.
-  if (window_.to_s - window_.from_s >=
-      std::min({stop_length_s_, window_s_, bank_.single() ? kStopWindow_s : kStopWindowOfMany_s})) {
-    stop_length_s_ = std::max(1.0, 2.0 * stop_length_s_);
-    close_window();
-    condition_.disagree = false;
-  }
+void OptimalCorrector::end_steady() {
+  if (window_.kind == Kind::kSteady) close_window();
+  if (run_open_) ++condition_.stops_open;
+  run_ = Run::kMoving;
+  run_open_ = false;
+  readings_.end_steady();
+  detector_.forget_turns();
+  stop_length_s_ = kFirstStopWindow_s;
+  refresh();
 }
 
 bool OptimalCorrector::has_jumped(const Block& block) {
   const double length = block.length_s();
-  const double difference = block.mean_dps(0) - block.mean_dps(1);
+  double difference = 0.0;
   double rate = 0.0;
   double rate_square = 0.0;
+  double slope = 0.0;
   for (std::size_t i = 0; i < block.count; ++i) {
-    const double one = cell_rate(block.cells[i], block.present);
-    rate += one / static_cast<double>(block.count);
-    rate_square += one * one / static_cast<double>(block.count);
+    const Cell& cell = block.cells[i];
+    const double one = cell_rate(cell, block.to_s, Present::kBoth);
+    const double share = cell.length_s / length;
+    difference += share * (cell.mean_dps[0] - cell.mean_dps[1]);
+    rate += share * one;
+    rate_square += share * one * one;
+    if (i > 0) {
+      slope = std::max(slope, std::abs(one - cell_rate(block.cells[i - 1], block.to_s,
+                                                       Present::kBoth)) /
+                                  cell.length_s);
+    }
   }
-  const double slope = block.count < 2 ? 0.0
-                                       : (cell_rate(block.cells[block.count - 1], block.present) -
-                                          cell_rate(block.cells[0], block.present)) /
-                                             length;
-  const DriftFilter::Observables regressor{1.0, -1.0, rate, slope};
-  const double away = difference - regressor.dot(estimate_.mean);
   const double late_s = std::max(block.to_s - learned_until_s_, 0.0);
+  DriftFilter::Observables regressor;
+  regressor << 1.0, -1.0, rate, 0.0;
+  const double foretold = regressor.dot(estimate_.mean) + (slope_[0] - slope_[1]) * late_s;
+  const double away = difference - foretold;
+  const Eigen::Vector2d apart(1.0, -1.0);
   double variance = regressor.dot(estimate_.covariance * regressor) +
                     (estimate_.growth[0] + estimate_.growth[1]) * late_s +
+                    2.0 * late_s * apart.dot(estimate_.slope_with_bias * apart) +
+                    late_s * late_s * apart.dot(estimate_.slope_covariance * apart) +
                     of_difference(noise_.density()) / length +
-                    (rate_density(0, rate) + rate_density(1, rate)) / length;
+                    (rate_density(0, rate) + rate_density(1, rate)) / length +
+                    noise_.rounding_variance(0) + noise_.rounding_variance(1);
   if (rate_square > squared(kTurning_dps))
     variance += squared(kTurnTolerance) * rate_square + squared(kTurnTolerance_s * slope);
   if (squared(away) <= squared(kJumpSigma) * variance) {
@@ -672,71 +713,177 @@ bool OptimalCorrector::has_jumped(const Block& block) {
   if (!again) return true;
   jump_suspected_ = false;
   close_window();
-  const double first = suspicion_of_first();
-  bank_.widen(first * squared(away), 0.0, (1.0 - first) * squared(away));
+  readings_.split_step(away, variance, suspicion_of_first());
+  fast_difference_ = 0.0;
   refresh();
-  if (!condition_.disagree) ++condition_.disagreements;
-  condition_.disagree = true;
   return false;
 }
 
 // --- windows -------------------------------------------------------------------------------------
 
-// Normal equations → rows of unit noise, by Cholesky; what was not excited has no row.
-DriftMeasurement OptimalCorrector::measure_difference() const {
-  constexpr double kNothing = 1e-9;
-  Matrix3 lower = Matrix3::Zero();
-  Vector3 white = Vector3::Zero();
-  std::array<int, 3> used{};
-  int rows = 0;
-  for (int j = 0; j < 3; ++j) {
-    double pivot = window_.normal(j, j);
-    double value = window_.right(j);
-    for (int r = 0; r < rows; ++r) {
-      const int k = used[static_cast<std::size_t>(r)];
-      pivot -= lower(j, k) * lower(j, k);
-      value -= lower(j, k) * white(k);
+void OptimalCorrector::open_window(const Block& block, Kind kind, Present present) {
+  const bool goes_on = window_.kind == kind && window_.present == present &&
+                       block.from_s <= window_.to_s + kRounding_s;
+  if (!goes_on) {
+    close_window();
+    // What a run of one gyro has shown says nothing of a level of both.
+    if (run_ != Run::kMoving && window_.present != present) end_steady();
+    if (block.from_s > learned_until_s_) {
+      readings_.predict(block.from_s - learned_until_s_);
+      learned_until_s_ = block.from_s;
     }
-    if (pivot <= kNothing * window_.normal(j, j)) continue;
-    lower(j, j) = std::sqrt(pivot);
-    white(j) = value / lower(j, j);
-    for (int i = j + 1; i < 3; ++i) {
-      double cross = window_.normal(i, j);
-      for (int r = 0; r < rows; ++r) {
-        const int k = used[static_cast<std::size_t>(r)];
-        cross -= lower(i, k) * lower(j, k);
-      }
-      lower(i, j) = cross / lower(j, j);
-    }
-    used[static_cast<std::size_t>(rows++)] = j;
+    window_ = Window{
+        .kind = kind, .present = present, .from_s = learned_until_s_, .to_s = learned_until_s_};
+    difference_.clear();
   }
-  DriftMeasurement measurement(rows);
-  for (int r = 0; r < rows; ++r) {
-    const int j = used[static_cast<std::size_t>(r)];
-    measurement.rows(r, kBias1) = lower(0, j);
-    measurement.rows(r, kBias2) = -lower(0, j);
-    measurement.rows(r, kScale) = lower(1, j);
-    measurement.rows(r, kSkew) = lower(2, j);
-    measurement.values(r) = white(j);
-  }
-  return measurement;
+  window_.to_s = std::max(block.to_s, window_.to_s);
+  for (std::size_t gyro = 0; gyro < 2; ++gyro)
+    window_.temperature_c_s[gyro] += temperature_c_[gyro] * block.length_s();
+  window_.temperature_s += block.length_s();
 }
 
-DriftMeasurement OptimalCorrector::measure_stop() const {
+void OptimalCorrector::add_difference(const Block& block, Present present) {
+  stop_length_s_ = kFirstStopWindow_s;
+  if (block.from_s > recent_until_s_ + kRounding_s || present != Present::kBoth)
+    difference_.break_off();
+  open_window(block, Kind::kDifference, present);
+  if (present == Present::kBoth) {
+    const RateNoise noise{weighted(weight_, noise_.density()), of_difference(noise_.density()),
+                          rate_density(0, 1.0) + rate_density(1, 1.0)};
+    for (std::size_t i = 0; i < block.count; ++i) {
+      const Cell& cell = block.cells[i];
+      difference_.add({cell_rate(cell, block.to_s, present), cell.mean_dps[0] - cell.mean_dps[1],
+                       cell.length_s},
+                      noise);
+    }
+  }
+  recent_until_s_ = block.to_s;
+  // A turn that tells much about scale factor or skew is used at once.
+  const bool tells =
+      difference_.scale_information() * estimate_.covariance(kScale, kScale) > 1.0 ||
+      difference_.skew_information() * estimate_.covariance(kSkew, kSkew) > 1.0;
+  if (tells || window_.to_s - window_.from_s >= window_s_) close_window();
+}
+
+void OptimalCorrector::add_steady(const Block& block, Present present) {
+  open_window(block, Kind::kSteady, present);
+  const double length = block.length_s();
+  for (std::size_t gyro = 0; gyro < 2; ++gyro) {
+    window_.excess_s[gyro] += (block.mean_dps(gyro) - *settings_.stop_rate_dps) * length;
+  }
+  window_.covered_s += length;
+  window_.sway_s += detector_.sway_variance() * length;
+  // At the beginning of a stop every second counts; later the windows grow.
+  const double longest_s = readings_.few() ? kStopWindow_s : kStopWindowOfMany_s;
+  if (window_.to_s - window_.from_s < std::min({stop_length_s_, window_s_, longest_s})) return;
+  stop_length_s_ = 2.0 * stop_length_s_;
+  close_window();
+}
+
+void OptimalCorrector::close_window() {
+  if (window_.kind == Kind::kNothing) return;
+  const double length = window_.to_s - window_.from_s;
+  std::array<double, 2> mean_c{kNone, kNone};
+  for (std::size_t gyro = 0; gyro < 2 && window_.temperature_s > 0.0; ++gyro)
+    mean_c[gyro] = window_.temperature_c_s[gyro] / window_.temperature_s;
+  const Kind kind = window_.kind;
+  window_.kind = Kind::kNothing;
+  readings_.observe_at(mean_c);
+  if (kind == Kind::kSteady) {
+    learn_steady(length);
+  } else {
+    learn_difference(length);
+  }
+  readings_.observe_at(applied_temperature_c_);
+  learned_until_s_ = window_.to_s;
+  refresh();
+}
+
+void OptimalCorrector::learn_difference(double length_s) {
+  DriftMeasurement measurement(0);
+  if (window_.present == Present::kBoth) measurement = difference_.measure();
+  if (measurement.values.size() == 0) {
+    readings_.predict(length_s);
+    ++windows_.skipped;
+    return;
+  }
+  doubt_contradiction(measurement, length_s);
+  readings_.learn(length_s, measurement);
+  ++windows_.completed;
+}
+
+DriftMeasurement OptimalCorrector::standing_measurement() const {
   const double length = window_.covered_s;
   const double sway = window_.sway_s / length;
   const std::array<double, 2> excess{window_.excess_s[0] / length, window_.excess_s[1] / length};
+  const std::array<double, 2> rounding{noise_.rounding_variance(0), noise_.rounding_variance(1)};
   if (window_.present == Present::kBoth) {
-    DriftMeasurement measurement = excess_of_both(excess, noise_.density(), length);
-    measurement.noise.array() += sway;
+    DriftMeasurement measurement = excess_of_both(excess, noise_.density(), length, sway);
+    measurement.noise(0, 0) += rounding[0];
+    measurement.noise(1, 1) += rounding[1];
     return measurement;
   }
   const std::size_t gyro = window_.present == Present::kGyro1 ? 0 : 1;
   DriftMeasurement measurement(1);
   measurement.rows(0, gyro == 0 ? kBias1 : kBias2) = 1.0;
   measurement.values(0) = excess[gyro];
-  measurement.noise(0, 0) = noise_.density()[2 * gyro] / length + sway;
+  measurement.noise(0, 0) = noise_.density()[2 * gyro] / length + rounding[gyro] + sway;
   return measurement;
+}
+
+DriftMeasurement OptimalCorrector::turning_measurement() const {
+  if (window_.present != Present::kBoth) return DriftMeasurement(0);
+  const double length = window_.covered_s;
+  const double rate = cell_rate(
+      {.mean_dps = {window_.excess_s[0] / length + *settings_.stop_rate_dps,
+                    window_.excess_s[1] / length + *settings_.stop_rate_dps}},
+      window_.to_s, Present::kBoth);
+  DriftMeasurement measurement(1);
+  measurement.rows(0, kBias1) = 1.0;
+  measurement.rows(0, kBias2) = -1.0;
+  measurement.rows(0, kScale) = rate;
+  measurement.values(0) = (window_.excess_s[0] - window_.excess_s[1]) / length;
+  measurement.noise(0, 0) =
+      (of_difference(noise_.density()) + rate_density(0, rate) + rate_density(1, rate)) / length +
+      noise_.rounding_variance(0) + noise_.rounding_variance(1);
+  return measurement;
+}
+
+SteadyWindow OptimalCorrector::steady_window() {
+  SteadyWindow steady;
+  steady.standing = standing_measurement();
+  steady.turning = turning_measurement();
+  steady.length_s = window_.to_s - window_.from_s;
+  const DriftMeasurement& both = steady.standing;
+  if (window_.present == Present::kBoth) {
+    // The weights that make the level independent of the difference.
+    const double sum = both.noise(0, 0) + both.noise(1, 1) - 2.0 * both.noise(0, 1);
+    const double first = sum > 0.0 ? (both.noise(1, 1) - both.noise(0, 1)) / sum : 0.5;
+    steady.weight = {first, 1.0 - first};
+    steady.level_dps = first * both.values(0) + (1.0 - first) * both.values(1);
+    steady.level_variance =
+        weighted(steady.weight, {both.noise(0, 0), both.noise(0, 1), both.noise(1, 1)});
+  } else {
+    steady.weight = {window_.present == Present::kGyro1 ? 1.0 : 0.0,
+                     window_.present == Present::kGyro2 ? 1.0 : 0.0};
+    steady.level_dps = both.values(0);
+    steady.level_variance = both.noise(0, 0);
+  }
+  steady.turned_deg = detector_.turned_deg();
+  steady.log_turning = run_ == Run::kMoving
+                           ? detector_.log_turning(wheels_) + log_turning_by_vibration()
+                           : detector_.log_turning_gain(wheels_, steady.length_s);
+  return steady;
+}
+
+void OptimalCorrector::learn_steady(double length_s) {
+  static_cast<void>(length_s);
+  readings_.learn_steady(steady_window());
+  ++windows_.completed;
+  const double standing = readings_.standing();
+  note_run(standing > kDecided ? Run::kStop : Run::kTurn);
+  run_open_ = std::min(standing, 1.0 - standing) > Readings::kWorthTelling;
+  if (standing > 1.0 - Readings::kWorthTelling) follow_still_vibration();
 }
 
 // Turns that neither scale factor nor skew explains, and drift that is faster than its model.
@@ -744,43 +891,81 @@ void OptimalCorrector::doubt_contradiction(DriftMeasurement& measurement, double
   DriftFilter::Covariance doubt = estimate_.covariance;
   doubt(kBias1, kBias1) += estimate_.growth[0] * length_s;
   doubt(kBias2, kBias2) += estimate_.growth[1] * length_s;
+  doubt.topLeftCorner<2, 2>() += estimate_.slope_covariance * squared(0.5 * length_s);
+  DriftFilter::Observables mean = estimate_.mean;
+  mean.head<2>() += estimate_.slope * (0.5 * length_s);
   DriftMeasurement::Square expected = measurement.noise;
   expected += measurement.rows * doubt * measurement.rows.transpose();
-  const DriftMeasurement::Values away = measurement.values - measurement.rows * estimate_.mean;
+  const DriftMeasurement::Values away = measurement.values - measurement.rows * mean;
   const double contradiction =
       away.dot(Eigen::LLT<DriftMeasurement::Square>(expected).solve(away)) /
       static_cast<double>(away.size());
   if (contradiction > kContradiction) measurement.noise *= contradiction / kContradiction;
 }
 
-void OptimalCorrector::close_window() {
-  if (window_.kind == Kind::kNothing) return;
-  const double length = window_.to_s - window_.from_s;
-  DriftMeasurement measurement(0);
-  if (window_.kind == Kind::kStop) {
-    measurement = measure_stop();
-  } else if (window_.present == Present::kBoth) {
-    measurement = measure_difference();
+// --- surroundings --------------------------------------------------------------------------------
+
+void OptimalCorrector::apply_temperature() {
+  bool changed = false;
+  for (std::size_t gyro = 0; gyro < 2; ++gyro) {
+    if (!settings_.gyros[gyro].learns_temperature || !std::isfinite(temperature_c_[gyro])) continue;
+    changed = changed || !(std::abs(temperature_c_[gyro] - applied_temperature_c_[gyro]) <=
+                           kTemperatureStep_k);
   }
-  if (measurement.values.size() == 0) {
-    bank_.predict(length);
-    ++windows_.skipped;
-  } else {
-    if (window_.kind == Kind::kDifference) doubt_contradiction(measurement, length);
-    bank_.learn(length, measurement);
-    ++windows_.completed;
-  }
-  learned_until_s_ = window_.to_s;
-  window_.kind = Kind::kNothing;
+  if (!changed) return;
+  readings_.set_temperature(temperature_c_);
+  applied_temperature_c_ = temperature_c_;
   refresh();
+}
+
+void OptimalCorrector::follow_still_vibration() {
+  if (!std::isfinite(vibration_g2_)) return;
+  const double now = std::max(vibration_g2_, kVibrationFloor_g2);
+  still_vibration_g2_ = std::isfinite(still_vibration_g2_)
+                            ? still_vibration_g2_ * std::pow(now / still_vibration_g2_, kVibrationGain)
+                            : now;
+}
+
+double OptimalCorrector::log_turning_by_vibration() const {
+  if (!std::isfinite(vibration_g2_) || !std::isfinite(still_vibration_g2_)) return 0.0;
+  const double ratio = std::log(std::max(vibration_g2_, kVibrationFloor_g2) / still_vibration_g2_);
+  const double still = -0.5 * squared(ratio / kStillSpread) - std::log(kStillSpread);
+  const double moving = -0.5 * squared((ratio - kMovingLog) / kMovingSpread) - std::log(kMovingSpread);
+  return std::clamp(moving - still, kVibrationLeast, kVibrationMost);
 }
 
 // --- weights -------------------------------------------------------------------------------------
 
 void OptimalCorrector::refresh() {
-  estimate_ = bank_.estimate();
+  const DriftEstimate now = readings_.estimate();
+  if (!now.mean.allFinite() || !now.covariance.allFinite() || !now.slope.allFinite()) {
+    begin_anew();
+    return;
+  }
+  estimate_ = now;
   bias_ = {estimate_.mean(kBias1), estimate_.mean(kBias2)};
+  slope_ = {estimate_.slope(0), estimate_.slope(1)};
   gain_ = {1.0 / (1.0 + estimate_.scale[0]), 1.0 / (1.0 + estimate_.scale[1])};
+  set_weights(weights_for_);
+  const bool disagree = std::min(readings_.stepped(0), readings_.stepped(1)) >
+                            Readings::kWorthTelling ||
+                        coherence_.contradict();
+  if (disagree && !condition_.disagree) ++condition_.disagreements;
+  condition_.disagree = disagree;
+  condition_.ambiguous = readings_.ambiguous();
+}
+
+// Nothing that is not finite stays: the last good biases go on, less sure.
+void OptimalCorrector::begin_anew() {
+  ++condition_.restarts;
+  const Symmetric& density = noise_.usual_density();
+  const double first = std::max(kRestartDoubt * estimate_.covariance(kBias1, kBias1), density[0]);
+  const double second = std::max(kRestartDoubt * estimate_.covariance(kBias2, kBias2), density[2]);
+  readings_.begin({std::sqrt(density[0]), std::sqrt(density[2])}, bias_, {first, 0.0, second});
+  run_ = Run::kMoving;
+  estimate_ = readings_.estimate();
+  slope_ = {0.0, 0.0};
+  gain_ = {1.0, 1.0};
   set_weights(weights_for_);
 }
 
@@ -788,7 +973,9 @@ void OptimalCorrector::refresh() {
 // the window's length, white noise averages out over it.
 void OptimalCorrector::set_weights(Present present) {
   weights_for_ = present;
-  const Symmetric doubt = biases_of(estimate_.covariance);
+  Symmetric doubt = biases_of(estimate_.covariance);
+  doubt[0] += noise_.rounding_variance(0);
+  doubt[2] += noise_.rounding_variance(1);
   if (present == Present::kBoth) {
     const Symmetric& density = noise_.density();
     const double first = doubt[0] + density[0] / window_s_;
@@ -800,8 +987,14 @@ void OptimalCorrector::set_weights(Present present) {
   } else {
     weight_ = {present == Present::kGyro1 ? 1.0 : 0.0, present == Present::kGyro2 ? 1.0 : 0.0};
   }
-  doubt_ = weighted(weight_, doubt);
+  const auto weighted_slope = [this](const Eigen::Matrix2d& matrix) {
+    const Eigen::Vector2d weight(weight_[0], weight_[1]);
+    return weight.dot(matrix * weight);
+  };
+  doubt_ = std::max(weighted(weight_, doubt), 0.0);
   doubt_growth_ = weighted(weight_, {estimate_.growth[0], 0.0, estimate_.growth[1]});
+  doubt_with_slope_ = std::max(weighted_slope(estimate_.slope_with_bias), 0.0);
+  slope_variance_ = std::max(weighted_slope(estimate_.slope_covariance), 0.0);
   scale_doubt_ = std::max(weighted(weight_, estimate_.scale_covariance), 0.0);
   fast_noise_ = kFastNoise * of_difference(noise_.sample_variance()) + of_difference(doubt);
   const double first_share = suspicion_of_first();
@@ -812,6 +1005,25 @@ void OptimalCorrector::set_weights(Present present) {
                       ? 0.0
                       : skew_square * (estimate_.blame[0] * squared(weight_[0]) +
                                        estimate_.blame[1] * squared(weight_[1]));
+}
+
+Condition OptimalCorrector::condition() const {
+  Condition now = condition_;
+  now.noisy = {noise_.noisy(0), noise_.noisy(1)};
+  now.blind = {blind_[0] >= kBlind, blind_[1] >= kBlind};
+  now.stopped = run_ == Run::kStop;
+  if (readings_.empty()) return now;
+  auto& probability = now.probability;
+  probability[index_of(Hypothesis::kStanding)] = readings_.standing();
+  probability[index_of(Hypothesis::kTurning)] = readings_.turning();
+  probability[index_of(Hypothesis::kGyro1Stepped)] = readings_.stepped(0);
+  probability[index_of(Hypothesis::kGyro2Stepped)] = readings_.stepped(1);
+  probability[index_of(Hypothesis::kGyro1Blind)] = blind_[0];
+  probability[index_of(Hypothesis::kGyro2Blind)] = blind_[1];
+  probability[index_of(Hypothesis::kWarmingUp)] = estimate_.kind_weight[1];
+  probability[index_of(Hypothesis::kOwnSlopes)] = estimate_.kind_weight[2];
+  probability[index_of(Hypothesis::kAlikeSlopes)] = estimate_.kind_weight[3];
+  return now;
 }
 
 }  // namespace

@@ -9,16 +9,30 @@ namespace vgyro::fusion {
 
 namespace {
 
-// A turn that no drift explains; so much of it between two refusals makes them separate stops.
+// A rate that no drift explains: only so much counts as an angle that was turned.
 constexpr double kTurning_dps = 2.0;
-constexpr double kTurned_deg = 30.0;
-constexpr double kRefusalRun_s = 5.0;
 
 // Wheels that stand while the platform does this are broken, or the platform is carried.
 constexpr double kNoStand_dps = 1.0;
+constexpr double kNoStandSigmas = 6.0;
 
 // Weight of a new block in the recent level.
 constexpr double kRecent = 0.25;
+
+// Of the steady stretches that a gyro sees: stops; bends and circles of a road; platforms that turn
+// by themselves (ferry, turntable, ship at sea). With wheels that stand only the last are left, and
+// few of them.
+constexpr double kStops = 0.70;
+constexpr double kRoadTurns = 0.25;
+constexpr double kPlatformTurns = 0.05;
+constexpr double kCarried = 0.03;
+
+// How long they last, on average; some stops are a parking.
+constexpr double kStop_s = 60.0;
+constexpr double kParking_s = 3600.0;
+constexpr double kParkings = 0.2;
+constexpr double kRoadTurn_s = 15.0;
+constexpr double kPlatformTurn_s = 600.0;
 
 // Quantile of χ² over its degrees of freedom (Wilson and Hilferty), z standard deviations up.
 double scatter_limit(double degrees, double z) {
@@ -45,70 +59,53 @@ bool StopDetector::steady(const BlockLevel& block, bool on_wheels) {
   return true;
 }
 
-bool StopDetector::proven() const {
-  if (refusal_count_ < kRefusals || run_s_ < kRefusalRun_s || turned_deg_ < kTurned_deg)
-    return false;
-  for (const Refusal& refusal : refusals_) {
-    if (squared(refusal.level_dps - run_level_) >
-        squared(kGate) * (refusal.variance + run_variance_) + squared(0.2 * run_level_))
-      return false;
-  }
-  return refusals_[1].turned_deg >= kTurned_deg;
-}
-
 void StopDetector::end_run() {
-  if (run_refused_ && run_s_ >= kRefusalRun_s) {
-    refusals_[0] = refusals_[1];
-    refusals_[1] = {run_level_, run_variance_, turned_deg_};
-    refusal_count_ = std::min(refusal_count_ + 1, kRefusals);
-    turned_deg_ = 0.0;
-  }
   run_s_ = 0.0;
   run_blocks_ = 0;
-  run_refused_ = false;
 }
 
 StopDetector::Verdict StopDetector::judge(const BlockLevel& block, Wheels wheels) {
-  const double doubt = std::sqrt(block.doubt_variance);
   double level = 0.0;
-  double noise = 0.0;
-  for (std::size_t gyro = 0; gyro < 2; ++gyro) {
+  for (std::size_t gyro = 0; gyro < 2; ++gyro)
     level += block.weight[gyro] * (block.excess_dps[gyro] - block.bias_dps[gyro]);
-    noise += squared(block.weight[gyro]) * block.excess_variance[gyro];
-  }
   if (wheels == Wheels::kRolling) wheels_distrusted_ = false;
-  if (wheels == Wheels::kStanding && (std::abs(level) > kNoStand_dps + 6.0 * doubt ||
-                                      block.cell_variance > squared(kNoStand_dps))) {
+  const double no_stand = kNoStand_dps + kNoStandSigmas * std::sqrt(block.doubt_variance);
+  if (wheels == Wheels::kStanding &&
+      (std::abs(level) > no_stand || block.cell_variance > squared(kNoStand_dps))) {
     wheels_distrusted_ = true;
   }
-  if (wheels_distrusted_) wheels = Wheels::kUnknown;
-
-  if (wheels == Wheels::kRolling || !steady(block, wheels == Wheels::kStanding)) {
+  const bool on_wheels = wheels == Wheels::kStanding && !wheels_distrusted_;
+  if (wheels == Wheels::kRolling || !steady(block, on_wheels)) {
     end_run();
     if (std::abs(level) > kTurning_dps) turned_deg_ += std::abs(level) * block.length_s;
     return Verdict::kMoving;
   }
-  noise += sway_variance_;
   const double weight = block.length_s / (run_s_ + block.length_s);
   const double recent = std::max(kRecent, weight);
   for (std::size_t gyro = 0; gyro < 2; ++gyro)
     recent_[gyro] += recent * (block.excess_dps[gyro] - recent_[gyro]);
-  run_level_ += weight * (level - run_level_);
-  run_variance_ = squared(1.0 - weight) * run_variance_ + squared(weight) * noise;
   run_s_ += block.length_s;
   run_blocks_ = std::min(run_blocks_ + 1, kRunBlocks);
-  if (run_s_ < kRun_s || run_blocks_ < kRunBlocks) return Verdict::kSteady;
-  double recent_level = 0.0;
-  for (std::size_t gyro = 0; gyro < 2; ++gyro)
-    recent_level += block.weight[gyro] * (recent_[gyro] - block.bias_dps[gyro]);
-  const double recent_variance = std::max(run_variance_, kRecent / (2.0 - kRecent) * noise);
-  const bool possible =
-      squared(recent_level) <= squared(kGate) * (block.doubt_variance + recent_variance);
-  run_refused_ = !possible;
-  if (!possible && !proven()) return Verdict::kRefused;
-  refusal_count_ = 0;
-  run_refused_ = false;
-  return possible ? Verdict::kStop : Verdict::kRelearn;
+  return run_s_ < kRun_s || run_blocks_ < kRunBlocks ? Verdict::kUnsure : Verdict::kSteady;
+}
+
+double StopDetector::log_turning(Wheels wheels) const {
+  if (wheels == Wheels::kStanding && !wheels_distrusted_)
+    return std::log(kCarried / (1.0 - kCarried));
+  return std::log((kRoadTurns + kPlatformTurns) / kStops);
+}
+
+double StopDetector::log_turning_gain(Wheels wheels, double length_s) const {
+  const double before_s = std::max(run_s_ - length_s, 0.0);
+  const bool on_wheels = wheels == Wheels::kStanding && !wheels_distrusted_;
+  const double road = on_wheels ? 0.0 : kRoadTurns;
+  const auto turns = [&](double t_s) {
+    return road * std::exp(-t_s / kRoadTurn_s) + kPlatformTurns * std::exp(-t_s / kPlatformTurn_s);
+  };
+  const auto stops = [](double t_s) {
+    return (1.0 - kParkings) * std::exp(-t_s / kStop_s) + kParkings * std::exp(-t_s / kParking_s);
+  };
+  return std::log(turns(run_s_) / turns(before_s)) - std::log(stops(run_s_) / stops(before_s));
 }
 
 }  // namespace vgyro::fusion

@@ -1,11 +1,9 @@
 #pragma once
 
-// Does the platform stand? Judged block by block (about half a second) from the gyros' own
-// steadiness, and from the wheels where there are any. A stop is learned from only when what both
-// gyros read lies within what their drift may have become: two gyros that moved together mean that
-// the platform turns – a ferry, a turntable, a tow truck – and the stop is refused. A gate that
-// refused for ever would lock itself out, so a level that comes back at several stops with real
-// turns in between is believed after all: no platform turns like that.
+// Is the platform steady: standing, or turning at a constant rate? Judged block by block (about half
+// a second) from how the gyros' cells scatter and whether their means stay where they were, and from
+// the wheels where there are any. Which of the two it is, is for others to weigh (readings.h): this
+// says only that nothing changes, and how much the wheels and time speak for a turn.
 
 #include <array>
 #include <cstdint>
@@ -29,19 +27,16 @@ struct BlockLevel {
 
 class StopDetector {
  public:
-  static constexpr double kRun_s = 2.5;   ///< a stop is sure after this long
+  static constexpr double kRun_s = 2.5;   ///< steady for this long
   static constexpr int kRunBlocks = 4;    ///< and so many blocks
-  static constexpr double kGate = 3.0;    ///< standard deviations, for the level
-  static constexpr double kSteady = 3.5;  ///< the same for steadiness from block to block
+  static constexpr double kSteady = 3.5;  ///< standard deviations, from block to block
   /// Standing on its wheels a vehicle may sway by this much, rms.
   static constexpr double kSway_dps = 0.05;
 
   enum class Verdict : std::uint8_t {
     kMoving,
-    kSteady,  ///< not long enough
-    kStop,
-    kRefused,  ///< steady, but the gyros have moved together
-    kRelearn   ///< a stop; the drift is where it was thought impossible
+    kUnsure,  ///< steady, but not for long enough
+    kSteady
   };
 
   Verdict judge(const BlockLevel& block, Wheels wheels);
@@ -51,32 +46,26 @@ class StopDetector {
   [[nodiscard]] bool run_begins() const { return run_blocks_ == 1; }
   /// What sway adds to the variance of one block's mean. Valid after judge().
   [[nodiscard]] double sway_variance() const { return sway_variance_; }
-  /// Mean of what both gyros read beyond their known drift, in the present run.
-  [[nodiscard]] double run_level_dps() const { return run_level_; }
+  /// Log of how much likelier a steady turn is than a stop, at the beginning of a run.
+  [[nodiscard]] double log_turning(Wheels wheels) const;
+  /// What `length_s` seconds more of the present run add to it: turns end sooner than stops.
+  [[nodiscard]] double log_turning_gain(Wheels wheels, double length_s) const;
+  /// The angle turned since the last steady run, either way.
+  [[nodiscard]] double turned_deg() const { return turned_deg_; }
+  void forget_turns() { turned_deg_ = 0.0; }
+  /// The wheels stood while the platform turned, and have not rolled since.
+  [[nodiscard]] bool wheels_distrusted() const { return wheels_distrusted_; }
 
  private:
-  struct Refusal {
-    double level_dps = 0.0;
-    double variance = 0.0;
-    double turned_deg = 0.0;  ///< before it, since the refusal before
-  };
-  static constexpr std::size_t kRefusals = 2;  ///< remembered; one more makes the proof
-
   [[nodiscard]] bool steady(const BlockLevel& block, bool on_wheels);
   void end_run();
-  [[nodiscard]] bool proven() const;
 
   bool wheels_distrusted_ = false;
   double sway_variance_ = 0.0;
   double run_s_ = 0.0;
   int run_blocks_ = 0;
-  double run_level_ = 0.0;
-  double run_variance_ = 0.0;       ///< of that mean, from noise
   std::array<double, 2> recent_{};  ///< excess of the last blocks
-  bool run_refused_ = false;
   double turned_deg_ = 0.0;
-  std::array<Refusal, kRefusals> refusals_;
-  std::size_t refusal_count_ = 0;
 };
 
 }  // namespace vgyro::fusion

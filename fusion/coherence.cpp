@@ -1,0 +1,84 @@
+#include "fusion/coherence.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace vgyro::fusion {
+
+namespace {
+
+// A gyro goes blind once in many thousand hours, here per block; what one block can tell is
+// bounded, so that a step of the other gyro, which shows in two blocks, is not enough.
+constexpr double kBlindPrior = -16.0;
+constexpr double kBlockTells = 6.0;
+constexpr double kBlindMost = 12.0;
+// A platform has moved when a gyro's mean has changed by so many standard deviations.
+constexpr double kMoved = 5.0;
+// Healthy gyros may differ by this share of a change: scale factors, and instants of blocks.
+constexpr double kChangeTolerance = 0.05;
+// Somebody else's frames may look like a gyro that moves for some seconds; until then a gyro that
+// does not is not surely the wrong one.
+constexpr double kSure_s = 8.0;
+constexpr double kUnsureMost = 0.95;
+constexpr double kSureMost = 0.9995;
+// Changes that differ by so many standard deviations are no chance.
+constexpr double kUnlike = 6.0;
+constexpr double kContradictionPrior = -8.0;
+constexpr double kContradictionMost = 12.0;
+constexpr double kAlikeTells = 2.0;
+// A hole between two blocks beyond which they are not compared.
+constexpr double kGap_s = 1.0;
+
+}  // namespace
+
+void Coherence::judge(const std::array<double, 2>& mean_dps, double from_s, double to_s,
+                      const Symmetric& density, double changing_dps_s2_allowance) {
+  if (count_ > 0 && from_s - before_[count_ - 1].to_s > kGap_s) count_ = 0;
+  const Mean now{mean_dps, to_s - from_s, to_s};
+  if (count_ < kBack) {
+    before_[count_++] = now;
+    return;
+  }
+  const Mean old = before_[0];
+  before_[0] = before_[1];
+  before_[1] = now;
+  const double per_s = 1.0 / now.length_s + 1.0 / old.length_s;
+  const std::array<double, 2> variance{density[0] * per_s, density[2] * per_s};
+  const std::array<double, 2> change{now.rate_dps[0] - old.rate_dps[0],
+                                     now.rate_dps[1] - old.rate_dps[1]};
+  const double greatest = std::max(std::abs(change[0]), std::abs(change[1]));
+  const double unlike = change[0] - change[1];
+  const double unlike_variance =
+      of_difference(density) * per_s + squared(kChangeTolerance * greatest) +
+      squared(changing_dps_s2_allowance);
+  const double log_alike = -0.5 * (squared(unlike) / unlike_variance + std::log(unlike_variance));
+  std::array<bool, 2> moved{};
+  for (std::size_t gyro = 0; gyro < 2; ++gyro)
+    moved[gyro] = squared(change[gyro]) > squared(kMoved) * variance[gyro];
+  for (std::size_t gyro = 0; gyro < 2; ++gyro) {
+    double tells = 0.0;
+    if (moved[1 - gyro]) {
+      const double log_blind =
+          -0.5 * (squared(change[gyro]) / variance[gyro] + std::log(variance[gyro]));
+      tells = std::clamp(log_blind - log_alike, -kBlockTells, kBlockTells);
+      if (tells > 0.0) shown_s_[gyro] += now.length_s;
+    } else if (moved[gyro]) {
+      tells = -kBlockTells;
+    }
+    blind_[gyro] = std::clamp(blind_[gyro] + tells, 0.0, kBlindMost - kBlindPrior);
+    if (blind_[gyro] == 0.0) shown_s_[gyro] = 0.0;
+  }
+  const bool both_moved = moved[0] && moved[1];
+  if (both_moved || contradiction_ > 0.0) {
+    const bool far = squared(unlike) > squared(kUnlike) * unlike_variance;
+    contradiction_ = std::clamp(contradiction_ + (far ? kBlockTells : -kAlikeTells),
+                                kContradictionPrior, kContradictionMost);
+  }
+}
+
+double Coherence::blind(std::size_t gyro) const {
+  const double probability = 1.0 / (1.0 + std::exp(-(kBlindPrior + blind_[gyro])));
+  return std::min(probability, shown_s_[gyro] >= kSure_s ? kSureMost : kUnsureMost);
+}
+
+}  // namespace vgyro::fusion

@@ -1,0 +1,45 @@
+#pragma once
+
+// Do the two gyros feel the same rotation? Judged from how their block means change: a gyro that
+// stays where it was while the other one moves is blind to rotation, whatever noise it makes; two
+// that both move, but not alike, are not on one platform, or one is not what it is taken for. Both
+// are probabilities, built up block by block and taken back the same way; a drift or a step of one
+// gyro changes too few blocks to look like either.
+
+#include <array>
+#include <cstddef>
+
+#include "fusion/quadratic.h"
+
+namespace vgyro::fusion {
+
+class Coherence {
+ public:
+  /// A block of both gyros: their means less the known drifts, its length, their noise densities.
+  void judge(const std::array<double, 2>& mean_dps, double from_s, double to_s,
+             const Symmetric& density, double changing_dps_s2_allowance);
+  /// What came before says nothing of what follows.
+  void break_off() { count_ = 0; }
+  void clear() { *this = {}; }
+
+  /// Probability that this gyro feels no rotation. Near 1 only when that has been seen for long.
+  [[nodiscard]] double blind(std::size_t gyro) const;
+  /// The gyros move, and not alike.
+  [[nodiscard]] bool contradict() const { return contradiction_ > 0.0; }
+
+ private:
+  static constexpr std::size_t kBack = 2;
+  struct Mean {
+    std::array<double, 2> rate_dps{};
+    double length_s = 0.0;
+    double to_s = 0.0;
+  };
+
+  std::array<Mean, kBack> before_;  ///< the last blocks, the newest last
+  std::size_t count_ = 0;
+  std::array<double, 2> blind_{};    ///< log odds above the prior
+  std::array<double, 2> shown_s_{};  ///< for so long the other one has moved and this one has not
+  double contradiction_ = -8.0;      ///< log odds
+};
+
+}  // namespace vgyro::fusion

@@ -1,0 +1,313 @@
+#include "fusion/readings.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace vgyro::fusion {
+
+namespace {
+
+// How fast platforms turn when they turn steadily: as likely between 0.02 and 0.2 deg/s as between
+// 2 and 20; below 0.02 about even.
+constexpr double kSlowTurn_dps = 0.02;
+constexpr double kFastTurn_dps = 60.0;
+
+// A steady turn that was interrupted goes on as it was: a circle with a wobble, a ferry, a
+// turntable. How likely, and how nearly; less so when the platform has turned away in between.
+constexpr double kGoesOn = 0.5;
+constexpr double kGoesOnElsewhere = 0.05;
+constexpr double kGoesOnWithin = 0.05;
+constexpr double kElsewhere_deg = 30.0;
+
+// How a steady turn wanders, per √s: a helmsman's and a driver's hands.
+constexpr double kTurnWalk_dps_rts = 0.002;
+constexpr double kTurnWalkShare_rts = 0.02;
+
+// A step is of one gyro; one that has stepped is the one to step again, or back.
+constexpr double kSameGyroAgain = 0.9;
+// How far a step is known when it is seen: by the blocks that show it, and this share of it.
+constexpr double kStepDoubt = 0.05;
+
+// A bias beyond what its gyro can have: σ of that limit, as a share of it.
+constexpr double kLimitSoftness = 0.1;
+
+// Readings so much alike are one.
+constexpr double kAlikeSigmas = 0.1;
+constexpr double kAlikeVariance = 1.2;
+
+constexpr double kHalfLogTwoPi = 0.918938533204672741780;
+
+double log_normal(double away, double variance) {
+  return -0.5 * (away * away / variance + std::log(variance)) - kHalfLogTwoPi;
+}
+
+double of_level(const std::array<double, 2>& weight, const DriftEstimate& estimate) {
+  return weight[0] * estimate.mean(kBias1) + weight[1] * estimate.mean(kBias2);
+}
+
+double level_doubt(const std::array<double, 2>& weight, const DriftEstimate& estimate) {
+  return weighted(weight, {estimate.covariance(kBias1, kBias1), estimate.covariance(kBias1, kBias2),
+                           estimate.covariance(kBias2, kBias2)});
+}
+
+}  // namespace
+
+Readings::Readings(const std::array<GyroParameters, 2>& gyros)
+    : gyros_(gyros),
+      slots_{Reading{DriftBank(gyros)}, Reading{DriftBank(gyros)}, Reading{DriftBank(gyros)},
+             Reading{DriftBank(gyros)}, Reading{DriftBank(gyros)}, Reading{DriftBank(gyros)},
+             Reading{DriftBank(gyros)}, Reading{DriftBank(gyros)}} {}
+
+void Readings::begin(const std::array<double, 2>& white_dps_rthz,
+                     const std::array<double, 2>& bias_dps, const Symmetric& covariance) {
+  slots_[0].bank.begin(white_dps_rthz, bias_dps, covariance);
+  slots_[0].log_weight = 0.0;
+  slots_[0].steady = Steady::kNo;
+  slots_[0].stepped = kNoGyro;
+  slots_[0].last_turn_dps = 0.0;
+  count_ = 1;
+}
+
+void Readings::resume(const DriftMemory& memory, double age_s) {
+  begin({1.0, 1.0}, {0.0, 0.0}, {1.0, 0.0, 1.0});
+  slots_[0].bank.resume(memory, age_s);
+}
+
+void Readings::predict(double length_s) {
+  for (std::size_t i = 0; i < count_; ++i)
+    slots_[i].bank.predict(length_s);
+}
+
+void Readings::learn(double length_s, const DriftMeasurement& measurement) {
+  for (std::size_t i = 0; i < count_; ++i)
+    slots_[i].log_weight += slots_[i].bank.learn(length_s, measurement);
+  settle();
+}
+
+// --- steady: does it stand, or turn? -------------------------------------------------------------
+
+void Readings::learn_steady(const SteadyWindow& window) {
+  if (standing() + turning() > 0.0) {
+    go_on_steady(window);
+  } else {
+    begin_steady(window);
+  }
+  settle();
+}
+
+double Readings::turn_density(const Reading& reading, const SteadyWindow& window,
+                              const DriftEstimate& estimate) const {
+  static const double kSpan = 2.0 * std::log((kFastTurn_dps + kSlowTurn_dps) / kSlowTurn_dps);
+  const double turn = window.level_dps - of_level(window.weight, estimate);
+  const double variance = window.level_variance + level_doubt(window.weight, estimate);
+  const double anew = 1.0 / (kSpan * (kSlowTurn_dps + std::sqrt(turn * turn + variance)));
+  if (reading.last_turn_dps == 0.0) return anew;
+  const double share = window.turned_deg < kElsewhere_deg ? kGoesOn : kGoesOnElsewhere;
+  const double on_variance = variance + squared(kGoesOnWithin * reading.last_turn_dps);
+  return (1.0 - share) * anew + share * std::exp(log_normal(turn - reading.last_turn_dps, on_variance));
+}
+
+double Readings::beyond_limits(const DriftEstimate& estimate) const {
+  double penalty = 0.0;
+  for (std::size_t gyro = 0; gyro < 2; ++gyro) {
+    if (!gyros_[gyro].max_bias_dps) continue;
+    const double limit = *gyros_[gyro].max_bias_dps;
+    const double beyond = std::abs(estimate.mean(static_cast<int>(gyro))) - limit;
+    if (beyond > 0.0) penalty += 0.5 * squared(beyond / (kLimitSoftness * limit));
+  }
+  return penalty;
+}
+
+void Readings::begin_steady(const SteadyWindow& window) {
+  const std::size_t before = count_;
+  for (std::size_t i = 0; i < before; ++i) {
+    Reading& stands = slots_[count_++];
+    Reading& turns = slots_[i];
+    const DriftEstimate known = turns.bank.estimate();
+    stands = turns;
+    stands.steady = Steady::kStands;
+    stands.log_weight += stands.bank.learn(window.length_s, window.standing);
+    stands.log_weight -= beyond_limits(stands.bank.estimate());
+    turns.steady = Steady::kTurns;
+    turns.turn_dps = window.level_dps;
+    turns.turn_variance = window.level_variance;
+    turns.log_weight += window.log_turning + std::log(turn_density(turns, window, known));
+    turns.last_turn_dps = window.level_dps - of_level(window.weight, known);
+    if (window.turning.values.size() == 0) {
+      turns.bank.predict(window.length_s);
+    } else {
+      turns.log_weight += turns.bank.learn(window.length_s, window.turning);
+    }
+    stands.last_turn_dps = 0.0;
+  }
+}
+
+void Readings::go_on_steady(const SteadyWindow& window) {
+  for (std::size_t i = 0; i < count_; ++i) {
+    Reading& one = slots_[i];
+    if (one.steady == Steady::kStands) {
+      one.log_weight += one.bank.learn(window.length_s, window.standing);
+      continue;
+    }
+    const double walk =
+        squared(kTurnWalk_dps_rts) + squared(kTurnWalkShare_rts * one.last_turn_dps);
+    one.log_weight += window.log_turning +
+                      log_normal(window.level_dps - one.turn_dps,
+                                 window.level_variance + one.turn_variance + walk * window.length_s);
+    one.turn_dps = window.level_dps;
+    one.turn_variance = window.level_variance;
+    if (window.turning.values.size() == 0) {
+      one.bank.predict(window.length_s);
+    } else {
+      one.log_weight += one.bank.learn(window.length_s, window.turning);
+    }
+  }
+}
+
+void Readings::end_steady() {
+  for (std::size_t i = 0; i < count_; ++i) {
+    if (slots_[i].steady == Steady::kStands) slots_[i].stepped = kNoGyro;
+    slots_[i].steady = Steady::kNo;
+  }
+  join_alike();
+}
+
+// --- steps ---------------------------------------------------------------------------------------
+
+void Readings::split_step(double away_dps, double variance, double first_share) {
+  const std::size_t before = count_;
+  const double doubt = variance + squared(kStepDoubt * away_dps);
+  for (std::size_t i = 0; i < before; ++i) {
+    Reading& first = slots_[i];
+    Reading& second = slots_[count_++];
+    second = first;
+    double share = first_share;
+    if (first.stepped == 0) share = kSameGyroAgain;
+    if (first.stepped == 1) share = 1.0 - kSameGyroAgain;
+    first.bank.shift(0, away_dps, doubt);
+    first.log_weight += std::log(share);
+    first.stepped = 0;
+    second.bank.shift(1, -away_dps, doubt);
+    second.log_weight += std::log(1.0 - share);
+    second.stepped = 1;
+  }
+  settle();
+}
+
+void Readings::widen(double variance_1, double covariance_12, double variance_2) {
+  for (std::size_t i = 0; i < count_; ++i)
+    slots_[i].bank.widen(variance_1, covariance_12, variance_2);
+}
+
+void Readings::set_temperature(const std::array<double, 2>& temperature_c) {
+  for (std::size_t i = 0; i < count_; ++i)
+    slots_[i].bank.set_temperature(temperature_c);
+}
+
+void Readings::observe_at(const std::array<double, 2>& temperature_c) {
+  for (std::size_t i = 0; i < count_; ++i)
+    slots_[i].bank.observe_at(temperature_c);
+}
+
+// --- weights -------------------------------------------------------------------------------------
+
+std::size_t Readings::likeliest() const {
+  std::size_t best = 0;
+  for (std::size_t i = 1; i < count_; ++i) {
+    if (slots_[i].log_weight > slots_[best].log_weight) best = i;
+  }
+  return best;
+}
+
+// Weights sum to 1, the likeliest come first, and what weighs nothing is gone.
+void Readings::settle() {
+  // By swaps: no bank may lose the memory that it has.
+  for (std::size_t i = 1; i < count_; ++i) {
+    for (std::size_t j = i; j > 0 && slots_[j].log_weight > slots_[j - 1].log_weight; --j)
+      std::swap(slots_[j], slots_[j - 1]);
+  }
+  const double greatest = slots_[0].log_weight;
+  while (count_ > 1 && (count_ > kKept ||
+                        slots_[count_ - 1].log_weight < greatest + std::log(kGone)))
+    --count_;
+  double sum = 0.0;
+  for (std::size_t i = 0; i < count_; ++i)
+    sum += std::exp(slots_[i].log_weight - greatest);
+  for (std::size_t i = 0; i < count_; ++i)
+    slots_[i].log_weight -= greatest + std::log(sum);
+}
+
+// Readings that have come to say the same are one again.
+void Readings::join_alike() {
+  std::array<DriftEstimate, kKept> estimate;
+  for (std::size_t i = 0; i < count_; ++i)
+    estimate[i] = slots_[i].bank.estimate();
+  const auto alike = [&](std::size_t a, std::size_t b) {
+    for (int bias = kBias1; bias <= kBias2; ++bias) {
+      const double variance = estimate[a].covariance(bias, bias);
+      const double other = estimate[b].covariance(bias, bias);
+      const double away = estimate[a].mean(bias) - estimate[b].mean(bias);
+      if (squared(away) > squared(kAlikeSigmas) * std::min(variance, other)) return false;
+      if (std::max(variance, other) > kAlikeVariance * std::min(variance, other)) return false;
+    }
+    return true;
+  };
+  for (std::size_t i = 0; i < count_; ++i) {
+    for (std::size_t j = count_ - 1; j > i; --j) {
+      if (!alike(i, j)) continue;
+      slots_[i].log_weight = std::log(std::exp(slots_[i].log_weight) + std::exp(slots_[j].log_weight));
+      if (j + 1 < count_) {
+        std::swap(slots_[j], slots_[count_ - 1]);
+        std::swap(estimate[j], estimate[count_ - 1]);
+      }
+      --count_;
+    }
+  }
+  settle();
+}
+
+DriftEstimate Readings::estimate() const {
+  if (count_ == 1) return slots_[0].bank.estimate();
+  EstimateMixer mixer;
+  for (std::size_t i = 0; i < count_; ++i)
+    mixer.add(std::exp(slots_[i].log_weight), slots_[i].bank.estimate());
+  return mixer.result();
+}
+
+double Readings::standing() const {
+  double sum = 0.0;
+  for (std::size_t i = 0; i < count_; ++i)
+    sum += slots_[i].steady == Steady::kStands ? std::exp(slots_[i].log_weight) : 0.0;
+  return sum;
+}
+
+double Readings::turning() const {
+  double sum = 0.0;
+  for (std::size_t i = 0; i < count_; ++i)
+    sum += slots_[i].steady == Steady::kTurns ? std::exp(slots_[i].log_weight) : 0.0;
+  return sum;
+}
+
+double Readings::stepped(std::size_t gyro) const {
+  double sum = 0.0;
+  for (std::size_t i = 0; i < count_; ++i)
+    sum += slots_[i].stepped == gyro ? std::exp(slots_[i].log_weight) : 0.0;
+  return sum;
+}
+
+bool Readings::ambiguous() const {
+  if (count_ < 2 || std::exp(slots_[1].log_weight) < kWorthTelling) return false;
+  const DriftEstimate first = slots_[0].bank.estimate();
+  for (std::size_t i = 1; i < count_ && std::exp(slots_[i].log_weight) >= kWorthTelling; ++i) {
+    const DriftEstimate other = slots_[i].bank.estimate();
+    for (int bias = kBias1; bias <= kBias2; ++bias) {
+      const double apart = first.mean(bias) - other.mean(bias);
+      if (squared(apart) > 4.0 * (first.covariance(bias, bias) + other.covariance(bias, bias)))
+        return true;
+    }
+  }
+  return false;
+}
+
+}  // namespace vgyro::fusion

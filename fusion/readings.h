@@ -1,0 +1,100 @@
+#pragma once
+
+// Several readings of the same data, carried side by side until something decides between them:
+// when both gyros are steady the platform stands, or it turns steadily and both have kept their
+// drifts; when their difference jumps, one gyro has stepped, or the other one. Each reading is a
+// bank of drift filters of its own, weighed by what it foretold and by how common such things are.
+// What goes out is the mixture: its mean, and the spread between the readings as part of its σ.
+// docs/optimal.md derives the weights. No clock, no samples; nothing is allocated after start.
+
+#include <array>
+#include <cstddef>
+
+#include "fusion/drift_bank.h"
+
+namespace vgyro::fusion {
+
+/// Both gyros steady over one window.
+struct SteadyWindow {
+  DriftMeasurement standing{0};  ///< what it measures if the platform stands
+  DriftMeasurement turning{0};   ///< if it turns; without rows where one gyro is alone
+  std::array<double, 2> weight{};  ///< of each gyro in the level
+  double level_dps = 0.0;          ///< weighted readings less the rate at a stop
+  double level_variance = 0.0;     ///< from noise
+  double length_s = 0.0;
+  /// Log of how much likelier a turn is than a stop, before the level is looked at; beyond the first
+  /// window of a run only its change.
+  double log_turning = 0.0;
+  double turned_deg = 0.0;  ///< since the last steady run
+};
+
+class Readings {
+ public:
+  /// Carried on; of more the least likely are given up.
+  static constexpr std::size_t kKept = 4;
+  /// A reading that weighs less is gone.
+  static constexpr double kGone = 1e-6;
+  /// What is worth telling.
+  static constexpr double kWorthTelling = 0.05;
+  static constexpr std::size_t kNoGyro = 2;
+
+  explicit Readings(const std::array<GyroParameters, 2>& gyros);
+
+  [[nodiscard]] bool empty() const { return count_ == 0; }
+  void begin(const std::array<double, 2>& white_dps_rthz, const std::array<double, 2>& bias_dps,
+             const Symmetric& covariance);
+  void resume(const DriftMemory& memory, double age_s);
+  void save(DriftMemory& memory) const { slots_[likeliest()].bank.save(memory); }
+
+  void predict(double length_s);
+  /// Both gyros' difference, or what is surely known; weighs the readings by it.
+  void learn(double length_s, const DriftMeasurement& measurement);
+  /// A window of a run of steady ones. The first one splits every reading in two.
+  void learn_steady(const SteadyWindow& window);
+  /// The run of steady windows has ended.
+  void end_steady();
+  /// The difference y₁ − y₂ has jumped by so much: gyro 1 has stepped with probability
+  /// `first_share`, or gyro 2.
+  void split_step(double away_dps, double variance, double first_share);
+  void widen(double variance_1, double covariance_12, double variance_2);
+  void set_temperature(const std::array<double, 2>& temperature_c);
+  void observe_at(const std::array<double, 2>& temperature_c);
+
+  [[nodiscard]] DriftEstimate estimate() const;
+  /// Probability that the platform stands, in a run of steady windows; 0 outside.
+  [[nodiscard]] double standing() const;
+  /// The same that it turns steadily.
+  [[nodiscard]] double turning() const;
+  /// Probability that this gyro has made a step that nothing has settled yet.
+  [[nodiscard]] double stepped(std::size_t gyro) const;
+  /// Two readings are likely, and further apart than each is wide.
+  [[nodiscard]] bool ambiguous() const;
+  /// No filter of one window: how many filters a window costs.
+  [[nodiscard]] bool few() const { return slots_[0].bank.few() && count_ == 1; }
+
+ private:
+  enum class Steady : std::uint8_t { kNo, kStands, kTurns };
+  struct Reading {
+    DriftBank bank;
+    double log_weight = 0.0;
+    Steady steady = Steady::kNo;
+    double turn_dps = 0.0;  ///< level of the last window, where it turns
+    double turn_variance = 0.0;
+    double last_turn_dps = 0.0;  ///< of the last run, less the drifts; 0: it stood
+    std::size_t stepped = kNoGyro;
+  };
+  [[nodiscard]] double turn_density(const Reading& reading, const SteadyWindow& window,
+                                    const DriftEstimate& estimate) const;
+  void begin_steady(const SteadyWindow& window);
+  void go_on_steady(const SteadyWindow& window);
+  [[nodiscard]] double beyond_limits(const DriftEstimate& estimate) const;
+  void settle();
+  void join_alike();
+  [[nodiscard]] std::size_t likeliest() const;
+
+  std::array<GyroParameters, 2> gyros_;
+  std::array<Reading, 2 * kKept> slots_;
+  std::size_t count_ = 0;
+};
+
+}  // namespace vgyro::fusion
