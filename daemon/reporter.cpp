@@ -44,6 +44,8 @@ const char* sentence(gateway::Fault fault) {
       return "is not used: it reads 0 inside its dead band";
     case gateway::Fault::kNoisy:
       return "has far more noise than before";
+    case gateway::Fault::kBlind:
+      return "does not feel the rotation that the other one feels";
   }
   return "";
 }

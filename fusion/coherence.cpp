@@ -8,17 +8,21 @@ namespace vgyro::fusion {
 namespace {
 
 // A gyro goes blind once in many thousand hours, here per block; what one block can tell is
-// bounded, so that a step of the other gyro, which shows in two blocks, is not enough.
-constexpr double kBlindPrior = -16.0;
+// bounded, so that a step of the other gyro, which shows in three blocks, is not enough.
+constexpr double kBlindPrior = -20.0;
 constexpr double kBlockTells = 6.0;
 constexpr double kBlindMost = 12.0;
+constexpr double kFades = 2.0;
 // A platform has moved when a gyro's mean has changed by so many standard deviations.
 constexpr double kMoved = 5.0;
+// No bias drifts so far within a second.
+constexpr double kMovedMin_dps = 0.05;
 // Healthy gyros may differ by this share of a change: scale factors, and instants of blocks.
 constexpr double kChangeTolerance = 0.05;
 // Somebody else's frames may look like a gyro that moves for some seconds; until then a gyro that
 // does not is not surely the wrong one.
-constexpr double kSure_s = 8.0;
+constexpr double kSure_s = 10.0;
+constexpr double kShown_s = 2.5;  ///< of these, seconds in which only one of the two moved
 constexpr double kUnsureMost = 0.95;
 constexpr double kSureMost = 0.9995;
 // Changes that differ by so many standard deviations are no chance.
@@ -33,6 +37,7 @@ constexpr double kGap_s = 1.0;
 
 void Coherence::judge(const std::array<double, 2>& mean_dps, double from_s, double to_s,
                       const Symmetric& density, double changing_dps_s2_allowance) {
+  now_s_ = to_s;
   if (count_ > 0 && from_s - before_[count_ - 1].to_s > kGap_s) count_ = 0;
   const Mean now{mean_dps, to_s - from_s, to_s};
   if (count_ < kBack) {
@@ -48,13 +53,14 @@ void Coherence::judge(const std::array<double, 2>& mean_dps, double from_s, doub
                                      now.rate_dps[1] - old.rate_dps[1]};
   const double greatest = std::max(std::abs(change[0]), std::abs(change[1]));
   const double unlike = change[0] - change[1];
-  const double unlike_variance =
-      of_difference(density) * per_s + squared(kChangeTolerance * greatest) +
-      squared(changing_dps_s2_allowance);
+  const double unlike_variance = of_difference(density) * per_s +
+                                 squared(kChangeTolerance * greatest) +
+                                 squared(changing_dps_s2_allowance);
   const double log_alike = -0.5 * (squared(unlike) / unlike_variance + std::log(unlike_variance));
   std::array<bool, 2> moved{};
   for (std::size_t gyro = 0; gyro < 2; ++gyro)
-    moved[gyro] = squared(change[gyro]) > squared(kMoved) * variance[gyro];
+    moved[gyro] = squared(change[gyro]) > squared(kMoved) * variance[gyro] &&
+                  std::abs(change[gyro]) > kMovedMin_dps;
   for (std::size_t gyro = 0; gyro < 2; ++gyro) {
     double tells = 0.0;
     if (moved[1 - gyro]) {
@@ -62,8 +68,12 @@ void Coherence::judge(const std::array<double, 2>& mean_dps, double from_s, doub
           -0.5 * (squared(change[gyro]) / variance[gyro] + std::log(variance[gyro]));
       tells = std::clamp(log_blind - log_alike, -kBlockTells, kBlockTells);
       if (tells > 0.0) shown_s_[gyro] += now.length_s;
+      if (tells > 0.0 && blind_[gyro] == 0.0) since_s_[gyro] = to_s;
     } else if (moved[gyro]) {
       tells = -kBlockTells;
+    } else if (blind_[gyro] < -kBlindPrior) {
+      // What a step of the other gyro has left fades.
+      tells = -kFades;
     }
     blind_[gyro] = std::clamp(blind_[gyro] + tells, 0.0, kBlindMost - kBlindPrior);
     if (blind_[gyro] == 0.0) shown_s_[gyro] = 0.0;
@@ -78,7 +88,8 @@ void Coherence::judge(const std::array<double, 2>& mean_dps, double from_s, doub
 
 double Coherence::blind(std::size_t gyro) const {
   const double probability = 1.0 / (1.0 + std::exp(-(kBlindPrior + blind_[gyro])));
-  return std::min(probability, shown_s_[gyro] >= kSure_s ? kSureMost : kUnsureMost);
+  const bool sure = shown_s_[gyro] >= kShown_s && now_s_ - since_s_[gyro] >= kSure_s;
+  return std::min(probability, sure ? kSureMost : kUnsureMost);
 }
 
 }  // namespace vgyro::fusion

@@ -26,9 +26,14 @@ class Coherence {
   [[nodiscard]] double blind(std::size_t gyro) const;
   /// The gyros move, and not alike.
   [[nodiscard]] bool contradict() const { return contradiction_ > 0.0; }
+  /// Something speaks for one of these: what the difference shows now is no drift.
+  [[nodiscard]] bool suspects() const {
+    return contradict() || blind_[0] > kSuspicion || blind_[1] > kSuspicion;
+  }
 
  private:
   static constexpr std::size_t kBack = 2;
+  static constexpr double kSuspicion = 5.0;  ///< about what one block tells
   struct Mean {
     std::array<double, 2> rate_dps{};
     double length_s = 0.0;
@@ -39,7 +44,9 @@ class Coherence {
   std::size_t count_ = 0;
   std::array<double, 2> blind_{};    ///< log odds above the prior
   std::array<double, 2> shown_s_{};  ///< for so long the other one has moved and this one has not
-  double contradiction_ = -8.0;      ///< log odds
+  std::array<double, 2> since_s_{};  ///< and began to
+  double now_s_ = 0.0;
+  double contradiction_ = -8.0;  ///< log odds
 };
 
 }  // namespace vgyro::fusion

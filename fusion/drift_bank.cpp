@@ -42,6 +42,15 @@ constexpr double kCoefficientWhite_per_k = 1.5;
 // What a bias does with temperature besides: bends and hysteresis, a walk over kelvins.
 constexpr double kBendWhite_per_rtk = 0.05;
 
+// Scale errors go with a sensor's class, from 0.05 % of a fibre-optic gyro to 0.5 % of a cheap
+// MEMS; that two differ is plain from so many standard deviations on.
+constexpr double kUsualScale = 5e-4;
+constexpr double kUsualScaleWhite = 1e-4;
+constexpr double kUsualScalePower = 0.6;
+constexpr double kUsualScaleMin = 3e-4;
+constexpr double kUsualScaleMax = 1e-2;
+constexpr double kPlainSigmas = 4.0;
+
 // Parts that weigh less are left out of the sums.
 constexpr double kWeightMin = 1e-9;
 constexpr double kHalfLogTwoPi = 0.918938533204672741780;
@@ -92,8 +101,8 @@ WalkChoices walk_choices(const DriftKind& kind, const GyroParameters& gyro, doub
 SlopeModel slopes_of(const DriftKind& kind, const std::array<double, 2>& white_dps_rthz) {
   SlopeModel slopes{.tau_s = kind.tau_s, .correlation = kind.correlation};
   for (std::size_t gyro = 0; gyro < 2; ++gyro) {
-    const double white = kind.alike ? std::min(white_dps_rthz[0], white_dps_rthz[1])
-                                    : white_dps_rthz[gyro];
+    const double white =
+        kind.alike ? std::min(white_dps_rthz[0], white_dps_rthz[1]) : white_dps_rthz[gyro];
     slopes.begin_dps_s[gyro] = kind.begin_per_s * white;
     slopes.steady_dps_s[gyro] = kind.steady_per_s * white;
   }
@@ -104,8 +113,7 @@ SlopeModel slopes_of(const DriftKind& kind, const std::array<double, 2>& white_d
 /// `to`: places in between are shared out, those beyond the ends go to the ends.
 double share_of_place(const DriftKind& kind, std::size_t from, std::size_t to) {
   const auto last = static_cast<double>(kWalkRatios_per_s.size() - 1 - kind.margin);
-  const double at =
-      std::clamp(static_cast<double>(from), static_cast<double>(kind.margin), last);
+  const double at = std::clamp(static_cast<double>(from), static_cast<double>(kind.margin), last);
   const double away = std::abs(at - static_cast<double>(to)) / static_cast<double>(kind.stride);
   return std::max(1.0 - away, 0.0);
 }
@@ -288,6 +296,24 @@ void DriftBank::take_coefficients(const DriftMemory& memory) {
   }
 }
 
+// As long as nothing is known of their difference, and where they plainly differ, gyros have the
+// scale errors of their class, and what both have in common does not show.
+double DriftBank::usual_scale_doubt(double difference, double variance) const {
+  std::array<double, 2> usual{};
+  for (std::size_t gyro = 0; gyro < 2; ++gyro) {
+    usual[gyro] = std::clamp(
+        kUsualScale * std::pow(white_dps_rthz_[gyro] / kUsualScaleWhite, kUsualScalePower),
+        kUsualScaleMin, kUsualScaleMax);
+  }
+  const double square = difference * difference;
+  const double sum = squared(usual[0]) + squared(usual[1]);
+  const double together = squared(usual[0] * usual[1]) / sum;
+  const double unknown = std::min(variance / sum, 1.0);
+  const double plain =
+      square > 0.0 ? std::clamp(1.0 - squared(kPlainSigmas) * variance / square, 0.0, 1.0) : 0.0;
+  return std::max(unknown * together, plain * std::min(together, 4.0 * square));
+}
+
 void DriftBank::predict(double length_s) {
   for (Hypothesis& one : hypotheses_)
     one.filter.predict(length_s);
@@ -324,8 +350,8 @@ void DriftBank::set_temperature(const std::array<double, 2>& temperature_c) {
     }
     const double away_k = temperature_c[gyro] - reference_c_[gyro];
     changed = changed || away_k != away_k_[gyro];
-    bend[gyro] = squared(kBendWhite_per_rtk * white_dps_rthz_[gyro]) *
-                 std::abs(away_k - away_k_[gyro]);
+    bend[gyro] =
+        squared(kBendWhite_per_rtk * white_dps_rthz_[gyro]) * std::abs(away_k - away_k_[gyro]);
     away_k_[gyro] = away_k;
   }
   if (!changed) return;
@@ -381,8 +407,9 @@ DriftEstimate DriftBank::estimate() const {
     const double s = part.mean(kScale);
     const double variance = part.covariance(kScale, kScale);
     const double blamed = share * share / (share * share + rest * rest);
-    const double common =
-        (blamed * rest * rest + (1.0 - blamed) * share * share) * std::max(s * s - variance, 0.0);
+    const double common = std::max(
+        (blamed * rest * rest + (1.0 - blamed) * share * share) * std::max(s * s - variance, 0.0),
+        usual_scale_doubt(s, variance));
     part.blame = {blamed, 1.0 - blamed};
     part.scale = {share * s, -rest * s};
     part.scale_covariance = {share * share * variance + common, -share * rest * variance + common,
@@ -414,8 +441,8 @@ void DriftBank::save(DriftMemory& memory) const {
     if (!has_reference_[gyro]) continue;
     memory.has_temperature[gyro] = true;
     memory.temperature_c[gyro] = reference_c_[gyro] + away_k_[gyro];
-    memory.coefficient_sigma_dps_k[gyro] =
-        std::sqrt(std::max(coefficient_square[gyro] - squared(memory.coefficient_dps_k[gyro]), 0.0));
+    memory.coefficient_sigma_dps_k[gyro] = std::sqrt(
+        std::max(coefficient_square[gyro] - squared(memory.coefficient_dps_k[gyro]), 0.0));
   }
 }
 

@@ -1,10 +1,11 @@
 #pragma once
 
 // What is known of the drifts when neither their size nor their kind is: one filter for each kind
-// of drift and each pair of values that K₁ and K₂ may have, weighed by how well it foretold the data
-// (Magill's adaptive estimator). The kinds: a walk alone; a gyro that warms up; slopes that come and
-// go, in each gyro by itself or in both alike. Where the model gives K there is one filter a kind.
-// The spread between the filters is part of the covariance, so doubt of K is doubt of the bias.
+// of drift and each pair of values that K₁ and K₂ may have, weighed by how well it foretold the
+// data (Magill's adaptive estimator). The kinds: a walk alone; a gyro that warms up; slopes that
+// come and go, in each gyro by itself or in both alike. Where the model gives K there is one filter
+// a kind. The spread between the filters is part of the covariance, so doubt of K is doubt of the
+// bias.
 //
 // A scale-factor difference is shared out in proportion to N·K: the gyro that is quieter and drifts
 // less is the one that is believed, but a vague K does not decide all.
@@ -100,6 +101,7 @@ class DriftBank {
   void make_kind(std::size_t kind, const std::array<double, 2>& white_dps_rthz,
                  const DriftFilter::Observables& mean, const DriftFilter::Covariance& covariance);
   void weigh_as(const DriftMemory& memory);
+  [[nodiscard]] double usual_scale_doubt(double difference, double variance) const;
   void take_slopes(const DriftMemory& memory);
   void take_coefficients(const DriftMemory& memory);
   /// Returns the logarithm of the sum that the weights had.

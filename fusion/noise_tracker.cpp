@@ -25,6 +25,10 @@ constexpr double kOneBlockMax = 22.0;
 // A sensor that says nothing of its resolution still has some noise, (deg/s)²/Hz.
 constexpr double kDensityMin = 1e-14;
 
+// A block is usual within so many standard deviations of its sum of squares.
+constexpr double kUsualSigmas = 4.0;
+constexpr double kGainMin = 1e-3;
+
 // What motion shares between the gyros never explains all of one's noise: scale factors differ, and
 // the difference of the two is noise that neither can be without.
 constexpr double kOwnShareMin = 0.05;
@@ -41,8 +45,8 @@ double NoiseTracker::step_dps(std::size_t gyro) const {
   return std::max(gyros_[gyro].resolution_dps, step_dps_[gyro]);
 }
 
-// The mean of a rounded value is off by (step/π)·sin(…)·exp(−2π²σ²/step²) to first order: its square
-// over all places between two steps, which noise of half a step makes vanish.
+// The mean of a rounded value is off by (step/π)·sin(…)·exp(−2π²σ²/step²) to first order: its
+// square over all places between two steps, which noise of half a step makes vanish.
 double NoiseTracker::rounding_variance(std::size_t gyro) const {
   const double step = step_dps(gyro);
   if (!(step > 0.0)) return 0.0;
@@ -83,9 +87,23 @@ void NoiseTracker::measure(const Block& block, bool moving) {
   gain_[1] *= 0.5;
 }
 
+bool NoiseTracker::usual(const Block& block) const {
+  Symmetric squares{};
+  double freedom = 0.0;
+  for (std::size_t i = 0; i < block.count; ++i) {
+    const Cell& cell = block.cells[i];
+    freedom += cell.count - 1.0;
+    for (std::size_t gyro = 0; gyro < 2; ++gyro)
+      squares[2 * gyro] += cell.scatter[2 * gyro] / std::max(cell.noise_gain[gyro], kGainMin);
+  }
+  const double most = freedom + kUsualSigmas * std::sqrt(2.0 * freedom);
+  return squares[0] <= most * present_sample_[0] && squares[2] <= most * present_sample_[2];
+}
+
 void NoiseTracker::settle(double interval_s) {
   if (cells_ == 0.0) return;
   const auto own_part = [](const Symmetric& squares, std::size_t k, double shared_part) {
+    if (shared_part == 0.0) return squares[k];
     return std::max(squares[k] - shared_part, kOwnShareMin * of_difference(squares));
   };
   const auto shared = [&](const Symmetric& squares, double count) {

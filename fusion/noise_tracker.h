@@ -25,6 +25,9 @@ class NoiseTracker {
   /// A block whose true rate is constant: its cells differ by noise alone. With `moving` only what
   /// the gyros do not share counts as noise.
   void measure(const Block& block, bool moving);
+  /// Does the block scatter as its gyros usually do? People who get in and engines that run are no
+  /// noise, even where a stop is a stop.
+  [[nodiscard]] bool usual(const Block& block) const;
   /// A block of which nothing is known.
   void watch(const Block& block);
   /// The present rise was none, or is of no use any more.

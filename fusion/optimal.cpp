@@ -17,8 +17,9 @@
 
 // Samples → cells (0.1 s) → blocks (0.5 s) → windows → the readings of what they mean, each a bank
 // of drift filters. A window holds either the difference of the gyros, regressed on rate and its
-// derivative, or, while both are steady, both gyros against the known rate. Between windows a sample
-// costs two subtractions, two weights and its share in a cell. docs/optimal.md derives weights and σ.
+// derivative, or, while both are steady, both gyros against the known rate. Between windows a
+// sample costs two subtractions, two weights and its share in a cell. docs/optimal.md derives
+// weights and σ.
 
 namespace vgyro::fusion {
 
@@ -50,6 +51,9 @@ constexpr double kFastNoise = kFastGain / (2.0 - kFastGain);
 constexpr double kFastSigma = 5.0;
 // … and block by block: beyond this it has jumped.
 constexpr double kJumpSigma = 6.0;
+// … it is a step where it stays within this share of itself, or a drift after so many blocks.
+constexpr double kStepTolerance = 0.05;
+constexpr int kDriftBlocks = 6;
 // While turning, this much of the rate may be the gyros' own disagreement about it.
 constexpr double kTurnTolerance = 0.02;
 constexpr double kTurnTolerance_s = 0.02;  ///< the same of its derivative
@@ -59,6 +63,8 @@ constexpr double kShareMin = 0.1;
 
 // A window that contradicts the filter by this much, per row, is believed less.
 constexpr double kContradiction = 9.0;
+// … and by this many standard deviations of the bias difference one gyro may have stepped.
+constexpr double kStepSigma = 5.0;
 
 // From here on a gyro counts as blind; below the other probability nothing is said of it.
 constexpr double kBlind = 0.5;
@@ -71,8 +77,8 @@ constexpr double kDecided = 0.5;
 constexpr double kTemperatureStep_k = 0.05;
 
 // The specific force's variance at a stop against that at other stops: a spread of ± 0.7 in its
-// logarithm; on the road it is twelve times more, give or take a factor of five. What it may tell is
-// bounded: a ferry and a smooth road are as still as a stop.
+// logarithm; on the road it is twelve times more, give or take a factor of five. What it may tell
+// is bounded: a ferry and a smooth road are as still as a stop.
 constexpr double kStillSpread = 0.7;
 constexpr double kMovingLog = 2.5;
 constexpr double kMovingSpread = 1.6;
@@ -223,6 +229,7 @@ class OptimalCorrector final : public Corrector {
   [[nodiscard]] Present trusted(const Block& block) const;
   void learn_from(const Block& block, bool steady);
   bool has_jumped(const Block& block);
+  bool is_step(double away_dps, double variance);
   void end_steady();
   void note_run(Run run);
 
@@ -236,7 +243,14 @@ class OptimalCorrector final : public Corrector {
   [[nodiscard]] DriftMeasurement standing_measurement() const;
   [[nodiscard]] DriftMeasurement turning_measurement() const;
   [[nodiscard]] SteadyWindow steady_window();
-  void doubt_contradiction(DriftMeasurement& measurement, double length_s) const;
+  /// By how much a window contradicts what is foretold.
+  struct Contradiction {
+    double per_row = 0.0;   ///< χ² a row
+    double bias_dps = 0.0;  ///< of the bias difference, in its first row
+    double bias_variance = 0.0;
+  };
+  [[nodiscard]] Contradiction contradiction(const DriftMeasurement& measurement,
+                                            double length_s) const;
 
   // What samples need.
   void refresh();
@@ -281,7 +295,7 @@ class OptimalCorrector final : public Corrector {
   double still_vibration_g2_ = kNone;  ///< at stops
 
   Window window_;
-  double learned_until_s_ = 0.0;  ///< the filters stand here
+  double learned_until_s_ = 0.0;               ///< the filters stand here
   double stop_length_s_ = kFirstStopWindow_s;  ///< of the next window of this steady run
   /// Blocks that wait for the verdict: the last one, and while a run is not sure all of its blocks
   /// so far.
@@ -290,7 +304,7 @@ class OptimalCorrector final : public Corrector {
   double recent_until_s_ = 0.0;
   bool held_steady_ = false;
   bool held_begins_ = false;  ///< the first of them begins a run of steady ones
-  bool jump_suspected_ = false;
+  int jump_blocks_ = 0;       ///< in a row that contradict what is foretold
   double suspected_jump_dps_ = 0.0;
   Run run_ = Run::kMoving;
   bool run_open_ = false;  ///< both readings of the run are likely
@@ -363,8 +377,7 @@ void OptimalCorrector::start(const Calibration& calibration) {
   const double sway = calibration_.sway_variance(density);
   for (std::size_t i = 0; i < calibration_.count(); ++i) {
     const CalibrationBlocks::Mean& mean = calibration_[i];
-    const DriftMeasurement measured =
-        excess_of_both(mean.excess_dps, density, mean.length_s, sway);
+    const DriftMeasurement measured = excess_of_both(mean.excess_dps, density, mean.length_s, sway);
     if (i == 0) {
       readings_.begin(white, mean.excess_dps,
                       {measured.noise(0, 0), measured.noise(0, 1), measured.noise(1, 1)});
@@ -521,6 +534,7 @@ VirtualRate OptimalCorrector::update_alone(std::size_t gyro, const RatePair& pai
   alone.rate_dps[1 - gyro] = 0.0;
   if (cells_.add(alone.t_s, alone.rate_dps, alone.noise_gain, present)) close_block(cells_.last());
   if (weights_for_ != present) {
+    readings_.suspect(1 - gyro);
     // A rise was told by comparison: a gyro that falls out may have made the other one look noisy.
     noise_.forget_rise();
     set_weights(present);
@@ -610,7 +624,11 @@ void OptimalCorrector::close_block(const Block& block) {
   judge_coherence(block);
   const Present present = trusted(block);
   if (present != weights_for_) set_weights(present);
-  noise_.watch(block);
+  if (present == Present::kBoth) {
+    noise_.watch(block);
+  } else {
+    noise_.forget_rise();
+  }
   apply_temperature();
   auto verdict = StopDetector::Verdict::kMoving;
   if (settings_.stop_rate_dps) verdict = detector_.judge(level_of(block), wheels_);
@@ -634,15 +652,16 @@ void OptimalCorrector::close_block(const Block& block) {
 void OptimalCorrector::learn_from(const Block& block, bool steady) {
   const Present present = trusted(block);
   if (steady) {
-    if (readings_.standing() > kDecided) {
+    if (readings_.standing() > kDecided && detector_.sway_variance() == 0.0 &&
+        noise_.usual(block)) {
       noise_.measure(block, false);
       noise_.settle(cells_.interval_s());
     }
-    jump_suspected_ = false;
+    jump_blocks_ = 0;
     add_steady(block, present);
     return;
   }
-  if (present == Present::kBoth && (coherence_.contradict() || has_jumped(block))) return;
+  if (present == Present::kBoth && (coherence_.suspects() || has_jumped(block))) return;
   add_difference(block, present);
 }
 
@@ -681,9 +700,9 @@ bool OptimalCorrector::has_jumped(const Block& block) {
     rate += share * one;
     rate_square += share * one * one;
     if (i > 0) {
-      slope = std::max(slope, std::abs(one - cell_rate(block.cells[i - 1], block.to_s,
-                                                       Present::kBoth)) /
-                                  cell.length_s);
+      slope = std::max(slope,
+                       std::abs(one - cell_rate(block.cells[i - 1], block.to_s, Present::kBoth)) /
+                           cell.length_s);
     }
   }
   const double late_s = std::max(block.to_s - learned_until_s_, 0.0);
@@ -702,21 +721,29 @@ bool OptimalCorrector::has_jumped(const Block& block) {
   if (rate_square > squared(kTurning_dps))
     variance += squared(kTurnTolerance) * rate_square + squared(kTurnTolerance_s * slope);
   if (squared(away) <= squared(kJumpSigma) * variance) {
-    jump_suspected_ = false;
+    jump_blocks_ = 0;
     return false;
   }
-  // One block may hold anything; two that agree are a new state of things.
-  const bool again = jump_suspected_ && away * suspected_jump_dps_ > 0.0 &&
-                     std::abs(away) < 2.0 * std::abs(suspected_jump_dps_);
-  jump_suspected_ = true;
-  suspected_jump_dps_ = away;
-  if (!again) return true;
-  jump_suspected_ = false;
+  return !is_step(away, variance);
+}
+
+// One block may hold anything. A step stays what it is: two blocks that agree are one. What goes on
+// changing is a turn that one gyro does not feel, as long as that is likely, and else a drift.
+bool OptimalCorrector::is_step(double away_dps, double variance) {
+  const double changed = std::abs(away_dps - suspected_jump_dps_);
+  const bool constant = jump_blocks_ > 0 && changed <= kJumpSigma * std::sqrt(2.0 * variance) +
+                                                           kStepTolerance * std::abs(away_dps);
+  suspected_jump_dps_ = away_dps;
+  ++jump_blocks_;
+  if (coherence_.suspects()) return false;
+  if (!constant && jump_blocks_ < kDriftBlocks) return false;
+  jump_blocks_ = 0;
   close_window();
-  readings_.split_step(away, variance, suspicion_of_first());
+  const double doubt = constant ? variance : squared(kShareMin * away_dps) + variance;
+  readings_.split_step(away_dps, doubt, suspicion_of_first());
   fast_difference_ = 0.0;
   refresh();
-  return false;
+  return true;
 }
 
 // --- windows -------------------------------------------------------------------------------------
@@ -759,9 +786,8 @@ void OptimalCorrector::add_difference(const Block& block, Present present) {
   }
   recent_until_s_ = block.to_s;
   // A turn that tells much about scale factor or skew is used at once.
-  const bool tells =
-      difference_.scale_information() * estimate_.covariance(kScale, kScale) > 1.0 ||
-      difference_.skew_information() * estimate_.covariance(kSkew, kSkew) > 1.0;
+  const bool tells = difference_.scale_information() * estimate_.covariance(kScale, kScale) > 1.0 ||
+                     difference_.skew_information() * estimate_.covariance(kSkew, kSkew) > 1.0;
   if (tells || window_.to_s - window_.from_s >= window_s_) close_window();
 }
 
@@ -807,8 +833,15 @@ void OptimalCorrector::learn_difference(double length_s) {
     ++windows_.skipped;
     return;
   }
-  doubt_contradiction(measurement, length_s);
-  readings_.learn(length_s, measurement);
+  const Contradiction found = contradiction(measurement, length_s);
+  DriftMeasurement doubted = measurement;
+  if (found.per_row > kContradiction) doubted.noise *= found.per_row / kContradiction;
+  if (squared(found.bias_dps) > squared(kStepSigma) * found.bias_variance) {
+    readings_.learn_maybe_step(length_s, measurement, doubted, found.bias_dps, found.bias_variance,
+                               suspicion_of_first());
+  } else {
+    readings_.learn(length_s, doubted);
+  }
   ++windows_.completed;
 }
 
@@ -834,10 +867,10 @@ DriftMeasurement OptimalCorrector::standing_measurement() const {
 DriftMeasurement OptimalCorrector::turning_measurement() const {
   if (window_.present != Present::kBoth) return DriftMeasurement(0);
   const double length = window_.covered_s;
-  const double rate = cell_rate(
-      {.mean_dps = {window_.excess_s[0] / length + *settings_.stop_rate_dps,
-                    window_.excess_s[1] / length + *settings_.stop_rate_dps}},
-      window_.to_s, Present::kBoth);
+  const double rate =
+      cell_rate({.mean_dps = {window_.excess_s[0] / length + *settings_.stop_rate_dps,
+                              window_.excess_s[1] / length + *settings_.stop_rate_dps}},
+                window_.to_s, Present::kBoth);
   DriftMeasurement measurement(1);
   measurement.rows(0, kBias1) = 1.0;
   measurement.rows(0, kBias2) = -1.0;
@@ -887,7 +920,8 @@ void OptimalCorrector::learn_steady(double length_s) {
 }
 
 // Turns that neither scale factor nor skew explains, and drift that is faster than its model.
-void OptimalCorrector::doubt_contradiction(DriftMeasurement& measurement, double length_s) const {
+OptimalCorrector::Contradiction OptimalCorrector::contradiction(const DriftMeasurement& measurement,
+                                                                double length_s) const {
   DriftFilter::Covariance doubt = estimate_.covariance;
   doubt(kBias1, kBias1) += estimate_.growth[0] * length_s;
   doubt(kBias2, kBias2) += estimate_.growth[1] * length_s;
@@ -897,10 +931,15 @@ void OptimalCorrector::doubt_contradiction(DriftMeasurement& measurement, double
   DriftMeasurement::Square expected = measurement.noise;
   expected += measurement.rows * doubt * measurement.rows.transpose();
   const DriftMeasurement::Values away = measurement.values - measurement.rows * mean;
-  const double contradiction =
-      away.dot(Eigen::LLT<DriftMeasurement::Square>(expected).solve(away)) /
-      static_cast<double>(away.size());
-  if (contradiction > kContradiction) measurement.noise *= contradiction / kContradiction;
+  Contradiction found;
+  found.per_row = away.dot(Eigen::LLT<DriftMeasurement::Square>(expected).solve(away)) /
+                  static_cast<double>(away.size());
+  const double unit = measurement.rows(0, kBias1);
+  if (unit > 0.0) {
+    found.bias_dps = away(0) / unit;
+    found.bias_variance = expected(0, 0) / squared(unit);
+  }
+  return found;
 }
 
 // --- surroundings --------------------------------------------------------------------------------
@@ -921,16 +960,18 @@ void OptimalCorrector::apply_temperature() {
 void OptimalCorrector::follow_still_vibration() {
   if (!std::isfinite(vibration_g2_)) return;
   const double now = std::max(vibration_g2_, kVibrationFloor_g2);
-  still_vibration_g2_ = std::isfinite(still_vibration_g2_)
-                            ? still_vibration_g2_ * std::pow(now / still_vibration_g2_, kVibrationGain)
-                            : now;
+  still_vibration_g2_ =
+      std::isfinite(still_vibration_g2_)
+          ? still_vibration_g2_ * std::pow(now / still_vibration_g2_, kVibrationGain)
+          : now;
 }
 
 double OptimalCorrector::log_turning_by_vibration() const {
   if (!std::isfinite(vibration_g2_) || !std::isfinite(still_vibration_g2_)) return 0.0;
   const double ratio = std::log(std::max(vibration_g2_, kVibrationFloor_g2) / still_vibration_g2_);
   const double still = -0.5 * squared(ratio / kStillSpread) - std::log(kStillSpread);
-  const double moving = -0.5 * squared((ratio - kMovingLog) / kMovingSpread) - std::log(kMovingSpread);
+  const double moving =
+      -0.5 * squared((ratio - kMovingLog) / kMovingSpread) - std::log(kMovingSpread);
   return std::clamp(moving - still, kVibrationLeast, kVibrationMost);
 }
 
@@ -947,9 +988,9 @@ void OptimalCorrector::refresh() {
   slope_ = {estimate_.slope(0), estimate_.slope(1)};
   gain_ = {1.0 / (1.0 + estimate_.scale[0]), 1.0 / (1.0 + estimate_.scale[1])};
   set_weights(weights_for_);
-  const bool disagree = std::min(readings_.stepped(0), readings_.stepped(1)) >
-                            Readings::kWorthTelling ||
-                        coherence_.contradict();
+  const bool disagree =
+      std::min(readings_.stepped(0), readings_.stepped(1)) > Readings::kWorthTelling ||
+      coherence_.suspects();
   if (disagree && !condition_.disagree) ++condition_.disagreements;
   condition_.disagree = disagree;
   condition_.ambiguous = readings_.ambiguous();

@@ -26,8 +26,15 @@ constexpr double kTurnWalkShare_rts = 0.02;
 
 // A step is of one gyro; one that has stepped is the one to step again, or back.
 constexpr double kSameGyroAgain = 0.9;
+// How likely a step is in a window that contradicts what is foretold.
+constexpr double kStepInWindow = 1e-2;
+// A gyro that contradicts the other one and then falls out was the wrong one, but for this share.
+constexpr double kStepOfTheOther = 0.02;
 // How far a step is known when it is seen: by the blocks that show it, and this share of it.
 constexpr double kStepDoubt = 0.05;
+
+// A run of steady windows is another one when its level has changed by so many standard deviations.
+constexpr double kOtherRun = 3.5;
 
 // A bias beyond what its gyro can have: σ of that limit, as a share of it.
 constexpr double kLimitSoftness = 0.1;
@@ -53,11 +60,14 @@ double level_doubt(const std::array<double, 2>& weight, const DriftEstimate& est
 
 }  // namespace
 
+template <std::size_t Count, std::size_t... I>
+std::array<Readings::Reading, Count> Readings::empty_slots(
+    const std::array<GyroParameters, 2>& gyros, std::index_sequence<I...> /*numbers*/) {
+  return {((void)I, Reading{DriftBank(gyros)})...};
+}
+
 Readings::Readings(const std::array<GyroParameters, 2>& gyros)
-    : gyros_(gyros),
-      slots_{Reading{DriftBank(gyros)}, Reading{DriftBank(gyros)}, Reading{DriftBank(gyros)},
-             Reading{DriftBank(gyros)}, Reading{DriftBank(gyros)}, Reading{DriftBank(gyros)},
-             Reading{DriftBank(gyros)}, Reading{DriftBank(gyros)}} {}
+    : gyros_(gyros), slots_(empty_slots<3 * kKept>(gyros, std::make_index_sequence<3 * kKept>())) {}
 
 void Readings::begin(const std::array<double, 2>& white_dps_rthz,
                      const std::array<double, 2>& bias_dps, const Symmetric& covariance) {
@@ -88,12 +98,27 @@ void Readings::learn(double length_s, const DriftMeasurement& measurement) {
 // --- steady: does it stand, or turn? -------------------------------------------------------------
 
 void Readings::learn_steady(const SteadyWindow& window) {
-  if (standing() + turning() > 0.0) {
+  if (standing() + turning() > 0.0 && goes_on(window)) {
     go_on_steady(window);
   } else {
     begin_steady(window);
   }
   settle();
+}
+
+// A run ends where its likeliest reading no longer fits: a ferry that casts off, a circle that
+// ends.
+bool Readings::goes_on(const SteadyWindow& window) {
+  const Reading& best = slots_[likeliest()];
+  const DriftEstimate known = best.bank.estimate();
+  const double away = window.level_dps - of_level(window.weight, known);
+  const double variance = window.level_variance + level_doubt(window.weight, known);
+  const bool at_rest = squared(away) <= squared(kOtherRun) * variance;
+  const bool was_far = squared(best.last_turn_dps) > squared(2.0 * kOtherRun) * variance;
+  const bool fits = best.steady == Steady::kStands ? at_rest : !(at_rest && was_far);
+  if (fits) return true;
+  end_steady();
+  return false;
 }
 
 double Readings::turn_density(const Reading& reading, const SteadyWindow& window,
@@ -105,7 +130,8 @@ double Readings::turn_density(const Reading& reading, const SteadyWindow& window
   if (reading.last_turn_dps == 0.0) return anew;
   const double share = window.turned_deg < kElsewhere_deg ? kGoesOn : kGoesOnElsewhere;
   const double on_variance = variance + squared(kGoesOnWithin * reading.last_turn_dps);
-  return (1.0 - share) * anew + share * std::exp(log_normal(turn - reading.last_turn_dps, on_variance));
+  return (1.0 - share) * anew +
+         share * std::exp(log_normal(turn - reading.last_turn_dps, on_variance));
 }
 
 double Readings::beyond_limits(const DriftEstimate& estimate) const {
@@ -152,9 +178,9 @@ void Readings::go_on_steady(const SteadyWindow& window) {
     }
     const double walk =
         squared(kTurnWalk_dps_rts) + squared(kTurnWalkShare_rts * one.last_turn_dps);
-    one.log_weight += window.log_turning +
-                      log_normal(window.level_dps - one.turn_dps,
-                                 window.level_variance + one.turn_variance + walk * window.length_s);
+    one.log_weight += window.log_turning + log_normal(window.level_dps - one.turn_dps,
+                                                      window.level_variance + one.turn_variance +
+                                                          walk * window.length_s);
     one.turn_dps = window.level_dps;
     one.turn_variance = window.level_variance;
     if (window.turning.values.size() == 0) {
@@ -175,22 +201,48 @@ void Readings::end_steady() {
 
 // --- steps ---------------------------------------------------------------------------------------
 
+void Readings::step(Reading& reading, std::size_t gyro, double away_dps, double doubt,
+                    double share) {
+  if (reading.stepped != kNoGyro)
+    share = reading.stepped == gyro ? kSameGyroAgain : 1.0 - kSameGyroAgain;
+  reading.bank.shift(gyro, gyro == 0 ? away_dps : -away_dps, doubt);
+  reading.log_weight += std::log(share);
+  reading.stepped = gyro;
+}
+
 void Readings::split_step(double away_dps, double variance, double first_share) {
   const std::size_t before = count_;
   const double doubt = variance + squared(kStepDoubt * away_dps);
   for (std::size_t i = 0; i < before; ++i) {
-    Reading& first = slots_[i];
     Reading& second = slots_[count_++];
-    second = first;
-    double share = first_share;
-    if (first.stepped == 0) share = kSameGyroAgain;
-    if (first.stepped == 1) share = 1.0 - kSameGyroAgain;
-    first.bank.shift(0, away_dps, doubt);
-    first.log_weight += std::log(share);
-    first.stepped = 0;
-    second.bank.shift(1, -away_dps, doubt);
-    second.log_weight += std::log(1.0 - share);
-    second.stepped = 1;
+    second = slots_[i];
+    step(slots_[i], 0, away_dps, doubt, first_share);
+    step(second, 1, away_dps, doubt, 1.0 - first_share);
+  }
+  settle();
+}
+
+void Readings::learn_maybe_step(double length_s, const DriftMeasurement& measurement,
+                                const DriftMeasurement& doubted, double away_dps, double variance,
+                                double first_share) {
+  const std::size_t before = count_;
+  // Within the window the step may have been anywhere.
+  const double doubt = variance + squared(away_dps);
+  for (std::size_t i = 0; i < before; ++i) {
+    for (std::size_t gyro = 0; gyro < 2; ++gyro) {
+      Reading& stepped = slots_[count_++];
+      stepped = slots_[i];
+      step(stepped, gyro, away_dps, doubt, gyro == 0 ? first_share : 1.0 - first_share);
+      stepped.log_weight += std::log(kStepInWindow) + stepped.bank.learn(length_s, measurement);
+    }
+    slots_[i].log_weight += slots_[i].bank.learn(length_s, doubted);
+  }
+  settle();
+}
+
+void Readings::suspect(std::size_t gyro) {
+  for (std::size_t i = 0; i < count_; ++i) {
+    if (slots_[i].stepped == 1 - gyro) slots_[i].log_weight += std::log(kStepOfTheOther);
   }
   settle();
 }
@@ -228,8 +280,8 @@ void Readings::settle() {
       std::swap(slots_[j], slots_[j - 1]);
   }
   const double greatest = slots_[0].log_weight;
-  while (count_ > 1 && (count_ > kKept ||
-                        slots_[count_ - 1].log_weight < greatest + std::log(kGone)))
+  while (count_ > 1 &&
+         (count_ > kKept || slots_[count_ - 1].log_weight < greatest + std::log(kGone)))
     --count_;
   double sum = 0.0;
   for (std::size_t i = 0; i < count_; ++i)
@@ -256,7 +308,8 @@ void Readings::join_alike() {
   for (std::size_t i = 0; i < count_; ++i) {
     for (std::size_t j = count_ - 1; j > i; --j) {
       if (!alike(i, j)) continue;
-      slots_[i].log_weight = std::log(std::exp(slots_[i].log_weight) + std::exp(slots_[j].log_weight));
+      slots_[i].log_weight =
+          std::log(std::exp(slots_[i].log_weight) + std::exp(slots_[j].log_weight));
       if (j + 1 < count_) {
         std::swap(slots_[j], slots_[count_ - 1]);
         std::swap(estimate[j], estimate[count_ - 1]);

@@ -9,6 +9,7 @@
 
 #include <array>
 #include <cstddef>
+#include <utility>
 
 #include "fusion/drift_bank.h"
 
@@ -16,14 +17,14 @@ namespace vgyro::fusion {
 
 /// Both gyros steady over one window.
 struct SteadyWindow {
-  DriftMeasurement standing{0};  ///< what it measures if the platform stands
-  DriftMeasurement turning{0};   ///< if it turns; without rows where one gyro is alone
+  DriftMeasurement standing{0};    ///< what it measures if the platform stands
+  DriftMeasurement turning{0};     ///< if it turns; without rows where one gyro is alone
   std::array<double, 2> weight{};  ///< of each gyro in the level
   double level_dps = 0.0;          ///< weighted readings less the rate at a stop
   double level_variance = 0.0;     ///< from noise
   double length_s = 0.0;
-  /// Log of how much likelier a turn is than a stop, before the level is looked at; beyond the first
-  /// window of a run only its change.
+  /// Log of how much likelier a turn is than a stop, before the level is looked at; beyond the
+  /// first window of a run only its change.
   double log_turning = 0.0;
   double turned_deg = 0.0;  ///< since the last steady run
 };
@@ -56,6 +57,14 @@ class Readings {
   /// The difference y₁ − y₂ has jumped by so much: gyro 1 has stepped with probability
   /// `first_share`, or gyro 2.
   void split_step(double away_dps, double variance, double first_share);
+  /// A window of the difference contradicts what is foretold by `away_dps`: noise, turns that
+  /// nothing explains, or a step of one gyro. `doubted` is the measurement as it is believed in the
+  /// first case.
+  void learn_maybe_step(double length_s, const DriftMeasurement& measurement,
+                        const DriftMeasurement& doubted, double away_dps, double variance,
+                        double first_share);
+  /// This gyro has fallen out: what contradicted the other one was likely its own.
+  void suspect(std::size_t gyro);
   void widen(double variance_1, double covariance_12, double variance_2);
   void set_temperature(const std::array<double, 2>& temperature_c);
   void observe_at(const std::array<double, 2>& temperature_c);
@@ -73,6 +82,11 @@ class Readings {
   [[nodiscard]] bool few() const { return slots_[0].bank.few() && count_ == 1; }
 
  private:
+  struct Reading;
+  template <std::size_t Count, std::size_t... I>
+  static std::array<Reading, Count> empty_slots(const std::array<GyroParameters, 2>& gyros,
+                                                std::index_sequence<I...> numbers);
+
   enum class Steady : std::uint8_t { kNo, kStands, kTurns };
   struct Reading {
     DriftBank bank;
@@ -85,6 +99,8 @@ class Readings {
   };
   [[nodiscard]] double turn_density(const Reading& reading, const SteadyWindow& window,
                                     const DriftEstimate& estimate) const;
+  [[nodiscard]] bool goes_on(const SteadyWindow& window);
+  void step(Reading& reading, std::size_t gyro, double away_dps, double doubt, double share);
   void begin_steady(const SteadyWindow& window);
   void go_on_steady(const SteadyWindow& window);
   [[nodiscard]] double beyond_limits(const DriftEstimate& estimate) const;
@@ -93,7 +109,7 @@ class Readings {
   [[nodiscard]] std::size_t likeliest() const;
 
   std::array<GyroParameters, 2> gyros_;
-  std::array<Reading, 2 * kKept> slots_;
+  std::array<Reading, 3 * kKept> slots_;
   std::size_t count_ = 0;
 };
 

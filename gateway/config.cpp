@@ -362,6 +362,7 @@ void apply_knowledge(Context& context) {
   for (std::size_t gyro = 0; gyro < 2; ++gyro) {
     plan.corrector.gyros[gyro].resolution_dps = plan.gyros[gyro].rate.step;
     plan.corrector.gyros[gyro].max_bias_dps = plan.gyros[gyro].max_bias_dps;
+    plan.corrector.gyros[gyro].learns_temperature = plan.gyros[gyro].temperature.has_value();
   }
   if (plan.model) apply_model(model::Model(*plan.model), plan, context.errors);
 }

@@ -128,13 +128,16 @@ void GyroHealth::fall_silent(TimePoint t) {
   note(t, Fault::kSilent, true);
 }
 
-void GyroHealth::set_noisy(TimePoint t, bool noisy) {
+void GyroHealth::set_opinion(TimePoint t, bool noisy, bool blind) {
   if (noisy) note(t, Fault::kNoisy, !noisy_);
+  if (blind) note(t, Fault::kBlind, !blind_);
   noisy_ = noisy;
+  blind_ = blind;
 }
 
 std::optional<Fault> GyroHealth::fault() const {
   if (fault_) return fault_;
+  if (blind_) return Fault::kBlind;
   return noisy_ ? std::optional(Fault::kNoisy) : std::nullopt;
 }
 

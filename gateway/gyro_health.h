@@ -28,15 +28,18 @@ class GyroHealth {
   void refuse(TimePoint t, Reject cause);
   /// It timed out: silent is all that is known of it.
   void fall_silent(TimePoint t);
-  /// The corrector's opinion of its noise. A noisy gyro stays in use, with the weight it deserves.
-  void set_noisy(TimePoint t, bool noisy);
+  /// The corrector's opinion: far noisier than it was, or without feeling for rotation. Such a gyro
+  /// stays in use, with the weight it deserves.
+  void set_opinion(TimePoint t, bool noisy, bool blind);
 
   /// Is the cause one that tells of the sensor, not of somebody else's frame?
   static bool tells_of_sensor(Reject cause);
 
   [[nodiscard]] bool set_aside() const { return fault_.has_value(); }
   /// For VB_Health. Zeros of a dead band are no defect.
-  [[nodiscard]] bool suspect() const { return noisy_ || (fault_ && *fault_ != Fault::kDeadBand); }
+  [[nodiscard]] bool suspect() const {
+    return noisy_ || blind_ || (fault_ && *fault_ != Fault::kDeadBand);
+  }
   /// What is wrong at present; what sets it aside comes first.
   [[nodiscard]] std::optional<Fault> fault() const;
   /// How close two different values of late have been; 0.5 deg/s, or the frame's own step if that
@@ -57,6 +60,7 @@ class GyroHealth {
   std::array<FaultRecord, kFaultCount> records_{};
   std::optional<Fault> fault_;  ///< for which it is set aside
   bool noisy_ = false;
+  bool blind_ = false;
   std::uint32_t unusable_in_row_ = 0;
   TimePoint last_bad_;
   TimePoint last_episode_end_;

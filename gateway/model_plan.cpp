@@ -92,6 +92,10 @@ void apply_model(const model::Model& model, Plan& plan, std::vector<Error>& erro
     check_inputs(effect, plan, place, errors);
     add_noise(effect, plan.corrector.gyros[effect.gyro]);
     add_limit(effect, plan.gyros[effect.gyro]);
+    // What the model tells of the temperature is not learned besides.
+    if (effect.kind == model::Kind::kTemperatureBias ||
+        effect.kind == model::Kind::kTemperatureBiasQuadratic)
+      plan.corrector.gyros[effect.gyro].learns_temperature = false;
     if (model::info(effect.kind).nature != model::Nature::kLag) continue;
     double& sum_s = lag_s[effect.gyro];
     sum_s += model::lag_s(effect);

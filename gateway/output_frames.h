@@ -21,7 +21,8 @@ enum class BiasMode : std::uint8_t {
   kCalibrating = 1,
   kTracking = 2,
   kHold = 3,
-  kStop = 4  ///< standing still: both biases are being learned
+  kStop = 4,      ///< standing still: both biases are being learned
+  kAmbiguous = 5  ///< two readings of what the gyros show are likely: both are carried on
 };
 
 /// VB_Health on the wire, a bit field.

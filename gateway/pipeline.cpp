@@ -94,6 +94,7 @@ struct Pipeline::Impl {
   void refuse(std::size_t gyro, Reject cause, TimePoint t, TimePoint stamp, FrameSink& sink);
   void set_aside(std::size_t gyro, TimePoint t, TimePoint stamp, FrameSink& sink);
   void note_condition(TimePoint t);
+  void tell_corrector(TimePoint t);
   void calibrate(const fusion::AlignedPair& pair);
   void calibrate_with(const fusion::AlignedPair& pair, double true_rate_dps);
 
@@ -259,10 +260,11 @@ void Pipeline::Impl::receive_gyro(std::size_t gyro, const can::Frame& frame, Tim
 // The reading less what the model knows of it.
 double Pipeline::Impl::take_back(std::size_t gyro, TimePoint t, double reading_dps) {
   surroundings.reach(t);
-  if (!compensations[gyro].takes_any()) return reading_dps;
-  if ((needs[gyro] & model::kNeedsTemperature) != 0) {
+  if ((needs[gyro] & model::kNeedsTemperature) != 0 ||
+      plan.corrector.gyros[gyro].learns_temperature) {
     surroundings.add_temperature(gyro, t, inputs[gyro].temperature_c());
   }
+  if (!compensations[gyro].takes_any()) return reading_dps;
   return compensations[gyro].correct(reading_dps, surroundings.at(gyro, t));
 }
 
@@ -369,12 +371,12 @@ void Pipeline::Impl::take_pair(const fusion::AlignedPair& pair, TimePoint stamp,
     enter_state(stamp, sink);
   }
   const bool was_calibrated = calibrated;
+  tell_corrector(pair.t);
   if (!calibrated) calibrate(pair);
   if (calibrated && !was_calibrated) enter_state(stamp, sink);
   // While one gyro was missing the other spoke alone, perhaps for later instants than this.
   if (pair.t <= newest) return;
   newest = pair.t;
-  corrector->set_wheels(surroundings.wheels(pair.t));
   fusion::VirtualRate rate;
   if (calibrated) rate = corrector->update({seconds(pair.t), pair.rate_dps, pair.noise_gain});
   tell_surroundings(pair.t, rate.rate_dps, calibrated);
@@ -390,11 +392,20 @@ void Pipeline::Impl::take_pair(const fusion::AlignedPair& pair, TimePoint stamp,
   send_bias_when_due(pair.t + lag_most(), stamp, sink);
 }
 
+// What the corrector weighs besides the rates.
+void Pipeline::Impl::tell_corrector(TimePoint t) {
+  corrector->set_wheels(surroundings.wheels(t));
+  corrector->set_vibration(surroundings.vibration_g2());
+  corrector->set_temperature({surroundings.temperature_c(0), surroundings.temperature_c(1)});
+  for (std::size_t gyro = 0; gyro < 2; ++gyro)
+    corrector->set_resolution(gyro, health_of[gyro].step_dps());
+}
+
 // The corrector's opinion of both; of one gyro alone it has none that is new.
 void Pipeline::Impl::note_condition(TimePoint t) {
   condition = corrector->condition();
   for (std::size_t gyro = 0; gyro < 2; ++gyro)
-    health_of[gyro].set_noisy(t, condition.noisy[gyro]);
+    health_of[gyro].set_opinion(t, condition.noisy[gyro], condition.blind[gyro]);
 }
 
 void Pipeline::Impl::take_single(std::size_t gyro, TimePoint t, double rate_dps, Duration age,
@@ -403,14 +414,15 @@ void Pipeline::Impl::take_single(std::size_t gyro, TimePoint t, double rate_dps,
   newest = t;
   alone = gyro;
   // A gyro that was never compared with the other one is not believed, whatever the method.
-  const bool valid = calibrated && status.pairs > 0;
+  bool valid = calibrated && status.pairs > 0;
   fusion::VirtualRate rate;
   if (valid) {
     fusion::RatePair single{.t_s = seconds(t)};
     single.rate_dps[gyro] = rate_dps;
-    corrector->set_wheels(surroundings.wheels(t));
+    tell_corrector(t);
     rate = corrector->update_alone(gyro, single);
     note_condition(t);
+    valid = rate.usable;
   }
   tell_surroundings(t, rate.rate_dps, valid);
   enter_state(stamp, sink);
@@ -585,8 +597,9 @@ void Pipeline::Impl::advance(TimePoint now, FrameSink& sink) {
 // --- frames out ----------------------------------------------------------------------------------
 
 Quality Pipeline::Impl::quality() const {
-  if (!pairing) return Quality::kOneGyro;
+  if (!pairing || condition.blind[0] || condition.blind[1]) return Quality::kOneGyro;
   if (condition.disagree) return Quality::kDisagree;
+  if (condition.ambiguous) return Quality::kAmbiguous;
   if (status.restored == Restored::kTakenUp) return Quality::kRestored;
   return status.moved_in_calibration ? Quality::kCalibrationUncertain : Quality::kTwoGyros;
 }
@@ -594,6 +607,7 @@ Quality Pipeline::Impl::quality() const {
 BiasMode Pipeline::Impl::bias_mode() const {
   if (!corrector->needs_calibration()) return BiasMode::kNone;
   if (!calibrated) return pairing ? BiasMode::kCalibrating : BiasMode::kNone;
+  if (condition.ambiguous && (heard[0] || heard[1])) return BiasMode::kAmbiguous;
   if (condition.stopped && (heard[0] || heard[1])) return BiasMode::kStop;
   return pairing ? BiasMode::kTracking : BiasMode::kHold;
 }
@@ -674,8 +688,12 @@ const Status& Pipeline::Impl::refreshed_status() {
   status.bias_sigma_dps = drift.bias_sigma_dps;
   status.disagree = pairing && condition.disagree;
   status.disagreements = condition.disagreements;
+  status.ambiguous = condition.ambiguous;
+  status.probability = condition.probability;
   status.stops = condition.stops;
   status.stops_refused = condition.stops_refused;
+  status.stops_open = condition.stops_open;
+  status.estimate_restarts = condition.restarts;
   status.windows = corrector->windows().completed;
   status.windows_skipped = corrector->windows().skipped;
   return status;

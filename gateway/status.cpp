@@ -18,6 +18,8 @@ std::string_view to_string(Quality quality) {
       return "one_gyro";
     case Quality::kDisagree:
       return "disagree";
+    case Quality::kAmbiguous:
+      return "ambiguous";
     case Quality::kCalibrationUncertain:
       return "calibration_uncertain";
     case Quality::kRestored:
@@ -45,9 +47,16 @@ std::string_view to_string(Restored restored) {
 
 std::string_view to_string(Fault fault) {
   constexpr std::array<std::string_view, kFaultCount> kNames{
-      "silent",    "flagged_invalid", "unreadable", "counter_stuck",
-      "saturated", "stuck",           "dead_band",  "noisy"};
+      "silent", "flagged_invalid", "unreadable", "counter_stuck", "saturated",
+      "stuck",  "dead_band",       "noisy",      "blind"};
   return kNames[static_cast<std::size_t>(fault)];
+}
+
+std::string_view to_string(fusion::Hypothesis hypothesis) {
+  constexpr std::array<std::string_view, fusion::kHypotheses> kNames{
+      "standing",     "turning",    "gyro_1_stepped", "gyro_2_stepped", "gyro_1_blind",
+      "gyro_2_blind", "warming_up", "own_slopes",     "alike_slopes"};
+  return kNames[static_cast<std::size_t>(hypothesis)];
 }
 
 }  // namespace vgyro::gateway

@@ -9,6 +9,7 @@
 #include <string_view>
 
 #include "base/time.h"
+#include "fusion/corrector.h"
 
 namespace vgyro::gateway {
 
@@ -28,6 +29,7 @@ enum class Quality : std::uint8_t {
   kUnusable = 0,
   kOneGyro = 4,
   kDisagree = 6,              ///< both in use, but they contradict each other
+  kAmbiguous = 7,             ///< what they show can be read in two ways, and σ spans both
   kCalibrationUncertain = 8,  ///< the platform moved while it should have rested
   kRestored = 12,             ///< biases of an earlier run, not confirmed yet
   kTwoGyros = 15
@@ -76,10 +78,14 @@ enum class Fault : std::uint8_t {
   kSaturated,
   kStuck,
   kDeadBand,
-  kNoisy  ///< far noisier than it was
+  kNoisy,  ///< far noisier than it was
+  kBlind   ///< it does not feel the rotation that the other one feels
 };
-inline constexpr std::size_t kFaultCount = 8;
+inline constexpr std::size_t kFaultCount = 9;
 std::string_view to_string(Fault fault);
+
+/// For people: "standing", "turning", …
+std::string_view to_string(fusion::Hypothesis hypothesis);
 
 struct FaultRecord {
   std::uint64_t times = 0;  ///< that it began
@@ -132,7 +138,12 @@ struct Status {
   bool disagree = false;                 ///< the gyros contradict each other
   std::uint64_t disagreements = 0;       ///< times that this began
   std::uint64_t stops = 0;               ///< stops learned from
-  std::uint64_t stops_refused = 0;       ///< steady, but both gyros had moved together
+  std::uint64_t stops_refused = 0;       ///< steady, but a turn was likelier
+  std::uint64_t stops_open = 0;          ///< steady, and it could not be told which
+  bool ambiguous = false;                ///< two readings of the data are likely, and far apart
+  /// Of what may be the case, by fusion::Hypothesis.
+  std::array<double, fusion::kHypotheses> probability{};
+  std::uint64_t estimate_restarts = 0;  ///< times that the estimate was lost and began anew
 };
 
 }  // namespace vgyro::gateway

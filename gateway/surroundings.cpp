@@ -111,6 +111,10 @@ fusion::Wheels Surroundings::wheels(TimePoint t) const {
                                                    : fusion::Wheels::kRolling;
 }
 
+double Surroundings::vibration_g2() const {
+  return vibration_.count() > 0 ? vibration_.variance() : model::Surroundings::kUnknown;
+}
+
 std::uint8_t Surroundings::missing(std::size_t gyro, std::uint8_t needs) const {
   std::uint8_t heard = 0;
   if (temperatures_[gyro].known()) heard |= model::kNeedsTemperature;

@@ -52,6 +52,12 @@ class Surroundings {
 
   [[nodiscard]] model::Surroundings at(std::size_t gyro, TimePoint t) const;
   [[nodiscard]] fusion::Wheels wheels(TimePoint t) const;
+  /// NaN where none is known.
+  [[nodiscard]] double temperature_c(std::size_t gyro) const {
+    return temperatures_[gyro].temperature_c();
+  }
+  /// Variance of the specific force's magnitude; NaN where there is no accelerometer.
+  [[nodiscard]] double vibration_g2() const;
   /// Of the inputs in `needs` (model::Need) those that were never heard.
   [[nodiscard]] std::uint8_t missing(std::size_t gyro, std::uint8_t needs) const;
 
