@@ -25,16 +25,18 @@ struct DriftKind {
   double steady_per_s;  ///< in the long run
   double tau_s;
   double correlation;
-  bool alike;  ///< both gyros' slopes are of the quieter one's size
+  double relative;  ///< how far a slope's own course may be another one, as a share of it
+  bool alike;       ///< both gyros' slopes are of the quieter one's size
   /// Every how many of kWalkRatios_per_s it is tried with, and how many are left out at each end.
   std::size_t stride;
   std::size_t margin;
 };
 constexpr std::array<DriftKind, kDriftKinds> kKinds{{
-    {0.87, 0.0, 0.0, 1.0, 0.0, false, 2, 0},
-    {0.10, 0.4, 0.05, 600.0, 0.0, false, 2, 2},
-    {0.02, 0.0, 0.1, 300.0, 0.0, false, 2, 2},
-    {0.01, 0.0, 0.1, 300.0, 0.98, true, 2, 2},
+    {0.87, 0.0, 0.0, 1.0, 0.0, 0.0, false, 2, 0},
+    {0.05, 0.5, 0.02, 100.0, 0.0, 0.3, false, 2, 2},
+    {0.05, 0.3, 0.02, 500.0, 0.0, 0.3, false, 2, 2},
+    {0.02, 0.0, 0.1, 300.0, 0.0, 0.0, false, 2, 2},
+    {0.01, 0.0, 0.1, 300.0, 0.98, 0.0, true, 2, 2},
 }};
 
 // A coefficient before anything is known of it, in units of N per kelvin.
@@ -46,9 +48,8 @@ constexpr double kBendWhite_per_rtk = 0.05;
 // MEMS; that two differ is plain from so many standard deviations on.
 constexpr double kUsualScale = 5e-4;
 constexpr double kUsualScaleWhite = 1e-4;
-constexpr double kUsualScalePower = 0.6;
 constexpr double kUsualScaleMin = 3e-4;
-constexpr double kUsualScaleMax = 1e-2;
+constexpr double kUsualScaleMax = 5e-3;
 constexpr double kPlainSigmas = 4.0;
 
 // Parts that weigh less are left out of the sums.
@@ -99,7 +100,8 @@ WalkChoices walk_choices(const DriftKind& kind, const GyroParameters& gyro, doub
 }
 
 SlopeModel slopes_of(const DriftKind& kind, const std::array<double, 2>& white_dps_rthz) {
-  SlopeModel slopes{.tau_s = kind.tau_s, .correlation = kind.correlation};
+  SlopeModel slopes{
+      .tau_s = kind.tau_s, .correlation = kind.correlation, .relative = kind.relative};
   for (std::size_t gyro = 0; gyro < 2; ++gyro) {
     const double white =
         kind.alike ? std::min(white_dps_rthz[0], white_dps_rthz[1]) : white_dps_rthz[gyro];
@@ -173,7 +175,7 @@ DriftEstimate EstimateMixer::result() const {
 }
 
 DriftBank::DriftBank(const std::array<GyroParameters, 2>& gyros) : gyros_(gyros) {
-  constexpr std::size_t kHypothesesMax = 25 + 3 * 9;
+  constexpr std::size_t kHypothesesMax = 25 + 4 * 9;
   hypotheses_.reserve(kHypothesesMax);
 }
 
@@ -301,9 +303,8 @@ void DriftBank::take_coefficients(const DriftMemory& memory) {
 double DriftBank::usual_scale_doubt(double difference, double variance) const {
   std::array<double, 2> usual{};
   for (std::size_t gyro = 0; gyro < 2; ++gyro) {
-    usual[gyro] = std::clamp(
-        kUsualScale * std::pow(white_dps_rthz_[gyro] / kUsualScaleWhite, kUsualScalePower),
-        kUsualScaleMin, kUsualScaleMax);
+    usual[gyro] = std::clamp(kUsualScale * white_dps_rthz_[gyro] / kUsualScaleWhite, kUsualScaleMin,
+                             kUsualScaleMax);
   }
   const double square = difference * difference;
   const double sum = squared(usual[0]) + squared(usual[1]);

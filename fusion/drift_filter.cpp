@@ -130,11 +130,15 @@ void DriftFilter::add_slope_noise(double length_s, Square& walked) const {
   const double integral_s2 =
       tau_s * tau_s *
       (a < kShort ? 2.0 / 3.0 * a * a * a : std::max(2.0 * (a - gone) - gone * gone, 0.0));
+  std::array<double, 2> steady{};
+  for (std::size_t gyro = 0; gyro < 2; ++gyro) {
+    const double slope = state_(slopes_at_ + static_cast<int>(gyro));
+    steady[gyro] = std::hypot(slopes.steady_dps_s[gyro], slopes.relative * slope);
+  }
   for (int i = 0; i < 2; ++i) {
     for (int j = 0; j < 2; ++j) {
-      const double both = slopes.steady_dps_s[static_cast<std::size_t>(i)] *
-                          slopes.steady_dps_s[static_cast<std::size_t>(j)] *
-                          (i == j ? 1.0 : slopes.correlation);
+      const double both = steady[static_cast<std::size_t>(i)] *
+                          steady[static_cast<std::size_t>(j)] * (i == j ? 1.0 : slopes.correlation);
       walked(slopes_at_ + i, slopes_at_ + j) += both * slope_gain;
       walked(kBias1 + i, slopes_at_ + j) += both * cross_s;
       walked(slopes_at_ + j, kBias1 + i) += both * cross_s;

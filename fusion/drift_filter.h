@@ -22,6 +22,8 @@ struct SlopeModel {
   std::array<double, 2> steady_dps_s{};  ///< σ in the long run
   double tau_s = 1.0;
   double correlation = 0.0;  ///< of the two gyros' changes of slope
+  /// Part of a slope by which it may be otherwise in the long run: the one that is steep changes.
+  double relative = 0.0;
 
   [[nodiscard]] bool any() const {
     return begin_dps_s[0] + begin_dps_s[1] + steady_dps_s[0] + steady_dps_s[1] > 0.0;

@@ -15,8 +15,8 @@ inline constexpr std::array<double, 9> kWalkRatios_per_s{1e-3,   3.2e-3, 5.6e-3,
 inline constexpr std::size_t kWalkPairs = kWalkRatios_per_s.size() * kWalkRatios_per_s.size();
 
 /// Kinds of drift that the optimal corrector weighs against each other: none but the walk, warming
-/// up, slopes that come and go in each gyro by itself, and the same in both alike.
-inline constexpr std::size_t kDriftKinds = 4;
+/// up fast or slowly, slopes that come and go in each gyro by itself, and the same in both alike.
+inline constexpr std::size_t kDriftKinds = 5;
 
 struct DriftMemory {
   std::array<double, 2> bias_dps{};
@@ -31,13 +31,13 @@ struct DriftMemory {
   double skew_sigma_s = 0.0;
 
   // What older memories do not hold. A σ or a sum of 0 stands for "not known".
-  std::array<double, kDriftKinds> kind_weight{};      ///< probability of each kind of drift
-  std::array<double, 2> slope_dps_s{};                ///< of the biases
-  std::array<double, 2> slope_sigma_dps_s{};          ///< of these
-  std::array<double, 2> coefficient_dps_k{};          ///< of the biases with temperature
-  std::array<double, 2> coefficient_sigma_dps_k{};    ///< of these
-  std::array<double, 2> temperature_c{};              ///< at which the biases stand …
-  std::array<bool, 2> has_temperature{};              ///< … where it was known
+  std::array<double, kDriftKinds> kind_weight{};    ///< probability of each kind of drift
+  std::array<double, 2> slope_dps_s{};              ///< of the biases
+  std::array<double, 2> slope_sigma_dps_s{};        ///< of these
+  std::array<double, 2> coefficient_dps_k{};        ///< of the biases with temperature
+  std::array<double, 2> coefficient_sigma_dps_k{};  ///< of these
+  std::array<double, 2> temperature_c{};            ///< at which the biases stand …
+  std::array<bool, 2> has_temperature{};            ///< … where it was known
 };
 
 }  // namespace vgyro::fusion

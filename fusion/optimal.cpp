@@ -1061,9 +1061,10 @@ Condition OptimalCorrector::condition() const {
   probability[index_of(Hypothesis::kGyro2Stepped)] = readings_.stepped(1);
   probability[index_of(Hypothesis::kGyro1Blind)] = blind_[0];
   probability[index_of(Hypothesis::kGyro2Blind)] = blind_[1];
-  probability[index_of(Hypothesis::kWarmingUp)] = estimate_.kind_weight[1];
-  probability[index_of(Hypothesis::kOwnSlopes)] = estimate_.kind_weight[2];
-  probability[index_of(Hypothesis::kAlikeSlopes)] = estimate_.kind_weight[3];
+  probability[index_of(Hypothesis::kWarmingUp)] =
+      estimate_.kind_weight[1] + estimate_.kind_weight[2];
+  probability[index_of(Hypothesis::kOwnSlopes)] = estimate_.kind_weight[3];
+  probability[index_of(Hypothesis::kAlikeSlopes)] = estimate_.kind_weight[4];
   return now;
 }
 
