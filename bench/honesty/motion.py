@@ -213,21 +213,24 @@ def slow_turns(life, end_s):
 
 
 def ferry(life, end_s):
-    """The car stands on a ship that turns; the ship's log tells nothing to the wheels."""
-    life.stop(life.u(10, 30))
-    begin = life.now
+    """The car stands on a ship that turns, docks, turns again; the ship's log tells nothing to the wheels."""
     steady = life.rng.random() < 0.2
     slowest = min(0.8, max(0.05, life.limits.slowest_smooth_dps))
-    longest = min(240.0, life.room_s() - 20)
-    while not life.over(end_s) and longest > 40:
-        hold = life.u(0.4, 1.0) * (longest - 20)
-        life.bend(life.side() * life.log_u(slowest, 1.0), hold, life.u(3, 12))
-        life.stay(life.u(5, 30))
+    life.stop(life.u(10, 30))
+    while not life.over(end_s):
+        begin = life.now
         longest = min(240.0, life.room_s() - 20)
-    if not steady:
-        swell(life, begin, life.now)
-    life.stay(life.u(10, 30))  # docked
-    life.last_stop_s = life.now
+        for _ in range(life.rng.integers(1, 4)):
+            hold = life.u(0.4, 1.0) * (longest - 30)
+            life.bend(life.side() * life.log_u(slowest, 1.0), hold, life.u(3, 12))
+            life.stay(life.u(5, 30))
+            longest = min(240.0, life.room_s() - 20)
+            if longest < 50 or life.over(end_s):
+                break
+        if not steady:
+            swell(life, begin, life.now)
+        life.stay(life.u(10, 40))  # docked
+        life.last_stop_s = life.now
     life.told.append("the ferry is perfectly steady" if steady else "the ferry rolls a little")
 
 
@@ -276,5 +279,4 @@ def live(rng, duration_s, rest_s, chapters, limits):
         CHAPTERS[name](life, life.now + share)
         if life.now >= duration_s:
             break
-    life.stop(30.0)
     return life

@@ -14,6 +14,7 @@ set output "{out}"
 set datafile separator ","
 set multiplot layout 2,1 title "{title}" noenhanced
 set lmargin 12
+set rmargin 10
 set grid
 set xrange [0:{end}]
 set yrange [-{height}:{height}]

@@ -19,6 +19,12 @@ COMMON_LAG_S = 240.0  # the longest time without a stop in worlds whose gyros dr
 # A motion that no wheel sees and no shaking betrays is told from drift by nothing but its suddenness; what is
 # slower than this many times the drift that both gyros share in that time, nobody could know.
 CLEAR_OF_DRIFT = 5.0
+# Drift that both gyros share, that began after the first rest and does not show in their difference either, cannot be
+# known before the next stop; nor can sigma allow for it always without being too large where there is none. It is
+# kept below so many sigma of a single sample of the pair.
+HIDDEN_SIGMAS = 3.0
+# A difference that moves tells that something drifts, and that what both share may be so many times as much.
+SHOWN_BY_DIFFERENCE = 3.0
 SOUND_AGAIN_S = 5.0  # after a fault ends
 
 GYRO_IDS = (0x101, 0x182)
@@ -135,14 +141,35 @@ def draw_faults(rng, pair, duration_s, rest_s):
     return kind + (" from the start" if begin_s == 0.0 else "")
 
 
+def sample_sigma_dps(pair):
+    return sum(1 / (g.density**2 * g.rate_hz) for g in pair) ** -0.5
+
+
+def changes_between_stops(world, drifts_of):
+    """How much each gyro drifts in the longest time without a stop, at every second."""
+    t = np.arange(world.rest_s, world.duration_s, 1.0)
+    lag = int(COMMON_LAG_S)
+    for g in world.gyros:
+        drift = gyros.drift_of(g, t, world.thermal, drifts_of(g))
+        yield drift[lag:] - drift[:-lag]
+
+
+def calm_hidden_drift(world):
+    def hidden(g):
+        return [d for d in g.drifts if d.kind == "thermal" or (d.kind == "ramp" and d.begin_s > 0)]
+
+    a, b = changes_between_stops(world, hidden)
+    together = np.where(np.sign(a) == np.sign(b), np.minimum(np.abs(a), np.abs(b)), 0)
+    unseen = float((together - SHOWN_BY_DIFFERENCE * np.abs(a - b)).max())
+    limit = HIDDEN_SIGMAS * sample_sigma_dps(world.gyros)
+    for d in [d for g in world.gyros for d in hidden(g)] if unseen > limit else []:
+        d.size *= limit / unseen
+
+
 def shared_drift_dps(world):
     """The most that both gyros drift in the same way between two stops."""
-    t = np.arange(world.rest_s, world.duration_s, 1.0)
-    changes = []
-    for g in world.gyros:
-        drift = gyros.drift_of(g, t, world.thermal)
-        changes.append(drift[int(COMMON_LAG_S):] - drift[:-int(COMMON_LAG_S)])
-    together = np.where(np.sign(changes[0]) == np.sign(changes[1]), np.minimum(*np.abs(changes)), 0)
+    a, b = changes_between_stops(world, lambda g: g.drifts)
+    together = np.where(np.sign(a) == np.sign(b), np.minimum(np.abs(a), np.abs(b)), 0)
     return float(together.max(initial=0.0))
 
 
@@ -178,6 +205,7 @@ def draw(seed, without=()):
         calm_hidden_heat(pair, thermal, sent)
     world = World(seed, duration_s, rest_s, math.floor(rest_s - rng.uniform(4, 10)), rest_dps, pair, thermal, sent, wheels, model,
                   draw_chapters(stream(seed, 5)))
+    calm_hidden_drift(world)
     drift_words = [name + (" of both" if all(any(d.kind == name for d in g.drifts) for g in pair) else " of one") for name in drift_kinds]
     world.tags = {
         "motion": world.chapters, "drift": drift_words or ["none"], "fault": [fault],
