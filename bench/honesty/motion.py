@@ -15,6 +15,11 @@ SWAY_KNOT_S = 0.4
 SPLINE_RMS = 0.69  # Of a cubic B-spline on knots of variance 1.
 
 
+QUIET_STOP_S = 8.0  # What counts as a stop where stops must come
+# How a car and a train speed up and brake, m/s^2.
+CAR_PULL, TRAIN_PULL = (1.2, 3.0), (0.5, 1.1)
+
+
 @dataclass
 class Limits:
     """What makes a life fair: drift that both gyros share shows at stops alone."""
@@ -43,6 +48,7 @@ class Life:
         self.now, self.speed = rest_s, 0.0
         self.last_stop_s = rest_s
         self.speeds, self.rough, self.wander = ([(0.0, 0.0), (rest_s, 0.0)] for _ in range(3))
+        self.pull = CAR_PULL
         self.sways, self.told, self.wheel_lies = [], [], []
         self.road = (rng.uniform(0.02, 0.08), rng.uniform(0.1, 0.3))
 
@@ -74,19 +80,25 @@ class Life:
         self.speed = speed
         self.now = end_s
 
+    def ramp_to(self, speed):
+        return max(1.5, abs(speed - self.speed) / self.u(*self.pull))
+
     def go(self, speed, rough=1.0, wander=1.0):
         """Rolls at this speed, with this share of the road's noise and wander."""
-        self.set(speed, rough * self.road[0], wander * self.road[1], self.u(2, 7))
+        self.set(speed, rough * self.road[0], wander * self.road[1], self.ramp_to(speed))
 
     def stop(self, length_s, people=False):
-        """The wheels stand for length_s; in people climb and shake the car."""
-        self.set(0.0, 0.0, 0.0, self.u(2, 6))
+        """The wheels stand for length_s; people who get in shake the car."""
+        self.set(0.0, 0.0, 0.0, self.ramp_to(0.0))
+        begin = self.now
         self.stay(length_s)
+        quiet_s = length_s
         if people and length_s > 6:
-            begin = self.now - self.u(0.4, 0.9) * length_s
-            self.sways.append((begin, min(self.now - 0.5, begin + self.u(3, 20))))
-        if length_s >= 8:
-            self.last_stop_s = self.now
+            quiet_s = self.u(0.1, 0.6) * length_s
+            shaken_from = begin + quiet_s
+            self.sways.append((shaken_from, min(self.now - 0.5, shaken_from + self.u(3, 20))))
+        if quiet_s >= QUIET_STOP_S:
+            self.last_stop_s = begin + quiet_s
 
     def stay(self, length_s):
         for points in (self.speeds, self.rough, self.wander):
@@ -108,7 +120,7 @@ class Life:
     def due(self, next_act_s=25.0):
         """Stops if the next act would be too long without."""
         if self.room_s() < next_act_s:
-            self.stop(self.u(8, 30), people=self.rng.random() < 0.3)
+            self.stop(self.u(QUIET_STOP_S, 30))
             return True
         return False
 
@@ -190,10 +202,11 @@ def car_park(life, end_s):
 
 
 def rail(life, end_s):
+    life.pull = TRAIN_PULL
     life.go(life.u(12, 40), rough=0.3, wander=0.1)
     while not life.over(end_s):
-        hold = min(life.u(30, 200), max(30.0, life.room_s() - 80))
-        if life.due(hold + 70) or (life.rng.random() < 0.35 and life.speed > 0):
+        hold = min(life.u(30, 200), max(30.0, life.room_s() - 110))
+        if life.due(hold + 100) or (life.rng.random() < 0.35 and life.speed > 0):
             if life.speed > 0:
                 life.stop(life.u(20, 60), people=True)
             life.go(life.u(12, 40), rough=0.3, wander=0.1)
