@@ -18,6 +18,8 @@ SPLINE_RMS = 0.69  # Of a cubic B-spline on knots of variance 1.
 QUIET_STOP_S = 8.0  # What counts as a stop where stops must come
 # How a car and a train speed up and brake, m/s^2.
 CAR_PULL, TRAIN_PULL = (1.2, 3.0), (0.5, 1.1)
+# Sideways acceleration that passengers bear, m/s^2: a fast vehicle turns slowly.
+CAR_GRIP, TRAIN_GRIP = 4.5, 1.5
 
 
 @dataclass
@@ -48,7 +50,7 @@ class Life:
         self.now, self.speed = rest_s, 0.0
         self.last_stop_s = rest_s
         self.speeds, self.rough, self.wander = ([(0.0, 0.0), (rest_s, 0.0)] for _ in range(3))
-        self.pull = CAR_PULL
+        self.pull, self.grip = CAR_PULL, CAR_GRIP
         self.sways, self.told, self.wheel_lies = [], [], []
         self.road = (rng.uniform(0.02, 0.08), rng.uniform(0.1, 0.3))
 
@@ -107,6 +109,8 @@ class Life:
 
     def bend(self, height_dps, hold_s, ramp_s):
         length_s = hold_s + 2 * ramp_s
+        if self.speed > 0:
+            height_dps = math.copysign(min(abs(height_dps), math.degrees(self.grip / self.speed)), height_dps)
         self.add_bump(self.now, length_s, height_dps, ramp_s)
         self.stay(length_s)
 
@@ -147,8 +151,8 @@ def city(life, end_s):
     while not life.over(end_s):
         if not life.due(20) and life.rng.random() < stops_a_minute * 14 / 60:
             life.stop(life.u(5, 60), people=life.rng.random() < 0.4)
-        if life.speed < 5:
-            life.go(life.u(7, 15))
+        if not 5 <= life.speed <= 12:
+            life.go(life.u(6, 11))
         if life.rng.random() < 0.12:
             roundabout(life)
         else:
@@ -202,7 +206,7 @@ def car_park(life, end_s):
 
 
 def rail(life, end_s):
-    life.pull = TRAIN_PULL
+    life.pull, life.grip = TRAIN_PULL, TRAIN_GRIP
     life.go(life.u(12, 40), rough=0.3, wander=0.1)
     while not life.over(end_s):
         hold = min(life.u(30, 200), max(30.0, life.room_s() - 110))

@@ -182,7 +182,7 @@ def draw_chapters(rng):
 
 
 def draw(seed, without=()):
-    """The plan of a world; cheap. `without` holds any of wheels, model, temperature, drift, faults."""
+    """The plan of a world; cheap. `without` holds any of wheels, model, temperature, drift, scale, faults."""
     rng = stream(seed, 0)
     duration_s, rest_s = rng.uniform(900, 1500), rng.uniform(45, 90)
     rest_dps = 0.0 if rng.random() < 0.3 else float(f"{EARTH_DPS * rng.uniform(-1, 1):.5f}")
@@ -196,6 +196,7 @@ def draw(seed, without=()):
     for g in pair:
         g.drifts = [] if "drift" in without else g.drifts
         g.faults = [] if "faults" in without else g.faults
+        g.scale = 0.0 if "scale" in without else g.scale
     rng = stream(seed, 4)
     wheels = Wheels(rng.choice([10.0, 20.0, 50.0]), rng.uniform(0, 0.02), rng.uniform(0.05, 0.4), rng.random() < 0.03)
     wheels = wheels if rng.random() < 0.6 and "wheels" not in without else None
