@@ -294,7 +294,7 @@ def to_us(t):
 
 def fault_words(faults):
     if len(faults) > 3:
-        return [f"{len(faults)} times: {faults[0].words()}"]
+        return [f"{len(faults)} times {faults[0].kind}, the first at {faults[0].begin_s:.0f} s"]
     return [f.words() for f in faults]
 
 
