@@ -681,7 +681,7 @@ void OptimalCorrector::end_steady() {
   run_ = Run::kMoving;
   run_open_ = false;
   readings_.end_steady();
-  detector_.forget_turns();
+  detector_.stay();
   stop_length_s_ = kFirstStopWindow_s;
   refresh();
 }
@@ -902,7 +902,7 @@ SteadyWindow OptimalCorrector::steady_window() {
     steady.level_dps = both.values(0);
     steady.level_variance = both.noise(0, 0);
   }
-  steady.turned_deg = detector_.turned_deg();
+  steady.elsewhere = detector_.moved_on();
   steady.log_turning = run_ == Run::kMoving
                            ? detector_.log_turning(wheels_) + log_turning_by_vibration()
                            : detector_.log_turning_gain(wheels_, steady.length_s);

@@ -13,12 +13,14 @@ namespace {
 constexpr double kSlowTurn_dps = 0.02;
 constexpr double kFastTurn_dps = 60.0;
 
-// A steady turn that was interrupted goes on as it was: a circle with a wobble, a ferry, a
-// turntable. How likely, and how nearly; less so when the platform has turned away in between.
-constexpr double kGoesOn = 0.5;
+// A steady turn that was interrupted goes on as it was: a circle with a wobble, a ferry in a swell,
+// a turntable; and so does a stop in which somebody gets in. How likely, and how nearly. When the
+// platform has moved on in between, the next turn may be like the last one all the same.
+constexpr double kGoesOn = 0.95;
 constexpr double kGoesOnElsewhere = 0.05;
 constexpr double kGoesOnWithin = 0.05;
-constexpr double kElsewhere_deg = 30.0;
+// How fast the level's scatter from run to run is followed.
+constexpr double kSwellGain = 0.3;
 
 // How a steady turn wanders, per √s: a helmsman's and a driver's hands.
 constexpr double kTurnWalk_dps_rts = 0.002;
@@ -75,7 +77,7 @@ void Readings::begin(const std::array<double, 2>& white_dps_rthz,
   slots_[0].log_weight = 0.0;
   slots_[0].steady = Steady::kNo;
   slots_[0].stepped = kNoGyro;
-  slots_[0].last_turn_dps = 0.0;
+  slots_[0].last = Steady::kNo;
   count_ = 1;
 }
 
@@ -127,9 +129,10 @@ double Readings::turn_density(const Reading& reading, const SteadyWindow& window
   const double turn = window.level_dps - of_level(window.weight, estimate);
   const double variance = window.level_variance + level_doubt(window.weight, estimate);
   const double anew = 1.0 / (kSpan * (kSlowTurn_dps + std::sqrt(turn * turn + variance)));
-  if (reading.last_turn_dps == 0.0) return anew;
-  const double share = window.turned_deg < kElsewhere_deg ? kGoesOn : kGoesOnElsewhere;
-  const double on_variance = variance + squared(kGoesOnWithin * reading.last_turn_dps);
+  if (reading.last != Steady::kTurns) return anew;
+  const double share = window.elsewhere ? kGoesOnElsewhere : kGoesOn;
+  const double on_variance =
+      variance + squared(kGoesOnWithin * reading.last_turn_dps) + swell_variance_;
   return (1.0 - share) * anew +
          share * std::exp(log_normal(turn - reading.last_turn_dps, on_variance));
 }
@@ -145,8 +148,22 @@ double Readings::beyond_limits(const DriftEstimate& estimate) const {
   return penalty;
 }
 
+// Prior odds of a turn against a stop: those of any steady stretch, or what it was before.
+double Readings::log_turning(const Reading& reading, const SteadyWindow& window) {
+  if (window.elsewhere || reading.last == Steady::kNo) return window.log_turning;
+  const double persists = std::log(kGoesOn / (1.0 - kGoesOn));
+  return reading.last == Steady::kTurns ? persists : -persists;
+}
+
 void Readings::begin_steady(const SteadyWindow& window) {
   const std::size_t before = count_;
+  if (!window.elsewhere) {
+    swell_variance_ +=
+        kSwellGain * (squared(window.level_dps - last_level_dps_) - swell_variance_);
+  } else {
+    swell_variance_ = 0.0;
+  }
+  last_level_dps_ = window.level_dps;
   for (std::size_t i = 0; i < before; ++i) {
     Reading& stands = slots_[count_++];
     Reading& turns = slots_[i];
@@ -158,14 +175,13 @@ void Readings::begin_steady(const SteadyWindow& window) {
     turns.steady = Steady::kTurns;
     turns.turn_dps = window.level_dps;
     turns.turn_variance = window.level_variance;
-    turns.log_weight += window.log_turning + std::log(turn_density(turns, window, known));
+    turns.log_weight += log_turning(turns, window) + std::log(turn_density(turns, window, known));
     turns.last_turn_dps = window.level_dps - of_level(window.weight, known);
     if (window.turning.values.size() == 0) {
       turns.bank.predict(window.length_s);
     } else {
       turns.log_weight += turns.bank.learn(window.length_s, window.turning);
     }
-    stands.last_turn_dps = 0.0;
   }
 }
 
@@ -194,6 +210,7 @@ void Readings::go_on_steady(const SteadyWindow& window) {
 void Readings::end_steady() {
   for (std::size_t i = 0; i < count_; ++i) {
     if (slots_[i].steady == Steady::kStands) slots_[i].stepped = kNoGyro;
+    slots_[i].last = slots_[i].steady;
     slots_[i].steady = Steady::kNo;
   }
   join_alike();

@@ -26,7 +26,7 @@ struct SteadyWindow {
   /// Log of how much likelier a turn is than a stop, before the level is looked at; beyond the
   /// first window of a run only its change.
   double log_turning = 0.0;
-  double turned_deg = 0.0;  ///< since the last steady run
+  bool elsewhere = true;  ///< the platform has moved on since the last steady run
 };
 
 class Readings {
@@ -94,11 +94,13 @@ class Readings {
     Steady steady = Steady::kNo;
     double turn_dps = 0.0;  ///< level of the last window, where it turns
     double turn_variance = 0.0;
-    double last_turn_dps = 0.0;  ///< of the last run, less the drifts; 0: it stood
+    Steady last = Steady::kNo;   ///< the last run, while the platform has not moved on
+    double last_turn_dps = 0.0;  ///< its rate, where it turned
     std::size_t stepped = kNoGyro;
   };
   [[nodiscard]] double turn_density(const Reading& reading, const SteadyWindow& window,
                                     const DriftEstimate& estimate) const;
+  static double log_turning(const Reading& reading, const SteadyWindow& window);
   [[nodiscard]] bool goes_on(const SteadyWindow& window);
   void step(Reading& reading, std::size_t gyro, double away_dps, double doubt, double share);
   void begin_steady(const SteadyWindow& window);
@@ -109,6 +111,8 @@ class Readings {
   [[nodiscard]] std::size_t likeliest() const;
 
   std::array<GyroParameters, 2> gyros_;
+  double swell_variance_ = 0.0;  ///< of the level from run to run of a platform that does not move on
+  double last_level_dps_ = 0.0;
   std::array<Reading, 3 * kKept> slots_;
   std::size_t count_ = 0;
 };

@@ -11,6 +11,9 @@ namespace {
 
 // A rate that no drift explains: only so much counts as an angle that was turned.
 constexpr double kTurning_dps = 2.0;
+// So much of it, or so long without a steady block, and the platform has moved on.
+constexpr double kTurned_deg = 30.0;
+constexpr double kMovedOn_s = 15.0;
 
 // Wheels that stand while the platform does this are broken, or the platform is carried.
 constexpr double kNoStand_dps = 1.0;
@@ -78,8 +81,13 @@ StopDetector::Verdict StopDetector::judge(const BlockLevel& block, Wheels wheels
   if (wheels == Wheels::kRolling || !steady(block, on_wheels)) {
     end_run();
     if (std::abs(level) > kTurning_dps) turned_deg_ += std::abs(level) * block.length_s;
+    moving_s_ += block.length_s;
+    moved_on_ = moved_on_ || wheels == Wheels::kRolling || turned_deg_ > kTurned_deg ||
+                moving_s_ > kMovedOn_s;
     return Verdict::kMoving;
   }
+  turned_deg_ = 0.0;
+  moving_s_ = 0.0;
   const double weight = block.length_s / (run_s_ + block.length_s);
   const double recent = std::max(kRecent, weight);
   for (std::size_t gyro = 0; gyro < 2; ++gyro)

@@ -50,9 +50,10 @@ class StopDetector {
   [[nodiscard]] double log_turning(Wheels wheels) const;
   /// What `length_s` seconds more of the present run add to it: turns end sooner than stops.
   [[nodiscard]] double log_turning_gain(Wheels wheels, double length_s) const;
-  /// The angle turned since the last steady run, either way.
-  [[nodiscard]] double turned_deg() const { return turned_deg_; }
-  void forget_turns() { turned_deg_ = 0.0; }
+  /// Since the last run the platform has moved on: it turned, rolled, or moved for long.
+  [[nodiscard]] bool moved_on() const { return moved_on_; }
+  /// A run has been made use of.
+  void stay() { moved_on_ = false; }
   /// The wheels stood while the platform turned, and have not rolled since.
   [[nodiscard]] bool wheels_distrusted() const { return wheels_distrusted_; }
 
@@ -65,7 +66,9 @@ class StopDetector {
   double run_s_ = 0.0;
   int run_blocks_ = 0;
   std::array<double, 2> recent_{};  ///< excess of the last blocks
-  double turned_deg_ = 0.0;
+  double turned_deg_ = 0.0;  ///< since the last steady block
+  double moving_s_ = 0.0;    ///< the same
+  bool moved_on_ = true;
 };
 
 }  // namespace vgyro::fusion
