@@ -149,6 +149,8 @@ int append_counters(sd_bus_message* reply, const Snapshot& now) {
       {"frames_overflowed", sent.dropped_overflow},
       {"frames_refused", sent.dropped_failed},
       {"send_retries", sent.retries},
+      {"log_lines_lost", now.log_lines_lost},
+      {"service_messages_lost", now.service_messages_lost},
   };
   Dictionary fields(reply, "{st}");
   for (const auto& [name, count] : counters)

@@ -5,7 +5,6 @@
 // status of each second); frames go past it, straight from epoll. Nothing on the frame path
 // allocates.
 
-#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
@@ -22,6 +21,7 @@
 #include "daemon/host_time.h"
 #include "daemon/log.h"
 #include "daemon/metrics.h"
+#include "daemon/plan_loader.h"
 #include "daemon/reporter.h"
 #include "daemon/service.h"
 #include "daemon/snapshot.h"
@@ -33,11 +33,9 @@ namespace vgyro::daemon {
 
 class GatewayLoop final : private gateway::FrameSink {
  public:
-  /// Reads the configuration again; nothing, when it cannot be used, and then it has said why.
-  using Loader = std::function<std::optional<gateway::Plan>()>;
-
-  /// `keeper` is null where nothing is kept across a restart, `metrics` where nobody wants them.
-  GatewayLoop(gateway::Plan plan, Loader loader, StateKeeper* keeper, MetricsFile* metrics,
+  /// `load` reads the configuration again, beside the loop. `keeper` is null where nothing is kept
+  /// across a restart, `metrics` where nobody wants them.
+  GatewayLoop(gateway::Plan plan, LoadPlan load, StateKeeper* keeper, MetricsFile* metrics,
               Log& log);
   GatewayLoop(const GatewayLoop&) = delete;
   GatewayLoop& operator=(const GatewayLoop&) = delete;
@@ -84,12 +82,14 @@ class GatewayLoop final : private gateway::FrameSink {
   void look_at_status();
   void second_passed();
   void reopen_dead_buses();
-  Expected<void> reload();
+  void begin_reload();
+  Expected<void> take_reloaded();
   Expected<void> do_what_was_asked();
   void recalibrate();
   Expected<void> save_state();
   /// `keep`: goes on with what was learned, where the gyros are the same.
   Expected<void> replace_setup(gateway::Plan plan, bool keep);
+  Expected<void> try_to_replace_setup(gateway::Plan plan, bool keep);
   std::string hand_over(Setup& next);
   std::string begin_anew(Setup& next);
   const Snapshot& snapshot();
@@ -102,10 +102,11 @@ class GatewayLoop final : private gateway::FrameSink {
   static int on_second(sd_event_source* source, std::uint64_t usec, void* self);
   static int on_watchdog(sd_event_source* source, std::uint64_t usec, void* self);
 
-  Loader loader_;
+  PlanLoader loader_;
   StateKeeper* keeper_;
   MetricsFile* metrics_;
   Log& log_;
+  Notifier notifier_;
   TurnClock clock_;
   std::unique_ptr<Setup> setup_;
   can::TransmitQueue queue_;

@@ -102,6 +102,11 @@ void add_counters(Text& text, const Snapshot& now) {
   text.sample({{"cause", "stale"}}, sent.dropped_stale);
   text.sample({{"cause", "overflow"}}, sent.dropped_overflow);
   text.sample({{"cause", "refused"}}, sent.dropped_failed);
+  text.family("vgyro_log_lines_lost_total", "counter", "Lines of the log that nobody took.");
+  text.sample({}, now.log_lines_lost);
+  text.family("vgyro_service_messages_lost_total", "counter",
+              "Messages that the service manager did not take at once.");
+  text.sample({}, now.service_messages_lost);
 }
 
 void add_gyros(Text& text, const Snapshot& now) {

@@ -151,7 +151,9 @@ class OnTheBus(Bench):
         can0, can1 = self.get("Buses")
         self.assertEqual(can0["errors"]["data"]["bus_off"], 3)
         self.assertIs(can1["present"]["data"], False)
-        self.assertEqual(self.get("Counters")["pairs"], 1 << 40)
+        counters = self.get("Counters")
+        self.assertEqual(counters["pairs"], 1 << 40)
+        self.assertEqual((counters["log_lines_lost"], counters["service_messages_lost"]), (41, 3))
 
     def test_changes_are_told_once_a_second(self):
         with subprocess.Popen(["busctl", f"--address={self.address}", "--json=short", "monitor", NAME],
@@ -373,6 +375,8 @@ class Metrics(Bench):
         self.assertNotEqual(rate, rate, "not NaN")
         self.assertEqual(samples["vgyro_pairs_total", ()], float(1 << 40))
         self.assertEqual(samples["vgyro_dropped_frames_total", (("cause", "stale"),)], 7)
+        self.assertEqual(samples["vgyro_log_lines_lost_total", ()], 41)
+        self.assertEqual(samples["vgyro_service_messages_lost_total", ()], 3)
         self.assertEqual(samples["vgyro_bus_errors_total", (("bus", "can0"), ("cause", "bus_off"))], 3)
         self.assertEqual(samples["vgyro_gyro_rejected_frames_total", (("gyro", GYRO), ("cause", "counter_repeated"))], 10)
         self.assertEqual(path.stat().st_mode & 0o777, 0o644)

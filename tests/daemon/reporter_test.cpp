@@ -33,9 +33,10 @@ class ReporterTest : public testing::Test {
   }
 
   template <class Action>
-  static std::string said_during(const Action& action) {
+  std::string said_during(const Action& action) {
     testing::internal::CaptureStderr();
     action();
+    EXPECT_TRUE(log.flush(std::chrono::minutes(1)));
     return testing::internal::GetCapturedStderr();
   }
 

@@ -16,9 +16,10 @@ namespace {
 class StateKeeperTest : public testing::Test {
  protected:
   template <class Action>
-  static std::string said_during(const Action& action) {
+  std::string said_during(const Action& action) {
     testing::internal::CaptureStderr();
     action();
+    EXPECT_TRUE(log.flush(std::chrono::minutes(1)));
     return testing::internal::GetCapturedStderr();
   }
 
