@@ -103,6 +103,8 @@ int append_bus(sd_bus_message* reply, const BusStatus& bus) {
   fields.put("lost", bus.lost);
   fields.put("downs", bus.downs);
   fields.put("reopened", bus.reopened);
+  fields.put("foreign", bus.foreign);
+  fields.put("contested", bus.contested);
   fields.put_counts("errors", bus.errors,
                     [](std::size_t i) { return to_string(static_cast<can::ErrorCause>(i)); });
   return fields.close();

@@ -34,8 +34,17 @@ TimePoint read_clock() {
   return time_from_ns(static_cast<std::int64_t>(now.tv_sec) * 1'000'000'000 + now.tv_nsec);
 }
 
+std::array<std::uint32_t, 3> own_ids(const gateway::OutputPlan& output) {
+  return {output.rate_id, output.bias_id, output.model_id};
+}
+
+// What comes in, and our own identifiers, which nobody else should send.
 std::vector<can::Filter> filters_of(const gateway::Plan& plan, std::size_t bus) {
   std::vector<can::Filter> filters;
+  if (bus == plan.output.bus) {
+    for (const std::uint32_t id : own_ids(plan.output))
+      filters.push_back({id, can::kStandardIdMax, false});
+  }
   for (const gateway::FrameMatch& match : plan.inputs()) {
     if (match.bus == bus) filters.push_back({match.id, match.mask, match.extended});
   }
@@ -53,7 +62,9 @@ GatewayLoop::Setup::Setup(gateway::Plan the_plan, TurnClock& clock, Log& log)
   for (std::size_t i = 0; i < plan.buses.size(); ++i) {
     can::SocketOptions options;
     options.send_buffer_bytes = kSendBufferBytes;
-    buses.emplace_back(plan.buses[i], filters_of(plan, i), options, clock, log);
+    const IdentifierWatch own =
+        i == plan.output.bus ? IdentifierWatch(own_ids(plan.output)) : IdentifierWatch();
+    buses.emplace_back(plan.buses[i], filters_of(plan, i), own, options, clock, log);
   }
 }
 

@@ -51,7 +51,13 @@ int run(const Options& options, vgyro::daemon::Log& log) {
   if (!loaded) return kBadInput;
   std::optional<vgyro::daemon::StateKeeper> keeper;
   if (!options.state.empty()) keeper.emplace(options.state, log);
-  if (keeper && options.forget) keeper->forget();
+  if (keeper) {
+    if (const vgyro::Expected<void> locked = keeper->lock(); !locked) {
+      log.error("{}", locked.error().message());
+      return kBadInput;
+    }
+    if (options.forget) keeper->forget();
+  }
   std::optional<vgyro::daemon::MetricsFile> metrics;
   if (!options.metrics.empty()) metrics.emplace(options.metrics, log);
   vgyro::daemon::GatewayLoop loop(std::move(loaded->plan), load, keeper ? &*keeper : nullptr,
@@ -106,8 +112,9 @@ int main(int argc, char** argv) {
   app.footer(
       "`vgyro check FILE` explains a configuration before it is trusted.\n"
       "SIGHUP reads the configuration again; one that cannot be used is refused.\n"
-      "Exit codes: 0 stopped by a signal, 1 configuration unusable, 2 wrong usage, 3 the system "
-      "failed.");
+      "Exit codes: 0 stopped by a signal, 1 configuration unusable, or another gateway has the "
+      "state "
+      "file, 2 wrong usage, 3 the system failed.");
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

@@ -169,6 +169,10 @@ void add_buses(Text& text, const Snapshot& now) {
   text.family("vgyro_bus_link_downs_total", "counter", "Times that the link went down.");
   for (const BusStatus& bus : buses)
     text.sample({{"bus", bus.name}}, bus.downs);
+  text.family("vgyro_bus_foreign_frames_total", "counter",
+              "Frames with our identifiers that somebody else sent.");
+  for (const BusStatus& bus : buses)
+    text.sample({{"bus", bus.name}}, bus.foreign);
   text.family("vgyro_bus_errors_total", "counter", "What its controller told, by cause.");
   for (const BusStatus& bus : buses) {
     for (std::size_t i = 0; i < can::kErrorCauseCount; ++i) {

@@ -57,6 +57,8 @@ struct Sample {
     daemon::BusStatus bus{.name = "can0", .present = true, .link_up = true};
     bus.errors[static_cast<std::size_t>(can::ErrorCause::kBusOff)] = 3;
     bus.received = 4321;
+    bus.foreign = 17;
+    bus.contested = true;
     now.traffic.buses = {bus, {.name = "can1"}};
   }
 
