@@ -138,15 +138,21 @@ def read_run(folder, result, ids=(0x610, 0x611, 0x612)):
     return Run(folder, result, inputs, outputs, said, ids)
 
 
-def check_service(run):
-    """READY, STATUS, STOPPING, exit code, memory."""
+def check_life(run):
+    """READY, STOPPING, exit code, and the watchdog fed throughout."""
     texts = [text for _, text in run.result["notices"]]
     require(texts[0].startswith("READY=1"), f"first notice: {texts[0]!r}")
     require(texts[-1].startswith("STOPPING=1"), f"last notice: {texts[-1]!r}")
     require(run.result["exit"] == 0, f"exit {run.result['exit']!r}; it said: {run.said.strip()}")
-    require("stopped: " in run.said, f"no summary; it said: {run.said.strip()}")
     lived_s = run.result["notices"][-1][0] - run.result["notices"][0][0]
     require(texts.count("WATCHDOG=1") >= int(lived_s / 2), f"watchdog fed {texts.count('WATCHDOG=1')} times in {lived_s:.1f} s")
+
+
+def check_service(run):
+    """What check_life() does, and what it said, and memory."""
+    check_life(run)
+    require("stopped: " in run.said, f"no summary; it said: {run.said.strip()}")
+    require("with our identifiers" not in run.said, f"heard itself: {run.said.strip()}")
     resident = run.result["resources"]["rss_most_kb"]
     require(resident <= RSS_MOST_KB, f"{resident} kB resident, more than {RSS_MOST_KB}")
 
@@ -517,6 +523,111 @@ class ReloadCase:
         return np.concatenate([plays[:1], plays[1:][np.diff(plays) > 400_000]])
 
 
+class SlowReloadCase:
+    """SIGHUP with a pipe as DBC file, then, amid traffic, with a file that takes long to read."""
+
+    name = "slow_reload"
+    says = "a pipe as DBC is refused; while a large DBC is read the rates go on"
+    messages = 60_000
+
+    def prepare(self, folder):
+        twin = Twin(run_s=0.0)
+        twin.prepare(folder)
+        config = folder / "vgyro.toml"
+        text = config.read_text(encoding="utf-8")
+        os.mkfifo(folder / "pipe.dbc")
+        small = (folder / "twin.dbc").read_text(encoding="utf-8")
+        more = "".join(f'BO_ {0x80000000 + 0x10000 + i} MORE_{i}: 8 OTHER\n'
+                       f' SG_ Value : 0|32@1- (0.001,0) [-1000|1000] "m" Vector__XXX\n\n' for i in range(self.messages))
+        (folder / "large.dbc").write_text(small + "\n" + more, encoding="utf-8")
+        for name in ("pipe", "large"):
+            (folder / f"{name}.toml").write_text(text.replace("twin.dbc", f"{name}.dbc"), encoding="utf-8")
+        def take(name):
+            return ["run", ["cp", str(folder / name), str(config)]]
+        steps = [take("pipe.toml"), ["reload", None], take("large.toml"),
+                 ["play_and_reload", [str(folder / "played.log"), STILL_S]]]
+        return {"links": twin.links(), "steps": steps,
+                "command": [str(BIN / "vgyrod"), "--config", str(config), "--method", "optimal"]}
+
+    def judge(self, folder, result):
+        run = read_run(folder, result)
+        check_life(run)
+        require("pipe.dbc: is a pipe" in run.said, f"the pipe was not refused\n{run.said}")
+        require(run.said.count("the new configuration is refused") == 1, run.said)
+        require("its gyros are the same: nothing was interrupted" in run.said, run.said)
+        verdicts.check_protection(run.of(0x610), 0x610)
+        begin_s = [t for t, text in result["notices"] if text.startswith("RELOADING=1")][1]
+        took_s = [t for t, text in result["notices"] if text.startswith("READY=1") and t > begin_s][0] - begin_s
+        since = result["reloads_us"][1]
+        until = since + int(took_s * 1e6)
+        samples = sum(line.name == "102" and since <= line.us < until for line in run.inputs)
+        rates = sum(since <= line.us < until for line in run.of(0x610))
+        require(samples > 20, f"the large file took no time: {samples} samples came meanwhile")
+        require(rates >= 0.8 * samples, f"{rates} rates of {samples} samples while the file was read")
+        return f"{rates} rates of {samples} samples while the file was read, {describe(run)}"
+
+
+class UnreadLogCase:
+    """stderr is a pipe that nobody reads, and much is said: nobody notices on the bus."""
+
+    name = "unread_log"
+    says = "stderr is a full pipe that nobody reads: rates, watchdog and SIGTERM as ever"
+
+    def prepare(self, folder):
+        twin = Twin(run_s=0.0)
+        twin.prepare(folder)
+        config = folder / "vgyro.toml"
+        text = config.read_text(encoding="utf-8")
+        (folder / "good.toml").write_text(text, encoding="utf-8")
+        wrong = "".join(f"no_such_key_{i} = {i}\n" for i in range(3000))
+        (folder / "bad.toml").write_text(wrong + text, encoding="utf-8")
+        def take(name):
+            return ["run", ["cp", str(folder / name), str(config)]]
+        script = (f"mkfifo {{memory}}/unread; exec 3<>{{memory}}/unread; rm {{memory}}/unread; "
+                  f"exec {BIN / 'vgyrod'} --config {config} --metrics {{memory}}/state.toml.prom 2>&3")
+        steps = [take("bad.toml"), ["reload", None], take("good.toml"), ["play", str(folder / "played.log")],
+                 ["wait", 2.0]]
+        return {"links": twin.links(), "steps": steps, "command": ["/bin/sh", "-c", script]}
+
+    def judge(self, folder, result):
+        run = read_run(folder, result)
+        check_life(run)
+        check_played(run)
+        rates = check_against_replay(run)
+        metrics = (folder / "state.toml.prom").read_text(encoding="ascii")
+        lost = int(re.search(r"^vgyro_log_lines_lost_total (\d+)$", metrics, re.MULTILINE).group(1))
+        require(lost > 100, f"{lost} lines counted as lost")
+        return f"{rates} rates as in the replay, {lost} lines lost, {describe(run)}"
+
+
+class SharedCase:
+    """A second gateway on the same state file, and somebody else who sends one of our identifiers."""
+
+    name = "shared"
+    says = "a second gateway on the state file does not start; foreign frames with our identifiers are told"
+
+    def prepare(self, folder):
+        twin = Twin(run_s=0.0)
+        twin.prepare(folder)
+        command = [str(BIN / "vgyrod"), "--config", str(folder / "vgyro.toml"), "--state", "{memory}/state.toml"]
+        second = f"{' '.join(command)} 2>{folder}/second.err; test $? = 1"
+        foreign = ["run", ["cansend", "can0", "610#0011223344556677"]]
+        steps = [["run", ["sh", "-c", second]], ["play", str(folder / "played.log")], ["reload", None],
+                 ["wait", 3.0], foreign, ["until_said", "with our identifiers"]]
+        return {"links": twin.links(), "steps": steps, "command": command}
+
+    def judge(self, folder, result):
+        run = read_run(folder, result)
+        check_life(run)
+        second = (folder / "second.err").read_text(encoding="utf-8")
+        require(re.search(r"state\.toml: another gateway keeps its biases there \(process \d+\); .*--state FILE", second), second)
+        require("can0: 1 frames with our identifiers came from somebody else" in run.said, run.said)
+        require(not (folder / "state.toml.lock").exists(), "the lock file was left behind")
+        statuses = [text for _, text in result["notices"]]
+        require(any("somebody else sends our identifiers on can0" in text for text in statuses), f"{statuses}")
+        return describe(run)
+
+
 class RestartCase:
     """Killed without warning after it has calibrated, and started again: it goes on where it was."""
 
@@ -672,6 +783,9 @@ def all_cases(recordings):
         DeadBusCase(),
         ErrorFramesCase(),
         ReloadCase(),
+        SlowReloadCase(),
+        UnreadLogCase(),
+        SharedCase(),
         RestartCase(),
         IdleCase(),
         CommandCase("no_can_interface", "an interface that is none of CAN: exit 1 and what to do",
