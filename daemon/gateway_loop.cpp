@@ -187,7 +187,7 @@ Expected<void> GatewayLoop::run() {
     if (Expected<void> done = turn(events); !done) return done;
   }
   notifier_.stopping();
-  if (keeper_ != nullptr) keeper_->finish(setup_->pipeline.memory());
+  if (keeper_ != nullptr) keeper_->finish(memory());
   setup_->reporter->summarize(setup_->pipeline.status(), traffic());
   return {};
 }
@@ -353,7 +353,8 @@ void GatewayLoop::second_passed() {
   notifier_.status(status_line());
   control_->second_passed();
   if (metrics_ != nullptr && metrics_->second_passed()) metrics_->write(snapshot());
-  if (keeper_ != nullptr && keeper_->second_passed()) keeper_->keep(setup_->pipeline.memory());
+  const std::optional<gateway::SavedState> known = memory();
+  if (keeper_ != nullptr && keeper_->second_passed()) keeper_->keep(known);
 }
 
 std::string GatewayLoop::status_line() {
@@ -388,9 +389,28 @@ void GatewayLoop::recalibrate() {
   const Expected<void> replaced = try_to_replace_setup(setup_->plan, false);
   if (!replaced) {
     log_.error("calibrating anew: {}", replaced.error().message());
-  } else if (keeper_ != nullptr) {
-    keeper_->forget();
+    return;
   }
+  inheritance_.forget();
+  if (keeper_ != nullptr) keeper_->forget();
+}
+
+// What is worth keeping: what the pipeline knows, or what was known before a reload, as long as
+// that is better.
+std::optional<gateway::SavedState> GatewayLoop::memory() {
+  const bool was_contradicted = inheritance_.is_contradicted();
+  std::optional<gateway::SavedState> known =
+      inheritance_.choose(setup_->pipeline.memory(), setup_->plan, setup_->pipeline.status().stops);
+  if (inheritance_.is_contradicted() && !was_contradicted) {
+    log_.tell(Severity::kWarning, {.cause = "calibration_contradicted"},
+              "the new calibration contradicts what was known of the gyros; did the platform turn? "
+              "It is used, but not saved before a stop has confirmed it; `vgyro recalibrate` at "
+              "rest begins afresh");
+  }
+  if (was_contradicted && !inheritance_.is_contradicted()) {
+    log_.notice("a stop has decided for the new calibration; it is saved from now on");
+  }
+  return known;
 }
 
 Expected<void> GatewayLoop::save_state() {
@@ -398,9 +418,9 @@ Expected<void> GatewayLoop::save_state() {
     return fail({}, "the gateway keeps no state",
                 "start it with --state FILE, or with StateDirectory= in its unit");
   }
-  const std::optional<gateway::SavedState> memory = setup_->pipeline.memory();
-  if (!memory) return fail({}, "nothing was learned yet that is worth keeping");
-  keeper_->keep(memory);
+  const std::optional<gateway::SavedState> known = memory();
+  if (!known) return fail({}, "nothing was learned yet that is worth keeping");
+  keeper_->keep(known);
   return {};
 }
 
@@ -416,8 +436,9 @@ const Snapshot& GatewayLoop::snapshot() {
   snapshot_.log_lines_lost = log_.lost();
   snapshot_.service_messages_lost = notifier_.failures();
   snapshot_.bias_sigma_dps.fill(std::numeric_limits<double>::quiet_NaN());
-  if (const std::optional<gateway::SavedState> memory = setup_->pipeline.memory()) {
-    const std::array<double, 3>& covariance = memory->drift.bias_covariance;
+  const std::optional<gateway::SavedState> known = setup_->pipeline.memory();
+  if (known && std::isfinite(snapshot_.status.gyros[0].bias_dps)) {
+    const std::array<double, 3>& covariance = known->drift.bias_covariance;
     snapshot_.bias_sigma_dps = {std::sqrt(covariance[0]), std::sqrt(covariance[2])};
   }
   return snapshot_;
@@ -489,11 +510,15 @@ std::string GatewayLoop::hand_over(Setup& next) {
     next.reporter->buses_are_new();
     return how;
   }
-  const std::optional<gateway::SavedState> memory = setup_->pipeline.memory();
+  const std::optional<gateway::SavedState> known = memory();
   begin_anew(next);
   const Expected<void> resumed =
-      memory ? next.pipeline.resume(*memory) : Expected<void>(fail({}, "nothing was learned yet"));
-  if (resumed) return "the new configuration is in use, with what was learned";
+      known ? next.pipeline.resume(*known) : Expected<void>(fail({}, "nothing was learned yet"));
+  if (resumed) {
+    inheritance_.forget();
+    return "the new configuration is in use, with what was learned";
+  }
+  if (known) inheritance_.keep(*known);
   return "the new configuration is in use; calibrating anew: " + resumed.error().message();
 }
 

@@ -26,6 +26,7 @@
 #include "daemon/service.h"
 #include "daemon/snapshot.h"
 #include "daemon/state_keeper.h"
+#include "gateway/inheritance.h"
 #include "gateway/pipeline.h"
 #include "gateway/plan.h"
 
@@ -86,6 +87,7 @@ class GatewayLoop final : private gateway::FrameSink {
   Expected<void> take_reloaded();
   Expected<void> do_what_was_asked();
   void recalibrate();
+  std::optional<gateway::SavedState> memory();
   Expected<void> save_state();
   /// `keep`: goes on with what was learned, where the gyros are the same.
   Expected<void> replace_setup(gateway::Plan plan, bool keep);
@@ -104,6 +106,7 @@ class GatewayLoop final : private gateway::FrameSink {
 
   PlanLoader loader_;
   StateKeeper* keeper_;
+  gateway::Inheritance inheritance_;  ///< from a setup that was given up
   MetricsFile* metrics_;
   Log& log_;
   Notifier notifier_;
