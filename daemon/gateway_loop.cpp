@@ -6,6 +6,7 @@
 #include <cmath>
 #include <csignal>
 #include <ctime>
+#include <exception>
 #include <limits>
 #include <new>
 #include <sys/signalfd.h>
@@ -358,6 +359,14 @@ void GatewayLoop::second_passed() {
 }
 
 std::string GatewayLoop::status_line() {
+  try {
+    return full_status_line();
+  } catch (const std::bad_alloc&) {
+    return "short of memory";
+  }
+}
+
+std::string GatewayLoop::full_status_line() {
   std::string line = setup_->reporter->second_passed(setup_->pipeline.status(), traffic());
   if (reload_refused_) line += "; the new configuration was refused";
   return line;
@@ -539,11 +548,14 @@ int GatewayLoop::on_hangup(sd_event_source*, const signalfd_siginfo*, void* self
 }
 
 int GatewayLoop::on_second(sd_event_source* source, std::uint64_t, void* self) {
-  // Rates need no memory; what should be told this second waits for the next.
+  // Rates need no memory and no further thread; what should be told this second waits for the next.
+  auto& loop = *static_cast<GatewayLoop*>(self);
   try {
-    static_cast<GatewayLoop*>(self)->second_passed();
-  } catch (const std::bad_alloc&) {
-    static_cast<GatewayLoop*>(self)->log_.warning("the memory runs short");
+    loop.second_passed();
+    loop.told_of_shortage_ = false;
+  } catch (const std::exception& error) {
+    if (!std::exchange(loop.told_of_shortage_, true))
+      loop.log_.warning("the system gives the gateway too little: {}", error.what());
   }
   sd_event_source_set_time_relative(source, kSecondUsec);
   return sd_event_source_set_enabled(source, SD_EVENT_ONESHOT);

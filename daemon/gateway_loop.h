@@ -98,6 +98,7 @@ class GatewayLoop final : private gateway::FrameSink {
   [[nodiscard]] Traffic traffic() const;
   [[nodiscard]] bool all_drained() const;
   [[nodiscard]] std::string status_line();
+  [[nodiscard]] std::string full_status_line();
 
   static int on_stop(sd_event_source* source, const struct signalfd_siginfo* info, void* self);
   static int on_hangup(sd_event_source* source, const struct signalfd_siginfo* info, void* self);
@@ -127,6 +128,7 @@ class GatewayLoop final : private gateway::FrameSink {
   bool reload_wanted_ = false;
   bool recalibration_wanted_ = false;
   bool reload_refused_ = false;
+  bool told_of_shortage_ = false;
   std::uint64_t watchdog_half_usec_ = 0;
   LifeSign life_;
   std::uint64_t put_out_ = 0;  ///< frames that the pipeline has put out

@@ -529,6 +529,7 @@ class SlowReloadCase:
     name = "slow_reload"
     says = "a pipe as DBC is refused; while a large DBC is read the rates go on"
     messages = 60_000
+    limits = []  # a program that starts the gateway within them
 
     def prepare(self, folder):
         twin = Twin(run_s=0.0)
@@ -547,14 +548,17 @@ class SlowReloadCase:
         steps = [take("pipe.toml"), ["reload", None], take("large.toml"),
                  ["play_and_reload", [str(folder / "played.log"), STILL_S]]]
         return {"links": twin.links(), "steps": steps,
-                "command": [str(BIN / "vgyrod"), "--config", str(config), "--method", "optimal"]}
+                "command": self.limits + [str(BIN / "vgyrod"), "--config", str(config), "--method", "optimal"]}
+
+    def check_outcome(self, run):
+        require(run.said.count("the new configuration is refused") == 1, run.said)
+        require("its gyros are the same: nothing was interrupted" in run.said, run.said)
 
     def judge(self, folder, result):
         run = read_run(folder, result)
         check_life(run)
         require("pipe.dbc: is a pipe" in run.said, f"the pipe was not refused\n{run.said}")
-        require(run.said.count("the new configuration is refused") == 1, run.said)
-        require("its gyros are the same: nothing was interrupted" in run.said, run.said)
+        self.check_outcome(run)
         verdicts.check_protection(run.of(0x610), 0x610)
         begin_s = [t for t, text in result["notices"] if text.startswith("RELOADING=1")][1]
         took_s = [t for t, text in result["notices"] if text.startswith("READY=1") and t > begin_s][0] - begin_s
@@ -565,6 +569,18 @@ class SlowReloadCase:
         require(samples > 20, f"the large file took no time: {samples} samples came meanwhile")
         require(rates >= 0.8 * samples, f"{rates} rates of {samples} samples while the file was read")
         return f"{rates} rates of {samples} samples while the file was read, {describe(run)}"
+
+
+class ShortMemoryCase(SlowReloadCase):
+    """The same, but there is no memory for the large file."""
+
+    name = "short_memory"
+    says = "a DBC that the memory is too short for is refused; the rates go on"
+    limits = ["sh", "-c", 'ulimit -v 60000; exec "$@"', "limited"]
+
+    def check_outcome(self, run):
+        require("there is not memory enough to read the configuration" in run.said, run.said)
+        require(run.said.count("the new configuration is refused") == 2, run.said)
 
 
 class UnreadLogCase:
@@ -784,6 +800,7 @@ def all_cases(recordings):
         ErrorFramesCase(),
         ReloadCase(),
         SlowReloadCase(),
+        ShortMemoryCase(),
         UnreadLogCase(),
         SharedCase(),
         RestartCase(),
