@@ -695,6 +695,43 @@ class RestartCase:
         return read
 
 
+class InheritedCase:
+    """Two reloads without a sample between them; then one that needs a new calibration, and the platform turns."""
+
+    name = "inherited"
+    says = "biases outlive reloads in a row, and a steady turn that is calibrated as rest does not replace them"
+    new_rate_dps = make_twin.EARTH_DPS + 0.001
+
+    def prepare(self, folder):
+        twin = Twin()
+        twin.prepare(folder)
+        config = folder / "vgyro.toml"
+        text = config.read_text(encoding="utf-8")
+        for name, old, new in (("longer", f"rest_s = {REST_S}", f"rest_s = {REST_S + 0.5}"), ("same", "", ""),
+                               ("moved", f"rate_dps = {make_twin.EARTH_DPS}", f"rate_dps = {self.new_rate_dps}")):
+            require(old in text, f"{old} is not in the configuration")
+            (folder / f"{name}.toml").write_text(text.replace(old, new, 1), encoding="utf-8")
+        lines = (folder / "played.log").read_text(encoding="ascii").splitlines(keepends=True)
+        turning = int(len(lines) * (STILL_S + RAMP_S + 0.1) / (STILL_S + RAMP_S + RUN_S))
+        (folder / "turning.log").write_text("".join(lines[turning:]), encoding="ascii")
+        def take(name):
+            return ["run", ["cp", str(folder / name), str(config)]]
+        steps = [["play", str(folder / "played.log")], take("longer.toml"), ["reload", None], take("same.toml"), ["reload", None],
+                 take("moved.toml"), ["reload", None], ["play", str(folder / "turning.log")],
+                 ["until_said", "contradicts what was known"]]
+        return {"links": twin.links(), "steps": steps,
+                "command": [str(BIN / "vgyrod"), "--config", str(config), "--method", "optimal", "--state", "{memory}/state.toml"]}
+
+    def judge(self, folder, result):
+        run = read_run(folder, result)
+        check_service(run)
+        for text, times in (("in use, with what was learned", 2), ("calibrating anew", 1), ("contradicts what was known", 1)):
+            require(run.said.count(text) == times, f"{text}: {run.said.count(text)} times\n{run.said}")
+        biases = RestartCase().check_file(folder / "state.toml")["drift"]["bias_dps"]
+        verdicts.check_protection(run.of(0x610), 0x610)
+        return f"biases {biases} deg/s kept, {describe(run)}"
+
+
 class IdleCase:
     """No gyro is there: heartbeat, status, and a clean end."""
 
@@ -804,6 +841,7 @@ def all_cases(recordings):
         UnreadLogCase(),
         SharedCase(),
         RestartCase(),
+        InheritedCase(),
         IdleCase(),
         CommandCase("no_can_interface", "an interface that is none of CAN: exit 1 and what to do",
                     [vgyrod, "--config", "{folder}/vgyro.toml"], 1,
