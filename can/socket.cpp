@@ -293,6 +293,7 @@ void Socket::read_control(std::size_t index, Received& out) {
   out.stamp = TimePoint{};
   out.hardware = TimePoint{};
   msghdr& header = buffers_->headers[index].msg_hdr;
+  out.local = (header.msg_flags & MSG_DONTROUTE) != 0;
   for (cmsghdr* part = CMSG_FIRSTHDR(&header); part != nullptr; part = CMSG_NXTHDR(&header, part)) {
     if (part->cmsg_level != SOL_SOCKET) continue;
     if (part->cmsg_type == SCM_TIMESTAMPING) {

@@ -38,6 +38,7 @@ struct Received {
   Frame frame;
   TimePoint stamp;     ///< kernel's software stamp, host clock; 0 in its first moments
   TimePoint hardware;  ///< controller's own clock, whatever its epoch; 0 where it has none
+  bool local = false;  ///< sent by another socket of this host
 };
 
 enum class ReceiveStatus : std::uint8_t {

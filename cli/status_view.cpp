@@ -207,6 +207,13 @@ std::string head(const Json& status, const ViewOptions& options, const Paint& pa
          "the gyros disagree; which one is wrong cannot be told");
   remark(flag_of(status, "config_refused"), Mood::kBad,
          "the new configuration was refused; journalctl -u vgyrod says why");
+  for (const Json& bus : at(status, "buses")) {
+    remark(flag_of(bus, "contested"), Mood::kBad,
+           ("somebody else sends our identifiers on " + text_of(bus, "name")).c_str());
+  }
+  const std::uint64_t lines_lost = count_of(at(status, "counters"), "log_lines_lost");
+  remark(lines_lost > 0, Mood::kDoubtful,
+         fmt::format("{} lines of its log are lost: nobody took them", lines_lost).c_str());
   return text;
 }
 

@@ -19,6 +19,17 @@ target_compile_options(vgyro_flags INTERFACE
 if(CMAKE_BUILD_TYPE STREQUAL "Release")
   # A frame on the bus can be anything: what a mistake of ours would let it overwrite is noticed.
   target_compile_options(vgyro_flags INTERFACE -fstack-protector-strong -D_FORTIFY_SOURCE=2)
+  # A stack that grows past its guard page is noticed at the page, and a call or a return that was bent goes nowhere.
+  include(CheckCXXCompilerFlag)
+  foreach(guard stack-clash-protection cf-protection=full)
+    string(MAKE_C_IDENTIFIER "VGYRO_HAS_${guard}" known)
+    check_cxx_compiler_flag(-f${guard} ${known})
+    if(${known})
+      target_compile_options(vgyro_flags INTERFACE -f${guard})
+    endif()
+  endforeach()
+  # An assertion tells its place within the project; where that was built is nobody's business.
+  target_compile_options(vgyro_flags INTERFACE -ffile-prefix-map=${PROJECT_SOURCE_DIR}=.)
 endif()
 if(VGYRO_SANITIZE)
   target_compile_options(vgyro_flags INTERFACE -fsanitize=${VGYRO_SANITIZE} -fno-sanitize-recover=all -fno-omit-frame-pointer)

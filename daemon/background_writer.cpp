@@ -1,12 +1,13 @@
 #include "daemon/background_writer.h"
 
-#include <csignal>
 #include <utility>
+
+#include "daemon/loose_thread.h"
 
 namespace vgyro::daemon {
 
 void BackgroundWriter::put(std::string text) {
-  if (!thread_.joinable()) start_thread();
+  if (!thread_.joinable()) thread_ = start_thread([this] { write_what_comes(); });
   {
     const std::scoped_lock lock(mutex_);
     to_write_ = std::move(text);
@@ -17,16 +18,6 @@ void BackgroundWriter::put(std::string text) {
 std::optional<Expected<void>> BackgroundWriter::take_result() {
   const std::scoped_lock lock(mutex_);
   return std::exchange(result_, std::nullopt);
-}
-
-// The signals are the event loop's.
-void BackgroundWriter::start_thread() {
-  sigset_t all;
-  sigset_t before;
-  ::sigfillset(&all);
-  ::pthread_sigmask(SIG_BLOCK, &all, &before);
-  thread_ = std::thread([this] { write_what_comes(); });
-  ::pthread_sigmask(SIG_SETMASK, &before, nullptr);
 }
 
 void BackgroundWriter::finish() {

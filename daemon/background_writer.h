@@ -33,7 +33,6 @@ class BackgroundWriter {
   void finish();
 
  private:
-  void start_thread();
   void write_what_comes();
 
   Write write_;

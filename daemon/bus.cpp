@@ -4,13 +4,14 @@
 
 namespace vgyro::daemon {
 
-Bus::Bus(std::string name, std::vector<can::Filter> filters, can::SocketOptions options,
-         TurnClock& clock, Log& log)
+Bus::Bus(std::string name, std::vector<can::Filter> filters, IdentifierWatch own,
+         can::SocketOptions options, TurnClock& clock, Log& log)
     : name_(std::move(name)),
       filters_(std::move(filters)),
       options_(options),
       turn_clock_(&clock),
-      log_(&log) {}
+      log_(&log),
+      own_(own) {}
 
 Expected<void> Bus::open() {
   Expected<can::Socket> socket = can::Socket::open(name_, filters_, options_);
@@ -25,6 +26,7 @@ Expected<void> Bus::open() {
   socket_.emplace(std::move(*socket));
   clock_ = {};
   controller_.forget_state();
+  own_.opened();
   down_ = !socket_->link_up();
   const char* form = socket_->fd_frames() ? ", CAN FD" : "";
   const bool again = std::exchange(was_open_, true);
@@ -43,8 +45,9 @@ Arrival Bus::peek() {
   for (;;) {
     if (next_ == batch_.frames.size() && !refill()) return {};
     const can::Frame& frame = batch_.frames[next_].frame;
-    if (!frame.has(can::kError)) break;
-    controller_.note(frame);
+    const bool is_error = frame.has(can::kError);
+    if (is_error) controller_.note(frame);
+    if (!is_error && !own_.takes(frame, batch_.frames[next_].local)) break;
     stamped_ = ++next_;
   }
   const can::Received& received = batch_.frames[next_];
@@ -96,6 +99,7 @@ void Bus::close_dead(const std::string& why) {
 }
 
 void Bus::second_passed() {
+  own_.second_passed();
   if (down_ && socket_ && socket_->link_up()) {
     down_ = false;
     controller_.forget_state();
@@ -116,7 +120,9 @@ BusStatus Bus::status() const {
           .received = received_,
           .lost = lost_before_ + (socket_ ? socket_->drops() : 0),
           .downs = downs_,
-          .reopened = reopened_};
+          .reopened = reopened_,
+          .foreign = own_.count(),
+          .contested = own_.is_contested()};
 }
 
 }  // namespace vgyro::daemon

@@ -16,6 +16,7 @@
 #include "can/stamp_clock.h"
 #include "daemon/bus_status.h"
 #include "daemon/host_time.h"
+#include "daemon/identifier_watch.h"
 #include "daemon/line_budget.h"
 #include "daemon/log.h"
 
@@ -28,10 +29,10 @@ struct Arrival {
 
 class Bus final : public can::Sender {
  public:
-  /// Without filters the bus is only written to. The clock stands in where the kernel gives no
-  /// stamp.
-  Bus(std::string name, std::vector<can::Filter> filters, can::SocketOptions options,
-      TurnClock& clock, Log& log);
+  /// Without filters the bus is only written to. `own` are the identifiers that the gateway sends
+  /// here; they belong into the filters too. The clock stands in where the kernel gives no stamp.
+  Bus(std::string name, std::vector<can::Filter> filters, IdentifierWatch own,
+      can::SocketOptions options, TurnClock& clock, Log& log);
 
   /// Binds a new socket, filters included. An interface that is not there yet is no error: it is
   /// told once, and is_open() stays false.
@@ -40,8 +41,8 @@ class Bus final : public can::Sender {
   /// Poll reported something: read again when peek() runs dry, but not without end.
   void begin_reading() { reads_left_ = kReadsPerCycle; }
 
-  /// The oldest frame not yet taken; its frame is null when there is none for now. Error frames are
-  /// kept here.
+  /// The oldest frame not yet taken; its frame is null when there is none for now. Error frames,
+  /// and what somebody else sends with our identifiers, are kept here.
   Arrival peek();
   void take() {
     ++next_;
@@ -97,6 +98,7 @@ class Bus final : public can::Sender {
   std::optional<can::Socket> socket_;
   can::StampClock clock_;
   can::ControllerWatch controller_;
+  IdentifierWatch own_;
   can::Batch batch_;
   std::size_t next_ = 0;
   TimePoint next_stamp_;

@@ -20,6 +20,8 @@ struct BusStatus {
   std::uint64_t lost = 0;      ///< of these, dropped because the receive buffer was full
   std::uint64_t downs = 0;     ///< times that the link went down
   std::uint64_t reopened = 0;  ///< times that the interface was bound again
+  std::uint64_t foreign = 0;   ///< frames with our identifiers that somebody else sent
+  bool contested = false;      ///< there was one lately
 };
 
 }  // namespace vgyro::daemon

@@ -1,8 +1,10 @@
 #include "daemon/control.h"
 
 #include <array>
+#include <cerrno>
 #include <cmath>
 #include <cstring>
+#include <new>
 #include <string_view>
 #include <utility>
 
@@ -103,6 +105,8 @@ int append_bus(sd_bus_message* reply, const BusStatus& bus) {
   fields.put("lost", bus.lost);
   fields.put("downs", bus.downs);
   fields.put("reopened", bus.reopened);
+  fields.put("foreign", bus.foreign);
+  fields.put("contested", bus.contested);
   fields.put_counts("errors", bus.errors,
                     [](std::size_t i) { return to_string(static_cast<can::ErrorCause>(i)); });
   return fields.close();
@@ -149,6 +153,8 @@ int append_counters(sd_bus_message* reply, const Snapshot& now) {
       {"frames_overflowed", sent.dropped_overflow},
       {"frames_refused", sent.dropped_failed},
       {"send_retries", sent.retries},
+      {"log_lines_lost", now.log_lines_lost},
+      {"service_messages_lost", now.service_messages_lost},
   };
   Dictionary fields(reply, "{st}");
   for (const auto& [name, count] : counters)
@@ -164,6 +170,16 @@ int append_number(sd_bus_message* reply, double number) {
 }
 int append_flag(sd_bus_message* reply, bool flag) {
   return sd_bus_message_append(reply, "b", static_cast<int>(flag));
+}
+
+// sd-bus is C: nothing may be thrown through it.
+template <class Answer>
+int or_no_memory(const Answer& answer) {
+  try {
+    return answer();
+  } catch (const std::bad_alloc&) {
+    return -ENOMEM;
+  }
 }
 
 using Append = int (*)(sd_bus_message*, const Snapshot&);
@@ -319,11 +335,13 @@ void Control::tell_changes() {
 
 int Control::on_get(sd_bus*, const char*, const char*, const char* property, sd_bus_message* reply,
                     void* self, sd_bus_error*) {
-  const Snapshot& now = static_cast<Control*>(self)->gateway_.snapshot();
-  for (const Property& one : kProperties) {
-    if (std::strcmp(one.name, property) == 0) return one.append(reply, now);
-  }
-  return -ENOENT;
+  return or_no_memory([&] {
+    const Snapshot& now = static_cast<Control*>(self)->gateway_.snapshot();
+    for (const Property& one : kProperties) {
+      if (std::strcmp(one.name, property) == 0) return one.append(reply, now);
+    }
+    return -ENOENT;
+  });
 }
 
 int Control::on_recalibrate(sd_bus_message* call, void* self, sd_bus_error*) {
@@ -332,9 +350,11 @@ int Control::on_recalibrate(sd_bus_message* call, void* self, sd_bus_error*) {
 }
 
 int Control::on_save_state(sd_bus_message* call, void* self, sd_bus_error* error) {
-  const Expected<void> saved = static_cast<Control*>(self)->gateway_.save_state();
-  if (!saved) return sd_bus_error_set(error, kNothingToSave, saved.error().message().c_str());
-  return sd_bus_reply_method_return(call, "");
+  return or_no_memory([&] {
+    const Expected<void> saved = static_cast<Control*>(self)->gateway_.save_state();
+    if (!saved) return sd_bus_error_set(error, kNothingToSave, saved.error().message().c_str());
+    return sd_bus_reply_method_return(call, "");
+  });
 }
 
 }  // namespace vgyro::daemon

@@ -6,7 +6,9 @@
 #include <cmath>
 #include <csignal>
 #include <ctime>
+#include <exception>
 #include <limits>
+#include <new>
 #include <sys/signalfd.h>
 #include <unistd.h>
 #include <utility>
@@ -16,6 +18,7 @@ namespace {
 
 constexpr std::uint32_t kEventsTag = 0xFFFFFFFF;
 constexpr std::uint32_t kTimerTag = 0xFFFFFFFE;
+constexpr std::uint32_t kLoaderTag = 0xFFFFFFFD;
 constexpr std::uint64_t kSecondUsec = 1'000'000;
 
 // A process that was stopped must not send its backlog.
@@ -32,8 +35,17 @@ TimePoint read_clock() {
   return time_from_ns(static_cast<std::int64_t>(now.tv_sec) * 1'000'000'000 + now.tv_nsec);
 }
 
+std::array<std::uint32_t, 3> own_ids(const gateway::OutputPlan& output) {
+  return {output.rate_id, output.bias_id, output.model_id};
+}
+
+// What comes in, and our own identifiers, which nobody else should send.
 std::vector<can::Filter> filters_of(const gateway::Plan& plan, std::size_t bus) {
   std::vector<can::Filter> filters;
+  if (bus == plan.output.bus) {
+    for (const std::uint32_t id : own_ids(plan.output))
+      filters.push_back({id, can::kStandardIdMax, false});
+  }
   for (const gateway::FrameMatch& match : plan.inputs()) {
     if (match.bus == bus) filters.push_back({match.id, match.mask, match.extended});
   }
@@ -51,13 +63,15 @@ GatewayLoop::Setup::Setup(gateway::Plan the_plan, TurnClock& clock, Log& log)
   for (std::size_t i = 0; i < plan.buses.size(); ++i) {
     can::SocketOptions options;
     options.send_buffer_bytes = kSendBufferBytes;
-    buses.emplace_back(plan.buses[i], filters_of(plan, i), options, clock, log);
+    const IdentifierWatch own =
+        i == plan.output.bus ? IdentifierWatch(own_ids(plan.output)) : IdentifierWatch();
+    buses.emplace_back(plan.buses[i], filters_of(plan, i), own, options, clock, log);
   }
 }
 
-GatewayLoop::GatewayLoop(gateway::Plan plan, Loader loader, StateKeeper* keeper,
+GatewayLoop::GatewayLoop(gateway::Plan plan, LoadPlan load, StateKeeper* keeper,
                          MetricsFile* metrics, Log& log)
-    : loader_(std::move(loader)),
+    : loader_(std::move(load)),
       keeper_(keeper),
       metrics_(metrics),
       log_(log),
@@ -150,6 +164,8 @@ Expected<void> GatewayLoop::start_events() {
   }
   if (Expected<void> opened = timer_.open(); !opened) return opened;
   if (!poll_readable(timer_.fd(), kTimerTag)) return fail("timerfd", system_reason(errno));
+  if (Expected<void> opened = loader_.open(); !opened) return opened;
+  if (!poll_readable(loader_.fd(), kLoaderTag)) return fail("eventfd", system_reason(errno));
   return {};
 }
 
@@ -162,7 +178,7 @@ Expected<void> GatewayLoop::run() {
                                     .save_state = [this] { return save_state(); }},
                    log_);
   if (Expected<void> armed = serve_events(false); !armed) return armed;
-  notify_ready(status_line());
+  notifier_.ready(status_line());
   set_alarm();
   while (!stopping_) {
     const int count = ::epoll_wait(epoll_fd_, ready.data(), static_cast<int>(ready.size()), -1);
@@ -171,8 +187,8 @@ Expected<void> GatewayLoop::run() {
                                               static_cast<std::size_t>(std::max(count, 0))};
     if (Expected<void> done = turn(events); !done) return done;
   }
-  notify_stopping();
-  if (keeper_ != nullptr) keeper_->finish(setup_->pipeline.memory());
+  notifier_.stopping();
+  if (keeper_ != nullptr) keeper_->finish(memory());
   setup_->reporter->summarize(setup_->pipeline.status(), traffic());
   return {};
 }
@@ -191,12 +207,15 @@ Expected<void> GatewayLoop::serve_events(bool armed) {
 Expected<void> GatewayLoop::turn(std::span<const epoll_event> ready) {
   clock_.begin_turn();
   bool events_ready = false;
+  bool loaded = false;
   rang_ = false;
   for (const epoll_event& event : ready) {
     if (event.data.u32 == kEventsTag) {
       events_ready = true;
     } else if (event.data.u32 == kTimerTag) {
       rang_ = true;
+    } else if (event.data.u32 == kLoaderTag) {
+      loaded = true;
     } else {
       if ((event.events & EPOLLOUT) != 0) queue_.on_writable();
       if ((event.events & ~std::uint32_t{EPOLLOUT}) != 0)
@@ -210,6 +229,9 @@ Expected<void> GatewayLoop::turn(std::span<const epoll_event> ready) {
   if (events_ready) {
     if (Expected<void> done = serve_events(true); !done) return done;
     if (Expected<void> done = do_what_was_asked(); !done) return done;
+  }
+  if (loaded) {
+    if (Expected<void> done = take_reloaded(); !done) return done;
   }
   set_alarm();
   return {};
@@ -329,13 +351,22 @@ void GatewayLoop::second_passed() {
   for (Bus& bus : setup_->buses)
     bus.second_passed();
   reopen_dead_buses();
-  notify_status(status_line());
+  notifier_.status(status_line());
   control_->second_passed();
   if (metrics_ != nullptr && metrics_->second_passed()) metrics_->write(snapshot());
-  if (keeper_ != nullptr && keeper_->second_passed()) keeper_->keep(setup_->pipeline.memory());
+  const std::optional<gateway::SavedState> known = memory();
+  if (keeper_ != nullptr && keeper_->second_passed()) keeper_->keep(known);
 }
 
 std::string GatewayLoop::status_line() {
+  try {
+    return full_status_line();
+  } catch (const std::bad_alloc&) {
+    return "short of memory";
+  }
+}
+
+std::string GatewayLoop::full_status_line() {
   std::string line = setup_->reporter->second_passed(setup_->pipeline.status(), traffic());
   if (reload_refused_) line += "; the new configuration was refused";
   return line;
@@ -357,21 +388,38 @@ void GatewayLoop::reopen_dead_buses() {
 
 // Not from within the dispatching: the buses are replaced.
 Expected<void> GatewayLoop::do_what_was_asked() {
-  if (std::exchange(reload_wanted_, false)) {
-    if (Expected<void> done = reload(); !done) return done;
-  }
+  if (std::exchange(reload_wanted_, false)) begin_reload();
   if (std::exchange(recalibration_wanted_, false)) recalibrate();
   return {};
 }
 
 void GatewayLoop::recalibrate() {
   log_.tell(Severity::kNotice, {.cause = "recalibrate"}, "asked to calibrate anew");
-  const Expected<void> replaced = replace_setup(setup_->plan, false);
+  const Expected<void> replaced = try_to_replace_setup(setup_->plan, false);
   if (!replaced) {
     log_.error("calibrating anew: {}", replaced.error().message());
-  } else if (keeper_ != nullptr) {
-    keeper_->forget();
+    return;
   }
+  inheritance_.forget();
+  if (keeper_ != nullptr) keeper_->forget();
+}
+
+// What is worth keeping: what the pipeline knows, or what was known before a reload, as long as
+// that is better.
+std::optional<gateway::SavedState> GatewayLoop::memory() {
+  const bool was_contradicted = inheritance_.is_contradicted();
+  std::optional<gateway::SavedState> known =
+      inheritance_.choose(setup_->pipeline.memory(), setup_->plan, setup_->pipeline.status().stops);
+  if (inheritance_.is_contradicted() && !was_contradicted) {
+    log_.tell(Severity::kWarning, {.cause = "calibration_contradicted"},
+              "the new calibration contradicts what was known of the gyros; did the platform turn? "
+              "It is used, but not saved before a stop has confirmed it; `vgyro recalibrate` at "
+              "rest begins afresh");
+  }
+  if (was_contradicted && !inheritance_.is_contradicted()) {
+    log_.notice("a stop has decided for the new calibration; it is saved from now on");
+  }
+  return known;
 }
 
 Expected<void> GatewayLoop::save_state() {
@@ -379,9 +427,9 @@ Expected<void> GatewayLoop::save_state() {
     return fail({}, "the gateway keeps no state",
                 "start it with --state FILE, or with StateDirectory= in its unit");
   }
-  const std::optional<gateway::SavedState> memory = setup_->pipeline.memory();
-  if (!memory) return fail({}, "nothing was learned yet that is worth keeping");
-  keeper_->keep(memory);
+  const std::optional<gateway::SavedState> known = memory();
+  if (!known) return fail({}, "nothing was learned yet that is worth keeping");
+  keeper_->keep(known);
   return {};
 }
 
@@ -394,31 +442,54 @@ const Snapshot& GatewayLoop::snapshot() {
   snapshot_.traffic = traffic();
   snapshot_.uptime_s = to_seconds(clock_.steady() - started_);
   snapshot_.config_refused = reload_refused_;
+  snapshot_.log_lines_lost = log_.lost();
+  snapshot_.service_messages_lost = notifier_.failures();
   snapshot_.bias_sigma_dps.fill(std::numeric_limits<double>::quiet_NaN());
-  if (const std::optional<gateway::SavedState> memory = setup_->pipeline.memory()) {
-    const std::array<double, 3>& covariance = memory->drift.bias_covariance;
+  const std::optional<gateway::SavedState> known = setup_->pipeline.memory();
+  if (known && std::isfinite(snapshot_.status.gyros[0].bias_dps)) {
+    const std::array<double, 3>& covariance = known->drift.bias_covariance;
     snapshot_.bias_sigma_dps = {std::sqrt(covariance[0]), std::sqrt(covariance[2])};
   }
   return snapshot_;
 }
 
 // The gateway goes on with the old configuration until the new one is known to work.
-Expected<void> GatewayLoop::reload() {
-  notify_reloading();
-  log_.info("reading the configuration again");
-  std::optional<gateway::Plan> plan = loader_();
-  Expected<void> replaced = plan ? replace_setup(std::move(*plan), true) : fail({}, {});
-  reload_refused_ = !replaced;
-  if (!replaced) {
-    if (!replaced.error().what.empty()) log_.error("{}", replaced.error().message());
+void GatewayLoop::begin_reload() {
+  if (!loader_.is_busy()) {
+    notifier_.reloading();
+    log_.info("reading the configuration again");
+  }
+  loader_.ask();
+}
+
+Expected<void> GatewayLoop::take_reloaded() {
+  std::optional<gateway::ConfigResult> loaded = loader_.take();
+  if (!loaded) return {};
+  tell_config(*loaded, log_);
+  reload_refused_ = !*loaded;
+  if (*loaded) {
+    const Expected<void> replaced = try_to_replace_setup(std::move((*loaded)->plan), true);
+    if (!replaced) log_.error("{}", replaced.error().message());
+    reload_refused_ = !replaced;
+  }
+  if (reload_refused_) {
     log_.tell(Severity::kError, {.cause = "config_refused"},
               "the new configuration is refused; the old one goes on");
   }
   clock_.begin_turn();
-  notify_ready(status_line());
+  if (!loader_.is_busy()) notifier_.ready(status_line());
   return {};
 }
 
+Expected<void> GatewayLoop::try_to_replace_setup(gateway::Plan plan, bool keep) {
+  try {
+    return replace_setup(std::move(plan), keep);
+  } catch (const std::bad_alloc&) {
+    return fail({}, "there is not memory enough for a second configuration beside the first");
+  }
+}
+
+// Nothing of the present setup is given up before all memory is there.
 Expected<void> GatewayLoop::replace_setup(gateway::Plan plan, bool keep) {
   auto next = std::make_unique<Setup>(std::move(plan), clock_, log_);
   if (Expected<void> opened = open_buses(*next); !opened) return opened;
@@ -441,16 +512,22 @@ Expected<void> GatewayLoop::replace_setup(gateway::Plan plan, bool keep) {
 // What the present pipeline has learned, as much of it as the next one can use; tells how much.
 std::string GatewayLoop::hand_over(Setup& next) {
   if (gateway::same_but_output(setup_->plan, next.plan)) {
+    std::string how =
+        "the new configuration is in use; its gyros are the same: nothing was interrupted";
     next.pipeline.take_over(std::move(setup_->pipeline));
     next.reporter = std::move(setup_->reporter);
     next.reporter->buses_are_new();
-    return "the new configuration is in use; its gyros are the same: nothing was interrupted";
+    return how;
   }
-  const std::optional<gateway::SavedState> memory = setup_->pipeline.memory();
+  const std::optional<gateway::SavedState> known = memory();
   begin_anew(next);
   const Expected<void> resumed =
-      memory ? next.pipeline.resume(*memory) : Expected<void>(fail({}, "nothing was learned yet"));
-  if (resumed) return "the new configuration is in use, with what was learned";
+      known ? next.pipeline.resume(*known) : Expected<void>(fail({}, "nothing was learned yet"));
+  if (resumed) {
+    inheritance_.forget();
+    return "the new configuration is in use, with what was learned";
+  }
+  if (known) inheritance_.keep(*known);
   return "the new configuration is in use; calibrating anew: " + resumed.error().message();
 }
 
@@ -471,14 +548,22 @@ int GatewayLoop::on_hangup(sd_event_source*, const signalfd_siginfo*, void* self
 }
 
 int GatewayLoop::on_second(sd_event_source* source, std::uint64_t, void* self) {
-  static_cast<GatewayLoop*>(self)->second_passed();
+  // Rates need no memory and no further thread; what should be told this second waits for the next.
+  auto& loop = *static_cast<GatewayLoop*>(self);
+  try {
+    loop.second_passed();
+    loop.told_of_shortage_ = false;
+  } catch (const std::exception& error) {
+    if (!std::exchange(loop.told_of_shortage_, true))
+      loop.log_.warning("the system gives the gateway too little: {}", error.what());
+  }
   sd_event_source_set_time_relative(source, kSecondUsec);
   return sd_event_source_set_enabled(source, SD_EVENT_ONESHOT);
 }
 
 int GatewayLoop::on_watchdog(sd_event_source* source, std::uint64_t, void* self) {
   auto& loop = *static_cast<GatewayLoop*>(self);
-  if (loop.life_.has_moved(loop.clock_.steady(), loop.put_out_)) notify_alive();
+  if (loop.life_.has_moved(loop.clock_.steady(), loop.put_out_)) loop.notifier_.alive();
   sd_event_source_set_time_relative(source, loop.watchdog_half_usec_);
   return sd_event_source_set_enabled(source, SD_EVENT_ONESHOT);
 }

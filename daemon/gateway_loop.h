@@ -5,7 +5,6 @@
 // status of each second); frames go past it, straight from epoll. Nothing on the frame path
 // allocates.
 
-#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
@@ -22,10 +21,12 @@
 #include "daemon/host_time.h"
 #include "daemon/log.h"
 #include "daemon/metrics.h"
+#include "daemon/plan_loader.h"
 #include "daemon/reporter.h"
 #include "daemon/service.h"
 #include "daemon/snapshot.h"
 #include "daemon/state_keeper.h"
+#include "gateway/inheritance.h"
 #include "gateway/pipeline.h"
 #include "gateway/plan.h"
 
@@ -33,11 +34,9 @@ namespace vgyro::daemon {
 
 class GatewayLoop final : private gateway::FrameSink {
  public:
-  /// Reads the configuration again; nothing, when it cannot be used, and then it has said why.
-  using Loader = std::function<std::optional<gateway::Plan>()>;
-
-  /// `keeper` is null where nothing is kept across a restart, `metrics` where nobody wants them.
-  GatewayLoop(gateway::Plan plan, Loader loader, StateKeeper* keeper, MetricsFile* metrics,
+  /// `load` reads the configuration again, beside the loop. `keeper` is null where nothing is kept
+  /// across a restart, `metrics` where nobody wants them.
+  GatewayLoop(gateway::Plan plan, LoadPlan load, StateKeeper* keeper, MetricsFile* metrics,
               Log& log);
   GatewayLoop(const GatewayLoop&) = delete;
   GatewayLoop& operator=(const GatewayLoop&) = delete;
@@ -84,28 +83,34 @@ class GatewayLoop final : private gateway::FrameSink {
   void look_at_status();
   void second_passed();
   void reopen_dead_buses();
-  Expected<void> reload();
+  void begin_reload();
+  Expected<void> take_reloaded();
   Expected<void> do_what_was_asked();
   void recalibrate();
+  std::optional<gateway::SavedState> memory();
   Expected<void> save_state();
   /// `keep`: goes on with what was learned, where the gyros are the same.
   Expected<void> replace_setup(gateway::Plan plan, bool keep);
+  Expected<void> try_to_replace_setup(gateway::Plan plan, bool keep);
   std::string hand_over(Setup& next);
   std::string begin_anew(Setup& next);
   const Snapshot& snapshot();
   [[nodiscard]] Traffic traffic() const;
   [[nodiscard]] bool all_drained() const;
   [[nodiscard]] std::string status_line();
+  [[nodiscard]] std::string full_status_line();
 
   static int on_stop(sd_event_source* source, const struct signalfd_siginfo* info, void* self);
   static int on_hangup(sd_event_source* source, const struct signalfd_siginfo* info, void* self);
   static int on_second(sd_event_source* source, std::uint64_t usec, void* self);
   static int on_watchdog(sd_event_source* source, std::uint64_t usec, void* self);
 
-  Loader loader_;
+  PlanLoader loader_;
   StateKeeper* keeper_;
+  gateway::Inheritance inheritance_;  ///< from a setup that was given up
   MetricsFile* metrics_;
   Log& log_;
+  Notifier notifier_;
   TurnClock clock_;
   std::unique_ptr<Setup> setup_;
   can::TransmitQueue queue_;
@@ -123,6 +128,7 @@ class GatewayLoop final : private gateway::FrameSink {
   bool reload_wanted_ = false;
   bool recalibration_wanted_ = false;
   bool reload_refused_ = false;
+  bool told_of_shortage_ = false;
   std::uint64_t watchdog_half_usec_ = 0;
   LifeSign life_;
   std::uint64_t put_out_ = 0;  ///< frames that the pipeline has put out

@@ -1,8 +1,10 @@
 #include "daemon/log.h"
 
 #include <array>
+#include <cerrno>
 #include <cstdlib>
-#include <iterator>
+#include <new>
+#include <poll.h>
 #include <string>
 #include <sys/stat.h>
 #include <systemd/sd-journal.h>
@@ -21,34 +23,62 @@ bool stderr_is_journal() {
   return fmt::format("{}:{}", status.st_dev, status.st_ino) == std::string_view(stream);
 }
 
-}  // namespace
-
-Log::Log() : journal_(stderr_is_journal() ? &sd_journal_sendv : nullptr) {}
-
-bool Log::write_journal(Severity severity, const Subject& subject, std::string_view message) const {
+bool write_journal(Log::Journal journal, const Line& line) {
   const std::array<std::string, 5> fields{
-      fmt::format("MESSAGE={}", message), fmt::format("PRIORITY={}", static_cast<int>(severity)),
-      fmt::format("VGYRO_GYRO={}", subject.gyro), fmt::format("VGYRO_CAUSE={}", subject.cause),
-      fmt::format("VGYRO_BUS={}", subject.bus)};
+      fmt::format("MESSAGE={}", line.message),
+      fmt::format("PRIORITY={}", static_cast<int>(line.severity)),
+      fmt::format("VGYRO_GYRO={}", line.gyro), fmt::format("VGYRO_CAUSE={}", line.cause),
+      fmt::format("VGYRO_BUS={}", line.bus)};
   std::array<iovec, fields.size()> parts{};
   int count = 0;
   for (const std::string& field : fields) {
     if (field.back() == '=') continue;  // nothing to say
     parts[static_cast<std::size_t>(count++)] = {const_cast<char*>(field.data()), field.size()};
   }
-  return journal_(parts.data(), count) >= 0;
+  return journal(parts.data(), count) >= 0;
 }
 
-void Log::write(Severity severity, const Subject& subject, fmt::string_view text,
-                fmt::format_args args) const {
-  const std::string message = fmt::vformat(text, args);
-  if (journal_ != nullptr && write_journal(severity, subject, message)) return;
+// Somebody who shares stderr may have made it one that does not wait.
+bool write_stderr(std::string_view text) {
+  while (!text.empty()) {
+    const ssize_t written = ::write(STDERR_FILENO, text.data(), text.size());
+    if (written >= 0) {
+      text.remove_prefix(static_cast<std::size_t>(written));
+    } else if (errno == EAGAIN) {
+      pollfd stream{.fd = STDERR_FILENO, .events = POLLOUT, .revents = 0};
+      ::poll(&stream, 1, -1);
+    } else if (errno != EINTR) {
+      return false;
+    }
+  }
+  return true;
+}
+
+bool write_line(Log::Journal journal, const Line& line) {
+  if (journal == nullptr) return write_stderr(fmt::format("vgyrod: {}\n", line.message));
+  if (write_journal(journal, line)) return true;
   // Where journald does not answer its stream may; it takes the priority from the line's beginning.
-  const std::string line = journal_ != nullptr
-                               ? fmt::format("<{}>{}\n", static_cast<int>(severity), message)
-                               : fmt::format("vgyrod: {}\n", message);
-  // A full or closed stderr must not stop the gateway.
-  [[maybe_unused]] const ssize_t written = ::write(STDERR_FILENO, line.data(), line.size());
+  return write_stderr(fmt::format("<{}>{}\n", static_cast<int>(line.severity), line.message));
+}
+
+}  // namespace
+
+Log::Log() : Log(stderr_is_journal() ? &sd_journal_sendv : nullptr) {}
+
+Log::Log(Journal journal)
+    : lines_([journal](const Line& line) { return write_line(journal, line); }) {}
+
+void Log::write(Severity severity, const Subject& subject, fmt::string_view text,
+                fmt::format_args args) {
+  try {
+    lines_.put({.severity = severity,
+                .message = fmt::vformat(text, args),
+                .gyro = std::string(subject.gyro),
+                .cause = std::string(subject.cause),
+                .bus = std::string(subject.bus)});
+  } catch (const std::bad_alloc&) {  // whoever speaks goes on
+    lines_.count_lost();
+  }
 }
 
 }  // namespace vgyro::daemon

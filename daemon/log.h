@@ -2,16 +2,18 @@
 
 // One line per event for people: to the journal, with fields to filter by, when systemd connected
 // stderr to it, else to stderr as it is. Rare lines only; nothing here belongs on the frame path.
+// Nobody waits for the journal or for stderr: lines that are not taken are counted (line_queue.h).
 
+#include <chrono>
+#include <cstdint>
 #include <string_view>
 #include <sys/uio.h>
 
 #include <fmt/core.h>
 
-namespace vgyro::daemon {
+#include "daemon/line_queue.h"
 
-/// Priorities of syslog.
-enum class Severity : int { kError = 3, kWarning = 4, kNotice = 5, kInfo = 6 };
+namespace vgyro::daemon {
 
 /// What a line is about: VGYRO_GYRO=, VGYRO_CAUSE= and VGYRO_BUS= of the journal. Empty: nothing.
 struct Subject {
@@ -27,8 +29,8 @@ class Log {
 
   /// To the journal when stderr is connected to it.
   Log();
-  /// To this journal.
-  explicit Log(Journal journal) : journal_(journal) {}
+  /// To this journal; where it fails, or is null, to stderr.
+  explicit Log(Journal journal);
 
   template <class... Args>
   void error(fmt::format_string<Args...> text, Args&&... args) {
@@ -53,13 +55,17 @@ class Log {
     write(severity, subject, text, fmt::make_format_args(args...));
   }
 
+  /// Waits until all lines are written; false when that takes too long.
+  bool flush(std::chrono::milliseconds patience) { return lines_.flush(patience); }
+
+  /// Lines that nobody took, since the start.
+  [[nodiscard]] std::uint64_t lost() const { return lines_.lost(); }
+
  private:
   void write(Severity severity, const Subject& subject, fmt::string_view text,
-             fmt::format_args args) const;
-  [[nodiscard]] bool write_journal(Severity severity, const Subject& subject,
-                                   std::string_view message) const;
+             fmt::format_args args);
 
-  Journal journal_ = nullptr;
+  LineQueue lines_;
 };
 
 }  // namespace vgyro::daemon

@@ -12,6 +12,7 @@
 #include "daemon/gateway_loop.h"
 #include "daemon/log.h"
 #include "daemon/metrics.h"
+#include "daemon/plan_loader.h"
 #include "daemon/state_keeper.h"
 #include "gateway/config.h"
 
@@ -40,30 +41,27 @@ std::string default_state() {
   return std::string(all.substr(0, all.find(':'))) + "/state.toml";
 }
 
-std::optional<vgyro::gateway::Plan> load(const Options& options, vgyro::daemon::Log& log) {
-  vgyro::gateway::ConfigResult loaded = vgyro::gateway::load_config(
-      options.config, {vgyro::gateway::method_from(options.method), options.model});
-  if (!loaded) {
-    for (const vgyro::Error& error : loaded.error())
-      log.tell(vgyro::daemon::Severity::kError, {.cause = "config"}, "{}", error.message());
-    return std::nullopt;
-  }
-  for (const vgyro::Error& warning : loaded->warnings)
-    log.tell(vgyro::daemon::Severity::kWarning, {.cause = "config"}, "{}", warning.message());
-  return std::move(loaded->plan);
-}
-
 int run(const Options& options, vgyro::daemon::Log& log) {
-  std::optional<vgyro::gateway::Plan> plan = load(options, log);
-  if (!plan) return kBadInput;
+  const vgyro::daemon::LoadPlan load = [options] {
+    return vgyro::gateway::load_config(
+        options.config, {vgyro::gateway::method_from(options.method), options.model});
+  };
+  vgyro::gateway::ConfigResult loaded = vgyro::daemon::load_or_refuse(load);
+  vgyro::daemon::tell_config(loaded, log);
+  if (!loaded) return kBadInput;
   std::optional<vgyro::daemon::StateKeeper> keeper;
   if (!options.state.empty()) keeper.emplace(options.state, log);
-  if (keeper && options.forget) keeper->forget();
+  if (keeper) {
+    if (const vgyro::Expected<void> locked = keeper->lock(); !locked) {
+      log.error("{}", locked.error().message());
+      return kBadInput;
+    }
+    if (options.forget) keeper->forget();
+  }
   std::optional<vgyro::daemon::MetricsFile> metrics;
   if (!options.metrics.empty()) metrics.emplace(options.metrics, log);
-  vgyro::daemon::GatewayLoop loop(
-      std::move(*plan), [&] { return load(options, log); }, keeper ? &*keeper : nullptr,
-      metrics ? &*metrics : nullptr, log);
+  vgyro::daemon::GatewayLoop loop(std::move(loaded->plan), load, keeper ? &*keeper : nullptr,
+                                  metrics ? &*metrics : nullptr, log);
   if (const vgyro::Expected<void> started = loop.start(); !started) {
     log.error("{}", started.error().message());
     return kBadInput;
@@ -71,6 +69,16 @@ int run(const Options& options, vgyro::daemon::Log& log) {
   const vgyro::Expected<void> result = loop.run();
   if (!result) log.error("{}", result.error().message());
   return result ? kDone : kSystemTrouble;
+}
+
+int run_with_log(const Options& options) {
+  vgyro::daemon::Log log;
+  try {
+    return run(options, log);
+  } catch (const std::exception& error) {
+    log.error("{}", error.what());
+    return kSystemTrouble;
+  }
 }
 
 }  // namespace
@@ -104,8 +112,9 @@ int main(int argc, char** argv) {
   app.footer(
       "`vgyro check FILE` explains a configuration before it is trusted.\n"
       "SIGHUP reads the configuration again; one that cannot be used is refused.\n"
-      "Exit codes: 0 stopped by a signal, 1 configuration unusable, 2 wrong usage, 3 the system "
-      "failed.");
+      "Exit codes: 0 stopped by a signal, 1 configuration unusable, or another gateway has the "
+      "state "
+      "file, 2 wrong usage, 3 the system failed.");
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
@@ -113,11 +122,10 @@ int main(int argc, char** argv) {
   }
 
   std::signal(SIGPIPE, SIG_IGN);  // a reader of stderr that went away must not stop the gateway
-  vgyro::daemon::Log log;
   try {
-    return run(options, log);
-  } catch (const std::exception& error) {
-    log.error("{}", error.what());
+    return run_with_log(options);
+  } catch (const std::exception& error) {  // no thread for the log
+    std::fprintf(stderr, "vgyrod: %s\n", error.what());
     return kSystemTrouble;
   }
 }

@@ -102,6 +102,11 @@ void add_counters(Text& text, const Snapshot& now) {
   text.sample({{"cause", "stale"}}, sent.dropped_stale);
   text.sample({{"cause", "overflow"}}, sent.dropped_overflow);
   text.sample({{"cause", "refused"}}, sent.dropped_failed);
+  text.family("vgyro_log_lines_lost_total", "counter", "Lines of the log that nobody took.");
+  text.sample({}, now.log_lines_lost);
+  text.family("vgyro_service_messages_lost_total", "counter",
+              "Messages that the service manager did not take at once.");
+  text.sample({}, now.service_messages_lost);
 }
 
 void add_gyros(Text& text, const Snapshot& now) {
@@ -164,6 +169,10 @@ void add_buses(Text& text, const Snapshot& now) {
   text.family("vgyro_bus_link_downs_total", "counter", "Times that the link went down.");
   for (const BusStatus& bus : buses)
     text.sample({{"bus", bus.name}}, bus.downs);
+  text.family("vgyro_bus_foreign_frames_total", "counter",
+              "Frames with our identifiers that somebody else sent.");
+  for (const BusStatus& bus : buses)
+    text.sample({{"bus", bus.name}}, bus.foreign);
   text.family("vgyro_bus_errors_total", "counter", "What its controller told, by cause.");
   for (const BusStatus& bus : buses) {
     for (std::size_t i = 0; i < can::kErrorCauseCount; ++i) {

@@ -79,6 +79,7 @@ const char* sentence(can::ErrorCause cause) {
 std::string trouble_of(const BusStatus& bus) {
   if (!bus.present) return fmt::format("; {} is not there", bus.name);
   if (!bus.link_up) return fmt::format("; {} is down", bus.name);
+  if (bus.contested) return fmt::format("; somebody else sends our identifiers on {}", bus.name);
   switch (bus.controller) {
     case can::ControllerState::kBusOff:
       return fmt::format("; {} is bus-off", bus.name);
@@ -299,6 +300,14 @@ void Reporter::tell_bus(const BusStatus& bus, BusTold& told) {
   if (const std::uint64_t n = news(told.lost, bus.lost); n > 0) {
     log_.tell(Severity::kWarning, {.cause = "receive_overrun", .bus = bus.name},
               "{}: {} received frames lost: the socket's buffer was full", bus.name, n);
+  }
+  if (const std::uint64_t n = news(told.foreign, bus.foreign); n > 0) {
+    log_.tell(
+        Severity::kWarning, {.cause = "foreign_frames", .bus = bus.name},
+        "{}: {} frames with our identifiers came from somebody else: is there a second "
+        "gateway, or does the vehicle use them? [output] rate_id, bias_id and model_id choose "
+        "others",
+        bus.name, n);
   }
   for (std::size_t i = 0; i < can::kErrorCauseCount; ++i) {
     const auto cause = static_cast<can::ErrorCause>(i);

@@ -69,6 +69,7 @@ class Reporter {
   struct BusTold {
     std::array<Told, can::kErrorCauseCount> errors;
     Told lost;
+    Told foreign;
   };
 
   void state_changed(const gateway::Status& status);

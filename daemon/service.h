@@ -1,20 +1,50 @@
 #pragma once
 
-// What systemd is told (sd_notify), and whether it may be told that the gateway is alive. Without a
-// service manager all of this does nothing.
+// What systemd is told, and whether it may be told that the gateway is alive. Without a service
+// manager all of this does nothing. Unlike sd_notify() it never waits: a manager that does not read
+// must not stop the rates. What is not taken is counted; what systemd must know comes again.
 
 #include <cstdint>
+#include <deque>
 #include <string>
 
 #include "base/time.h"
 
 namespace vgyro::daemon {
 
-void notify_ready(const std::string& status);
-void notify_reloading();
-void notify_stopping();
-void notify_status(const std::string& status);
-void notify_alive();
+class Notifier {
+ public:
+  /// Speaks to the socket that $NOTIFY_SOCKET names.
+  Notifier();
+  /// To this one: a path, or a name that begins with '@'. Empty: to nobody.
+  explicit Notifier(const std::string& address);
+  Notifier(const Notifier&) = delete;
+  Notifier& operator=(const Notifier&) = delete;
+  ~Notifier();
+
+  void ready(const std::string& status);
+  void reloading();
+  void stopping();
+  void status(const std::string& status);
+  void alive();
+
+  /// Messages that the manager's socket did not take at once.
+  [[nodiscard]] std::uint64_t failures() const { return failures_; }
+
+ private:
+  // READY, RELOADING and READY again; older ones say nothing new.
+  static constexpr std::size_t kOwedMost = 4;
+
+  void tell(const std::string& text);
+  void tell_surely(std::string text);
+  bool pay_debts();
+  bool send(const std::string& text);
+
+  int fd_ = -1;
+  std::string address_;
+  std::deque<std::string> owed_;  ///< must be told, and was not taken so far
+  std::uint64_t failures_ = 0;
+};
 
 /// WATCHDOG_USEC of this process; 0 where nobody watches.
 std::uint64_t watchdog_usec();

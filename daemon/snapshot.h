@@ -3,6 +3,7 @@
 // Everything that is known of the running gateway at one moment, for those who ask or watch.
 
 #include <array>
+#include <cstdint>
 #include <string>
 
 #include "daemon/reporter.h"
@@ -17,7 +18,9 @@ struct Snapshot {
   std::array<double, 2> bias_sigma_dps{};  ///< of each gyro; NaN where it is not known
   Traffic traffic;
   double uptime_s = 0.0;
-  bool config_refused = false;  ///< by the last reload
+  std::uint64_t log_lines_lost = 0;         ///< nobody took them
+  std::uint64_t service_messages_lost = 0;  ///< the service manager did not take them at once
+  bool config_refused = false;              ///< by the last reload
 };
 
 /// "ok", or what is wrong: gateway::Fault in words.

@@ -6,8 +6,17 @@ namespace vgyro::daemon {
 
 StateKeeper::StateKeeper(std::string path, Log& log)
     : file_(std::move(path), gateway::kSavedStateBytesMax),
+      lock_(file_.path()),
       log_(log),
       writer_([this](const std::string& text) { return file_.write(text); }) {}
+
+// Where no lock can be made nothing can be written either, and load() tells of that.
+Expected<void> StateKeeper::lock() {
+  if (lock_.take() != FileLock::Outcome::kHeld) return {};
+  return fail(file_.path(), "another gateway keeps its biases there (" + lock_.holder() + ")",
+              "stop that one (`systemctl stop vgyrod`), or give this one a file of its own with "
+              "--state FILE");
+}
 
 std::optional<gateway::SavedState> StateKeeper::load(const gateway::Plan& plan) {
   file_.clean_up();

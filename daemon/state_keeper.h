@@ -9,6 +9,7 @@
 
 #include "base/error.h"
 #include "daemon/background_writer.h"
+#include "daemon/file_lock.h"
 #include "daemon/log.h"
 #include "daemon/state_file.h"
 #include "gateway/plan.h"
@@ -21,6 +22,9 @@ class StateKeeper {
   static constexpr int kPeriod_s = 60;
 
   StateKeeper(std::string path, Log& log);
+
+  /// Before anything else: nobody else writes this file from now on. Error when somebody does.
+  Expected<void> lock();
 
   /// What an earlier run left, when it is whole and of these gyros. What is not is set aside.
   std::optional<gateway::SavedState> load(const gateway::Plan& plan);
@@ -40,6 +44,7 @@ class StateKeeper {
   void tell(const Expected<void>& written);
 
   StateFile file_;
+  FileLock lock_;
   Log& log_;
   int seconds_left_ = 0;
   std::string latest_;   ///< given to the thread, or written

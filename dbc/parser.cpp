@@ -9,7 +9,7 @@
 
 #include <fmt/core.h>
 
-#include "base/file.h"
+#include "base/bounded_file.h"
 #include "dbc/assembly.h"
 #include "dbc/contents.h"
 #include "dbc/cursor.h"
@@ -385,7 +385,7 @@ Database parse(std::string_view text, std::string path) {
 }
 
 Expected<Database> load(const std::string& path) {
-  const Expected<std::string> text = read_file(path);
+  const Expected<std::string> text = read_regular_file(path, kFileBytesMax);
   if (!text) return tl::unexpected(text.error());
   Database database = parse(*text, path);
   if (!database.messages.empty()) return database;

@@ -7,7 +7,7 @@
 
 #include <fmt/core.h>
 
-#include "base/file.h"
+#include "base/bounded_file.h"
 #include "base/nearest.h"
 #include "base/toml_reader.h"
 #include "fusion/polynomial.h"
@@ -21,6 +21,8 @@ namespace {
 
 // IERS: the Earth turns 7.292115e-5 rad/s against the stars.
 constexpr double kEarthRate_dps = 7.292115e-5 * 180.0 / std::numbers::pi;
+// A configuration takes some kB; what is so much larger is another file.
+constexpr std::size_t kConfigBytesMax = std::size_t{1} << 20U;
 constexpr double kRestMax_s = 86'400.0;
 constexpr double kWindowMax_s = 3'600.0;
 // Gyros that read more than this at rest are broken rather than biased.
@@ -439,7 +441,7 @@ std::string_view to_string(Method method) {
 }
 
 ConfigResult load_config(const std::string& path, const ConfigOverrides& overrides) {
-  const auto text = read_file(path);
+  const auto text = read_regular_file(path, kConfigBytesMax);
   if (!text) return tl::unexpected(std::vector<Error>{text.error()});
   const auto parsed = parse_toml(*text, path, "strings stand in quotes, tables in [brackets]");
   if (!parsed) return tl::unexpected(std::vector<Error>{parsed.error()});

@@ -495,6 +495,7 @@ void Pipeline::Impl::look_for_confirmation() {
 }
 
 std::optional<SavedState> Pipeline::Impl::memory() const {
+  if (status.restored == Restored::kOffered) return saved;
   if (!calibrated || status.pairs == 0) return std::nullopt;
   // Motion learned as drift must not outlive the run.
   if (status.moved_in_calibration && corrector->condition().stops == 0) return std::nullopt;

@@ -67,7 +67,8 @@ class Pipeline {
 
   [[nodiscard]] const Status& status() const;
 
-  /// What to keep across a restart; nothing before there is anything worth it.
+  /// What to keep across a restart; nothing before there is anything worth it. What was given to
+  /// resume() and not taken up yet is.
   [[nodiscard]] std::optional<SavedState> memory() const;
 
   /// Before the first frame: the first pair takes this up instead of a calibration, aged by the

@@ -6,7 +6,7 @@
 
 #include <fmt/core.h>
 
-#include "base/file.h"
+#include "base/bounded_file.h"
 #include "base/nearest.h"
 #include "base/toml_reader.h"
 #include "model/catalogue.h"
@@ -14,6 +14,9 @@
 namespace vgyro::model {
 
 namespace {
+
+// 256 effects with tables of temperatures take some 100 kB.
+constexpr std::size_t kFileBytesMax = std::size_t{1} << 20U;
 
 constexpr std::int64_t kFormat = 1;
 constexpr std::array<std::string_view, 3> kAxes{"x", "y", "z"};
@@ -151,7 +154,7 @@ ModelResult parse_model(std::string_view text, const std::string& file) {
 }
 
 ModelResult load_model(const std::string& path) {
-  const auto text = read_file(path);
+  const auto text = read_regular_file(path, kFileBytesMax);
   if (!text) return tl::unexpected(std::vector<Error>{text.error()});
   return parse_model(*text, path);
 }

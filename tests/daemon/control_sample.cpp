@@ -52,9 +52,13 @@ struct Sample {
     now.bias_sigma_dps = {0.0002, std::nan("")};
     now.traffic.transmitted.sent = 12'345;
     now.traffic.transmitted.dropped_stale = 7;
+    now.log_lines_lost = 41;
+    now.service_messages_lost = 3;
     daemon::BusStatus bus{.name = "can0", .present = true, .link_up = true};
     bus.errors[static_cast<std::size_t>(can::ErrorCause::kBusOff)] = 3;
     bus.received = 4321;
+    bus.foreign = 17;
+    bus.contested = true;
     now.traffic.buses = {bus, {.name = "can1"}};
   }
 

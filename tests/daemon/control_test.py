@@ -150,8 +150,11 @@ class OnTheBus(Bench):
         self.assertEqual(right["faults"]["data"]["stuck"], 2)
         can0, can1 = self.get("Buses")
         self.assertEqual(can0["errors"]["data"]["bus_off"], 3)
+        self.assertEqual((can0["foreign"]["data"], can0["contested"]["data"]), (17, True))
         self.assertIs(can1["present"]["data"], False)
-        self.assertEqual(self.get("Counters")["pairs"], 1 << 40)
+        counters = self.get("Counters")
+        self.assertEqual(counters["pairs"], 1 << 40)
+        self.assertEqual((counters["log_lines_lost"], counters["service_messages_lost"]), (41, 3))
 
     def test_changes_are_told_once_a_second(self):
         with subprocess.Popen(["busctl", f"--address={self.address}", "--json=short", "monitor", NAME],
@@ -214,6 +217,8 @@ class OnTheBus(Bench):
     def test_status_as_a_table(self):
         done = self.vgyro("status")
         self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn("somebody else sends our identifiers on can0\n", done.stdout)
+        self.assertIn("41 lines of its log are lost: nobody took them\n", done.stdout)
         self.assertNotIn("\x1b", done.stdout)
         self.assertRegex(done.stdout, r"(?m)^running  \+5\d\.\d{5} ± 0\.00050 deg/s  two_gyros$")
         self.assertRegex(done.stdout, r'(?m)^left "one" \\  can0 +ok +\+118\.80 ± 0\.72 +\+50\.28300 +21\.5 +1000 +99\.0 % +0  counter repeated 10, crc wrong 7$')
@@ -373,6 +378,9 @@ class Metrics(Bench):
         self.assertNotEqual(rate, rate, "not NaN")
         self.assertEqual(samples["vgyro_pairs_total", ()], float(1 << 40))
         self.assertEqual(samples["vgyro_dropped_frames_total", (("cause", "stale"),)], 7)
+        self.assertEqual(samples["vgyro_log_lines_lost_total", ()], 41)
+        self.assertEqual(samples["vgyro_service_messages_lost_total", ()], 3)
+        self.assertEqual(samples["vgyro_bus_foreign_frames_total", (("bus", "can0"),)], 17)
         self.assertEqual(samples["vgyro_bus_errors_total", (("bus", "can0"), ("cause", "bus_off"))], 3)
         self.assertEqual(samples["vgyro_gyro_rejected_frames_total", (("gyro", GYRO), ("cause", "counter_repeated"))], 10)
         self.assertEqual(path.stat().st_mode & 0o777, 0o644)

@@ -1,9 +1,17 @@
-// What a line looks like in the journal, and without one.
+// What a line looks like in the journal, and without one; and that nobody waits for who reads it.
 
 #include "daemon/log.h"
 
+#include <array>
+#include <atomic>
 #include <cerrno>
+#include <chrono>
+#include <condition_variable>
+#include <fcntl.h>
+#include <mutex>
+#include <optional>
 #include <string>
+#include <unistd.h>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -12,6 +20,9 @@
 
 namespace vgyro::daemon {
 namespace {
+
+// A hang, and not a slow machine.
+constexpr std::chrono::minutes kPatience{1};
 
 std::vector<std::string>& written() {
   static std::vector<std::string> fields;
@@ -34,12 +45,15 @@ using Fields = std::vector<std::string>;
 TEST(Log, GivesTheJournalFieldsToFilterBy) {
   Log log(&keep);
   log.tell(Severity::kWarning, {.gyro = "left", .cause = "stuck"}, "gyro {} is stuck", "left");
+  ASSERT_TRUE(log.flush(kPatience));
   EXPECT_EQ(written(), (Fields{"MESSAGE=gyro left is stuck", "PRIORITY=4", "VGYRO_GYRO=left",
                                "VGYRO_CAUSE=stuck"}));
   log.tell(Severity::kNotice, {.cause = "link_up", .bus = "can0"}, "{}: up", "can0");
+  ASSERT_TRUE(log.flush(kPatience));
   EXPECT_EQ(written(),
             (Fields{"MESSAGE=can0: up", "PRIORITY=5", "VGYRO_CAUSE=link_up", "VGYRO_BUS=can0"}));
   log.error("broken");
+  ASSERT_TRUE(log.flush(kPatience));
   EXPECT_EQ(written(), (Fields{"MESSAGE=broken", "PRIORITY=3"}));
 }
 
@@ -47,6 +61,7 @@ TEST(Log, FallsBackToTheStreamWhereTheJournalDoesNotAnswer) {
   Log log(&refuse);
   testing::internal::CaptureStderr();
   log.tell(Severity::kWarning, {.cause = "stuck"}, "gyro {} is stuck", 1);
+  ASSERT_TRUE(log.flush(kPatience));
   EXPECT_EQ(testing::internal::GetCapturedStderr(), "<4>gyro 1 is stuck\n");
 }
 
@@ -54,7 +69,140 @@ TEST(Log, SpeaksPlainlyToATerminal) {
   Log log;
   testing::internal::CaptureStderr();
   log.tell(Severity::kWarning, {.cause = "stuck"}, "gyro {} is stuck", 1);
+  ASSERT_TRUE(log.flush(kPatience));
   EXPECT_EQ(testing::internal::GetCapturedStderr(), "vgyrod: gyro 1 is stuck\n");
+}
+
+/// stderr is a pipe that holds little, and nobody reads it, until read_all() does.
+class UnreadStderr {
+ public:
+  UnreadStderr() : before_(::dup(STDERR_FILENO)) {
+    std::array<int, 2> ends{};
+    EXPECT_EQ(::pipe2(ends.data(), O_CLOEXEC), 0);
+    ::fcntl(ends[1], F_SETPIPE_SZ, 4096);
+    ::dup2(ends[1], STDERR_FILENO);
+    ::close(ends[1]);
+    reader_ = ends[0];
+  }
+  UnreadStderr(const UnreadStderr&) = delete;
+  UnreadStderr& operator=(const UnreadStderr&) = delete;
+  ~UnreadStderr() {
+    ::dup2(before_, STDERR_FILENO);
+    ::close(before_);
+    ::close(reader_);
+  }
+  /// Until `end` has come.
+  [[nodiscard]] std::string read_until(const std::string& end) const {
+    std::string text;
+    std::array<char, 4096> block{};
+    while (text.find(end) == std::string::npos) {
+      const ssize_t count = ::read(reader_, block.data(), block.size());
+      if (count <= 0) break;
+      text.append(block.data(), static_cast<std::size_t>(count));
+    }
+    return text;
+  }
+
+ private:
+  int before_;
+  int reader_ = -1;
+};
+
+constexpr int kTooMany = 2 * static_cast<int>(LineQueue::kLinesMost) + 100;
+
+TEST(Log, APipeThatNobodyReadsHoldsNobodyUpAndWhatWasLostIsCounted) {
+  const UnreadStderr unread;
+  Log log;
+  for (int i = 0; i < kTooMany; ++i)
+    log.notice("line {} of a daemon that has much to say and nobody who listens", i);
+  const std::uint64_t lost = log.lost();
+  EXPECT_GT(lost, 0U);
+  EXPECT_LT(lost, static_cast<std::uint64_t>(kTooMany));
+  const std::string remark = std::to_string(lost) + " lines of this log are missing here";
+  const std::string said = unread.read_until(remark);
+  EXPECT_NE(said.find(remark), std::string::npos) << said;
+  EXPECT_NE(said.find("line 0 of"), std::string::npos);
+  log.notice("heard again");
+  EXPECT_NE(unread.read_until("heard again").find("vgyrod: heard again\n"), std::string::npos);
+  EXPECT_EQ(log.lost(), lost);
+}
+
+TEST(Log, EndsAlthoughNobodyReads) {
+  const UnreadStderr unread;
+  std::optional<Log> log(std::in_place);
+  for (int i = 0; i < kTooMany; ++i)
+    log->notice("line {} of a daemon that has much to say and nobody who listens", i);
+  EXPECT_FALSE(log->flush(std::chrono::milliseconds(1)));
+  log.reset();
+  // The thread that was left behind has what it works on; here it ends, for the sake of other
+  // tests.
+  EXPECT_NE(unread.read_until("are missing here").find("line 0 of"), std::string::npos);
+}
+
+std::mutex& journal_door() {
+  static std::mutex mutex;
+  return mutex;
+}
+
+int wait_at_the_door(const iovec*, int) {
+  const std::scoped_lock lock(journal_door());
+  return 0;
+}
+
+TEST(Log, AJournalThatHangsHoldsNobodyUp) {
+  std::unique_lock door(journal_door());
+  Log log(&wait_at_the_door);
+  for (int i = 0; i < kTooMany; ++i)
+    log.notice("line {}", i);
+  EXPECT_GE(log.lost(), 100U);
+  door.unlock();
+  EXPECT_TRUE(log.flush(kPatience));
+}
+
+std::atomic<int>& failures_left() {
+  static std::atomic<int> count = 0;
+  return count;
+}
+
+std::vector<std::string>& messages() {
+  static std::vector<std::string> texts;
+  return texts;
+}
+
+TEST(LineQueue, SaysBeforeTheNextLineHowManyCouldNotBeWritten) {
+  failures_left() = 3;
+  messages().clear();
+  LineQueue lines([](const Line& line) {
+    if (failures_left().fetch_sub(1) > 0) return false;
+    messages().push_back(line.message);
+    return true;
+  });
+  for (const char* text : {"one", "two", "three", "four"}) {
+    lines.put({.message = text});
+    ASSERT_TRUE(lines.flush(kPatience));
+  }
+  EXPECT_EQ(lines.lost(), 3U);
+  EXPECT_EQ(messages(), (Fields{"3 lines of this log are missing here: nobody took them", "four"}));
+}
+
+TEST(LineQueue, SaysWhereLinesAreMissing) {
+  messages().clear();
+  std::unique_lock door(journal_door());
+  LineQueue lines([](const Line& line) {
+    const std::scoped_lock lock(journal_door());
+    messages().push_back(line.message);
+    return true;
+  });
+  const std::size_t put = LineQueue::kLinesMost + 10;
+  for (std::size_t i = 0; i < put; ++i)
+    lines.put({.message = std::to_string(i)});
+  const std::uint64_t lost = lines.lost();
+  door.unlock();
+  ASSERT_TRUE(lines.flush(kPatience));
+  ASSERT_EQ(messages().size(), put - lost + 1);
+  EXPECT_EQ(messages().back(),
+            std::to_string(lost) + " lines of this log are missing here: nobody took them");
+  EXPECT_EQ(messages()[messages().size() - 2], std::to_string(put - lost - 1));
 }
 
 TEST(LineBudget, HoldsBackWhatIsTooMuchAndTellsOfItWithTheMinute) {

@@ -33,9 +33,10 @@ class ReporterTest : public testing::Test {
   }
 
   template <class Action>
-  static std::string said_during(const Action& action) {
+  std::string said_during(const Action& action) {
     testing::internal::CaptureStderr();
     action();
+    EXPECT_TRUE(log.flush(std::chrono::minutes(1)));
     return testing::internal::GetCapturedStderr();
   }
 
@@ -244,6 +245,24 @@ TEST_F(ReporterTest, WarnsWhenTheSavedBiasesCannotBeRight) {
   status.restored = gateway::Restored::kRefused;
   EXPECT_NE(second().find("the saved biases cannot be right; calibrating"), std::string::npos);
   EXPECT_EQ(second(), "");
+}
+
+TEST_F(ReporterTest, TellsOnceAMinuteThatSomebodyElseSendsOurIdentifiers) {
+  bus().foreign = 3;
+  bus().contested = true;
+  const std::string said = second();
+  EXPECT_NE(said.find("can0: 3 frames with our identifiers came from somebody else"),
+            std::string::npos)
+      << said;
+  EXPECT_NE(said.find("rate_id"), std::string::npos) << said;
+  EXPECT_NE(last_line.find("somebody else sends our identifiers on can0"), std::string::npos);
+  for (int i = 1; i < 60; ++i) {
+    bus().foreign += 10;
+    EXPECT_EQ(second(), "");
+  }
+  bus().contested = false;
+  EXPECT_NE(second().find("can0: 590 frames"), std::string::npos);
+  EXPECT_EQ(last_line.find("somebody else"), std::string::npos);
 }
 
 }  // namespace

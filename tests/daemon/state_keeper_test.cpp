@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <string>
+#include <unistd.h>
 
 #include <gtest/gtest.h>
 
@@ -16,9 +17,10 @@ namespace {
 class StateKeeperTest : public testing::Test {
  protected:
   template <class Action>
-  static std::string said_during(const Action& action) {
+  std::string said_during(const Action& action) {
     testing::internal::CaptureStderr();
     action();
+    EXPECT_TRUE(log.flush(std::chrono::minutes(1)));
     return testing::internal::GetCapturedStderr();
   }
 
@@ -147,6 +149,25 @@ TEST_F(StateKeeperTest, ADirectoryThatIsNotThereIsToldOnceAndNeverFatal) {
   const std::size_t first = said.find("cannot be written: No such file or directory");
   ASSERT_NE(first, std::string::npos) << said;
   EXPECT_EQ(said.find("cannot be written", first + 1), std::string::npos) << said;
+}
+
+TEST_F(StateKeeperTest, ASecondGatewayOnTheSameFileIsToldWhoHasItAndWhatToDo) {
+  StateKeeper keeper(path, log);
+  ASSERT_TRUE(keeper.lock());
+  keeper.keep(state(1.0));
+  StateKeeper second(path, log);
+  const Expected<void> locked = second.lock();
+  ASSERT_FALSE(locked);
+  const std::string message = locked.error().message();
+  for (const std::string& part :
+       {path, "process " + std::to_string(::getpid()), std::string("--state FILE")}) {
+    EXPECT_NE(message.find(part), std::string::npos) << message;
+  }
+}
+
+TEST_F(StateKeeperTest, AFolderThatIsNotThereKeepsNobodyFromStarting) {
+  StateKeeper keeper(scratch.path("nowhere/state.toml"), log);
+  EXPECT_TRUE(keeper.lock());
 }
 
 TEST_F(StateKeeperTest, SaysWhenItCanWriteAgain) {

@@ -138,15 +138,21 @@ def read_run(folder, result, ids=(0x610, 0x611, 0x612)):
     return Run(folder, result, inputs, outputs, said, ids)
 
 
-def check_service(run):
-    """READY, STATUS, STOPPING, exit code, memory."""
+def check_life(run):
+    """READY, STOPPING, exit code, and the watchdog fed throughout."""
     texts = [text for _, text in run.result["notices"]]
     require(texts[0].startswith("READY=1"), f"first notice: {texts[0]!r}")
     require(texts[-1].startswith("STOPPING=1"), f"last notice: {texts[-1]!r}")
     require(run.result["exit"] == 0, f"exit {run.result['exit']!r}; it said: {run.said.strip()}")
-    require("stopped: " in run.said, f"no summary; it said: {run.said.strip()}")
     lived_s = run.result["notices"][-1][0] - run.result["notices"][0][0]
     require(texts.count("WATCHDOG=1") >= int(lived_s / 2), f"watchdog fed {texts.count('WATCHDOG=1')} times in {lived_s:.1f} s")
+
+
+def check_service(run):
+    """What check_life() does, and what it said, and memory."""
+    check_life(run)
+    require("stopped: " in run.said, f"no summary; it said: {run.said.strip()}")
+    require("with our identifiers" not in run.said, f"heard itself: {run.said.strip()}")
     resident = run.result["resources"]["rss_most_kb"]
     require(resident <= RSS_MOST_KB, f"{resident} kB resident, more than {RSS_MOST_KB}")
 
@@ -517,6 +523,127 @@ class ReloadCase:
         return np.concatenate([plays[:1], plays[1:][np.diff(plays) > 400_000]])
 
 
+class SlowReloadCase:
+    """SIGHUP with a pipe as DBC file, then, amid traffic, with a file that takes long to read."""
+
+    name = "slow_reload"
+    says = "a pipe as DBC is refused; while a large DBC is read the rates go on"
+    messages = 60_000
+    limits = []  # a program that starts the gateway within them
+
+    def prepare(self, folder):
+        twin = Twin(run_s=0.0)
+        twin.prepare(folder)
+        config = folder / "vgyro.toml"
+        text = config.read_text(encoding="utf-8")
+        os.mkfifo(folder / "pipe.dbc")
+        small = (folder / "twin.dbc").read_text(encoding="utf-8")
+        more = "".join(f'BO_ {0x80000000 + 0x10000 + i} MORE_{i}: 8 OTHER\n'
+                       f' SG_ Value : 0|32@1- (0.001,0) [-1000|1000] "m" Vector__XXX\n\n' for i in range(self.messages))
+        (folder / "large.dbc").write_text(small + "\n" + more, encoding="utf-8")
+        for name in ("pipe", "large"):
+            (folder / f"{name}.toml").write_text(text.replace("twin.dbc", f"{name}.dbc"), encoding="utf-8")
+        def take(name):
+            return ["run", ["cp", str(folder / name), str(config)]]
+        steps = [take("pipe.toml"), ["reload", None], take("large.toml"),
+                 ["play_and_reload", [str(folder / "played.log"), STILL_S]]]
+        return {"links": twin.links(), "steps": steps,
+                "command": self.limits + [str(BIN / "vgyrod"), "--config", str(config), "--method", "optimal"]}
+
+    def check_outcome(self, run):
+        require(run.said.count("the new configuration is refused") == 1, run.said)
+        require("its gyros are the same: nothing was interrupted" in run.said, run.said)
+
+    def judge(self, folder, result):
+        run = read_run(folder, result)
+        check_life(run)
+        require("pipe.dbc: is a pipe" in run.said, f"the pipe was not refused\n{run.said}")
+        self.check_outcome(run)
+        verdicts.check_protection(run.of(0x610), 0x610)
+        begin_s = [t for t, text in result["notices"] if text.startswith("RELOADING=1")][1]
+        took_s = [t for t, text in result["notices"] if text.startswith("READY=1") and t > begin_s][0] - begin_s
+        since = result["reloads_us"][1]
+        until = since + int(took_s * 1e6)
+        samples = sum(line.name == "102" and since <= line.us < until for line in run.inputs)
+        rates = sum(since <= line.us < until for line in run.of(0x610))
+        require(samples > 20, f"the large file took no time: {samples} samples came meanwhile")
+        require(rates >= 0.8 * samples, f"{rates} rates of {samples} samples while the file was read")
+        return f"{rates} rates of {samples} samples while the file was read, {describe(run)}"
+
+
+class ShortMemoryCase(SlowReloadCase):
+    """The same, but there is no memory for the large file."""
+
+    name = "short_memory"
+    says = "a DBC that the memory is too short for is refused; the rates go on"
+    limits = ["sh", "-c", 'ulimit -v 60000; exec "$@"', "limited"]
+
+    def check_outcome(self, run):
+        require("there is not memory enough to read the configuration" in run.said, run.said)
+        require(run.said.count("the new configuration is refused") == 2, run.said)
+
+
+class UnreadLogCase:
+    """stderr is a pipe that nobody reads, and much is said: nobody notices on the bus."""
+
+    name = "unread_log"
+    says = "stderr is a full pipe that nobody reads: rates, watchdog and SIGTERM as ever"
+
+    def prepare(self, folder):
+        twin = Twin(run_s=0.0)
+        twin.prepare(folder)
+        config = folder / "vgyro.toml"
+        text = config.read_text(encoding="utf-8")
+        (folder / "good.toml").write_text(text, encoding="utf-8")
+        wrong = "".join(f"no_such_key_{i} = {i}\n" for i in range(3000))
+        (folder / "bad.toml").write_text(wrong + text, encoding="utf-8")
+        def take(name):
+            return ["run", ["cp", str(folder / name), str(config)]]
+        script = (f"mkfifo {{memory}}/unread; exec 3<>{{memory}}/unread; rm {{memory}}/unread; "
+                  f"exec {BIN / 'vgyrod'} --config {config} --metrics {{memory}}/state.toml.prom 2>&3")
+        steps = [take("bad.toml"), ["reload", None], take("good.toml"), ["play", str(folder / "played.log")],
+                 ["wait", 2.0]]
+        return {"links": twin.links(), "steps": steps, "command": ["/bin/sh", "-c", script]}
+
+    def judge(self, folder, result):
+        run = read_run(folder, result)
+        check_life(run)
+        check_played(run)
+        rates = check_against_replay(run)
+        metrics = (folder / "state.toml.prom").read_text(encoding="ascii")
+        lost = int(re.search(r"^vgyro_log_lines_lost_total (\d+)$", metrics, re.MULTILINE).group(1))
+        require(lost > 100, f"{lost} lines counted as lost")
+        return f"{rates} rates as in the replay, {lost} lines lost, {describe(run)}"
+
+
+class SharedCase:
+    """A second gateway on the same state file, and somebody else who sends one of our identifiers."""
+
+    name = "shared"
+    says = "a second gateway on the state file does not start; foreign frames with our identifiers are told"
+
+    def prepare(self, folder):
+        twin = Twin(run_s=0.0)
+        twin.prepare(folder)
+        command = [str(BIN / "vgyrod"), "--config", str(folder / "vgyro.toml"), "--state", "{memory}/state.toml"]
+        second = f"{' '.join(command)} 2>{folder}/second.err; test $? = 1"
+        foreign = ["run", ["cansend", "can0", "610#0011223344556677"]]
+        steps = [["run", ["sh", "-c", second]], ["play", str(folder / "played.log")], ["reload", None],
+                 ["wait", 3.0], foreign, ["until_said", "with our identifiers"]]
+        return {"links": twin.links(), "steps": steps, "command": command}
+
+    def judge(self, folder, result):
+        run = read_run(folder, result)
+        check_life(run)
+        second = (folder / "second.err").read_text(encoding="utf-8")
+        require(re.search(r"state\.toml: another gateway keeps its biases there \(process \d+\); .*--state FILE", second), second)
+        require("can0: 1 frames with our identifiers came from somebody else" in run.said, run.said)
+        require(not (folder / "state.toml.lock").exists(), "the lock file was left behind")
+        statuses = [text for _, text in result["notices"]]
+        require(any("somebody else sends our identifiers on can0" in text for text in statuses), f"{statuses}")
+        return describe(run)
+
+
 class RestartCase:
     """Killed without warning after it has calibrated, and started again: it goes on where it was."""
 
@@ -566,6 +693,43 @@ class RestartCase:
         truth = [gyro.bias_dps for gyro in make_twin.GYROS]
         require(np.allclose(read["drift"]["bias_dps"], truth, rtol=0, atol=1.3e-3), f"biases {read['drift']['bias_dps']}")
         return read
+
+
+class InheritedCase:
+    """Two reloads without a sample between them; then one that needs a new calibration, and the platform turns."""
+
+    name = "inherited"
+    says = "biases outlive reloads in a row, and a steady turn that is calibrated as rest does not replace them"
+    new_rate_dps = make_twin.EARTH_DPS + 0.001
+
+    def prepare(self, folder):
+        twin = Twin()
+        twin.prepare(folder)
+        config = folder / "vgyro.toml"
+        text = config.read_text(encoding="utf-8")
+        for name, old, new in (("longer", f"rest_s = {REST_S}", f"rest_s = {REST_S + 0.5}"), ("same", "", ""),
+                               ("moved", f"rate_dps = {make_twin.EARTH_DPS}", f"rate_dps = {self.new_rate_dps}")):
+            require(old in text, f"{old} is not in the configuration")
+            (folder / f"{name}.toml").write_text(text.replace(old, new, 1), encoding="utf-8")
+        lines = (folder / "played.log").read_text(encoding="ascii").splitlines(keepends=True)
+        turning = int(len(lines) * (STILL_S + RAMP_S + 0.1) / (STILL_S + RAMP_S + RUN_S))
+        (folder / "turning.log").write_text("".join(lines[turning:]), encoding="ascii")
+        def take(name):
+            return ["run", ["cp", str(folder / name), str(config)]]
+        steps = [["play", str(folder / "played.log")], take("longer.toml"), ["reload", None], take("same.toml"), ["reload", None],
+                 take("moved.toml"), ["reload", None], ["play", str(folder / "turning.log")],
+                 ["until_said", "contradicts what was known"]]
+        return {"links": twin.links(), "steps": steps,
+                "command": [str(BIN / "vgyrod"), "--config", str(config), "--method", "optimal", "--state", "{memory}/state.toml"]}
+
+    def judge(self, folder, result):
+        run = read_run(folder, result)
+        check_service(run)
+        for text, times in (("in use, with what was learned", 2), ("calibrating anew", 1), ("contradicts what was known", 1)):
+            require(run.said.count(text) == times, f"{text}: {run.said.count(text)} times\n{run.said}")
+        biases = RestartCase().check_file(folder / "state.toml")["drift"]["bias_dps"]
+        verdicts.check_protection(run.of(0x610), 0x610)
+        return f"biases {biases} deg/s kept, {describe(run)}"
 
 
 class IdleCase:
@@ -672,7 +836,12 @@ def all_cases(recordings):
         DeadBusCase(),
         ErrorFramesCase(),
         ReloadCase(),
+        SlowReloadCase(),
+        ShortMemoryCase(),
+        UnreadLogCase(),
+        SharedCase(),
         RestartCase(),
+        InheritedCase(),
         IdleCase(),
         CommandCase("no_can_interface", "an interface that is none of CAN: exit 1 and what to do",
                     [vgyrod, "--config", "{folder}/vgyro.toml"], 1,

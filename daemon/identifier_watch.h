@@ -1,0 +1,59 @@
+#pragma once
+
+// Notices who else sends our identifiers: a second gateway on the bus, or the vehicle itself.
+// Receivers would take its frames for ours. What this process sends its sockets do not hear; what a
+// socket of it sent that was closed since (at a reload, or by a run before) may still come back.
+// Clock-free: the caller says when a second has passed.
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+
+#include "can/frame.h"
+
+namespace vgyro::daemon {
+
+class IdentifierWatch {
+ public:
+  /// So long after the last such frame the bus counts as contested: VG_Bias comes ten times a
+  /// second.
+  static constexpr int kContestedSeconds = 10;
+  /// A frame that was handed to a controller is sent, or given up, and looped back within this.
+  static constexpr int kEchoSeconds = 2;
+
+  /// Nothing is sent to this bus.
+  IdentifierWatch() = default;
+  explicit IdentifierWatch(const std::array<std::uint32_t, 3>& standard_ids)
+      : ids_(standard_ids), is_used_(true) {}
+
+  /// A socket was opened: echoes of an earlier one may come.
+  void opened() { echoes_left_ = kEchoSeconds; }
+
+  /// Has it one of our identifiers? Then it is no input. `local`: somebody on this host sent it.
+  bool takes(const can::Frame& frame, bool local) {
+    if (!is_used_ || frame.has(can::kExtended) || frame.has(can::kRemote)) return false;
+    if (std::find(ids_.begin(), ids_.end(), frame.id) == ids_.end()) return false;
+    if (local && echoes_left_ > 0) return true;
+    ++count_;
+    contested_left_ = kContestedSeconds;
+    return true;
+  }
+
+  void second_passed() {
+    echoes_left_ = std::max(0, echoes_left_ - 1);
+    contested_left_ = std::max(0, contested_left_ - 1);
+  }
+
+  /// Frames that somebody else sent, so far.
+  [[nodiscard]] std::uint64_t count() const { return count_; }
+  [[nodiscard]] bool is_contested() const { return contested_left_ > 0; }
+
+ private:
+  std::array<std::uint32_t, 3> ids_{};
+  bool is_used_ = false;
+  int echoes_left_ = 0;
+  int contested_left_ = 0;
+  std::uint64_t count_ = 0;
+};
+
+}  // namespace vgyro::daemon

@@ -1,0 +1,123 @@
+#include "daemon/plan_loader.h"
+
+#include <cerrno>
+#include <chrono>
+#include <exception>
+#include <mutex>
+#include <new>
+#include <sys/eventfd.h>
+#include <system_error>
+#include <unistd.h>
+#include <utility>
+#include <vector>
+
+#include <malloc.h>
+
+namespace vgyro::daemon {
+namespace {
+
+// At the end of the process: one that goes on takes milliseconds more.
+constexpr std::chrono::milliseconds kLastPatience{1000};
+
+std::vector<Error> refusal(std::string what, std::string remedy) {
+  return {{{}, std::move(what), std::move(remedy)}};
+}
+
+}  // namespace
+
+gateway::ConfigResult load_or_refuse(const LoadPlan& load) {
+  // Made before it is needed: then there may be no memory for it.
+  std::vector<Error> no_memory =
+      refusal("there is not memory enough to read the configuration",
+              "name a DBC file that holds only the messages that are needed");
+  try {
+    return load();
+  } catch (const std::bad_alloc&) {
+    return tl::unexpected(std::move(no_memory));
+  } catch (const std::exception& error) {
+    return tl::unexpected(refusal(error.what(), {}));
+  }
+}
+
+void tell_config(const gateway::ConfigResult& loaded, Log& log) {
+  const auto tell = [&](Severity severity, const std::vector<Error>& errors) {
+    for (const Error& error : errors)
+      log.tell(severity, {.cause = "config"}, "{}", error.message());
+  };
+  if (loaded) {
+    tell(Severity::kWarning, loaded->warnings);
+  } else {
+    tell(Severity::kError, loaded.error());
+  }
+}
+
+struct PlanLoader::Desk {
+  Desk() = default;
+  Desk(const Desk&) = delete;
+  Desk& operator=(const Desk&) = delete;
+  ~Desk() {
+    if (fd >= 0) ::close(fd);
+  }
+  void hand_over(gateway::ConfigResult what) {
+    const std::scoped_lock lock(mutex);
+    result = std::move(what);
+    ::eventfd_write(fd, 1);
+  }
+
+  int fd = -1;
+  std::mutex mutex;  ///< guards what follows
+  std::optional<gateway::ConfigResult> result;
+};
+
+PlanLoader::PlanLoader(LoadPlan load) : load_(std::move(load)), desk_(std::make_shared<Desk>()) {}
+
+PlanLoader::~PlanLoader() {
+  thread_.finish(kLastPatience);
+}
+
+Expected<void> PlanLoader::open() {
+  desk_->fd = ::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
+  if (desk_->fd < 0) return fail("eventfd", system_reason(errno));
+  return {};
+}
+
+int PlanLoader::fd() const {
+  return desk_->fd;
+}
+
+void PlanLoader::ask() {
+  asked_again_ = busy_;
+  if (!busy_) begin();
+}
+
+void PlanLoader::begin() {
+  busy_ = true;
+  try {
+    thread_.start([desk = desk_, load = load_] {
+      desk->hand_over(load_or_refuse(load));
+      // A large file's heap is this thread's own, and nobody else would ever give it back.
+      ::malloc_trim(0);
+    });
+  } catch (const std::system_error& error) {
+    desk_->hand_over(tl::unexpected(
+        refusal(std::string("no thread to read the configuration: ") + error.what(), {})));
+  } catch (const std::bad_alloc&) {
+    desk_->hand_over(tl::unexpected(std::vector<Error>{}));
+  }
+}
+
+std::optional<gateway::ConfigResult> PlanLoader::take() {
+  std::optional<gateway::ConfigResult> result;
+  {
+    const std::scoped_lock lock(desk_->mutex);
+    eventfd_t count = 0;
+    ::eventfd_read(desk_->fd, &count);
+    result = std::exchange(desk_->result, std::nullopt);
+  }
+  if (!result) return result;
+  busy_ = false;
+  if (std::exchange(asked_again_, false)) begin();
+  return result;
+}
+
+}  // namespace vgyro::daemon

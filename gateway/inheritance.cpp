@@ -1,0 +1,72 @@
+#include "gateway/inheritance.h"
+
+#include <array>
+#include <cmath>
+#include <utility>
+
+#include "fusion/corrector.h"
+#include "gateway/pipeline.h"
+
+namespace vgyro::gateway {
+namespace {
+
+/// The old biases with the σ that the time since has left them; nothing where they cannot be right.
+std::optional<fusion::DriftMemory> aged(const SavedState& before, const SavedState& now,
+                                        const Plan& plan) {
+  const bool age_is_known = now.rate_stamp >= before.rate_stamp;
+  const double age_s =
+      age_is_known ? to_seconds(now.rate_stamp - before.rate_stamp) : Pipeline::kUnknownAge_s;
+  const auto corrector =
+      fusion::make_optimal_corrector({.window_s = plan.corrector.window_s,
+                                      .stop_rate_dps = plan.calibration.stop_rate_dps,
+                                      .gyros = plan.corrector.gyros});
+  if (!corrector->resume(before.drift, age_s, 0.0)) return std::nullopt;
+  return corrector->memory(0.0);
+}
+
+/// `shift_dps`: what the new biases would differ by, were the old ones right.
+bool agree(const fusion::DriftMemory& before, const fusion::DriftMemory& now, double shift_dps) {
+  for (std::size_t gyro = 0; gyro < 2; ++gyro) {
+    const std::size_t own = 2 * gyro;  // of the covariance
+    const double sigma_dps = std::sqrt(before.bias_covariance[own] + now.bias_covariance[own]);
+    const double apart_dps = now.bias_dps[gyro] - before.bias_dps[gyro] - shift_dps;
+    if (std::abs(apart_dps) > Inheritance::kSigmasMost * sigma_dps) return false;
+  }
+  return true;
+}
+
+bool contradict(const SavedState& before, const SavedState& now, const Plan& plan) {
+  if (before.devices != now.devices) return false;  // biases of others
+  const std::optional<fusion::DriftMemory> old = aged(before, now, plan);
+  if (!old) return false;
+  // Where the configured rate at rest has changed, the place has, or a mistake was put right: then
+  // the old biases were off by it.
+  return !agree(*old, now.drift, 0.0) &&
+         !agree(*old, now.drift, before.rest_rate_dps - now.rest_rate_dps);
+}
+
+}  // namespace
+
+void Inheritance::keep(SavedState before) {
+  before_ = std::move(before);
+  contradicted_ = false;
+}
+
+void Inheritance::forget() {
+  before_.reset();
+  contradicted_ = false;
+}
+
+std::optional<SavedState> Inheritance::choose(const std::optional<SavedState>& now,
+                                              const Plan& plan, std::uint64_t stops) {
+  if (!before_) return now;
+  if (!now) return before_;
+  if (stops == 0) {
+    contradicted_ = contradicted_ || contradict(*before_, *now, plan);
+    if (contradicted_) return before_;
+  }
+  forget();
+  return now;
+}
+
+}  // namespace vgyro::gateway

@@ -1,0 +1,152 @@
+// The loop's side of a reload: it never waits, and every end of a load comes as a result.
+
+#include "daemon/plan_loader.h"
+
+#include <condition_variable>
+#include <fstream>
+#include <mutex>
+#include <new>
+#include <poll.h>
+#include <stdexcept>
+#include <string>
+#include <sys/stat.h>
+
+#include <gtest/gtest.h>
+
+#include "scratch.h"
+
+namespace vgyro::daemon {
+namespace {
+
+/// A disk that gives nothing until it is told to.
+class SlowDisk {
+ public:
+  void give() {
+    const std::scoped_lock lock(mutex_);
+    ++given_;
+    changed_.notify_all();
+  }
+  gateway::ConfigResult read() {
+    std::unique_lock lock(mutex_);
+    ++begun_;
+    changed_.notify_all();
+    changed_.wait(lock, [&] { return begun_ <= given_; });
+    gateway::Resolved resolved;
+    resolved.plan.calibration.rest_s = begun_;
+    return resolved;
+  }
+  void wait_until_begun(int loads) {
+    std::unique_lock lock(mutex_);
+    changed_.wait(lock, [&] { return begun_ >= loads; });
+  }
+  int begun() {
+    const std::scoped_lock lock(mutex_);
+    return begun_;
+  }
+
+ private:
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  int given_ = 0;
+  int begun_ = 0;
+};
+
+bool is_ready(const PlanLoader& loader, int wait_ms) {
+  pollfd event{.fd = loader.fd(), .events = POLLIN, .revents = 0};
+  return ::poll(&event, 1, wait_ms) == 1;
+}
+
+// A hang, and not a slow machine.
+constexpr int kPatience_ms = 60'000;
+
+gateway::ConfigResult result_of(PlanLoader& loader) {
+  EXPECT_TRUE(is_ready(loader, kPatience_ms));
+  std::optional<gateway::ConfigResult> result = loader.take();
+  if (result) return std::move(*result);
+  return tl::unexpected(std::vector<Error>{{{}, "there was no result", {}}});
+}
+
+TEST(PlanLoader, TheLoopTurnsWhileADiskGivesNothing) {
+  auto disk = std::make_shared<SlowDisk>();
+  PlanLoader loader([disk] { return disk->read(); });
+  ASSERT_TRUE(loader.open());
+  loader.ask();
+  disk->wait_until_begun(1);
+  for (int turn = 0; turn < 1000; ++turn) {
+    ASSERT_FALSE(is_ready(loader, 0));
+    ASSERT_FALSE(loader.take());
+    ASSERT_TRUE(loader.is_busy());
+  }
+  disk->give();
+  const gateway::ConfigResult result = result_of(loader);
+  ASSERT_TRUE(result);
+  EXPECT_EQ(result->plan.calibration.rest_s, 1.0);
+  EXPECT_FALSE(loader.is_busy());
+  EXPECT_FALSE(is_ready(loader, 0));
+}
+
+TEST(PlanLoader, WishesDuringALoadMakeOneFurtherLoad) {
+  auto disk = std::make_shared<SlowDisk>();
+  PlanLoader loader([disk] { return disk->read(); });
+  ASSERT_TRUE(loader.open());
+  for (int i = 0; i < 10; ++i)
+    loader.ask();
+  disk->wait_until_begun(1);
+  disk->give();
+  disk->give();
+  EXPECT_EQ(result_of(loader)->plan.calibration.rest_s, 1.0);
+  EXPECT_TRUE(loader.is_busy());
+  EXPECT_EQ(result_of(loader)->plan.calibration.rest_s, 2.0);
+  EXPECT_FALSE(loader.is_busy());
+  EXPECT_EQ(disk->begun(), 2);
+}
+
+TEST(PlanLoader, MemoryThatRunsShortIsARefusal) {
+  PlanLoader loader([]() -> gateway::ConfigResult { throw std::bad_alloc(); });
+  ASSERT_TRUE(loader.open());
+  loader.ask();
+  const gateway::ConfigResult result = result_of(loader);
+  ASSERT_FALSE(result);
+  EXPECT_NE(result.error().front().message().find("not memory enough"), std::string::npos);
+}
+
+TEST(PlanLoader, WhateverIsThrownIsARefusal) {
+  PlanLoader loader(
+      []() -> gateway::ConfigResult { throw std::runtime_error("the parser gave up"); });
+  ASSERT_TRUE(loader.open());
+  loader.ask();
+  EXPECT_EQ(result_of(loader).error().front().message(), "the parser gave up");
+}
+
+// What it works on is its own: the disk outlives the loader, and the sanitizers watch.
+TEST(PlanLoader, EndsAlthoughADiskNeverAnswers) {
+  auto disk = std::make_shared<SlowDisk>();
+  {
+    PlanLoader loader([disk] { return disk->read(); });
+    ASSERT_TRUE(loader.open());
+    loader.ask();
+    disk->wait_until_begun(1);
+  }
+  disk->give();
+}
+
+TEST(PlanLoader, APipeInsteadOfADbcFileIsRefused) {
+  Scratch scratch;
+  ASSERT_EQ(::mkfifo(scratch.path("a.dbc").c_str(), 0600), 0);
+  std::string text;
+  for (const char* name : {"left", "right"}) {
+    text += std::string("[[gyro]]\nname = \"") + name +
+            "\"\nbus = \"can0\"\ndbc = \"a.dbc\"\nmessage = \"GYRO\"\nrate = \"Rate\"\n";
+  }
+  scratch.put("vgyro.toml", text + "[output]\nbus = \"can0\"\n");
+  PlanLoader loader([path = scratch.path("vgyro.toml")] { return gateway::load_config(path); });
+  ASSERT_TRUE(loader.open());
+  loader.ask();
+  const gateway::ConfigResult result = result_of(loader);
+  ASSERT_FALSE(result);
+  EXPECT_NE(result.error().front().message().find("a.dbc: is a pipe"), std::string::npos)
+      << result.error().front().message();
+}
+
+}  // namespace
+}  // namespace vgyro::daemon
