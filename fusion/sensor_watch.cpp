@@ -82,6 +82,28 @@ double Movement::between(TimePoint from, TimePoint until) const {
   return std::max(0.0, highest - lowest);
 }
 
+// --- step ----------------------------------------------------------------------------------------
+
+void ValueStep::change(double from_dps, double to_dps) {
+  // A float's last digits are no step.
+  constexpr double kRounding = 1e-9;
+  const double size_dps = std::abs(to_dps - from_dps);
+  if (size_dps <= kRounding * std::max(std::abs(from_dps), std::abs(to_dps))) return;
+  seen_ = std::min(seen_ + 1, kEnough);
+  smallest_dps_ = std::min(smallest_dps_, size_dps);
+  if (++in_bucket_ < kBucket) return;
+  smallest_before_dps_ = smallest_dps_;
+  smallest_dps_ = std::numeric_limits<double>::infinity();
+  in_bucket_ = 0;
+}
+
+double ValueStep::dps() const {
+  double step_dps = std::min(smallest_dps_, smallest_before_dps_);
+  if (seen_ < kEnough) step_dps = std::min(step_dps, std::max(kUnknown_dps, lattice_dps_));
+  if (lattice_dps_ == 0.0) return step_dps;
+  return std::max(std::round(step_dps / lattice_dps_), 1.0) * lattice_dps_;
+}
+
 // --- habit ---------------------------------------------------------------------------------------
 
 // Second differences: steady motion, even fast, hardly shows in them.
@@ -145,7 +167,10 @@ void SensorWatch::follow(TimePoint t, double rate_dps) {
       longest_run_time_ = std::max(longest_run_time_, last_ - run_begin_);
     }
     if (any_) peak_dps_ = std::max(peak_dps_, std::abs(last_dps_));
-    if (any_ && !paused && rate_dps != last_dps_) habit_.change(last_dps_, rate_dps);
+    if (any_ && rate_dps != last_dps_) {
+      step_.change(last_dps_, rate_dps);
+      if (!paused) habit_.change(last_dps_, rate_dps);
+    }
     run_ = 1;
     run_begin_ = t;
     run_is_fault_ = false;

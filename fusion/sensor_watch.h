@@ -20,6 +20,7 @@ struct SensorLimits {
   double lowest_dps = -std::numeric_limits<double>::infinity();
   double highest_dps = std::numeric_limits<double>::infinity();
   double dead_band_dps = 0.0;  ///< below this it says 0; 0: none
+  double lattice_dps = 0.0;    ///< all its values lie this far apart, or multiples; 0: not known
 };
 
 /// Means over half seconds of a fixed grid: has the sensor moved, beyond its own noise?
@@ -47,6 +48,32 @@ class Movement {
   std::array<Block, kBlocks> done_;
   std::size_t next_ = 0;
   Block open_;
+};
+
+/// The sensor's resolution: how close two different values in a row have been of late. A message
+/// may carry far finer steps than the sensor makes.
+class ValueStep {
+ public:
+  /// Coarser than any sensor worth the name: what counts until values tell.
+  static constexpr double kUnknown_dps = 0.5;
+
+  explicit ValueStep(double lattice_dps) : lattice_dps_(lattice_dps) {}
+
+  void change(double from_dps, double to_dps);
+  [[nodiscard]] bool any() const { return seen_ > 0; }
+  [[nodiscard]] double dps() const;
+
+ private:
+  /// Two buckets make the memory: the last 2048 to 4096 changes.
+  static constexpr std::uint32_t kBucket = 2048;
+  /// So few changes may all be large ones.
+  static constexpr std::uint32_t kEnough = 8;
+
+  double lattice_dps_;
+  double smallest_dps_ = std::numeric_limits<double>::infinity();
+  double smallest_before_dps_ = std::numeric_limits<double>::infinity();
+  std::uint32_t in_bucket_ = 0;
+  std::uint32_t seen_ = 0;  ///< up to kEnough
 };
 
 /// How a sensor's values follow each other while it is well.
@@ -81,7 +108,7 @@ class Habit {
 
 class SensorWatch {
  public:
-  explicit SensorWatch(const SensorLimits& limits) : limits_(limits) {}
+  explicit SensorWatch(const SensorLimits& limits) : limits_(limits), step_(limits.lattice_dps) {}
 
   enum class Finding : std::uint8_t {
     kSound,
@@ -93,6 +120,11 @@ class SensorWatch {
   /// null.
   Finding judge(TimePoint t, double rate_dps, const SensorWatch* other);
 
+  /// Of late, between values that differ.
+  [[nodiscard]] double step_dps() const { return step_.dps(); }
+  /// A sensor that has said one value only may be dead.
+  [[nodiscard]] bool ever_changed() const { return step_.any(); }
+
  private:
   void follow(TimePoint t, double rate_dps);
   [[nodiscard]] bool at_a_limit(double rate_dps);
@@ -103,6 +135,7 @@ class SensorWatch {
   SensorLimits limits_;
   Movement movement_;
   Habit habit_;
+  ValueStep step_;
   bool any_ = false;
   double last_dps_ = 0.0;
   TimePoint last_;

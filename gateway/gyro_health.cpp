@@ -41,7 +41,8 @@ fusion::SensorLimits limits_of(const GyroPlan& plan) {
   const double high = value(std::min(rate.maximum, rate.codec.representable_max()));
   fusion::SensorLimits limits{.lowest_dps = std::min(low, high),
                               .highest_dps = std::max(low, high),
-                              .dead_band_dps = plan.dead_band_dps};
+                              .dead_band_dps = plan.dead_band_dps,
+                              .lattice_dps = rate.step};
   if (plan.sign) limits.lowest_dps = std::min(limits.lowest_dps, -limits.highest_dps);
   if (plan.sign) limits.highest_dps = -limits.lowest_dps;
   if (plan.saturation_dps) {

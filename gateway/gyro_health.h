@@ -39,6 +39,11 @@ class GyroHealth {
   [[nodiscard]] bool suspect() const { return noisy_ || (fault_ && *fault_ != Fault::kDeadBand); }
   /// What is wrong at present; what sets it aside comes first.
   [[nodiscard]] std::optional<Fault> fault() const;
+  /// How close two different values of late have been; 0.5 deg/s, or the frame's own step if that
+  /// is larger, until any two differed. What lies within one step is not known.
+  [[nodiscard]] double step_dps() const { return watch_.step_dps(); }
+  /// Has it ever said two different values? One that has not may be dead.
+  [[nodiscard]] bool ever_changed() const { return watch_.ever_changed(); }
   [[nodiscard]] const std::array<FaultRecord, kFaultCount>& records() const { return records_; }
 
  private:

@@ -170,6 +170,68 @@ TEST(SensorWatchHealthy, LateSensorIsNotStuck) {
   EXPECT_TRUE(two.all_sound(0)) << two.first_s[0].value_or(0.0);
 }
 
+// --- its step
+// --------------------------------------------------------------------------------------
+
+double step_after(const SensorLimits& limits, const Signal& signal, double to_s) {
+  SensorWatch watch(limits);
+  for (int i = 0; i < static_cast<int>(to_s * 100.0); ++i)
+    watch.judge(kStart + std::chrono::milliseconds(10 * i), signal(0.01 * i), nullptr);
+  return watch.step_dps();
+}
+
+TEST(SensorWatchStep, IsHalfADegreeOrTheFramesUntilTwoValuesDiffer) {
+  const Signal dead = [](double) { return 0.0; };
+  EXPECT_EQ(step_after({}, dead, 600.0), 0.5);
+  EXPECT_NEAR(step_after({.lattice_dps = 1e-3}, dead, 600.0), 0.5, 1e-12);
+  EXPECT_EQ(step_after({.lattice_dps = 2.0}, dead, 600.0), 2.0);
+  SensorWatch watch({});
+  watch.judge(kStart, 0.0, nullptr);
+  watch.judge(kStart + std::chrono::seconds(1), 0.0, nullptr);
+  EXPECT_FALSE(watch.ever_changed());
+  // One leap is no step.
+  watch.judge(kStart + std::chrono::seconds(2), 24.0, nullptr);
+  EXPECT_TRUE(watch.ever_changed());
+  EXPECT_EQ(watch.step_dps(), 0.5);
+}
+
+// Its lattice, whatever finer steps the frame could carry, at rest as after hours of driving.
+TEST(SensorWatchStep, IsTheLatticeOfACoarseSensor) {
+  for (const double noise_dps : {0.0, 0.1, 0.3}) {
+    for (const double lattice_dps : {0.0, 1e-3}) {
+      Random random(21);
+      const Signal coarse = rounded(noisy(town, noise_dps, random), kCarStep_dps);
+      EXPECT_NEAR(step_after({.lattice_dps = lattice_dps}, coarse, 3900.0), kCarStep_dps, 1e-12)
+          << noise_dps << " deg/s, frame " << lattice_dps << " deg/s, seed 21";
+    }
+  }
+  // The frame's own step is that of the sensor: exactly, though the difference of two is rounded.
+  Random random(22);
+  const Signal coarse = rounded(noisy(town, 0.3, random), 0.1);
+  EXPECT_EQ(step_after({.lattice_dps = 0.1}, coarse, 600.0), 0.1);
+}
+
+TEST(SensorWatchStep, IsSmallInAFineSensorAndForgetsWhatIsLongPast) {
+  Random random(23);
+  EXPECT_LT(step_after({}, noisy(town, 0.05, random), 100.0), 1e-3);
+  EXPECT_NEAR(step_after({}, rounded(noisy(town, 0.05, random), 1e-3), 100.0), 1e-3, 1e-12);
+  // It was fine, and a filter of its own makes it coarse from now on.
+  const Signal fine = noisy(town, 0.3, random);
+  const Signal coarse = rounded(noisy(town, 0.3, random), kCarStep_dps);
+  const Signal both = [&](double t_s) { return t_s < 100.0 ? fine(t_s) : coarse(t_s); };
+  EXPECT_NEAR(step_after({}, both, 300.0), kCarStep_dps, 1e-12);
+}
+
+// A float that is computed in two ways differs in its last digits.
+TEST(SensorWatchStep, IsNotTheRoundingOfFloats) {
+  Random random(24);
+  const Signal coarse = rounded(noisy(town, 0.3, random), kCarStep_dps);
+  const Signal shaken = [&](double t_s) {
+    return coarse(t_s) * (1.0 + random.uniform(0.0, 1e-14));
+  };
+  EXPECT_NEAR(step_after({}, shaken, 600.0), kCarStep_dps, 1e-9);
+}
+
 // --- stuck ---------------------------------------------------------------------------------------
 
 // Noise far above the steps: a value that repeats for a quarter of a second is no chance, at rest

@@ -8,6 +8,7 @@
 
 #include <gtest/gtest.h>
 
+#include "gateway/gyro_health.h"
 #include "gateway/pipeline.h"
 #include "tests/gateway/rig.h"
 
@@ -191,6 +192,28 @@ double fast_turn(double t_s) {
 
 // Six sigma of one gyro alone, and its bias from five seconds.
 constexpr double kErrorMax_dps = 6.0 * kSigma_dps + 4.0 * kSigma_dps / 22.0 + rig::kRateStep_dps;
+
+// --- resolution ----------------------------------------------------------------------------------
+
+// What the sensor does decides; the frame's step only where it is the coarser one.
+TEST(GyroHealthStep, IsTheSensorsOwnAndNotThatOfTheFrame) {
+  GyroPlan plan = rig::gyro_plan(0, rig::kIdA, "a");
+  plan.rate.step = rig::kInputStep_dps;
+  GyroHealth health(plan);
+  const auto judge = [&](std::int64_t i, double rate_dps) {
+    health.judge(at_ms(10 * i), rate_dps, nullptr, false);
+  };
+  for (std::int64_t i = 0; i < 100; ++i)
+    judge(i, 0.0);
+  EXPECT_FALSE(health.ever_changed());
+  EXPECT_NEAR(health.step_dps(), 0.5, 1e-9);
+  for (std::int64_t i = 100; i < 200; ++i)
+    judge(i, 0.244 * static_cast<double>(i % 5));
+  EXPECT_TRUE(health.ever_changed());
+  EXPECT_NEAR(health.step_dps(), 0.244, 1e-9);
+  plan.rate.step = 1.0;
+  EXPECT_EQ(GyroHealth(plan).step_dps(), 1.0);
+}
 
 // --- saturated -----------------------------------------------------------------------------------
 
