@@ -32,6 +32,8 @@ constexpr std::size_t kNobody = 2;
 constexpr int kTimeOutIntervals = 10;
 constexpr Duration kTimeOutMin = std::chrono::milliseconds(100);
 constexpr Duration kTimeOutMax = std::chrono::seconds(1);
+// But nobody is missed before he has failed to come twice.
+constexpr int kTimeOutIntervalsMin = 3;
 
 // VG_Bias stands on a grid of the bus's time. Samples drive it; the timer steps in only when none
 // came for half a period more, so that a replay sends the same frames at the same places.
@@ -385,7 +387,8 @@ void Pipeline::Impl::take_pair(const fusion::AlignedPair& pair, TimePoint stamp,
   }
   // A silence came before the choice of who paces: what waited for it is no rate of now.
   const Duration age = pair.complete - pair.t;
-  if (calibrated && age > time_out(aligner.pacing_gyro())) return;
+  // What is known to come late does.
+  if (calibrated && age - lag_most() > time_out(aligner.pacing_gyro())) return;
   send_rate(rate, calibrated, pair.t, age, stamp, sink);
   send_bias_when_due(pair.t + lag_most(), stamp, sink);
 }
@@ -518,7 +521,7 @@ void Pipeline::Impl::enter_state(TimePoint stamp, FrameSink& sink) {
 
 // Of the samples that made the choice; where the clock was set among them it says nothing.
 Duration Pipeline::Impl::usual_interval(std::size_t gyro) const {
-  return std::min<Duration>(aligner.interval(gyro), kTimeOutMax);
+  return std::min<Duration>(aligner.interval(gyro), fusion::StampGuard::kSlowest);
 }
 
 // Samples of a slow gyro keep their right to drive VG_Bias.
@@ -528,8 +531,10 @@ Duration Pipeline::Impl::bias_grace() const {
 }
 
 Duration Pipeline::Impl::time_out(std::size_t gyro) const {
-  if (!aligner.chosen()) return kTimeOutMax;
-  return std::clamp<Duration>(kTimeOutIntervals * usual_interval(gyro), kTimeOutMin, kTimeOutMax);
+  const Duration interval = aligner.chosen() ? usual_interval(gyro) : guard.interval(gyro);
+  const Duration most = std::max<Duration>(kTimeOutMax, kTimeOutIntervalsMin * interval);
+  if (!aligner.chosen()) return most;
+  return std::clamp<Duration>(kTimeOutIntervals * interval, kTimeOutMin, most);
 }
 
 // A gyro speaks alone only when the other one has really gone: not while pairs are about to start.
