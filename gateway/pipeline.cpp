@@ -676,6 +676,7 @@ const Status& Pipeline::Impl::refreshed_status() {
     status.gyros[gyro].waits_for = surroundings.missing(gyro, needs[gyro]);
     status.gyros[gyro].unpaired = aligner.counts().unpaired[gyro];
   }
+  status.rates_too_far_apart = aligner.chosen() && aligner.too_far_apart();
   status.bias_sigma_dps = drift.bias_sigma_dps;
   status.disagree = pairing && condition.disagree;
   status.disagreements = condition.disagreements;

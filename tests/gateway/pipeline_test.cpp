@@ -229,6 +229,51 @@ TEST(PipelineRates, TellTheirAge) {
   }
 }
 
+struct WorstError final : RateObserver {
+  explicit WorstError(RateOf the_truth) : truth(std::move(the_truth)) {}
+  void on_rate(TimePoint t, const std::array<double, 2>& /*raw_dps*/, double rate_dps) override {
+    if (std::isnan(rate_dps)) return;
+    worst_dps = std::max(worst_dps, std::abs(rate_dps - truth(to_seconds(t - at_ms(0)))));
+  }
+  RateOf truth;
+  double worst_dps = 0.0;
+};
+
+// What a model file says comes late is late, and no reason to keep the rate back.
+TEST(PipelineRates, OfGyrosThatAreKnownToBeLateAreRightAndComplete) {
+  const std::array<double, 2> none{};
+  for (const std::array<double, 2> lag_s :
+       {none, {0.06, 0.0}, {0.0, 0.15}, {0.25, 0.25}, {0.25, 0.0}, {0.12, 0.25}}) {
+    SCOPED_TRACE(::testing::Message() << lag_s[0] << " and " << lag_s[1] << " s");
+    Plan plan = rig::two_gyros();
+    plan.corrector.method = Method::kMutual;
+    plan.corrector.order = 0;
+    plan.model = model::Model{"m.toml", {}};
+    for (const std::size_t gyro : {0U, 1U}) {
+      plan.model->effects.push_back(
+          {.gyro = gyro, .kind = model::Kind::kDelay, .parameters = {lag_s[gyro]}});
+    }
+    const auto truth = [](double t_s) {
+      return t_s < 2.0 ? 0.0 : 10.0 * (1.0 - std::cos(t_s - 2.0));
+    };
+    const auto late = [&](std::size_t gyro, double bias_dps) {
+      return [=](double t_s) { return truth(t_s - lag_s[gyro]) + bias_dps; };
+    };
+    Bench run(plan);
+    WorstError error(truth);
+    run.pipeline.observe(&error);
+    run.play_live(merge({stream_a(ms(0), ms(10'000), late(0, kBiasA_dps)),
+                         stream_b(ms(0), ms(10'000), late(1, kBiasB_dps))}),
+                  at_ms(10'000));
+    const Duration longest = from_seconds(std::max(lag_s[0], lag_s[1]));
+    const Duration shortest = from_seconds(std::min(lag_s[0], lag_s[1]));
+    EXPECT_GE(run.pipeline.status().rates_out_valid + 6,
+              static_cast<std::uint64_t>((ms(9'000) - longest - (longest - shortest)) / ms(10)));
+    EXPECT_EQ(run.pipeline.status().state, State::kRunning);
+    EXPECT_LT(error.worst_dps, 1e-2);
+  }
+}
+
 // `mean` needs no calibration and has no biases, but it too needs both gyros to begin with.
 TEST(PipelineRates, OfTheMeanAreValidFromTheFirstPairOn) {
   Plan plan = rig::two_gyros();
