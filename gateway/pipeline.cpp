@@ -155,6 +155,7 @@ struct Pipeline::Impl {
   std::size_t alone = kNobody;          ///< gyro that speaks alone
   TimePoint next_bias{};
   TimePoint deadline{};  ///< nothing is due before; may lie too early, never too late
+  TimePoint reached{};   ///< newest time that was believed
   TimePoint suspect{};   ///< stamp far ahead that nobody has confirmed yet
 };
 
@@ -347,6 +348,7 @@ void Pipeline::Impl::take_sample(std::size_t gyro, TimePoint t, double rate_dps,
   // First what is due, or a silence of both would be noticed of one alone.
   if (t >= deadline) do_what_is_due(t, stamp, sink);
   heard[gyro] = true;
+  reached = t;
   last_heard[gyro] = std::max(last_heard[gyro], t);
   fusion::AlignedPair pair;
   while (aligner.pop(pair))
@@ -553,13 +555,14 @@ void Pipeline::Impl::let_time_pass(TimePoint stamp, FrameSink& sink) {
   if (!can_be_time(stamp)) return;
   const TimePoint t = whole_microseconds(stamp) + guard.offset();
   if (t < deadline) return;
-  const bool far_ahead = deadline != TimePoint{} && t - deadline > kOverdueMax;
+  const bool far_ahead = reached != TimePoint{} && t - reached > kOverdueMax;
   const bool confirmed = t >= suspect && t - suspect <= kOverdueMax;
   suspect = far_ahead ? t : TimePoint{};
   if (!far_ahead || confirmed) do_what_is_due(t, stamp, sink);
 }
 
 void Pipeline::Impl::do_what_is_due(TimePoint t, TimePoint stamp, FrameSink& sink) {
+  reached = t;
   TimePoint next = TimePoint::max();
   for (std::size_t gyro = 0; gyro < 2; ++gyro) {
     if (!heard[gyro] && !health_of[gyro].set_aside()) continue;

@@ -342,28 +342,35 @@ void expect_recovery(const Rates& rates, Method method, Calibrated when, std::ui
   }
 }
 
-constexpr std::array kRates{Rates{}, Rates{{100.0, 333.0}}, Rates{{1000.0, 10.0}},
-                            Rates{{1.0, 1.0}, 70.0}};
-
-void expect_recoveries(Method method, std::uint32_t seeds) {
-  for (const Rates& rates : kRates) {
-    for (std::uint32_t seed = 0; seed < seeds; ++seed) {
-      expect_recovery(rates, method, Calibrated::kBefore, seed);
-      expect_recovery(rates, method, Calibrated::kWithinOrBehind, seed);
-    }
+void expect_recoveries(const Rates& rates, Method method, std::uint32_t seeds) {
+  for (std::uint32_t seed = 0; seed < seeds; ++seed) {
+    expect_recovery(rates, method, Calibrated::kBefore, seed);
+    expect_recovery(rates, method, Calibrated::kWithinOrBehind, seed);
   }
 }
 
+constexpr std::array kQuickRates{Rates{}, Rates{{100.0, 333.0}}, Rates{{1000.0, 10.0}}};
+constexpr Rates kSlowRates{{1.0, 1.0}, 70.0};
+
 TEST(Recovery, AnyHostileMinuteIsForgottenByMean) {
-  expect_recoveries(Method::kMean, 100);
+  for (const Rates& rates : kQuickRates)
+    expect_recoveries(rates, Method::kMean, 40);
 }
 
 TEST(Recovery, AnyHostileMinuteIsForgottenByMutual) {
-  expect_recoveries(Method::kMutual, 40);
+  for (const Rates& rates : kQuickRates)
+    expect_recoveries(rates, Method::kMutual, 20);
 }
 
 TEST(Recovery, AnyHostileMinuteIsForgottenByOptimal) {
-  expect_recoveries(Method::kOptimal, 40);
+  for (const Rates& rates : kQuickRates)
+    expect_recoveries(rates, Method::kOptimal, 20);
+}
+
+// The guard of the stamps and the time-outs know that they are slow.
+TEST(Recovery, AnyHostileMinuteIsForgottenWithGyrosOfOneHertz) {
+  expect_recoveries(kSlowRates, Method::kMean, 100);
+  expect_recoveries(kSlowRates, Method::kMutual, 100);
 }
 
 }  // namespace
