@@ -42,7 +42,7 @@ class Aligner {
   /// A review takes so long and so many samples: more than a queue that was held up delivers at
   /// once.
   static constexpr Duration kReview = std::chrono::seconds(1);
-  static constexpr int kReviewSamples = 16;
+  static constexpr int kReviewSamples = 8;
   /// Longer, it is no interval: the clock was set among the samples judged.
   static constexpr Duration kIntervalMax = std::chrono::hours(1);
 

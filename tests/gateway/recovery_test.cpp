@@ -28,8 +28,9 @@ constexpr double kWindow_s = 2.0;
 
 struct Rates {
   std::array<double, 2> hz{100.0, 100.0};
-  /// Two windows, then the calibration; more where a slow gyro has to show first that it is slow.
-  double rest_s = 10.0;
+  /// The wait after the last of many faults, then the calibration; more where a slow gyro has to
+  /// show first that it is slow.
+  double rest_s = 16.0;
 
   [[nodiscard]] double good_s() const { return rest_s + 14.0; }
   /// At rest, and then to and fro.
@@ -350,7 +351,7 @@ void expect_recoveries(const Rates& rates, Method method, std::uint32_t seeds) {
 }
 
 constexpr std::array kQuickRates{Rates{}, Rates{{100.0, 333.0}}, Rates{{1000.0, 10.0}}};
-constexpr Rates kSlowRates{{1.0, 1.0}, 70.0};
+constexpr Rates kSlowRates{{1.0, 1.0}, 80.0};
 
 TEST(Recovery, AnyHostileMinuteIsForgottenByMean) {
   for (const Rates& rates : kQuickRates)
