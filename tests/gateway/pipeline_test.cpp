@@ -840,6 +840,30 @@ TEST(PipelineReference, CalibratesOnAMovingPlatform) {
   EXPECT_EQ(status.reference_rejected, 0U);
 }
 
+// It had run an hour ahead, and comes back to the gyros' time: it is heard again.
+TEST(PipelineReference, CalibratesWhenTheReferenceComesBackFromAnotherTime) {
+  const auto turning = [](double t_s) { return 5.0 + t_s; };
+  const auto with_bias = [&](double bias_dps) {
+    return [=](double t_s) { return turning(t_s) + bias_dps; };
+  };
+  Plan plan = rig::with_reference();
+  plan.corrector.method = Method::kMutual;
+  plan.corrector.order = 0;
+  Bench run(plan);
+  Recording reference = rig::stream(0, rig::kIdReference, ms(0), ms(8'000), ms(10), turning);
+  for (rig::Event& event : reference) {
+    if (event.stamp < at_ms(3'000)) event.stamp += std::chrono::hours(1);
+  }
+  // In the order of arrival.
+  const Recording gyros = merge({stream_a(ms(0), ms(8'000), with_bias(kBiasA_dps)),
+                                 stream_b(ms(0), ms(8'000), with_bias(kBiasB_dps))});
+  for (std::size_t i = 0; i < reference.size(); ++i)
+    run.play({reference[i], gyros[2 * i], gyros[2 * i + 1]});
+  EXPECT_EQ(run.pipeline.status().state, State::kRunning);
+  EXPECT_EQ(run.pipeline.status().clock_steps, 0U);
+  EXPECT_NEAR(run.rates().back().rate_dps, turning(7.99), 0.02);
+}
+
 // No reference, no calibration: better no rate than one against an invented truth.
 TEST(PipelineReference, WithoutItNothingBecomesValid) {
   Bench run(rig::with_reference());
