@@ -531,6 +531,36 @@ TEST(PipelineTime, ClockSetBackIsCountedAndSurvived) {
             recording.back().stamp - recording.back().stamp.time_since_epoch() % ms(10) + ms(3));
 }
 
+// The clock is set while the gyros go on: what their drifts had become is what they still are.
+TEST(PipelineTime, ClockSetForthExtendsNoDriftOfMutual) {
+  for (const Duration by : {Duration(std::chrono::seconds(20)), Duration(std::chrono::hours(20)),
+                            Duration(std::chrono::hours(24 * 3650))}) {
+    Plan plan = rig::two_gyros();
+    plan.corrector.method = Method::kMutual;
+    Bench run(plan);
+    // Slopes that a second of rest has taught: 0.2 and -0.1 deg/s each second.
+    const auto drifting = [](double bias_dps, double slope_dps_s) {
+      return [=](double t_s) { return bias_dps + slope_dps_s * t_s; };
+    };
+    const Recording first = merge({stream_a(ms(0), ms(4'000), drifting(kBiasA_dps, 0.2)),
+                                   stream_b(ms(0), ms(4'000), drifting(kBiasB_dps, -0.1))});
+    const Recording second = merge({stream_a(ms(4'000), ms(5'000), drifting(kBiasA_dps, 0.2)),
+                                    stream_b(ms(4'000), ms(5'000), drifting(kBiasB_dps, -0.1))});
+    run.play(first);
+    run.play(shifted(second, by));
+    ASSERT_EQ(run.pipeline.status().clock_steps, 0U);
+    const std::vector<RateSeen> rates = run.rates();
+    EXPECT_GT(std::count_if(rates.begin(), rates.end(), [](const auto& r) { return r.valid; }),
+              380);
+    for (const RateSeen& rate : rates) {
+      if (!rate.valid) continue;
+      // Of the bias it goes on to learn nothing from the frames that the guard waited for.
+      ASSERT_NEAR(rate.rate_dps, 0.0, 0.2 * 0.05 + rig::kRateStep_dps)
+          << to_seconds(rate.stamp - at_ms(0)) << " s, set by " << to_seconds(by);
+    }
+  }
+}
+
 // The daemon lets time go on while nobody speaks, whatever the clock does; when frames come back
 // with stamps of the clock as it was set, heartbeat and time-outs must not wait for it to catch up.
 TEST(PipelineTime, ClockSetBackInASilenceStopsNothing) {
