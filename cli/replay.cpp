@@ -231,6 +231,15 @@ std::optional<Error> explain_no_pair(const gateway::Status& status, const gatewa
                              causes_of_rejection(status.gyros[i])),
                  "`vgyro check` shows which bits are read, `vgyro decode` what the log holds"};
   }
+  if (status.rates_too_far_apart) {
+    const std::size_t slow = status.gyros[0].samples < status.gyros[1].samples ? 0 : 1;
+    return Error{logs,
+                 fmt::format("gyro {} speaks so much more often than gyro {} that no pairs can be "
+                             "made of them ({} samples and {})",
+                             plan.gyros[1 - slow].name, plan.gyros[slow].name,
+                             status.gyros[1 - slow].samples, status.gyros[slow].samples),
+                 "up to 2000 times as often is possible; a gyro so slow adds nothing to the other"};
+  }
   return Error{logs,
                fmt::format("the gyros {} and {} never spoke at the same time, or too shortly",
                            plan.gyros[0].name, plan.gyros[1].name),

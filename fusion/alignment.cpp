@@ -17,6 +17,11 @@ double line_at(TimePoint t, TimePoint t0, double y0, TimePoint t1, double y1) {
   return y0 + share * (y1 - y0);
 }
 
+bool alike(Duration a, Duration b) {
+  const double ratio = to_seconds(a) / to_seconds(b);
+  return ratio < Aligner::kOtherPace && ratio > 1.0 / Aligner::kOtherPace;
+}
+
 }  // namespace
 
 void Aligner::Ring::insert(const Sample& sample) {
@@ -74,8 +79,48 @@ bool Aligner::push(std::size_t gyro, TimePoint t, double rate_dps) {
     if (t <= used_until_[gyro]) return false;
   }
   ring.insert({t, rate_dps});
-  if (!chosen_) choose_pace();
+  if (!chosen_) {
+    choose_pace();
+  } else {
+    review(gyro, t);
+  }
   return true;
+}
+
+// Of one stream alone, so that it makes no difference how the two of them interleave.
+void Aligner::review(std::size_t gyro, TimePoint t) {
+  Review& review = reviews_[gyro];
+  if (review.begun && t <= review.newest) return;
+  if (review.begun) {
+    const Duration interval = std::min<Duration>(t - review.newest, kIntervalMax);
+    review.sum += interval;
+    review.longest = std::max(review.longest, interval);
+    ++review.intervals;
+  }
+  review.begun = true;
+  review.newest = t;
+  if (review.intervals < kReviewSamples || review.sum < kReview) return;
+  // One hole is no pace.
+  const Duration pace = (review.sum - review.longest) / (review.intervals - 1);
+  const bool other_pace = !alike(pace, interval_[gyro]);
+  const bool again =
+      other_pace && review.odd_pace > Duration::zero() && alike(pace, review.odd_pace);
+  review = {.begun = true, .newest = t, .odd_pace = other_pace ? pace : Duration::zero()};
+  if (again) choose_again(gyro, pace, t);
+}
+
+// What is buffered was received at the old pace, or before anybody knew; it is let go.
+void Aligner::choose_again(std::size_t gyro, Duration interval, TimePoint behind) {
+  reviewed_[gyro] = interval;
+  reviews_ = {};
+  chosen_ = false;
+  for (std::size_t each = 0; each < 2; ++each) {
+    const std::size_t gone = rings_[each].count_until(behind);
+    if (each == pace_) counts_.unpaired[each] += gone;
+    rings_[each].pop_front(gone);
+    used_until_[each] = any_used_[each] ? std::max(used_until_[each], behind) : behind;
+    any_used_[each] = true;
+  }
 }
 
 // How long pairs would wait for the other gyro if `pace` set the instants, on average.
@@ -107,7 +152,9 @@ void Aligner::choose_pace() {
   if (std::min(rings_[0].back().t, rings_[1].back().t) < until) return;
   for (std::size_t gyro = 0; gyro < 2; ++gyro) {
     const Ring& ring = rings_[gyro];
-    interval_[gyro] = std::min(ring.usual_interval(until), kIntervalMax);
+    const Duration usual = ring.usual_interval(until);
+    interval_[gyro] =
+        std::min(reviewed_[gyro] > Duration::zero() ? reviewed_[gyro] : usual, kIntervalMax);
     gap_[gyro] = from_seconds(to_seconds(interval_[gyro]) * kGapIntervals);
     const std::size_t last = ring.count_until(until) - 1;
     const TimePoint reached = ring[ring[last].t == until ? last : last + 1].t;
@@ -123,7 +170,13 @@ void Aligner::choose_pace() {
   }
   const bool averages = std::max(ratio, 1.0 / ratio) >= kAverageRatio;
   half_window_ = averages ? interval_[pace_] / 2 : Duration::zero();
+  // From behind the pair before to half a window behind this one, and what comes earlier by its
+  // lag.
+  const double kept_s =
+      2.0 * to_seconds(interval_[pace_]) + std::max(to_seconds(lag_[pace_] - lag_[1 - pace_]), 0.0);
+  too_far_apart_ = kept_s > static_cast<double>(kCapacity) * to_seconds(interval_[1 - pace_]);
   chosen_ = true;
+  ever_chosen_ = true;
 }
 
 // Samples that no pair at or behind `needed` can use; the last one before it is still a neighbour.
@@ -225,6 +278,7 @@ void Aligner::clear() {
   for (Ring& ring : rings_)
     ring.clear();
   any_used_ = {};
+  reviews_ = {};
 }
 
 }  // namespace vgyro::fusion

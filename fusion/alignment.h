@@ -5,7 +5,8 @@
 // its two neighbours, or, where it is at least kAverageRatio times faster, by the mean of its
 // interpolant over one pace interval, so that none of its information is lost and nothing aliases.
 // A pair is complete with the first sample of the other gyro at or behind it; that is the latency.
-// Readings that are known to come late are dated back first.
+// Readings that are known to come late are dated back first. The choice is made from the first
+// samples, and made again when a gyro keeps another pace than was found then.
 // Buffers are bounded; a sample that can no longer be paired is counted, never used.
 
 #include <array>
@@ -27,7 +28,7 @@ struct AlignedPair {
 
 class Aligner {
  public:
-  static constexpr std::size_t kCapacity = 512;
+  static constexpr std::size_t kCapacity = 4096;
   /// Samples of each gyro before the pacing gyro is chosen.
   static constexpr std::size_t kSamplesToChoose = 8;
   /// The choice looks back over no more of them than this.
@@ -36,6 +37,12 @@ class Aligner {
   /// it.
   static constexpr double kGapIntervals = 4.0;
   static constexpr double kAverageRatio = 1.5;
+  /// A pace this much off the one found is another one, when two reviews in a row say so.
+  static constexpr double kOtherPace = 1.5;
+  /// A review takes so long and so many samples: more than a queue that was held up delivers at
+  /// once.
+  static constexpr Duration kReview = std::chrono::seconds(1);
+  static constexpr int kReviewSamples = 8;
   /// Longer, it is no interval: the clock was set among the samples judged.
   static constexpr Duration kIntervalMax = std::chrono::hours(1);
 
@@ -63,10 +70,14 @@ class Aligner {
   };
   [[nodiscard]] const Counts& counts() const { return counts_; }
 
-  [[nodiscard]] bool chosen() const { return chosen_; }
+  /// Has the choice ever been made? While it is made again the old intervals stand.
+  [[nodiscard]] bool chosen() const { return ever_chosen_; }
   /// Gyro at whose stamps the pairs stand. Precondition of both: chosen().
   [[nodiscard]] std::size_t pacing_gyro() const { return pace_; }
   [[nodiscard]] Duration interval(std::size_t gyro) const { return interval_[gyro]; }
+  /// The faster gyro's samples of an averaging and of the wait for it do not fit the buffer: there
+  /// will be no pairs.
+  [[nodiscard]] bool too_far_apart() const { return too_far_apart_; }
 
  private:
   struct Sample {
@@ -100,7 +111,19 @@ class Aligner {
     std::size_t size_ = 0;
   };
 
+  /// How a gyro's stamps have followed each other since the last review.
+  struct Review {
+    bool begun = false;
+    TimePoint newest;
+    Duration sum{0};
+    Duration longest{0};
+    int intervals = 0;
+    Duration odd_pace{0};  ///< of the review before, if it was another one than was found; else 0
+  };
+
   void choose_pace();
+  void review(std::size_t gyro, TimePoint t);
+  void choose_again(std::size_t gyro, Duration interval, TimePoint behind);
   [[nodiscard]] Duration mean_wait(std::size_t pace, TimePoint until) const;
   void drop_before(TimePoint needed, std::size_t gyro);
   bool interpolate(const Ring& other, AlignedPair& pair, std::size_t other_index);
@@ -108,6 +131,8 @@ class Aligner {
 
   std::array<Duration, 2> lag_;
   std::array<Ring, 2> rings_;  ///< at the instants of the rates
+  std::array<Review, 2> reviews_{};
+  std::array<Duration, 2> reviewed_{};  ///< intervals that a review has found; 0: none has yet
   std::array<Duration, 2> interval_{};
   std::array<Duration, 2> gap_{};
   std::array<TimePoint, 2> used_until_{};  ///< samples at or before this come too late
@@ -116,6 +141,8 @@ class Aligner {
   Duration half_window_{0};  ///< of the averaging; 0 where interpolation does
   std::size_t pace_ = 0;
   bool chosen_ = false;
+  bool ever_chosen_ = false;
+  bool too_far_apart_ = false;
   Counts counts_;
 };
 

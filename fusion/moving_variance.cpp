@@ -29,7 +29,15 @@ void MovingVariance::sum_anew() {
 }
 
 void MovingVariance::add(TimePoint t, double value) {
-  if (size_ > 0 && t <= values_[(head_ + size_ - 1) % kCapacity].t) return;
+  if (size_ > 0) {
+    const TimePoint newest = values_[(head_ + size_ - 1) % kCapacity].t;
+    // Its clock was set back: what it said is of another time.
+    if (newest - t > kWindow) {
+      size_ = 0;
+    } else if (t <= newest) {
+      return;
+    }
+  }
   while (size_ > 0 && values_[head_].t <= t - kWindow)
     drop_oldest();
   if (size_ == kCapacity) drop_oldest();

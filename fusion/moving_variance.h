@@ -15,7 +15,8 @@ class MovingVariance {
   static constexpr Duration kWindow = std::chrono::seconds(1);
   static constexpr std::size_t kCapacity = 2048;
 
-  /// A value at or before the last one's time is passed over. Precondition: finite.
+  /// A value at or before the last one's time is passed over; one that is far before it begins
+  /// anew. Precondition: finite.
   void add(TimePoint t, double value);
 
   /// 0 with fewer than two values in the window.

@@ -32,14 +32,17 @@ class MutualCorrector final : public Corrector {
   void start(const Calibration& calibration) override {
     sum_ = calibration.sum;
     difference_ = calibration.difference;
+    newest_s_ = calibration.end_s;
     open_window(calibration.end_s);
+    difference_until_s_ = window_end_s_;
   }
 
   VirtualRate update(const RatePair& pair) override {
     if (pair.t_s >= window_end_s_) close_window(pair.t_s);
+    reach(pair.t_s);
     window_.add(pair.t_s, pair.rate_dps[0] - pair.rate_dps[1]);
     const double sum = sum_.at(pair.t_s);
-    const double difference = difference_.at(pair.t_s);
+    const double difference = difference_at(pair.t_s);
     return {
         0.5 * (pair.rate_dps[0] + pair.rate_dps[1]) - 0.5 * sum,
         kNone,
@@ -47,14 +50,16 @@ class MutualCorrector final : public Corrector {
   }
 
   VirtualRate update_alone(std::size_t gyro, const RatePair& pair) override {
+    reach(pair.t_s);
     VirtualRate alone{pair.rate_dps[gyro] - drift(pair.t_s).bias_dps[gyro], kNone, {kNone, kNone}};
     alone.corrected_dps[gyro] = alone.rate_dps;
     return alone;
   }
 
-  [[nodiscard]] Drift drift(double t_s) const override {
+  [[nodiscard]] Drift drift(double asked_s) const override {
+    const double t_s = leap_to(asked_s) ? newest_s_ : asked_s;
     const double sum = sum_.at(t_s);
-    const double difference = difference_.at(t_s);
+    const double difference = difference_at(t_s);
     return {{0.5 * (sum + difference), 0.5 * (sum - difference)},
             0.5 * sum_.slope_at(t_s),
             kNone,
@@ -72,6 +77,8 @@ class MutualCorrector final : public Corrector {
   void close_window(double t_s) {
     if (const auto fit = window_.fit()) {
       difference_ = fit->polynomial;
+      // The line of a window is for the next one; where that brings none it is held.
+      difference_until_s_ = window_end_s_ + window_s_;
       ++counts_.completed;
     } else {
       ++counts_.skipped;
@@ -82,12 +89,33 @@ class MutualCorrector final : public Corrector {
     open_window(window_end_s_ + behind * window_s_);
   }
 
+  // The method extends its lines by a window, so a silence that is longer is none that they can
+  // bridge: the clock was set, or nobody knows what the drifts did.
+  [[nodiscard]] bool leap_to(double t_s) const { return t_s - newest_s_ > window_s_; }
+
+  // Behind a leap the lines go on where they were.
+  void reach(double t_s) {
+    if (leap_to(t_s)) {
+      const double leap_s = t_s - newest_s_;
+      sum_.centre_s += leap_s;
+      difference_.centre_s += leap_s;
+      difference_until_s_ += leap_s;
+    }
+    newest_s_ = t_s;
+  }
+
+  [[nodiscard]] double difference_at(double t_s) const {
+    return difference_.at(std::min(t_s, difference_until_s_));
+  }
+
   int order_;
   double window_s_;
   LeastSquares window_;
   double window_end_s_ = 0.0;
+  double newest_s_ = 0.0;
   Polynomial sum_;         ///< S
   Polynomial difference_;  ///< D of the last completed window; of the calibration before the first
+  double difference_until_s_ = 0.0;  ///< held from here on
   WindowCounts counts_;
 };
 

@@ -20,6 +20,14 @@ constexpr std::uint64_t kClipSamples = 8;
 constexpr std::uint64_t kRunFactor = 10;
 constexpr std::uint64_t kClipRunFactor = 4;
 
+// A run of equal values this unlikely is no chance while something moves.
+constexpr double kChance = 1e-6;
+// A healthy sensor leaps into a run more rarely than this.
+constexpr double kLeapChance = 1e-3;
+constexpr std::uint64_t kRunMin = 3;
+// Motion that has just ended counts: what is frozen by it is frozen all the same.
+constexpr Duration kMovedLately = std::chrono::milliseconds(1500);
+
 // How much the other gyro must have moved while this one stood still. Sensors that hold an exact
 // zero at standstill do so up to some tenths of a deg/s.
 constexpr double kMovement_dps = 0.5;
@@ -28,6 +36,11 @@ constexpr std::uint64_t kUnmovedSamples = 5;
 // A filter, or a source slower than the bus, may lag behind by this or by its longest run.
 constexpr Duration kLagMin = std::chrono::milliseconds(250);
 constexpr Duration kLagMax = std::chrono::seconds(1);
+// A sensor that has never changed is not given so long: that it is alive is for it to show.
+constexpr Duration kLagUnproven = std::chrono::milliseconds(80);
+// Moving with the other one: by this share of its movement, within the blocks' memory.
+constexpr double kTogether = 0.5;
+constexpr Duration kTogetherWithin = std::chrono::seconds(6);
 // Behind a pause nothing is said of the time in it.
 constexpr Duration kPause = std::chrono::seconds(1);
 
@@ -38,9 +51,13 @@ constexpr std::uint64_t kCoarseShare = 10;
 // White noise has 23 of 30, smooth motion a few.
 constexpr int kTurnsMin = 12;
 
-std::int64_t block_of(TimePoint t) {
-  return to_ns(t) / Movement::kBlock.count();
-}
+// Sensors that have never repeated a value in a thousand samples may do so all the same.
+constexpr double kRepeatsMin = 0.02;
+// Their share is known from chance, and changes with vibration.
+constexpr double kRepeatsMargin = 1.5;
+constexpr double kRepeatsMemory = 4096.0;
+
+constexpr double kSigmas = 6.0;
 
 }  // namespace
 
@@ -50,15 +67,20 @@ double Movement::Block::mean_sigma_dps() const {
   return std::sqrt(squares / (2.0 * (count - 1)) / count);
 }
 
+Movement::Level Movement::Block::level() const {
+  // The neighbours of the block may have moved as much as it did itself.
+  return {mean_dps(), kSigmas * mean_sigma_dps() + 2.0 * std::abs(last_dps - first_dps)};
+}
+
 void Movement::add(TimePoint t, double rate_dps) {
-  const std::int64_t index = block_of(t);
-  if (index < open_.index) return;
-  if (index > open_.index) {
+  if (open_.count > 0 && t < open_.begin) return;
+  if (open_.count == 0 || t - open_.begin >= length_) {
     if (open_.count >= kSamplesMin) {
       done_[next_] = open_;
       next_ = (next_ + 1) % kBlocks;
+      ++closed_;
     }
-    open_ = {index, 1, rate_dps, 0.0, rate_dps, 0.0};
+    open_ = {t, 1, rate_dps, 0.0, rate_dps, 0.0};
     return;
   }
   ++open_.count;
@@ -68,18 +90,38 @@ void Movement::add(TimePoint t, double rate_dps) {
 }
 
 double Movement::between(TimePoint from, TimePoint until) const {
-  constexpr double kSigmas = 6.0;
   double lowest = std::numeric_limits<double>::infinity();
   double highest = -lowest;
   for (const Block& block : done_) {
-    if (block.count == 0) continue;
-    const TimePoint begin{block.index * kBlock};
-    if (begin < from || begin + kBlock > until) continue;
+    if (block.count == 0 || block.begin < from || block.begin + length_ > until) continue;
     const double doubt = kSigmas * block.mean_sigma_dps();
     lowest = std::min(lowest, block.mean_dps() + doubt);
     highest = std::max(highest, block.mean_dps() - doubt);
   }
   return std::max(0.0, highest - lowest);
+}
+
+std::optional<Movement::Level> Movement::before(TimePoint t) const {
+  constexpr int kOldMost = 5;  // blocks
+  for (std::size_t i = 0; i < kBlocks; ++i) {
+    const Block& block = past(i);
+    if (block.count == 0 || block.begin + kOldMost * length_ < t) break;
+    if (block.begin + length_ <= t) return block.level();
+  }
+  return std::nullopt;
+}
+
+std::optional<Movement::Level> Movement::behind(TimePoint t) const {
+  const Block& newest = past(0);
+  if (newest.count == 0 || newest.begin < t) return std::nullopt;
+  return newest.level();
+}
+
+bool Movement::is_leap(double step_dps) const {
+  const Block& newest = past(0);
+  const double beyond_dps = std::abs(step_dps) - kMovement_dps;
+  if (newest.count == 0 || beyond_dps <= 0.0) return false;
+  return beyond_dps * beyond_dps > kSigmas * kSigmas * newest.squares / (newest.count - 1);
 }
 
 // --- step ----------------------------------------------------------------------------------------
@@ -121,6 +163,38 @@ void Habit::change(double from_dps, double to_dps) {
   if (changes_ == kChangesPerBlock) close_block();
 }
 
+void Habit::repeated(std::uint64_t times) {
+  longest_run_ = std::max(longest_run_, times);
+  // All of them but the first one repeat.
+  repeats_in_bucket_ += times - 1;
+  in_bucket_ += times;
+  if (in_bucket_ < kBucket) return;
+  const auto count = static_cast<double>(in_bucket_);
+  repeats_of_late_ = static_cast<double>(repeats_in_bucket_) / count;
+  const double known = std::min(samples_, kRepeatsMemory);
+  repeats_ = (repeats_ * known + static_cast<double>(repeats_in_bucket_)) / (known + count);
+  samples_ += count;
+  in_bucket_ = 0;
+  repeats_in_bucket_ = 0;
+}
+
+void Habit::begins_run(bool leapt) {
+  ++runs_;
+  if (leapt) ++leaps_;
+}
+
+bool Habit::leaps_are_rare() const {
+  constexpr std::uint64_t kRunsToKnow = 200;
+  constexpr std::uint64_t kRare = 100;
+  return runs_ >= kRunsToKnow && leaps_ * kRare <= runs_;
+}
+
+double Habit::chance_of_run(std::uint64_t times) const {
+  const double repeats =
+      std::clamp(kRepeatsMargin * std::max(repeats_, repeats_of_late_), kRepeatsMin, 1.0);
+  return std::pow(repeats, static_cast<double>(times - 1));
+}
+
 void Habit::close_block() {
   // Of white noise they have six times its variance.
   const double noise_dps = std::sqrt(bends_ / (6.0 * (kChangesPerBlock - 1)));
@@ -149,39 +223,64 @@ SensorWatch::Finding SensorWatch::judge(TimePoint t, double rate_dps, const Sens
     run_is_fault_ = true;
     return Finding::kSaturated;
   }
-  if (stands_still(t, rate_dps, other)) {
+  const bool behind = other != nullptr && stays_behind(t, rate_dps, *other);
+  if (behind && !step_.any()) unproven_ = true;
+  if (unproven_ && other != nullptr && moves_with(t, *other)) unproven_ = false;
+  if (behind || unproven_ || repeats_too_long(t)) {
     run_is_fault_ = true;
     return Finding::kStuck;
+  }
+  const bool no_chance = !run_is_fault_ && is_no_chance(t, other);
+  if (no_chance && at_the_top(rate_dps)) {
+    run_is_fault_ = true;
+    clip_dps_ = std::abs(rate_dps);
+    return Finding::kSaturated;
+  }
+  if (run_is_fault_ || no_chance) {
+    run_is_fault_ = true;
+    return run_time(t) < kStuckTime ? Finding::kStanding : Finding::kStuck;
   }
   return rate_dps == 0.0 && limits_.dead_band_dps > 0.0 ? Finding::kBlind : Finding::kSound;
 }
 
 void SensorWatch::follow(TimePoint t, double rate_dps) {
-  movement_.add(t, rate_dps);
   const bool paused = any_ && t - last_ > kPause;
   if (any_ && !paused && rate_dps == last_dps_) {
     ++run_;
   } else {
-    if (any_ && !run_is_fault_) {
-      habit_.repeated(run_);
-      longest_run_time_ = std::max(longest_run_time_, last_ - run_begin_);
-    }
-    if (any_) peak_dps_ = std::max(peak_dps_, std::abs(last_dps_));
-    if (any_ && rate_dps != last_dps_) {
-      step_.change(last_dps_, rate_dps);
-      if (!paused) habit_.change(last_dps_, rate_dps);
-    }
-    run_ = 1;
-    run_begin_ = t;
-    run_is_fault_ = false;
+    begin_run(t, rate_dps, paused);
   }
+  movement_.add(t, rate_dps);
+  quick_.add(t, rate_dps);
   last_dps_ = rate_dps;
   last_ = any_ ? std::max(last_, t) : t;
   any_ = true;
 }
 
+void SensorWatch::begin_run(TimePoint t, double rate_dps, bool paused) {
+  if (any_ && !run_is_fault_) {
+    habit_.repeated(run_);
+    longest_run_time_ = std::max(longest_run_time_, last_ - run_begin_);
+  }
+  if (any_) peak_dps_ = std::max(peak_dps_, std::abs(last_dps_));
+  if (any_ && rate_dps != last_dps_) {
+    if (!step_.any()) alive_since_ = t;
+    step_.change(last_dps_, rate_dps);
+    if (!paused) habit_.change(last_dps_, rate_dps);
+  }
+  leapt_ = any_ && !paused && quick_.is_leap(rate_dps - last_dps_);
+  habit_.begins_run(leapt_);
+  run_ = 1;
+  run_begin_ = t;
+  run_is_fault_ = false;
+}
+
+bool SensorWatch::at_the_top(double rate_dps) const {
+  return std::abs(rate_dps) >= std::max(peak_dps_, kClipMin_dps);
+}
+
 bool SensorWatch::clipped(double rate_dps) const {
-  return std::abs(rate_dps) >= std::max(peak_dps_, kClipMin_dps) && habit_.fine() &&
+  return at_the_top(rate_dps) && habit_.fine() &&
          run_ >= std::max(kClipSamples, kClipRunFactor * habit_.longest_run());
 }
 
@@ -196,19 +295,64 @@ bool SensorWatch::at_a_limit(double rate_dps) {
   return std::abs(rate_dps) >= kLimitShare * clip_dps_;
 }
 
-bool SensorWatch::stands_still(TimePoint t, double rate_dps, const SensorWatch* other) {
-  if (run_is_fault_) return true;
-  if (habit_.fine() && run_ >= std::max(kStuckSamples, kRunFactor * habit_.longest_run()) &&
-      run_time(t) >= kStuckTime) {
-    return true;
-  }
-  // The other one's movement is looked at once in a block: it changes no more often.
-  if (other == nullptr || run_ < kUnmovedSamples || block_of(t) == asked_block_) return false;
-  asked_block_ = block_of(t);
+bool SensorWatch::repeats_too_long(TimePoint t) const {
+  return habit_.fine() && run_ >= std::max(kStuckSamples, kRunFactor * habit_.longest_run()) &&
+         run_time(t) >= kStuckTime;
+}
+
+// How far the other one may go before this one must have seen it.
+double SensorWatch::unseen_dps(double rate_dps) const {
   const double hidden_dps = rate_dps == 0.0 ? 2.0 * limits_.dead_band_dps : 0.0;
+  return std::max(kMovement_dps, kMovementSteps * habit_.step_dps()) + hidden_dps;
+}
+
+// The other one moves and this one does not. Its movement changes no more often than its blocks.
+bool SensorWatch::stays_behind(TimePoint t, double rate_dps, const SensorWatch& other) {
+  if (run_ < kUnmovedSamples) return false;
+  if (other.quick_.blocks() != asked_quick_) {
+    asked_quick_ = other.quick_.blocks();
+    const bool dead = !step_.any();
+    if (dead && other.quick_.between(run_begin_, t - kLagUnproven) > unseen_dps(rate_dps)) {
+      return true;
+    }
+    if (left_the_other(rate_dps, other)) return true;
+  }
+  if (other.movement_.blocks() == asked_) return false;
+  asked_ = other.movement_.blocks();
   const Duration lag = std::clamp(longest_run_time_, kLagMin, kLagMax);
-  return other->movement_.between(run_begin_, t - lag) >
-         std::max(kMovement_dps, kMovementSteps * habit_.step_dps()) + hidden_dps;
+  return other.movement_.between(run_begin_, t - lag) > unseen_dps(rate_dps);
+}
+
+// It has leapt to a value that it keeps, and the other one, which is alive, has not gone there.
+bool SensorWatch::left_the_other(double rate_dps, const SensorWatch& other) const {
+  if (!leapt_ || !habit_.leaps_are_rare() || other.run_ >= kUnmovedSamples) return false;
+  const auto before = quick_.before(run_begin_);
+  const auto other_before = other.quick_.before(run_begin_);
+  const auto other_now = other.quick_.behind(run_begin_ + kLagMin);
+  if (!before || !other_before || !other_now) return false;
+  const double doubt_dps = before->doubt_dps + other_before->doubt_dps + other_now->doubt_dps;
+  const double gone_dps = rate_dps - before->dps - (other_now->dps - other_before->dps);
+  return std::abs(gone_dps) > unseen_dps(rate_dps) + doubt_dps;
+}
+
+// Too many equal values for chance while something moves. At rest a sensor may fall quiet.
+bool SensorWatch::is_no_chance(TimePoint t, const SensorWatch* other) const {
+  if (run_ < kRunMin || !habit_.fine()) return false;
+  const bool leapt = leapt_ && habit_.leaps_are_rare();
+  if (habit_.chance_of_run(run_) > (leapt ? kChance / kLeapChance : kChance)) return false;
+  const TimePoint from = run_begin_ - kMovedLately;
+  return leapt || movement_.between(from, t) > kMovement_dps ||
+         (other != nullptr && other->movement_.between(from, t) > kMovement_dps);
+}
+
+// What was dead has come to life, and sees what the other one sees.
+bool SensorWatch::moves_with(TimePoint t, const SensorWatch& other) const {
+  if (!step_.any()) return false;
+  const TimePoint from = std::max(alive_since_, t - kTogetherWithin);
+  const double own_dps = movement_.between(from, t);
+  const double other_dps = other.movement_.between(from, t);
+  return other_dps > kMovement_dps && own_dps >= kTogether * other_dps &&
+         own_dps * kTogether <= other_dps;
 }
 
 }  // namespace vgyro::fusion

@@ -3,13 +3,16 @@
 // One gyro's raw values in order → is this a measurement at all? Tells values that stand still
 // where the sensor never did, values at the end of its range, and zeros of a dead band. It learns
 // from the sensor itself how long values repeat and how its noise compares with its steps; a coarse
-// sensor that repeats at rest is believed until the other gyro moves. O(1) a sample, no allocation.
+// sensor that repeats at rest is believed until the other gyro moves, one that has never changed is
+// not believed before it moves with the other. O(1) a sample, no allocation, and nothing depends on
+// what time it is.
 // Judges one sample at a time: how long a finding lasts is for others to decide.
 
 #include <array>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <optional>
 
 #include "base/time.h"
 
@@ -23,20 +26,34 @@ struct SensorLimits {
   double lattice_dps = 0.0;    ///< all its values lie this far apart, or multiples; 0: not known
 };
 
-/// Means over half seconds of a fixed grid: has the sensor moved, beyond its own noise?
+/// Means over blocks of time that follow each other from the first sample on: has the sensor moved,
+/// beyond its own noise?
 class Movement {
  public:
-  static constexpr Duration kBlock = std::chrono::milliseconds(500);
+  struct Level {
+    double dps = 0.0;
+    double doubt_dps = 0.0;  ///< six sigma, and what it moved within the block
+  };
+
+  explicit Movement(Duration block) : length_(block) {}
 
   void add(TimePoint t, double rate_dps);
   /// By how much the means of the blocks inside [from, until] differ at least, six sigma taken off.
   [[nodiscard]] double between(TimePoint from, TimePoint until) const;
+  /// The newest block that ended at or before `t`, unless that was long ago.
+  [[nodiscard]] std::optional<Level> before(TimePoint t) const;
+  /// The newest block, when it began at or behind `t`.
+  [[nodiscard]] std::optional<Level> behind(TimePoint t) const;
+  /// Is a step of this size from one sample to the next beyond its noise of late?
+  [[nodiscard]] bool is_leap(double step_dps) const;
+  /// So far: whoever has looked at the last one need not look again.
+  [[nodiscard]] std::uint64_t blocks() const { return closed_; }
 
  private:
   static constexpr std::size_t kBlocks = 8;
   static constexpr int kSamplesMin = 3;
   struct Block {
-    std::int64_t index = std::numeric_limits<std::int64_t>::min();
+    TimePoint begin;
     int count = 0;
     double first_dps = 0.0;
     double sum_dps = 0.0;  ///< less the first, so that nothing is lost to rounding
@@ -44,9 +61,17 @@ class Movement {
     double squares = 0.0;  ///< of the steps from sample to sample
     [[nodiscard]] double mean_dps() const { return first_dps + sum_dps / count; }
     [[nodiscard]] double mean_sigma_dps() const;
+    [[nodiscard]] Level level() const;
   };
+  /// 0: the newest.
+  [[nodiscard]] const Block& past(std::size_t i) const {
+    return done_[(next_ + 2 * kBlocks - 1 - i) % kBlocks];
+  }
+
+  Duration length_;
   std::array<Block, kBlocks> done_;
   std::size_t next_ = 0;
+  std::uint64_t closed_ = 0;
   Block open_;
 };
 
@@ -81,16 +106,24 @@ class Habit {
  public:
   /// A value other than the one before.
   void change(double from_dps, double to_dps);
-  void repeated(std::uint64_t times) { longest_run_ = times > longest_run_ ? times : longest_run_; }
+  /// A run of equal values has ended after so many.
+  void repeated(std::uint64_t times);
+  /// A run begins, with a leap or without.
+  void begins_run(bool leapt);
 
   /// Its noise is far above its steps, as far as was ever seen: equal values in a row are chance.
   [[nodiscard]] bool fine() const;
   [[nodiscard]] std::uint64_t longest_run() const { return longest_run_; }
+  /// How likely a run of so many equal values is, on the large side.
+  [[nodiscard]] double chance_of_run(std::uint64_t times) const;
+  /// A source that is slower than the bus leaps all the time.
+  [[nodiscard]] bool leaps_are_rare() const;
   /// Smallest step between values, on the large side while little is known.
   [[nodiscard]] double step_dps() const { return step_dps_; }
 
  private:
   static constexpr int kChangesPerBlock = 32;
+  static constexpr std::uint64_t kBucket = 256;  ///< samples
   void close_block();
 
   int changes_ = 0;
@@ -103,7 +136,14 @@ class Habit {
   std::uint64_t blocks_ = 0;
   std::uint64_t coarse_blocks_ = 0;
   std::uint64_t longest_run_ = 1;
-  double step_dps_ = 0.5;  ///< coarser than any sensor worth the name
+  std::uint64_t runs_ = 0;
+  std::uint64_t leaps_ = 0;
+  std::uint64_t in_bucket_ = 0;
+  std::uint64_t repeats_in_bucket_ = 0;
+  double samples_ = 0.0;
+  double repeats_ = 1.0;          ///< share of samples that repeat the one before
+  double repeats_of_late_ = 1.0;  ///< of the last bucket
+  double step_dps_ = 0.5;         ///< coarser than any sensor worth the name
 };
 
 class SensorWatch {
@@ -114,6 +154,7 @@ class SensorWatch {
     kSound,
     kSaturated,  ///< at the end of the range, known or found
     kStuck,      ///< the value stands still and should not
+    kStanding,   ///< so it seems after some samples, and it may still be chance
     kBlind       ///< 0 inside the dead band: anything smaller than that
   };
   /// The next sample. `other` is the watch of a gyro that turns with this one and is well; else
@@ -127,13 +168,21 @@ class SensorWatch {
 
  private:
   void follow(TimePoint t, double rate_dps);
+  void begin_run(TimePoint t, double rate_dps, bool paused);
   [[nodiscard]] bool at_a_limit(double rate_dps);
+  [[nodiscard]] bool at_the_top(double rate_dps) const;
   [[nodiscard]] bool clipped(double rate_dps) const;
-  [[nodiscard]] bool stands_still(TimePoint t, double rate_dps, const SensorWatch* other);
+  [[nodiscard]] bool repeats_too_long(TimePoint t) const;
+  [[nodiscard]] bool stays_behind(TimePoint t, double rate_dps, const SensorWatch& other);
+  [[nodiscard]] bool left_the_other(double rate_dps, const SensorWatch& other) const;
+  [[nodiscard]] bool is_no_chance(TimePoint t, const SensorWatch* other) const;
+  [[nodiscard]] bool moves_with(TimePoint t, const SensorWatch& other) const;
+  [[nodiscard]] double unseen_dps(double rate_dps) const;
   [[nodiscard]] Duration run_time(TimePoint t) const { return t - run_begin_; }
 
   SensorLimits limits_;
-  Movement movement_;
+  Movement movement_{std::chrono::milliseconds(500)};
+  Movement quick_{std::chrono::milliseconds(100)};
   Habit habit_;
   ValueStep step_;
   bool any_ = false;
@@ -142,9 +191,13 @@ class SensorWatch {
   TimePoint run_begin_;
   std::uint64_t run_ = 0;      ///< equal values in a row, this one included
   bool run_is_fault_ = false;  ///< found saturated or stuck
+  bool leapt_ = false;         ///< into this run
   Duration longest_run_time_{0};
-  std::int64_t asked_block_ = std::numeric_limits<std::int64_t>::min();
-  double peak_dps_ = 0.0;  ///< largest magnitude before this run
+  std::uint64_t asked_ = 0;        ///< blocks of the other one that were looked at
+  std::uint64_t asked_quick_ = 0;  ///< likewise
+  bool unproven_ = false;          ///< dead from the start, until it moves with the other one
+  TimePoint alive_since_;          ///< its first change then
+  double peak_dps_ = 0.0;          ///< largest magnitude before this run
   double clip_dps_ = std::numeric_limits<double>::infinity();  ///< found: it clips there
 };
 

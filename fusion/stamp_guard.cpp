@@ -4,33 +4,95 @@
 
 namespace vgyro::fusion {
 
+namespace {
+
+// A slow stream may lose a frame or two without a wait for confirmations.
+constexpr int kForwardIntervals = 3;
+// Share of a new interval in what is known of them.
+constexpr int kIntervalShare = 8;
+// Even spacing: to a quarter.
+constexpr int kSpacingShare = 4;
+
+}  // namespace
+
 StampGuard::Verdict StampGuard::check(std::size_t stream_index, TimePoint raw, TimePoint& time) {
   Stream& stream = streams_[stream_index];
   time = raw + offset_;
   const Duration step = time - stream.last;
   if (stream.seen && step == Duration::zero()) return Verdict::kRepeated;
-  const bool usual = !stream.seen || (step > -kReorderMax && step <= kForwardMax);
+  const bool usual = !stream.seen || (step > -kReorderMax && step <= forward_most(stream));
   if (!usual) return consider(stream_index, time);
+  follow(stream, time);
+  return Verdict::kAccepted;
+}
+
+Duration StampGuard::forward_most(const Stream& stream) {
+  return std::max<Duration>(kForwardMax, kForwardIntervals * stream.interval);
+}
+
+void StampGuard::follow(Stream& stream, TimePoint time) {
+  const Duration step = time - stream.last;
+  if (stream.seen && step > Duration::zero()) {
+    stream.interval =
+        stream.interval == Duration::zero()
+            ? std::min(step, kSlowest)
+            : stream.interval + (std::min(step, kSlowest) - stream.interval) / kIntervalShare;
+  }
+  stream.last = stream.seen ? std::max(stream.last, time) : time;
   stream.seen = true;
   stream.confirmations = 0;
-  stream.last = std::max(stream.last, time);
-  return Verdict::kAccepted;
+}
+
+// One more stamp that is far from the last one: do they agree by now?
+bool StampGuard::confirm(Stream& stream, TimePoint time) {
+  const Duration since = time - stream.candidate;
+  const bool close_by = since > Duration::zero() && since <= kConfirmWithin;
+  const bool first_spacing = stream.confirmations == 1;
+  const bool even =
+      since > Duration::zero() && since <= kSlowest &&
+      (first_spacing || std::chrono::abs(since - stream.spacing) * kSpacingShare <= stream.spacing);
+  if (stream.confirmations > 0 && (close_by || even)) {
+    ++stream.confirmations;
+    stream.close_by = stream.close_by && close_by;
+  } else {
+    stream.confirmations = 1;
+    stream.close_by = true;
+  }
+  stream.candidate = time;
+  stream.spacing = since;
+  return stream.confirmations >= (stream.close_by ? kConfirmations : kSlowConfirmations);
 }
 
 StampGuard::Verdict StampGuard::consider(std::size_t stream_index, TimePoint& time) {
   Stream& stream = streams_[stream_index];
-  const Duration since = time - stream.candidate;
-  const bool agrees =
-      stream.confirmations > 0 && since > Duration::zero() && since <= kConfirmWithin;
-  stream.confirmations = agrees ? stream.confirmations + 1 : 1;
-  stream.candidate = time;
-  if (stream.confirmations < kConfirmations) return Verdict::kUnconfirmed;
+  if (stream.confirmations > 0) {
+    // The same frame again, or one that was overtaken, neither confirms nor contradicts.
+    if (time == stream.candidate) return Verdict::kRepeated;
+    const bool overtaken = time < stream.candidate && stream.candidate - time < kReorderMax;
+    if (overtaken) return Verdict::kUnconfirmed;
+  }
+  if (!confirm(stream, time)) return Verdict::kUnconfirmed;
+  if (!stream.close_by) stream.interval = stream.spacing;
   stream.confirmations = 0;
   if (time > stream.last) {
     stream.last = time;
     return Verdict::kAccepted;
   }
-  if (stream_index >= kLeaders) return Verdict::kUnconfirmed;
+  if (stream_index < kLeaders) return step_back(stream_index, time);
+  // It was ahead of the gyros, and has come back to them.
+  if (!near_a_leader(time)) return Verdict::kUnconfirmed;
+  stream.last = time;
+  return Verdict::kAccepted;
+}
+
+bool StampGuard::near_a_leader(TimePoint time) const {
+  return std::any_of(streams_.begin(), streams_.begin() + kLeaders, [&](const Stream& leader) {
+    return leader.seen && std::chrono::abs(time - leader.last) <= forward_most(leader);
+  });
+}
+
+StampGuard::Verdict StampGuard::step_back(std::size_t stream_index, TimePoint& time) {
+  Stream& stream = streams_[stream_index];
   TimePoint newest = stream.last;
   for (std::size_t leader = 0; leader < kLeaders; ++leader) {
     if (streams_[leader].seen) newest = std::max(newest, streams_[leader].last);

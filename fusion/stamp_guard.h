@@ -2,8 +2,9 @@
 
 // Raw stamps in, monotone time out. Stamps come from a clock that may be set, and from frames that
 // may be garbage: one stamp far off its neighbours is refused; three in a row that agree with each
-// other are believed. Set back by more than the reorder limit, the common offset takes it up, so
-// that time as the estimation sees it never runs backwards. One guard serves all streams of a host.
+// other are believed, or four of a slow stream at its own pace. Set back by more than the reorder
+// limit, the common offset takes it up, so that time as the estimation sees it never runs
+// backwards. One guard serves all streams of a host.
 
 #include <array>
 #include <cstdint>
@@ -21,6 +22,10 @@ class StampGuard {
   static constexpr Duration kForwardMax = std::chrono::seconds(1);
   static constexpr Duration kConfirmWithin = std::chrono::seconds(1);
   static constexpr int kConfirmations = 3;
+  /// Of a stream whose stamps are further apart than kConfirmWithin, but evenly.
+  static constexpr int kSlowConfirmations = 4;
+  /// No stream that says less is worth listening to.
+  static constexpr Duration kSlowest = std::chrono::seconds(5);
 
   enum class Verdict : std::uint8_t { kAccepted, kRepeated, kUnconfirmed, kClockStep };
 
@@ -30,15 +35,25 @@ class StampGuard {
 
   /// monotone = raw + offset
   [[nodiscard]] Duration offset() const { return offset_; }
+  /// Between the stream's stamps of late; 0 before there were two.
+  [[nodiscard]] Duration interval(std::size_t stream) const { return streams_[stream].interval; }
 
  private:
   struct Stream {
     bool seen = false;
-    TimePoint last;       ///< newest accepted, monotone
-    TimePoint candidate;  ///< newest stamp that waits for confirmation, monotone
+    TimePoint last;        ///< newest accepted, monotone
+    Duration interval{0};  ///< of late
+    TimePoint candidate;   ///< newest stamp that waits for confirmation, monotone
+    Duration spacing{0};   ///< between it and the one before
     int confirmations = 0;
+    bool close_by = true;  ///< all of these within kConfirmWithin of each other
   };
+  [[nodiscard]] static Duration forward_most(const Stream& stream);
+  static void follow(Stream& stream, TimePoint time);
+  static bool confirm(Stream& stream, TimePoint time);
   Verdict consider(std::size_t stream_index, TimePoint& time);
+  Verdict step_back(std::size_t stream_index, TimePoint& time);
+  [[nodiscard]] bool near_a_leader(TimePoint time) const;
 
   std::array<Stream, kStreams> streams_;
   Duration offset_{0};

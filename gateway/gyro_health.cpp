@@ -65,7 +65,7 @@ std::optional<Fault> GyroHealth::fault_in(fusion::SensorWatch::Finding finding,
                                           bool can_spare) const {
   using Finding = fusion::SensorWatch::Finding;
   if (finding == Finding::kSaturated) return Fault::kSaturated;
-  if (finding == Finding::kStuck) return Fault::kStuck;
+  if (finding == Finding::kStuck || finding == Finding::kStanding) return Fault::kStuck;
   const bool defect = fault_ && is_defect(*fault_);
   if (finding == Finding::kBlind && can_spare && !defect) return Fault::kDeadBand;
   return std::nullopt;
@@ -76,6 +76,7 @@ std::optional<Reject> GyroHealth::judge(TimePoint t, double rate_dps, const Gyro
   unusable_in_row_ = 0;
   const auto finding = watch_.judge(t, rate_dps, other != nullptr ? &other->watch_ : nullptr);
   if (const auto found = fault_in(finding, can_spare)) {
+    hasty_ = finding == fusion::SensorWatch::Finding::kStanding && (hasty_ || !fault_);
     bad(t, *found);
     return reject_of(*found);
   }
@@ -100,6 +101,7 @@ void GyroHealth::refuse(TimePoint t, Reject cause) {
 }
 
 void GyroHealth::bad(TimePoint t, Fault fault) {
+  hasty_ = hasty_ && fault == Fault::kStuck;
   if (!fault_ && is_defect(fault)) {
     const bool relapse = any_episode_ && t - last_episode_end_ < kRelapseWithin;
     relapses_ = relapse ? std::min(relapses_ + 1, kRelapsesMost) : 0;
@@ -117,7 +119,7 @@ void GyroHealth::note(TimePoint t, Fault fault, bool begins) {
 }
 
 bool GyroHealth::recovered(TimePoint t) const {
-  const Probation probation = probation_of(*fault_);
+  const Probation probation = hasty_ ? kShort : probation_of(*fault_);
   const Duration time = is_defect(*fault_) ? probation.time * (1U << relapses_) : probation.time;
   return good_in_row_ > probation.samples && t - last_bad_ >= time;
 }

@@ -59,6 +59,7 @@ class GyroHealth {
   fusion::SensorWatch watch_;
   std::array<FaultRecord, kFaultCount> records_{};
   std::optional<Fault> fault_;  ///< for which it is set aside
+  bool hasty_ = false;          ///< on a few samples, of which nothing worse was found since
   bool noisy_ = false;
   bool blind_ = false;
   std::uint32_t unusable_in_row_ = 0;

@@ -32,6 +32,8 @@ constexpr std::size_t kNobody = 2;
 constexpr int kTimeOutIntervals = 10;
 constexpr Duration kTimeOutMin = std::chrono::milliseconds(100);
 constexpr Duration kTimeOutMax = std::chrono::seconds(1);
+// But nobody is missed before he has failed to come twice.
+constexpr int kTimeOutIntervalsMin = 3;
 
 // VG_Bias stands on a grid of the bus's time. Samples drive it; the timer steps in only when none
 // came for half a period more, so that a replay sends the same frames at the same places.
@@ -154,6 +156,7 @@ struct Pipeline::Impl {
   std::size_t alone = kNobody;          ///< gyro that speaks alone
   TimePoint next_bias{};
   TimePoint deadline{};  ///< nothing is due before; may lie too early, never too late
+  TimePoint reached{};   ///< newest time that was believed
   TimePoint suspect{};   ///< stamp far ahead that nobody has confirmed yet
 };
 
@@ -347,6 +350,7 @@ void Pipeline::Impl::take_sample(std::size_t gyro, TimePoint t, double rate_dps,
   // First what is due, or a silence of both would be noticed of one alone.
   if (t >= deadline) do_what_is_due(t, stamp, sink);
   heard[gyro] = true;
+  reached = t;
   last_heard[gyro] = std::max(last_heard[gyro], t);
   fusion::AlignedPair pair;
   while (aligner.pop(pair))
@@ -387,7 +391,8 @@ void Pipeline::Impl::take_pair(const fusion::AlignedPair& pair, TimePoint stamp,
   }
   // A silence came before the choice of who paces: what waited for it is no rate of now.
   const Duration age = pair.complete - pair.t;
-  if (calibrated && age > time_out(aligner.pacing_gyro())) return;
+  // What is known to come late does.
+  if (calibrated && age - lag_most() > time_out(aligner.pacing_gyro())) return;
   send_rate(rate, calibrated, pair.t, age, stamp, sink);
   send_bias_when_due(pair.t + lag_most(), stamp, sink);
 }
@@ -531,7 +536,7 @@ void Pipeline::Impl::enter_state(TimePoint stamp, FrameSink& sink) {
 
 // Of the samples that made the choice; where the clock was set among them it says nothing.
 Duration Pipeline::Impl::usual_interval(std::size_t gyro) const {
-  return std::min<Duration>(aligner.interval(gyro), kTimeOutMax);
+  return std::min<Duration>(aligner.interval(gyro), fusion::StampGuard::kSlowest);
 }
 
 // Samples of a slow gyro keep their right to drive VG_Bias.
@@ -541,8 +546,10 @@ Duration Pipeline::Impl::bias_grace() const {
 }
 
 Duration Pipeline::Impl::time_out(std::size_t gyro) const {
-  if (!aligner.chosen()) return kTimeOutMax;
-  return std::clamp<Duration>(kTimeOutIntervals * usual_interval(gyro), kTimeOutMin, kTimeOutMax);
+  const Duration interval = aligner.chosen() ? usual_interval(gyro) : guard.interval(gyro);
+  const Duration most = std::max<Duration>(kTimeOutMax, kTimeOutIntervalsMin * interval);
+  if (!aligner.chosen()) return most;
+  return std::clamp<Duration>(kTimeOutIntervals * interval, kTimeOutMin, most);
 }
 
 // A gyro speaks alone only when the other one has really gone: not while pairs are about to start.
@@ -561,13 +568,14 @@ void Pipeline::Impl::let_time_pass(TimePoint stamp, FrameSink& sink) {
   if (!can_be_time(stamp)) return;
   const TimePoint t = whole_microseconds(stamp) + guard.offset();
   if (t < deadline) return;
-  const bool far_ahead = deadline != TimePoint{} && t - deadline > kOverdueMax;
+  const bool far_ahead = reached != TimePoint{} && t - reached > kOverdueMax;
   const bool confirmed = t >= suspect && t - suspect <= kOverdueMax;
   suspect = far_ahead ? t : TimePoint{};
   if (!far_ahead || confirmed) do_what_is_due(t, stamp, sink);
 }
 
 void Pipeline::Impl::do_what_is_due(TimePoint t, TimePoint stamp, FrameSink& sink) {
+  reached = t;
   TimePoint next = TimePoint::max();
   for (std::size_t gyro = 0; gyro < 2; ++gyro) {
     if (!heard[gyro] && !health_of[gyro].set_aside()) continue;
@@ -686,6 +694,7 @@ const Status& Pipeline::Impl::refreshed_status() {
     status.gyros[gyro].waits_for = surroundings.missing(gyro, needs[gyro]);
     status.gyros[gyro].unpaired = aligner.counts().unpaired[gyro];
   }
+  status.rates_too_far_apart = aligner.chosen() && aligner.too_far_apart();
   status.bias_sigma_dps = drift.bias_sigma_dps;
   status.disagree = pairing && condition.disagree;
   status.disagreements = condition.disagreements;

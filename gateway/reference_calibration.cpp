@@ -12,8 +12,9 @@ void ReferenceCalibration::add_pair(const fusion::AlignedPair& pair) {
 }
 
 void ReferenceCalibration::add_reference(TimePoint t, double rate_dps) {
-  if (newest_ && t <= newest_->t) return;
-  before_ = newest_;
+  const bool set_back = newest_ && newest_->t - t > kGapMax;
+  if (newest_ && t <= newest_->t && !set_back) return;
+  before_ = set_back ? std::nullopt : newest_;
   newest_ = Sample{t, rate_dps};
 }
 

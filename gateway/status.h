@@ -118,7 +118,8 @@ struct Status {
   std::uint64_t speed_frames = 0;
   std::uint64_t speed_rejected = 0;
   std::uint64_t pairs = 0;
-  std::uint64_t clock_steps = 0;  ///< times the stamps were set back
+  bool rates_too_far_apart = false;  ///< of the gyros: no buffer reaches from sample to sample
+  std::uint64_t clock_steps = 0;     ///< times the stamps were set back
   std::uint64_t rates_out = 0;
   std::uint64_t rates_out_valid = 0;
   std::uint64_t rates_out_of_range = 0;  ///< virtual rate beyond what VG_Rate can carry

@@ -331,6 +331,16 @@ class BadInput(Replay):
         self.write("in.log", "".join([l for l in self.lines if "can0" in l] + [l for l in later if "can1" in l]))
         self.assertIn("never spoke at the same time", self.refuse("-q", "in.log"))
 
+    def test_gyros_of_rates_too_far_apart_say_so(self):
+        # 5 kHz beside a frame in 1.5 s: the samples from one to the next do not fit.
+        begin_us = 1_700_000_000_000_000
+        lines = [(i * 200, bench.line_a(begin_us + i * 200, 0.5, i)) for i in range(125_000)]
+        lines += [(i * 1_500_000, bench.line_b(begin_us + i * 1_500_000, 0.3)) for i in range(16)]
+        self.write("in.log", "".join(line for _, line in sorted(lines)))
+        said = self.refuse("-q", "in.log")
+        for part in ("gyro left speaks so much more often than gyro right", "no pairs", "2000 times"):
+            self.assertIn(part, said)
+
     def test_saved_state_that_cannot_be_used(self):
         whole = b"format = 2\n"
         whole += b'\n[checksum]\ncrc32 = "%08x"\n' % zlib.crc32(whole)

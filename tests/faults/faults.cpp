@@ -1,5 +1,6 @@
 // The pipeline and its transmit queue under faults, and for a long day; no bus, no clock.
 //   vgyro_faults sequences COUNT FIRST_SEED    random faults; a failed seed goes to stderr
+//   vgyro_faults shifted COUNT FIRST_SEED      the same at other times of day: the same rates
 //   vgyro_faults drive HOURS                   a drive with stops
 // Both print JSON. Truth and noise are made here, frames by hand, and what comes out is read from
 // its bits.
@@ -191,7 +192,11 @@ constexpr double kLateMost_s = 0.02;
 
 class Sequence final : public gateway::FrameSink, public can::Sender {
  public:
-  explicit Sequence(std::uint64_t seed) : dice_{std::mt19937_64(seed)}, plan_(plan()) {
+  explicit Sequence(std::uint64_t seed, Duration later = Duration{0})
+      : dice_{std::mt19937_64(seed)},
+        send_dice_{std::mt19937_64(~seed)},
+        plan_(plan()),
+        start_(time_from_ns(kStart_ns) + later) {
     pipeline_.emplace(plan_);
     const unsigned count = 3 + dice_.below(6);
     for (unsigned i = 0; i < count; ++i) {
@@ -232,10 +237,13 @@ class Sequence final : public gateway::FrameSink, public can::Sender {
   [[nodiscard]] std::uint64_t stale() const { return queue_.counts().dropped_stale; }
   [[nodiscard]] double worst_dps() const { return worst_dps_; }
   [[nodiscard]] const std::vector<Fault>& faults() const { return faults_; }
+  /// All that VG_Rate said, but for check value and counter, and when.
+  [[nodiscard]] const std::vector<std::uint8_t>& said() const { return said_; }
 
   void put(const Frame& frame, TimePoint /*stamp*/) override {
     queue_.push(frame, steady_ + std::chrono::milliseconds(20));
     if (frame.id != 0x610) return;
+    note(frame);
     made_.emplace_back(t_s_, frame);
     if (made_.size() > 200) made_.erase(made_.begin(), made_.begin() + 100);
     check_rate(rate_of(frame));
@@ -244,10 +252,11 @@ class Sequence final : public gateway::FrameSink, public can::Sender {
   SendResult send(const Frame& frame) override {
     for (const Fault& fault : faults_) {
       if (!active(fault)) continue;
-      if (fault.kind == Kind::kNoBuffer && dice_.below(3) != 0) return SendResult::kNoBuffer;
-      if (fault.kind == Kind::kWouldBlock && dice_.below(3) != 0) return SendResult::kWouldBlock;
       if (fault.kind == Kind::kLinkDown) return SendResult::kLinkDown;
-      if (fault.kind == Kind::kSendFails && dice_.below(3) != 0) return SendResult::kFailed;
+      if (send_dice_.below(3) == 0) continue;
+      if (fault.kind == Kind::kNoBuffer) return SendResult::kNoBuffer;
+      if (fault.kind == Kind::kWouldBlock) return SendResult::kWouldBlock;
+      if (fault.kind == Kind::kSendFails) return SendResult::kFailed;
     }
     if (crc8(frame) != frame.data[0]) failure_ = "a frame with a wrong checksum";
     if (frame.id == 0x610) {
@@ -315,8 +324,15 @@ class Sequence final : public gateway::FrameSink, public can::Sender {
   }
 
   TimePoint stamp_of(double t_s) const {
-    return time_from_ns(kStart_ns +
-                        static_cast<std::int64_t>(std::llround((t_s + offset_s_) * 1e9)));
+    return start_ + std::chrono::nanoseconds(std::llround((t_s + offset_s_) * 1e9));
+  }
+
+  void note(const Frame& frame) {
+    constexpr std::ptrdiff_t kHeader = 2;
+    said_.insert(said_.end(), frame.data.begin() + kHeader, frame.data.begin() + frame.length);
+    const auto when_us = static_cast<std::uint64_t>(std::llround(t_s_ * 1e6));
+    for (unsigned i = 0; i < 4; ++i)
+      said_.push_back(static_cast<std::uint8_t>(when_us >> (8U * i)));
   }
 
   void hand_on(std::size_t gyro, double reading, unsigned counter) {
@@ -430,7 +446,10 @@ class Sequence final : public gateway::FrameSink, public can::Sender {
   }
 
   Dice dice_;
+  Dice send_dice_;  ///< what the bus does must not change what the gyros do
   gateway::Plan plan_;
+  TimePoint start_;
+  std::vector<std::uint8_t> said_;
   std::optional<gateway::Pipeline> pipeline_;
   std::optional<gateway::SavedState> kept_;
   can::TransmitQueue queue_;
@@ -491,6 +510,30 @@ int run_sequences(unsigned count, std::uint64_t first_seed) {
       count, static_cast<unsigned long long>(first_seed), failed,
       static_cast<unsigned long long>(faults), static_cast<unsigned long long>(valid),
       static_cast<unsigned long long>(stale), worst, at(0.5), at(0.99), at(1.0));
+  return failed == 0 ? 0 : 1;
+}
+
+// VG_Bias keeps to the bus's time, so frames in between may come elsewhere; rates may not.
+int run_shifted(unsigned count, std::uint64_t first_seed) {
+  constexpr std::array kLater{std::chrono::milliseconds(37), std::chrono::milliseconds(12'345'678),
+                              std::chrono::milliseconds(-499)};
+  unsigned failed = 0;
+  std::size_t compared = 0;
+  for (std::uint64_t seed = first_seed; seed < first_seed + count; ++seed) {
+    Sequence sequence(seed);
+    sequence.run();
+    for (const auto later : kLater) {
+      Sequence shifted(seed, later);
+      shifted.run();
+      compared += shifted.said().size();
+      if (shifted.said() == sequence.said()) continue;
+      ++failed;
+      std::fprintf(stderr, "seed %llu: other rates when it is %lld ms later\n",
+                   static_cast<unsigned long long>(seed), static_cast<long long>(later.count()));
+    }
+  }
+  std::printf("{\"sequences\": %u, \"first_seed\": %llu, \"failed\": %u, \"bytes\": %zu}\n", count,
+              static_cast<unsigned long long>(first_seed), failed, compared);
   return failed == 0 ? 0 : 1;
 }
 
@@ -595,7 +638,10 @@ int main(int argc, char** argv) {
   if (mode == "sequences" && argc == 4)
     return run_sequences(static_cast<unsigned>(std::atoi(argv[2])),
                          std::strtoull(argv[3], nullptr, 10));
+  if (mode == "shifted" && argc == 4)
+    return run_shifted(static_cast<unsigned>(std::atoi(argv[2])),
+                       std::strtoull(argv[3], nullptr, 10));
   if (mode == "drive" && argc == 3) return run_drive(std::atof(argv[2]));
-  std::fputs("usage: vgyro_faults sequences COUNT FIRST_SEED | drive HOURS\n", stderr);
+  std::fputs("usage: vgyro_faults sequences|shifted COUNT FIRST_SEED | drive HOURS\n", stderr);
   return 2;
 }

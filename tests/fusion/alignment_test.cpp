@@ -544,5 +544,102 @@ TEST(Aligner, AveragesAGyroAHundredTimesFaster) {
   expect_on_lines(result);
 }
 
+// As far as the buffers reach: a pair of gyros of which one says a thousand values to the other's
+// two.
+TEST(Aligner, AveragesAGyroTwoThousandTimesFaster) {
+  for (const double slow_hz : {3.0, 2.0, 1.0}) {
+    const Aligned result =
+        align(stream_of(2000.0, 0ms, 30.0, line_a), stream_of(slow_hz, 300us, 30.0, line_b));
+    ASSERT_TRUE(result.aligner.chosen());
+    EXPECT_FALSE(result.aligner.too_far_apart());
+    EXPECT_GE(static_cast<double>(result.pairs.size()), 30.0 * slow_hz - 9.0) << slow_hz;
+    for (const AlignedPair& pair : result.pairs)
+      ASSERT_NEAR(pair.rate_dps[0], line_a(seconds(pair.t)), 1e-9);
+  }
+  const Aligned result =
+      align(stream_of(4000.0, 0ms, 30.0, line_a), stream_of(1.0, 300us, 30.0, line_b));
+  EXPECT_TRUE(result.aligner.too_far_apart());
+}
+
+// --- a choice that was made among garbage is made again
+// ------------------------------------------
+
+Stream burst(int count, Duration phase) {
+  Stream stream;
+  for (int i = 0; i < count; ++i)
+    stream.push_back({kStart + phase + i * 31us, 0.0});
+  return stream;
+}
+
+Stream joined(Stream first, const Stream& second) {
+  first.insert(first.end(), second.begin(), second.end());
+  return first;
+}
+
+struct PacePair {
+  double a_hz;
+  double b_hz;
+};
+
+// Two queues that were emptied at once look like gyros of thirty kilohertz.
+TEST(Aligner, ChoosesAgainWhenTheFirstSamplesWereABurst) {
+  for (const PacePair pace :
+       {PacePair{100.0, 100.0}, {100.0, 1000.0}, {1000.0, 100.0}, {83.0, 52.0}}) {
+    for (const int which : {0, 1, 2}) {
+      SCOPED_TRACE(::testing::Message() << pace.a_hz << " and " << pace.b_hz << " Hz, " << which);
+      const Stream a =
+          joined(which != 1 ? burst(20, 0us) : Stream{}, stream_of(pace.a_hz, 5ms, 10.0, line_a));
+      const Stream b =
+          joined(which != 0 ? burst(20, 7us) : Stream{}, stream_of(pace.b_hz, 8ms, 10.0, line_b));
+      Aligned result = align(a, b);
+      std::erase_if(result.pairs, [](const AlignedPair& pair) { return seconds(pair.t) < 4.0; });
+      EXPECT_GE(static_cast<double>(result.pairs.size()),
+                6.0 * std::min(pace.a_hz, pace.b_hz) - 5.0);
+      for (const AlignedPair& pair : result.pairs) {
+        ASSERT_NEAR(pair.rate_dps[0], line_a(seconds(pair.t)), 1e-9);
+        ASSERT_NEAR(pair.rate_dps[1], line_b(seconds(pair.t)), 1e-9);
+      }
+      expect_growing(result.pairs);
+    }
+  }
+}
+
+// A gyro that is set to another rate, and one that was choked at first.
+TEST(Aligner, FollowsAGyroToAnotherRate) {
+  for (const PacePair rates :
+       {PacePair{100.0, 10.0}, {10.0, 100.0}, {3.0, 100.0}, {1000.0, 50.0}}) {
+    SCOPED_TRACE(::testing::Message() << rates.a_hz << " then " << rates.b_hz << " Hz");
+    const Stream b = stream_of(100.0, 3ms, 60.0, line_b);
+    Stream a = without(stream_of(rates.a_hz, 0ms, 60.0, line_a), 30.0, 60.0);
+    a = joined(a, without(stream_of(rates.b_hz, 0ms, 60.0, line_a), 0.0, 30.0));
+    const Aligned result = align(a, b);
+    expect_growing(result.pairs);
+    const auto late = std::count_if(result.pairs.begin(), result.pairs.end(),
+                                    [](const auto& pair) { return seconds(pair.t) >= 45.0; });
+    EXPECT_GE(static_cast<double>(late), 15.0 * std::min(rates.b_hz, 100.0) - 3.0);
+    EXPECT_NEAR(to_seconds(result.aligner.interval(0)), 1.0 / rates.b_hz, 0.1 / rates.b_hz);
+    for (const AlignedPair& pair : result.pairs)
+      ASSERT_NEAR(pair.rate_dps[1], line_b(seconds(pair.t)), 1e-9);
+  }
+}
+
+// Jitter, losses and queues that deliver in heaps are no other pace: no pair is lost to a doubt.
+TEST(Aligner, KeepsItsChoiceThroughJitterLossesAndHeaps) {
+  Random random(31);
+  Stream a = stream_of(100.0, 0ms, 300.0, line_a);
+  Stream b = stream_of(100.0, 3ms, 300.0, line_b);
+  std::erase_if(a, [&](const Sample&) { return random.uniform(0.0, 1.0) < 0.25; });
+  for (std::size_t i = 0; i < b.size(); ++i) {
+    const std::size_t heap = i / 5 * 5 + 4;
+    const Duration late = heap < b.size() ? b[heap].t - b[i].t : Duration::zero();
+    if (i > 100) b[i].t += late * 6 / 10;
+  }
+  const Aligned result = align(merged(a, b));
+  EXPECT_EQ(result.refused, 0);
+  const Duration first = result.aligner.interval(0);
+  EXPECT_GE(static_cast<double>(result.pairs.size()), 0.98 * static_cast<double>(a.size()));
+  EXPECT_NEAR(to_seconds(first), 0.0125, 0.0035);
+}
+
 }  // namespace
 }  // namespace vgyro::fusion

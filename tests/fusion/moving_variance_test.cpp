@@ -62,5 +62,16 @@ TEST(MovingVariance, IsBounded) {
   EXPECT_NEAR(moving.variance(), 0.25, 1e-9);
 }
 
+// The stream had run ahead by an hour and has come back.
+TEST(MovingVariance, BeginsAnewWhenTimeIsSetBack) {
+  MovingVariance moving;
+  for (int i = 0; i < 10; ++i)
+    moving.add(TimePoint{ms(3'600'000 + 10 * i)}, i % 2 == 0 ? 5.0 : -5.0);
+  for (int i = 0; i < 10; ++i)
+    moving.add(TimePoint{ms(10 * i)}, i % 2 == 0 ? 1.0 : 3.0);
+  EXPECT_EQ(moving.count(), 10U);
+  EXPECT_NEAR(moving.variance(), 1.0, 1e-12);
+}
+
 }  // namespace
 }  // namespace vgyro::fusion

@@ -317,6 +317,68 @@ TEST(MutualCorrector, PassesOverASilenceOfAnyLengthInOneStep) {
   EXPECT_NEAR(static_cast<double>(corrector->windows().skipped), 1e12, 1e12 * 1e-9);
 }
 
+// --- over a leap of time the lines are held
+// ------------------------------------------------------
+
+Polynomial line(double at_s, double value, double slope) {
+  return {.centre_s = at_s, .half_width_s = 1.0, .coefficient = {value, slope, 0.0, 0.0}};
+}
+
+/// Every eighth of a second, from gyros whose difference is what the calibration has taught.
+void feed(Corrector& corrector, double from_s, double to_s, const Polynomial& difference) {
+  for (int i = 0; from_s + i * 0.125 < to_s; ++i) {
+    const double t_s = from_s + i * 0.125;
+    corrector.update({t_s, {0.5 * difference.at(t_s), -0.5 * difference.at(t_s)}});
+  }
+}
+
+// The clock is set, or the bus was silent: nobody knows what the drifts did, least of all a slope
+// that some seconds have taught. Every line goes on where it was.
+TEST(MutualCorrector, ExtendsNoLineOverALeapOfTime) {
+  for (const double leap_s : {11.0, 3600.0, 72e3, 1e9}) {
+    for (const double first_s : {kStart_s, 70.0, 75.0, 83.0}) {
+      SCOPED_TRACE(::testing::Message() << leap_s << " s at " << first_s << " s");
+      const auto corrector =
+          started(1, 10.0, calibration_of(line(kStart_s, 0.5, 1e-3), line(kStart_s, 0.25, 2e-3)));
+      feed(*corrector, kStart_s, first_s, line(kStart_s, 0.25, 2e-3));
+      const double last_s = std::max(first_s - 0.125, kStart_s);
+      const Drift before = corrector->drift(last_s);
+      const double later_s = last_s + leap_s;
+      const double change_dps = 1e-3 * leap_s;
+      // Within what a window may teach of it: the sum's and the difference's slope over ten
+      // seconds.
+      const double most_dps = std::min(change_dps, 0.05);
+      EXPECT_NEAR(corrector->drift(later_s).bias_dps[0], before.bias_dps[0], most_dps);
+      const double rate_dps = corrector->update({later_s, {0.0, 0.0}}).rate_dps;
+      EXPECT_NEAR(rate_dps, -0.5 * (before.bias_dps[0] + before.bias_dps[1]), 1e-12);
+      const Drift after = corrector->drift(later_s);
+      for (const std::size_t gyro : {0U, 1U})
+        EXPECT_NEAR(after.bias_dps[gyro], before.bias_dps[gyro], 1e-9);
+      // From there on it is the method again.
+      EXPECT_NEAR(corrector->update({later_s + 1.0, {0.0, 0.0}}).rate_dps, rate_dps - 5e-4, 1e-6);
+      EXPECT_DOUBLE_EQ(corrector->drift(later_s).slope_dps_s, 5e-4);
+    }
+  }
+}
+
+TEST(MutualCorrector, ExtendsNoLineOverALeapWhileOneGyroIsAlone) {
+  const auto corrector =
+      started(1, 10.0, calibration_of(line(kStart_s, 0.5, 1e-3), line(kStart_s, 0.25, 2e-3)));
+  const double before_dps = alone(*corrector, 0, kStart_s, 0.0).rate_dps;
+  EXPECT_NEAR(alone(*corrector, 0, kStart_s + 1e6, 0.0).rate_dps, before_dps, 1e-12);
+}
+
+// One gyro is away for an hour: the line of the difference reaches over one window, as the method
+// uses it, and no further. The sum is the calibration's, as ever.
+TEST(MutualCorrector, ExtendsTheDifferenceOverNoMoreThanOneWindowWithoutAFit) {
+  const auto corrector = started(1, 10.0, calibration_of(constant(0.0), line(kStart_s, 0.0, 2e-3)));
+  for (int i = 0; i < 3600; ++i)
+    alone(*corrector, 0, kStart_s + i, 0.0);
+  EXPECT_NEAR(alone(*corrector, 0, kStart_s + 3600.0, 0.0).rate_dps, -0.5 * 2e-3 * 10.0, 1e-12);
+  const Drift drift = corrector->drift(kStart_s + 3600.0);
+  EXPECT_NEAR(drift.bias_dps[0] - drift.bias_dps[1], 2e-3 * 10.0, 1e-12);
+}
+
 // When one gyro falls silent, the other goes on less its own last drift.
 TEST(MutualCorrector, CarriesOnWithOneGyroLessItsOwnDrift) {
   const auto corrector = started(1, 10.0, calibration_of(constant(0.5), constant(0.1)));

@@ -5,6 +5,7 @@
 #include <functional>
 #include <numbers>
 #include <optional>
+#include <string>
 
 #include <gtest/gtest.h>
 
@@ -85,7 +86,7 @@ struct Two {
   [[nodiscard]] bool all_sound(std::size_t gyro) const { return !first_s[gyro]; }
 
   std::array<SensorWatch, 2> watches;
-  std::array<std::array<std::uint64_t, 4>, 2> count{};
+  std::array<std::array<std::uint64_t, 5>, 2> count{};
   std::array<std::optional<double>, 2> first_s;
   std::array<double, 2> last_s{};
 };
@@ -299,6 +300,161 @@ TEST(SensorWatchStuck, PauseIsNoStandstill) {
   for (int i = 0; i < 200; ++i)
     two.step(0, 60.0 + 1.5 * i, 0.005);
   EXPECT_TRUE(two.all_sound(0));
+}
+
+// It freezes, or says 0, while the platform turns: a handful of values that its own noise makes
+// impossible are enough. The other one is believed all the while.
+TEST(SensorWatchStuck, FineSensorIsHeldAsideAfterAHandfulOfEqualValuesInATurn) {
+  for (const double step_dps : {1e-4, 1e-3, 5e-3}) {
+    for (const bool to_zero : {false, true}) {
+      for (const double rate_hz : {50.0, 100.0, 500.0}) {
+        SCOPED_TRACE(::testing::Message() << "step " << step_dps << " deg/s, to zero " << to_zero
+                                          << ", " << rate_hz << " Hz, seed 40");
+        Random random(40);
+        const auto turn = [](double t_s) { return 10.0 * std::sin(0.3 * t_s); };
+        const Signal well = rounded(noisy(turn, 0.02, random), step_dps);
+        const Signal other = noisy(turn, 0.05, random);
+        Two two;
+        two.run(well, other, 0.0, 125.0, rate_hz);
+        ASSERT_TRUE(two.all_sound(0)) << *two.first_s[0];
+        const double value = to_zero ? 0.0 : well(125.0);
+        two.run([&](double) { return value; }, other, 125.0, 125.2, rate_hz);
+        ASSERT_TRUE(two.first_s[0]);
+        const int most = step_dps < 5e-3 ? 5 : 9;
+        EXPECT_LE(*two.first_s[0] - 125.0, (most - 0.5) / rate_hz);
+        EXPECT_GT(two.of(0, Finding::kStanding), 0U);
+        EXPECT_EQ(two.of(0, Finding::kStuck), 0U) << "that takes longer";
+        two.run([&](double) { return value; }, other, 125.2, 126.0, rate_hz);
+        EXPECT_GT(two.of(0, Finding::kStuck), 0U);
+        EXPECT_TRUE(two.all_sound(1));
+        const double before_s = two.last_s[0];
+        two.run(well, other, 126.0, 140.0, rate_hz);
+        EXPECT_EQ(two.last_s[0], before_s) << "the first other value is the end of it";
+      }
+    }
+  }
+}
+
+// A coarse sensor may well repeat its value in a turn, but not leap to another one and stay there
+// while the other one goes on.
+TEST(SensorWatchStuck, CoarseSensorThatLeapsToAConstantInASteadyTurnIsFound) {
+  for (std::uint64_t seed = 0; seed < 20; ++seed) {
+    Random random(seed);
+    const double at_s = 330.0 + random.uniform(0.0, 3.0);
+    const double rate_dps = random.uniform(4.0, 30.0);
+    const auto turn = [=](double t_s) {
+      return t_s < 300.0 ? town(t_s) : rate_dps * std::min(1.0, (t_s - 300.0) / 5.0);
+    };
+    const Signal well = rounded(noisy(turn, 0.1, random), kCarStep_dps);
+    const Signal other = noisy(turn, 0.1, random);
+    Two two;
+    two.run(well, other, 0.0, at_s);
+    ASSERT_TRUE(two.all_sound(0)) << "seed " << seed;
+    two.run([](double) { return 0.0; }, other, at_s, at_s + 2.0);
+    ASSERT_TRUE(two.first_s[0]) << "seed " << seed << ", " << rate_dps << " deg/s";
+    EXPECT_LE(*two.first_s[0] - at_s, 0.6) << "seed " << seed << ", " << rate_dps << " deg/s";
+    EXPECT_TRUE(two.all_sound(1)) << "seed " << seed;
+  }
+}
+
+// --- dead from the start
+// -------------------------------------------------------------------------
+
+// One value since the power came: nobody can say that it is alive. As soon as the other one
+// undoubtedly moves it is set aside.
+TEST(SensorWatchDead, SensorThatHasNeverChangedIsSetAsideInTheFirstTenthsOfATurn) {
+  for (const double value : {0.0, 0.7, -150.0}) {
+    for (const double acceleration_dps_s : {3.0, 25.0, 200.0}) {
+      for (const double rate_hz : {50.0, 100.0, 500.0}) {
+        SCOPED_TRACE(::testing::Message() << value << " deg/s, " << acceleration_dps_s
+                                          << " deg/s2, " << rate_hz << " Hz, seed 41");
+        Random random(41);
+        const auto turn = [=](double t_s) {
+          return std::min(30.0, acceleration_dps_s * std::max(t_s - 60.03, 0.0));
+        };
+        Two two;
+        const Signal dead = [=](double) { return value; };
+        two.run(dead, noisy(turn, 0.05, random), 0.0, 60.0, rate_hz);
+        ASSERT_TRUE(two.all_sound(0)) << "it may take part in a rest";
+        two.run(dead, noisy(turn, 0.05, random), 60.0, 70.0, rate_hz);
+        ASSERT_TRUE(two.first_s[0]);
+        EXPECT_LE(*two.first_s[0] - 60.03, 0.3 + 2.5 / acceleration_dps_s);
+        EXPECT_TRUE(two.all_sound(1));
+      }
+    }
+  }
+}
+
+// It begins to say other values: not before they are those of the other one is it believed.
+TEST(SensorWatchDead, SensorThatWasDeadIsBelievedWhenItMovesWithTheOther) {
+  Random random(42);
+  const auto drive = [](double t_s) {
+    return t_s < 60.0 || t_s > 90.0 ? 0.0 : 20.0 * std::sin(t_s - 60.0);
+  };
+  const Signal other = noisy(drive, 0.05, random);
+  const Signal dead = [](double) { return 0.0; };
+  Two two;
+  two.run(dead, other, 0.0, 70.0);
+  ASSERT_TRUE(two.first_s[0]);
+  two.run(noisy(rest, 0.05, random), other, 70.0, 150.0);
+  EXPECT_NEAR(two.last_s[0], 149.99, 0.011) << "noise, while the other one turned, and then rest";
+  const auto again = [](double t_s) { return t_s < 160.0 ? 0.0 : 20.0 * std::sin(t_s - 160.0); };
+  two.run(noisy(again, 0.05, random), noisy(again, 0.05, random), 150.0, 200.0);
+  EXPECT_GT(two.last_s[0], 160.0);
+  EXPECT_LT(two.last_s[0], 163.0);
+  EXPECT_TRUE(two.all_sound(1));
+}
+
+// A coarse one that is well says 0 until it moves, and that is all that is asked of it.
+TEST(SensorWatchDead, CoarseSensorThatRestedFromTheStartIsNotDead) {
+  for (const double lag_s : {0.0, 0.1}) {
+    for (std::uint64_t seed = 0; seed < 30; ++seed) {
+      Random random(seed);
+      const double acceleration_dps_s = std::pow(10.0, random.uniform(0.0, 2.0));
+      const double from_s = 300.0 + random.uniform(0.0, 1.0);
+      const auto drive = [=](double t_s) {
+        return t_s < from_s ? 0.0
+                            : 20.0 * (1.0 - std::cos(acceleration_dps_s / 20.0 * (t_s - from_s)));
+      };
+      const auto late = [=](double t_s) { return drive(t_s - lag_s); };
+      Two two;
+      two.run(rounded(late, kCarStep_dps), noisy(drive, 0.05, random), 0.0, 400.0);
+      EXPECT_TRUE(two.all_sound(0))
+          << "seed " << seed << ", " << acceleration_dps_s << " deg/s2, lag " << lag_s
+          << " s, first at " << two.first_s[0].value_or(0.0) - from_s;
+    }
+  }
+}
+
+// --- what time it is
+// -----------------------------------------------------------------------------
+
+/// Every finding, one after the other.
+std::string findings_from(TimePoint start) {
+  Random random(43);
+  const Signal coarse = rounded(noisy(town, 0.1, random), kCarStep_dps);
+  const Signal fine = rounded(noisy(town, 0.02, random), 1e-3);
+  const Signal a = [&](double t_s) { return t_s > 100.0 && t_s < 130.0 ? 0.0 : coarse(t_s); };
+  const Signal b = [&](double t_s) { return t_s > 150.0 && t_s < 150.3 ? 1.0 : fine(t_s); };
+  std::array<SensorWatch, 2> watches{SensorWatch({}), SensorWatch({})};
+  std::string findings;
+  for (int i = 0; i < 40'000; ++i) {
+    const double t_s = 0.01 * i;
+    const TimePoint t = start + i * std::chrono::milliseconds(10);
+    const TimePoint t_b = t + std::chrono::milliseconds(3);
+    findings += static_cast<char>('0' + static_cast<int>(watches[0].judge(t, a(t_s), &watches[1])));
+    findings +=
+        static_cast<char>('0' + static_cast<int>(watches[1].judge(t_b, b(t_s), &watches[0])));
+  }
+  return findings;
+}
+
+TEST(SensorWatchTime, DoesNotDependOnWhatTimeItIs) {
+  const std::string findings = findings_from(kStart);
+  EXPECT_NE(findings.find_first_not_of('0'), std::string::npos);
+  for (const Duration by : {Duration(37'000'000), Duration(12'345'678'000'000),
+                            Duration(-1'700'000'000'000'000'000), Duration(250'000'000)})
+    EXPECT_EQ(findings_from(kStart + by), findings) << to_seconds(by);
 }
 
 // --- saturated -----------------------------------------------------------------------------------

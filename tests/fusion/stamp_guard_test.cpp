@@ -230,5 +230,68 @@ TEST(StampGuard, CarriesTheReferenceOverAStepOfTheGyrosClock) {
   EXPECT_EQ(reference.since_start, 10s + 5ms + 1us);
 }
 
+// --- streams that make it hard
+// -------------------------------------------------------------------
+
+/// How many of these stamps are accepted, in whatever way.
+int accepted_of(StampGuard& guard, std::size_t stream, Duration from, Duration interval, int count,
+                int times_each = 1) {
+  int accepted = 0;
+  for (int i = 0; i < count; ++i) {
+    for (int copy = 0; copy < times_each; ++copy) {
+      const Verdict verdict = check(guard, stream, from + i * interval).verdict;
+      if (verdict == Verdict::kAccepted || verdict == Verdict::kClockStep) ++accepted;
+    }
+  }
+  return accepted;
+}
+
+// One frame a second, and one of them a little late, or lost.
+TEST(StampGuard, GoesOnWithAStreamOfOneHertzBehindALateFrame) {
+  StampGuard guard;
+  EXPECT_EQ(accepted_of(guard, 0, 0s, 1s, 10), 10);
+  EXPECT_EQ(accepted_of(guard, 0, 10s + 15ms, 1s, 10), 10);
+  EXPECT_EQ(accepted_of(guard, 0, 21s, 1s, 10), 10);
+}
+
+// Slower than a second from the first frame on: its own even pace confirms it.
+TEST(StampGuard, TakesStreamsThatAreSlowerThanASecond) {
+  for (const Duration interval : {1001ms, 1500ms, 3000ms, 5000ms}) {
+    StampGuard guard;
+    EXPECT_GE(accepted_of(guard, 0, 0s, interval, 100), 97) << to_seconds(interval);
+    StampGuard fast = running_until(10s);
+    EXPECT_GE(accepted_of(fast, 0, 20s, interval, 100), 97) << to_seconds(interval);
+    StampGuard set_back = running_until(1000s);
+    EXPECT_GE(accepted_of(set_back, 0, 20s, interval, 100), 97) << to_seconds(interval);
+  }
+  StampGuard guard;
+  EXPECT_EQ(accepted_of(guard, 0, 0s, 6s, 100), 1) << "that is no gyro";
+}
+
+// A relay that sends everything twice, or the last but one again, over a hole and a step back.
+TEST(StampGuard, BelievesDoubledFramesBehindAHole) {
+  for (const Duration from : {12s, 600s, 5s}) {
+    StampGuard guard = running_until(10s);
+    EXPECT_EQ(accepted_of(guard, 0, from, 10ms, 100, 2), 98) << to_seconds(from);
+  }
+  StampGuard guard = running_until(10s);
+  int accepted = 0;
+  for (int i = 0; i < 100; ++i) {
+    accepted += check(guard, 0, 12s + i * 10ms).verdict == Verdict::kAccepted ? 1 : 0;
+    check(guard, 0, 12s + (i - 1) * 10ms);
+  }
+  EXPECT_EQ(accepted, 98);
+}
+
+// A reference that had run ahead comes back to the gyros' time and is heard again.
+TEST(StampGuard, HearsAReferenceAgainThatHadRunAhead) {
+  StampGuard guard = running_until(10s);
+  EXPECT_GT(accepted_of(guard, kReference, 3600s, 10ms, 100), 90);
+  for (const std::size_t stream : {0U, 1U})
+    EXPECT_EQ(accepted_of(guard, stream, 10s + 10ms, 10ms, 100), 100);
+  EXPECT_GE(accepted_of(guard, kReference, 11s, 10ms, 100), 98);
+  EXPECT_EQ(guard.offset(), 0ns);
+}
+
 }  // namespace
 }  // namespace vgyro::fusion

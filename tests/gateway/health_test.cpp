@@ -294,6 +294,69 @@ TEST(GyroHealthStuck, IsSetAsideInMotionAndAtRest) {
   }
 }
 
+/// Valid rates that are off by more than any two healthy gyros are.
+std::size_t wrong_rates(const Played& run, const RateOf& truth, Duration from, Duration to) {
+  return static_cast<std::size_t>(
+      std::count_if(run.rates.begin(), run.rates.end(), [&](const auto& r) {
+        const bool inside = r.instant >= TimePoint{from} && r.instant < TimePoint{to};
+        const double error_dps = r.rate_dps - truth(to_seconds(r.instant - TimePoint{}));
+        return inside && r.valid && std::abs(error_dps) > 2.0 * kErrorMax_dps;
+      }));
+}
+
+// It falls to 0, or freezes, amid a turn: a handful of samples tell, and no more of them than that
+// are in a rate that two healthy gyros would be believed to have made.
+TEST(GyroHealthStuck, IsHeldAsideAfterAHandfulOfSamplesInATurn) {
+  for (const std::size_t stuck : {0U, 1U}) {
+    for (const bool to_zero : {false, true}) {
+      SCOPED_TRACE(::testing::Message() << "gyro " << stuck << ", to zero " << to_zero);
+      const RateOf truth = drive;
+      Recording recording_a = a(ms(60'000), noisy(truth, kBiasA_dps, 3));
+      Recording recording_b = b(ms(60'000), noisy(truth, kBiasB_dps, 4));
+      Recording& sick = stuck == 0 ? recording_a : recording_b;
+      const double value = to_zero ? 0.0 : drive(41.0) + (stuck == 0 ? kBiasA_dps : kBiasB_dps);
+      change(sick, ms(41'000), ms(41'150), [&](can::Frame& f) { put_rate(f, value); });
+      const Played run(plan_of_gyros(), merge({recording_a, recording_b}));
+      EXPECT_LE(wrong_rates(run, truth, ms(6'000), ms(60'000)), 6U);
+      EXPECT_EQ(wrong_rates(run, truth, ms(41'070), ms(60'000)), 0U);
+      EXPECT_EQ(rig::times(run.pipeline, stuck, Fault::kStuck), 1U);
+      EXPECT_EQ(rig::times(run.pipeline, 1 - stuck, Fault::kStuck), 0U);
+      // Soon over, soon forgiven.
+      EXPECT_EQ(run.rates_in(State::kDegraded, ms(41'300), ms(60'000)), 0U);
+      EXPECT_LE(run.longest_hole(ms(6'000), ms(59'900)), ms(20));
+      run.expect_instants_to_grow();
+      run.expect_books_to_balance();
+    }
+  }
+}
+
+// Its frames come, its counter runs, and it says 0 from the start: in the first turn the other one
+// is left alone with the rate, and stays so until this one has shown that it sees the same.
+TEST(GyroHealthStuck, IsSetAsideInItsFirstTurnWhenItWasDeadFromTheStart) {
+  for (const std::size_t dead : {0U, 1U}) {
+    SCOPED_TRACE(::testing::Message() << "gyro " << dead);
+    const auto truth = [](double t_s) {
+      return t_s < 15.0 ? 0.0 : 20.0 * std::sin(0.5 * (t_s - 15.0));
+    };
+    Recording recording_a = a(ms(60'000), noisy(truth, dead == 0 ? 0.0 : kBiasA_dps, 3));
+    Recording recording_b = b(ms(60'000), noisy(truth, dead == 1 ? 0.0 : kBiasB_dps, 4));
+    Recording& sick = dead == 0 ? recording_a : recording_b;
+    change(sick, ms(0), ms(40'000), [&](can::Frame& f) { put_rate(f, 0.0); });
+    // Then noise that knows nothing of the turn, and at last it is well.
+    const RateOf noise = noisy([](double) { return 0.0; }, 0.0, 5);
+    change(sick, ms(40'000), ms(45'000), [&](can::Frame& f) { put_rate(f, noise(0.0)); });
+    const Played run(plan_of_gyros(), merge({recording_a, recording_b}));
+    EXPECT_EQ(run.rates_in(State::kRunning, ms(15'500), ms(45'000)), 0U);
+    EXPECT_GT(run.rates_in(State::kRunning, ms(50'000), ms(60'000)), 990U);
+    EXPECT_EQ(wrong_rates(run, truth, ms(15'500), ms(60'000)), 0U);
+    EXPECT_EQ(wrong_rates(run, truth, ms(0), ms(15'000)), 0U);
+    EXPECT_LE(run.longest_hole(ms(6'000), ms(59'900)), ms(20));
+    EXPECT_EQ(rig::times(run.pipeline, 1 - dead, Fault::kStuck), 0U);
+    run.expect_instants_to_grow();
+    run.expect_books_to_balance();
+  }
+}
+
 // --- flags and counters --------------------------------------------------------------------------
 
 // The frame says "invalid": the very next rate stands on the other gyro, with no hole in between.

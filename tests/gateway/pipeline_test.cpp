@@ -229,6 +229,51 @@ TEST(PipelineRates, TellTheirAge) {
   }
 }
 
+struct WorstError final : RateObserver {
+  explicit WorstError(RateOf the_truth) : truth(std::move(the_truth)) {}
+  void on_rate(TimePoint t, const std::array<double, 2>& /*raw_dps*/, double rate_dps) override {
+    if (std::isnan(rate_dps)) return;
+    worst_dps = std::max(worst_dps, std::abs(rate_dps - truth(to_seconds(t - at_ms(0)))));
+  }
+  RateOf truth;
+  double worst_dps = 0.0;
+};
+
+// What a model file says comes late is late, and no reason to keep the rate back.
+TEST(PipelineRates, OfGyrosThatAreKnownToBeLateAreRightAndComplete) {
+  const std::array<double, 2> none{};
+  for (const std::array<double, 2> lag_s :
+       {none, {0.06, 0.0}, {0.0, 0.15}, {0.25, 0.25}, {0.25, 0.0}, {0.12, 0.25}}) {
+    SCOPED_TRACE(::testing::Message() << lag_s[0] << " and " << lag_s[1] << " s");
+    Plan plan = rig::two_gyros();
+    plan.corrector.method = Method::kMutual;
+    plan.corrector.order = 0;
+    plan.model = model::Model{"m.toml", {}};
+    for (const std::size_t gyro : {0U, 1U}) {
+      plan.model->effects.push_back(
+          {.gyro = gyro, .kind = model::Kind::kDelay, .parameters = {lag_s[gyro]}});
+    }
+    const auto truth = [](double t_s) {
+      return t_s < 2.0 ? 0.0 : 10.0 * (1.0 - std::cos(t_s - 2.0));
+    };
+    const auto late = [&](std::size_t gyro, double bias_dps) {
+      return [=](double t_s) { return truth(t_s - lag_s[gyro]) + bias_dps; };
+    };
+    Bench run(plan);
+    WorstError error(truth);
+    run.pipeline.observe(&error);
+    run.play_live(merge({stream_a(ms(0), ms(10'000), late(0, kBiasA_dps)),
+                         stream_b(ms(0), ms(10'000), late(1, kBiasB_dps))}),
+                  at_ms(10'000));
+    const Duration longest = from_seconds(std::max(lag_s[0], lag_s[1]));
+    const Duration shortest = from_seconds(std::min(lag_s[0], lag_s[1]));
+    EXPECT_GE(run.pipeline.status().rates_out_valid + 6,
+              static_cast<std::uint64_t>((ms(9'000) - longest - (longest - shortest)) / ms(10)));
+    EXPECT_EQ(run.pipeline.status().state, State::kRunning);
+    EXPECT_LT(error.worst_dps, 1e-2);
+  }
+}
+
 // `mean` needs no calibration and has no biases, but it too needs both gyros to begin with.
 TEST(PipelineRates, OfTheMeanAreValidFromTheFirstPairOn) {
   Plan plan = rig::two_gyros();
@@ -484,6 +529,36 @@ TEST(PipelineTime, ClockSetBackIsCountedAndSurvived) {
   EXPECT_NEAR(last.rate_dps, kTrue_dps, rig::kRateStep_dps);
   EXPECT_EQ(last.stamp,
             recording.back().stamp - recording.back().stamp.time_since_epoch() % ms(10) + ms(3));
+}
+
+// The clock is set while the gyros go on: what their drifts had become is what they still are.
+TEST(PipelineTime, ClockSetForthExtendsNoDriftOfMutual) {
+  for (const Duration by : {Duration(std::chrono::seconds(20)), Duration(std::chrono::hours(20)),
+                            Duration(std::chrono::hours(24 * 3650))}) {
+    Plan plan = rig::two_gyros();
+    plan.corrector.method = Method::kMutual;
+    Bench run(plan);
+    // Slopes that a second of rest has taught: 0.2 and -0.1 deg/s each second.
+    const auto drifting = [](double bias_dps, double slope_dps_s) {
+      return [=](double t_s) { return bias_dps + slope_dps_s * t_s; };
+    };
+    const Recording first = merge({stream_a(ms(0), ms(4'000), drifting(kBiasA_dps, 0.2)),
+                                   stream_b(ms(0), ms(4'000), drifting(kBiasB_dps, -0.1))});
+    const Recording second = merge({stream_a(ms(4'000), ms(5'000), drifting(kBiasA_dps, 0.2)),
+                                    stream_b(ms(4'000), ms(5'000), drifting(kBiasB_dps, -0.1))});
+    run.play(first);
+    run.play(shifted(second, by));
+    ASSERT_EQ(run.pipeline.status().clock_steps, 0U);
+    const std::vector<RateSeen> rates = run.rates();
+    EXPECT_GT(std::count_if(rates.begin(), rates.end(), [](const auto& r) { return r.valid; }),
+              380);
+    for (const RateSeen& rate : rates) {
+      if (!rate.valid) continue;
+      // Of the bias it goes on to learn nothing from the frames that the guard waited for.
+      ASSERT_NEAR(rate.rate_dps, 0.0, 0.2 * 0.05 + rig::kRateStep_dps)
+          << to_seconds(rate.stamp - at_ms(0)) << " s, set by " << to_seconds(by);
+    }
+  }
 }
 
 // The daemon lets time go on while nobody speaks, whatever the clock does; when frames come back
@@ -793,6 +868,30 @@ TEST(PipelineReference, CalibratesOnAMovingPlatform) {
   EXPECT_NEAR(status.gyros[1].bias_dps, kBiasB_dps, 5e-3);
   EXPECT_EQ(status.reference_frames, 400U);
   EXPECT_EQ(status.reference_rejected, 0U);
+}
+
+// It had run an hour ahead, and comes back to the gyros' time: it is heard again.
+TEST(PipelineReference, CalibratesWhenTheReferenceComesBackFromAnotherTime) {
+  const auto turning = [](double t_s) { return 5.0 + t_s; };
+  const auto with_bias = [&](double bias_dps) {
+    return [=](double t_s) { return turning(t_s) + bias_dps; };
+  };
+  Plan plan = rig::with_reference();
+  plan.corrector.method = Method::kMutual;
+  plan.corrector.order = 0;
+  Bench run(plan);
+  Recording reference = rig::stream(0, rig::kIdReference, ms(0), ms(8'000), ms(10), turning);
+  for (rig::Event& event : reference) {
+    if (event.stamp < at_ms(3'000)) event.stamp += std::chrono::hours(1);
+  }
+  // In the order of arrival.
+  const Recording gyros = merge({stream_a(ms(0), ms(8'000), with_bias(kBiasA_dps)),
+                                 stream_b(ms(0), ms(8'000), with_bias(kBiasB_dps))});
+  for (std::size_t i = 0; i < reference.size(); ++i)
+    run.play({reference[i], gyros[2 * i], gyros[2 * i + 1]});
+  EXPECT_EQ(run.pipeline.status().state, State::kRunning);
+  EXPECT_EQ(run.pipeline.status().clock_steps, 0U);
+  EXPECT_NEAR(run.rates().back().rate_dps, turning(7.99), 0.02);
 }
 
 // No reference, no calibration: better no rate than one against an invented truth.

@@ -81,6 +81,20 @@ TEST(ReferenceCalibration, IgnoresReferenceSamplesOutOfOrder) {
   EXPECT_DOUBLE_EQ(ready->true_rate_dps, 0.5);
 }
 
+// It had run an hour ahead of the gyros and has come back to their time.
+TEST(ReferenceCalibration, GoesOnWithAReferenceThatHadRunAhead) {
+  ReferenceCalibration reference;
+  reference.add_reference(at_ms(3'600'000), 7.0);
+  reference.add_reference(at_ms(3'600'100), 7.0);
+  reference.add_reference(at_ms(100), 1.0);
+  reference.add_pair(pair_at(150));
+  EXPECT_FALSE(reference.next()) << "nothing is interpolated over the step";
+  reference.add_reference(at_ms(200), 2.0);
+  const auto ready = reference.next();
+  ASSERT_TRUE(ready);
+  EXPECT_DOUBLE_EQ(ready->true_rate_dps, 1.5);
+}
+
 // Without any reference the queue stays bounded and keeps the newest pairs.
 TEST(ReferenceCalibration, KeepsTheNewestPairsWhenTheReferenceIsLate) {
   ReferenceCalibration reference;

@@ -68,6 +68,19 @@ class Played:
         return float(np.abs(self.rate[inside] - make_twin.true_rate(self.t[inside], options)).max())
 
 
+def rates_of(streams, method, later_us):
+    """VG_Rate's stamps, and what it says behind its E2E header, of the recording made so much later."""
+    later = [canlog.Stream(s.bus, s.can_id, s.stamps_us + later_us, s.payloads) for s in streams]
+    with tempfile.TemporaryDirectory(prefix="vgyro-") as folder:
+        folder = Path(folder)
+        config = product.write_config(folder, REST_S, order=0)
+        with open(folder / "in.log", "wb") as file:
+            canlog.write(file, later)
+        frames = canlog.read(product.replay(config, folder / "in.log", folder / "out.log", method))
+    rates = frames.with_id(canlog.RATE_ID)
+    return rates.stamps_us, rates.payloads[:, 2:]
+
+
 class SickGyros(unittest.TestCase):
     def twin(self, turn_dps=40.0):
         print(f"seed {SEED}")
@@ -139,6 +152,26 @@ class SickGyros(unittest.TestCase):
                 self.assertEqual(played.health_within(REST_S + 16.0, REST_S + 22.0), 0)
                 self.assertIn("saturated", played.summary["gyros"][0]["faults"])
                 self.assertNotIn("stuck", played.summary["gyros"][0]["faults"])
+
+    def test_what_time_it_is_changes_no_rate(self):
+        options, twin = self.twin()
+        # A coarse one, which only the other one's movement can convict.
+        put_rate(twin.streams[0], np.full(len(twin.t_s[0]), True), np.rint(twin.reading_dps[0] / 0.25) * 0.25)
+        spells = ((0, 30.0, 40.0, 0.0), (1, 50.0, 50.2, None), (1, 60.0, 70.0, None))
+        for gyro, begin_s, end_s, value in spells:
+            where = (twin.t_s[gyro] >= begin_s) & (twin.t_s[gyro] < end_s)
+            put_rate(twin.streams[gyro], where, twin.reading_dps[gyro][where][0] if value is None else value)
+        stays = (twin.t_s[0] < 80.0) | (twin.t_s[0] >= 95.0)
+        gyro = twin.streams[0]
+        twin.streams[0] = canlog.Stream(gyro.bus, gyro.can_id, gyro.stamps_us[stays], gyro.payloads[stays])
+        for method in METHODS:
+            with self.subTest(method=method):
+                expected = rates_of(twin.streams, method, 0)
+                self.assertGreater(len(expected[0]), 5000)
+                for later_us in (37_000, 12_345_678_000):
+                    stamps, payloads = rates_of(twin.streams, method, later_us)
+                    np.testing.assert_array_equal(stamps - later_us, expected[0])
+                    np.testing.assert_array_equal(payloads, expected[1])
 
     def test_gone_for_a_minute(self):
         begin_s, end_s = REST_S + 10.0, REST_S + 70.0
