@@ -45,6 +45,7 @@ void print_gyro(const gateway::GyroPlan& gyro) {
   }
   print_e2e(gyro.e2e);
   if (gyro.valid) detail("valid when", gyro.valid->text);
+  if (gyro.max_bias_dps) detail("bias", fmt::format("at most {:g} deg/s", *gyro.max_bias_dps));
 }
 
 void print_model(const gateway::Plan& plan) {

@@ -25,6 +25,7 @@ struct GyroParameters {
   std::size_t gauss_markov_count = 0;
   double rate_noise_rthz = 0.0;  ///< white noise of density rate_noise_rthz · |Ω|, on top of N
   double resolution_dps = 0.0;   ///< step of the values, 0 when unknown
+  std::optional<double> max_bias_dps = {};  ///< largest bias that this gyro can have
 
   friend bool operator==(const GyroParameters&, const GyroParameters&) = default;
 };

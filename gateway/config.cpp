@@ -23,6 +23,8 @@ namespace {
 constexpr double kEarthRate_dps = 7.292115e-5 * 180.0 / std::numbers::pi;
 constexpr double kRestMax_s = 86'400.0;
 constexpr double kWindowMax_s = 3'600.0;
+// Gyros that read more than this at rest are broken rather than biased.
+constexpr double kMaxBiasMax_dps = 100.0;
 
 struct Context {
   std::string file;
@@ -65,6 +67,17 @@ std::optional<ComparisonText> parse_comparison(std::string_view text) {
     if (result.signal.empty() || !whole || !std::isfinite(result.value)) return std::nullopt;
     return result;
   }
+  return std::nullopt;
+}
+
+// A number inside limits; nothing after a complaint, or where the key is not there.
+std::optional<double> number_within(TomlReader& reader, std::string_view key, double above,
+                                    double up_to, std::string_view unit) {
+  const auto value = reader.number(key);
+  if (!value) return std::nullopt;
+  if (*value > above && *value <= up_to) return value;
+  reader.complain(reader.where(key), fmt::format("{} is {:g} {}", key, *value, unit),
+                  fmt::format("above {:g} and up to {:g}", above, up_to));
   return std::nullopt;
 }
 
@@ -138,6 +151,7 @@ std::optional<GyroPlan> read_gyro(const toml::table& table, std::size_t index, C
     read_source_address(reader, resolver.message(), gyro->match);
     gyro->e2e = read_e2e(reader, resolver, *rate_signal);
     gyro->valid = read_condition(reader, resolver, *rate_signal);
+    gyro->max_bias_dps = number_within(reader, "max_bias_dps", 0.0, kMaxBiasMax_dps, "deg/s");
     if (sign_signal != nullptr && resolver.shares_page("sign_signal", *sign_signal, *rate_signal)) {
       gyro->sign = resolver.codec(*sign_signal);
     }
@@ -147,7 +161,7 @@ std::optional<GyroPlan> read_gyro(const toml::table& table, std::size_t index, C
     }
   } else {
     // Ask for the rest, so that a good key is not called unknown on top of the real trouble.
-    reader.forgive({"sign", "source_address", "valid"});
+    reader.forgive({"sign", "source_address", "valid", "max_bias_dps"});
     forgive_e2e(reader);
   }
   reader.finish();
@@ -246,17 +260,6 @@ void read_speed(TomlReader& reader, SignalResolver& resolver, Plan& plan) {
                          read_e2e(reader, resolver, *signal)};
 }
 
-// A number inside limits, or the default after a complaint.
-double number_within(TomlReader& reader, std::string_view key, double fallback, double above,
-                     double up_to, std::string_view unit) {
-  const auto value = reader.number(key);
-  if (!value) return fallback;
-  if (*value > above && *value <= up_to) return *value;
-  reader.complain(reader.where(key), fmt::format("{} is {:g} {}", key, *value, unit),
-                  fmt::format("above {:g} and up to {:g}", above, up_to));
-  return fallback;
-}
-
 void read_when_moving(TomlReader& reader, CalibrationPlan& plan) {
   const std::string word = reader.text("when_moving").value_or("wait");
   if (plan.from_reference) {
@@ -274,7 +277,7 @@ void read_calibration(TomlReader& root, Context& context) {
   const toml::table* table = root.table("calibration");
   if (table == nullptr) return;
   TomlReader reader(*table, context.file, "[calibration]", context.errors);
-  plan.rest_s = number_within(reader, "rest_s", plan.rest_s, 0.0, kRestMax_s, "s");
+  plan.rest_s = number_within(reader, "rest_s", 0.0, kRestMax_s, "s").value_or(plan.rest_s);
   const auto rate = reader.number("rate_dps");
   const auto latitude = reader.number("latitude_deg");
   if (rate && latitude) {
@@ -341,7 +344,7 @@ void read_corrector(TomlReader& root, Context& context, const ConfigOverrides& o
     const auto path = (std::filesystem::path(context.folder) / *name).lexically_normal();
     read_model(path.string(), reader.where("model"), context);
   }
-  plan.window_s = number_within(reader, "window_s", plan.window_s, 0.0, kWindowMax_s, "s");
+  plan.window_s = number_within(reader, "window_s", 0.0, kWindowMax_s, "s").value_or(plan.window_s);
   if (const auto order = reader.integer("order")) {
     if (*order < 0 || *order > fusion::kOrderMax) {
       reader.complain(reader.where("order"), fmt::format("order is {}", *order),
@@ -356,8 +359,10 @@ void read_corrector(TomlReader& root, Context& context, const ConfigOverrides& o
 // Precondition: nothing was complained of so far.
 void apply_knowledge(Context& context) {
   Plan& plan = context.resolved.plan;
-  for (std::size_t gyro = 0; gyro < 2; ++gyro)
+  for (std::size_t gyro = 0; gyro < 2; ++gyro) {
     plan.corrector.gyros[gyro].resolution_dps = plan.gyros[gyro].rate.step;
+    plan.corrector.gyros[gyro].max_bias_dps = plan.gyros[gyro].max_bias_dps;
+  }
   if (plan.model) apply_model(model::Model(*plan.model), plan, context.errors);
 }
 

@@ -105,6 +105,7 @@ struct GyroPlan {
   std::optional<Condition> valid;
   std::optional<double> saturation_dps = {};  ///< from the model file: it clips at ± this
   double dead_band_dps = 0.0;                 ///< likewise: it reads 0 below; 0: it has none
+  std::optional<double> max_bias_dps = {};    ///< no bias of this gyro is larger
   std::string taken_back = {};                ///< digest of what is taken back; empty: nothing
 
   friend bool operator==(const GyroPlan&, const GyroPlan&) = default;

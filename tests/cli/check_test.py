@@ -33,6 +33,12 @@ class Check(bench.Bench):
                      "VG_Bias 611", "VG_Model 612", "classic CAN"):
             self.assertIn(part, text)
 
+    def test_names_the_largest_bias(self):
+        # It decides what a stop may teach.
+        self.assertNotIn("at most", self.good("check", "vgyro.toml").stdout.decode().split("corrector")[0])
+        self.write("vgyro.toml", bench.CONFIG.replace('rate = "RateZ"', 'rate = "RateZ"\nmax_bias_dps = 0.5', 1))
+        self.assertRegex(self.good("check", "vgyro.toml").stdout.decode(), r"bias +at most 0\.5 deg/s")
+
     def test_says_nothing_on_stderr_when_all_is_well(self):
         # Warnings must mean something.
         self.assertEqual(self.good("check", "vgyro.toml").stderr, b"")

@@ -63,6 +63,7 @@ rate = "RateZ"
 temperature = "Temp"
 counter = "Counter"
 valid = "Status == 0"
+max_bias_dps = 0.25
 
 [[gyro]]
 name = "right"
@@ -261,6 +262,22 @@ TEST_F(Config, TakesDefaults) {
   EXPECT_EQ(plan.output.bias_id, 0x611U);
   EXPECT_EQ(plan.output.model_id, 0x612U);
   EXPECT_FALSE(plan.output.fd);
+}
+
+// What a data sheet says of the bias reaches the corrector; 0, a negative value, one that no gyro
+// has and one that is no number are mistakes.
+TEST_F(Config, BoundsABiasByWhatTheFileSays) {
+  const Plan plan = plan_of(kGood);
+  ASSERT_EQ(plan.gyros.size(), 2U);
+  EXPECT_EQ(plan.gyros[0].max_bias_dps, 0.25);
+  EXPECT_EQ(plan.corrector.gyros[0].max_bias_dps, 0.25);
+  EXPECT_FALSE(plan.gyros[1].max_bias_dps);
+  EXPECT_FALSE(plan.corrector.gyros[1].max_bias_dps);
+  EXPECT_EQ(plan_of(replaced(kGood, "0.25", "100")).corrector.gyros[0].max_bias_dps, 100.0);
+  for (const char* wrong : {"0", "-0.1", "100.5", "nan", "inf"}) {
+    expect_error("max_bias_dps = 0.25", fmt::format("max_bias_dps = {}", wrong), "max_bias_dps",
+                 {"max_bias_dps is ", "above 0 and up to 100"});
+  }
 }
 
 // What the Earth turns along the vertical of Kyiv, by the sidereal day.
