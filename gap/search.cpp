@@ -33,9 +33,9 @@ constexpr double kLineLow_hz = 0.02;
 void clamp_to_catalogue(Effect& effect) {
   const auto parameters = model::info(effect.kind).parameters;
   for (std::size_t i = 0; i < parameters.size(); ++i) {
-    double low = parameters[i].minimum;
-    if (parameters[i].above_minimum) low = std::max(low + 1e-9, 1e-6);
-    effect.parameters[i] = std::clamp(effect.parameters[i], low, parameters[i].maximum);
+    effect.parameters[i] =
+        std::clamp(effect.parameters[i], parameters[i].minimum, parameters[i].maximum);
+    if (std::abs(effect.parameters[i]) < parameters[i].least) effect.parameters[i] = 0.0;
   }
   if (effect.kind == Kind::kBandwidth)
     effect.parameters[0] = std::clamp(effect.parameters[0], 0.05, 1e4);

@@ -174,7 +174,7 @@ TEST(ModelEdit, ChangesNothingThatIsNotThere) {
             std::string::npos);
   EXPECT_NE(refusal(replace_parameter(kThree, 3, "tau_s", 1.0)).find("has no parameter tau_s"),
             std::string::npos);
-  EXPECT_NE(refusal(replace_parameter(kThree, 12, "tau_s", -1.0)).find("above 0"),
+  EXPECT_NE(refusal(replace_parameter(kThree, 12, "tau_s", -1.0)).find("0.001 to"),
             std::string::npos);
   const char* two =
       "format = 1\neffect = [{gyro=1,kind=\"bias\",value_dps=1}, "
