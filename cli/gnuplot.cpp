@@ -1,11 +1,20 @@
 #include "cli/gnuplot.h"
 
+#include <array>
+#include <cerrno>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
+#include <memory>
+#include <spawn.h>
+#include <sys/mman.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include <fmt/format.h>
+
+#include "base/printable.h"
+#include "cli/output_file.h"
 
 namespace vgyro::cli {
 
@@ -25,6 +34,44 @@ std::string terminal_of(const std::string& path, int width, int height) {
                        width > height ? "11.7in,8.3" : "8.3in,11.7");
   }
   return {};
+}
+
+using File = std::unique_ptr<std::FILE, int (*)(std::FILE*)>;
+
+// In memory: no folder can be full, and no reader that ends early ends this program.
+Expected<File> memory_file(const std::string& path) {
+  const int fd = ::memfd_create("vgyro-picture", MFD_CLOEXEC);
+  if (fd < 0) return fail(path, "cannot be drawn: " + system_reason());
+  return File(::fdopen(fd, "w+b"), &std::fclose);
+}
+
+// gnuplot with this input and output, without the user's own settings; its exit status.
+Expected<int> run_program(int input, int output) {
+  posix_spawn_file_actions_t actions;
+  ::posix_spawn_file_actions_init(&actions);
+  ::posix_spawn_file_actions_adddup2(&actions, input, STDIN_FILENO);
+  ::posix_spawn_file_actions_adddup2(&actions, output, STDOUT_FILENO);
+  std::string name = "gnuplot";
+  std::string settings = "--default-settings";
+  std::string from_input = "-";
+  const std::array<char*, 4> words{name.data(), settings.data(), from_input.data(), nullptr};
+  pid_t child = 0;
+  const int error = ::posix_spawnp(&child, name.c_str(), &actions, nullptr, words.data(), environ);
+  ::posix_spawn_file_actions_destroy(&actions);
+  if (error != 0) return fail({}, system_reason(error));
+  int status = 0;
+  while (::waitpid(child, &status, 0) < 0) {
+    if (errno != EINTR) return fail({}, system_reason());
+  }
+  return status;
+}
+
+// gnuplot does not notice when its picture cannot be written; OutputFile does.
+void copy(std::FILE* from, OutputFile& to) {
+  std::rewind(from);
+  std::array<char, 65'536> block{};
+  while (const std::size_t got = std::fread(block.data(), 1, block.size(), from))
+    to.write({block.data(), got});
 }
 
 }  // namespace
@@ -47,29 +94,33 @@ Expected<void> check_picture_path(const std::string& path) {
 }
 
 std::string picture_script(const std::string& path, int width, int height) {
-  return fmt::format("set terminal {}\nset output {}\nset encoding utf8\n",
-                     terminal_of(path, width, height), gnuplot_text(path));
+  return fmt::format("set terminal {}\nset encoding utf8\n", terminal_of(path, width, height));
 }
 
 std::string gnuplot_text(const std::string& text) {
   std::string result = "'";
-  for (const char c : text) {
+  for (const char c : printable(text)) {
     if (c == '\'') result += '\'';
-    if (c != '\n') result += c;
+    result += c;
   }
   return result + "'";
 }
 
 Expected<void> run_gnuplot(const std::string& path, const std::function<void(std::FILE*)>& write) {
   if (auto good = check_picture_path(path); !good) return good;
-  std::FILE* to = std::fopen(path.c_str(), "wb");
-  if (to == nullptr) return fail(path, "cannot be written: " + system_reason());
-  std::fclose(to);
-  std::FILE* gnuplot = ::popen("gnuplot", "w");
-  if (gnuplot == nullptr) return fail(path, "cannot be drawn: gnuplot could not be started");
-  write(gnuplot);
-  if (::pclose(gnuplot) == 0) return {};
-  return fail(path, "was not drawn: gnuplot failed, as it says above");
+  const auto script = memory_file(path);
+  if (!script) return tl::unexpected(script.error());
+  const auto picture = memory_file(path);
+  if (!picture) return tl::unexpected(picture.error());
+  write(script->get());
+  std::rewind(script->get());
+  const auto status = run_program(::fileno(script->get()), ::fileno(picture->get()));
+  if (!status) return fail(path, "cannot be drawn: gnuplot: " + status.error().what);
+  if (*status != 0) return fail(path, "was not drawn: gnuplot failed, as it says above");
+  auto file = OutputFile::open(path);
+  if (!file) return tl::unexpected(file.error());
+  copy(picture->get(), *file);
+  return file->close();
 }
 
 }  // namespace vgyro::cli

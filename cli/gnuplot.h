@@ -13,13 +13,16 @@ namespace vgyro::cli {
 /// For a check before the long work: the ending, the folder, and whether there is a gnuplot.
 Expected<void> check_picture_path(const std::string& path);
 
-/// "set terminal …" and "set output …" for a picture of that size; pdf is one page, upright or not.
+/// "set terminal …" for a picture of that size; pdf is one page, upright or not. There is no "set
+/// output": gnuplot takes a name that begins with "|" for a command.
 std::string picture_script(const std::string& path, int width, int height);
 
-/// Quoted for a gnuplot script.
+/// Quoted for a gnuplot script, where it is text and nothing else: in single quotes gnuplot knows
+/// neither commands nor variables.
 std::string gnuplot_text(const std::string& text);
 
-/// Runs the script that `write` sends to gnuplot. Error when gnuplot is missing or fails.
+/// Runs the script that `write` writes; what gnuplot prints is the picture, and goes into the file
+/// that is opened here, by a name that can be nothing else. Error when gnuplot is missing or fails.
 Expected<void> run_gnuplot(const std::string& path, const std::function<void(std::FILE*)>& write);
 
 }  // namespace vgyro::cli

@@ -1,13 +1,10 @@
-#include <cstdio>
-
-#include <fmt/core.h>
-
 #include "cli/commands.h"
+#include "cli/terminal.h"
 
 namespace vgyro::cli {
 
 int report(const Error& error) {
-  fmt::print(stderr, "error: {}\n", error.message());
+  tell("error: {}\n", error.message());
   return kBadInput;
 }
 
@@ -18,7 +15,7 @@ int report(const std::vector<Error>& errors) {
 }
 
 void warn(const Error& warning) {
-  fmt::print(stderr, "warning: {}\n", warning.message());
+  tell("warning: {}\n", warning.message());
 }
 
 }  // namespace vgyro::cli
