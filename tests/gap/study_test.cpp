@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "gap/views.h"
 #include "tests/gap/made_recording.h"
 
 namespace vgyro::gap {
@@ -56,6 +57,19 @@ TEST(Study, BearsPauses) {
     recording.reference_dps.t_s[i] += 1800.0;
   recording.seconds += 1800.0;
   EXPECT_EQ(refusal(recording), "");
+}
+
+// An hour without a sample is one place for a step, not a thousand.
+TEST(Study, StepsWithinAPauseAreOne) {
+  Layout layout;
+  for (const double t_s : {0.5, 1.5, 2.5, 3600.5, 3601.5}) {
+    layout.blocks.emplace_back();
+    layout.blocks.back().t_s = t_s;
+  }
+  std::vector<double> even_s;
+  for (int k = 1; k < 3602; ++k)
+    even_s.push_back(k);
+  EXPECT_EQ(distinct_steps(layout, even_s), (std::vector<double>{1.0, 2.0, 3.0, 3601.0}));
 }
 
 }  // namespace
