@@ -1,5 +1,6 @@
 #include <fmt/core.h>
 
+#include "base/printable.h"
 #include "cli/commands.h"
 #include "cli/terminal.h"
 #include "gateway/config.h"
@@ -18,8 +19,8 @@ std::string id_text(const gateway::FrameMatch& match) {
 void print_row(std::string_view role, const std::string& bus, const gateway::FrameMatch& match,
                const std::string& message, const gateway::Quantity& quantity) {
   const std::string signal = message + "." + quantity.name;
-  say("  {:<14}{:<8}{:<10}{:<26}{:<8}{}\n", role, bus, id_text(match), signal, quantity.unit,
-      quantity.layout);
+  say("  {:<14}{:<8}{:<10}{:<26}{:<8}{}\n", role, bus, id_text(match), signal,
+      printable(quantity.unit), quantity.layout);
 }
 
 void detail(std::string_view what, const std::string& text) {
@@ -37,12 +38,13 @@ void print_e2e(const gateway::E2ePlan& e2e) {
 
 void print_gyro(const gateway::GyroPlan& gyro) {
   print_row("gyro " + gyro.name, gyro.bus, gyro.match, gyro.message, gyro.rate);
-  detail("accepted", fmt::format("{:g} to {:g} {}{}", gyro.rate.minimum, gyro.rate.maximum,
-                                 gyro.rate.unit, gyro.rate.scale < 0 ? ", sign flipped" : ""));
+  detail("accepted",
+         fmt::format("{:g} to {:g} {}{}", gyro.rate.minimum, gyro.rate.maximum,
+                     printable(gyro.rate.unit), gyro.rate.scale < 0 ? ", sign flipped" : ""));
   if (gyro.sign) detail("sign", "from a signal of its own: 1 is negative");
   if (gyro.temperature) {
     detail("temperature", fmt::format("{} in {}, {}", gyro.temperature->name,
-                                      gyro.temperature->unit, gyro.temperature->layout));
+                                      printable(gyro.temperature->unit), gyro.temperature->layout));
   }
   print_e2e(gyro.e2e);
   if (gyro.valid) detail("valid when", gyro.valid->text);

@@ -2,14 +2,14 @@
 
 #include <array>
 #include <cerrno>
-#include <cstdio>
 #include <cstdlib>
+#include <fcntl.h>
 #include <filesystem>
-#include <memory>
 #include <spawn.h>
 #include <sys/mman.h>
 #include <sys/wait.h>
 #include <unistd.h>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -36,42 +36,74 @@ std::string terminal_of(const std::string& path, int width, int height) {
   return {};
 }
 
-using File = std::unique_ptr<std::FILE, int (*)(std::FILE*)>;
+struct Descriptor {
+  explicit Descriptor(int number = -1) : fd(number) {}
+  Descriptor(const Descriptor&) = delete;
+  Descriptor& operator=(const Descriptor&) = delete;
+  ~Descriptor() { close(); }
+  void close() {
+    if (fd >= 0) ::close(std::exchange(fd, -1));
+  }
+  int fd;
+};
 
-// In memory: no folder can be full, and no reader that ends early ends this program.
-Expected<File> memory_file(const std::string& path) {
-  const int fd = ::memfd_create("vgyro-picture", MFD_CLOEXEC);
-  if (fd < 0) return fail(path, "cannot be drawn: " + system_reason());
-  return File(::fdopen(fd, "w+b"), &std::fclose);
+// A file without a name rather than a pipe, whose reader could end early and this program with it.
+bool write_script(int fd, std::string_view script) {
+  while (!script.empty()) {
+    const ssize_t written = ::write(fd, script.data(), script.size());
+    if (written < 0 && errno == EINTR) continue;
+    if (written < 0) return false;
+    script.remove_prefix(static_cast<std::size_t>(written));
+  }
+  return ::lseek(fd, 0, SEEK_SET) == 0;
 }
 
-// gnuplot with this input and output, without the user's own settings; its exit status.
-Expected<int> run_program(int input, int output) {
+Expected<pid_t> start_gnuplot(int input, int output) {
   posix_spawn_file_actions_t actions;
   ::posix_spawn_file_actions_init(&actions);
   ::posix_spawn_file_actions_adddup2(&actions, input, STDIN_FILENO);
   ::posix_spawn_file_actions_adddup2(&actions, output, STDOUT_FILENO);
   std::string name = "gnuplot";
-  std::string settings = "--default-settings";
+  std::string settings = "--default-settings";  // not the user's own
   std::string from_input = "-";
   const std::array<char*, 4> words{name.data(), settings.data(), from_input.data(), nullptr};
   pid_t child = 0;
   const int error = ::posix_spawnp(&child, name.c_str(), &actions, nullptr, words.data(), environ);
   ::posix_spawn_file_actions_destroy(&actions);
-  if (error != 0) return fail({}, system_reason(error));
-  int status = 0;
-  while (::waitpid(child, &status, 0) < 0) {
-    if (errno != EINTR) return fail({}, system_reason());
-  }
-  return status;
+  if (error != 0) return fail({}, "gnuplot cannot be started: " + system_reason(error));
+  return child;
 }
 
-// gnuplot does not notice when its picture cannot be written; OutputFile does.
-void copy(std::FILE* from, OutputFile& to) {
-  std::rewind(from);
+std::string read_to_end(int fd) {
+  std::string text;
   std::array<char, 65'536> block{};
-  while (const std::size_t got = std::fread(block.data(), 1, block.size(), from))
-    to.write({block.data(), got});
+  while (true) {
+    const ssize_t got = ::read(fd, block.data(), block.size());
+    if (got < 0 && errno == EINTR) continue;
+    if (got <= 0) return text;  // what gnuplot could not finish, its exit status says
+    text.append(block.data(), static_cast<std::size_t>(got));
+  }
+}
+
+// What gnuplot prints for the script.
+Expected<std::string> picture_of(const std::string& script) {
+  const Descriptor input(::memfd_create("vgyro-script", MFD_CLOEXEC));
+  if (input.fd < 0 || !write_script(input.fd, script)) {
+    return fail({}, "no script for gnuplot: " + system_reason());
+  }
+  std::array<int, 2> ends{};
+  if (::pipe2(ends.data(), O_CLOEXEC) != 0) return fail({}, "no pipe: " + system_reason());
+  const Descriptor from(ends[0]);
+  Descriptor to(ends[1]);
+  const auto child = start_gnuplot(input.fd, to.fd);
+  if (!child) return tl::unexpected(child.error());
+  to.close();
+  std::string picture = read_to_end(from.fd);
+  int status = 0;
+  while (::waitpid(*child, &status, 0) < 0 && errno == EINTR) {
+  }
+  if (status != 0) return fail({}, "gnuplot failed, as it says above");
+  return picture;
 }
 
 }  // namespace
@@ -106,20 +138,14 @@ std::string gnuplot_text(const std::string& text) {
   return result + "'";
 }
 
-Expected<void> run_gnuplot(const std::string& path, const std::function<void(std::FILE*)>& write) {
+Expected<void> run_gnuplot(const std::string& path, const std::string& script) {
   if (auto good = check_picture_path(path); !good) return good;
-  const auto script = memory_file(path);
-  if (!script) return tl::unexpected(script.error());
-  const auto picture = memory_file(path);
-  if (!picture) return tl::unexpected(picture.error());
-  write(script->get());
-  std::rewind(script->get());
-  const auto status = run_program(::fileno(script->get()), ::fileno(picture->get()));
-  if (!status) return fail(path, "cannot be drawn: gnuplot: " + status.error().what);
-  if (*status != 0) return fail(path, "was not drawn: gnuplot failed, as it says above");
+  const auto picture = picture_of(script);
+  if (!picture) return fail(path, "was not drawn: " + picture.error().what);
+  // gnuplot would not notice when its picture cannot be written.
   auto file = OutputFile::open(path);
   if (!file) return tl::unexpected(file.error());
-  copy(picture->get(), *file);
+  file->write(*picture);
   return file->close();
 }
 

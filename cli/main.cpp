@@ -248,6 +248,7 @@ int run(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  keep_standard_streams();
   const int code = run(argc, argv);
   const auto finished = finish_output();
   if (!finished) report(finished.error());

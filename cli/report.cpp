@@ -1,3 +1,5 @@
+#include <algorithm>
+
 #include "cli/commands.h"
 #include "cli/terminal.h"
 
@@ -9,8 +11,11 @@ int report(const Error& error) {
 }
 
 int report(const std::vector<Error>& errors) {
-  for (const Error& error : errors)
-    report(error);
+  // A wrong file can have a complaint for every line; nobody reads them.
+  constexpr std::size_t kMost = 40;
+  for (std::size_t i = 0; i < std::min(errors.size(), kMost); ++i)
+    report(errors[i]);
+  if (errors.size() > kMost) tell("error: … and {} more\n", errors.size() - kMost);
   return kBadInput;
 }
 

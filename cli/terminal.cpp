@@ -1,6 +1,8 @@
 #include "cli/terminal.h"
 
 #include <cerrno>
+#include <fcntl.h>
+#include <unistd.h>
 
 #include "base/printable.h"
 
@@ -16,6 +18,15 @@ void note(bool good) {
 }
 
 }  // namespace
+
+void keep_standard_streams() {
+  for (const int fd : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
+    if (::fcntl(fd, F_GETFD) >= 0) continue;
+    // The wrong way round: what is read from it or written to it fails, as if it were closed.
+    const int placed = ::open("/dev/null", fd == STDIN_FILENO ? O_WRONLY : O_RDONLY);
+    if (placed > STDERR_FILENO) ::close(placed);
+  }
+}
 
 void draw(std::FILE* to, std::string_view text) {
   errno = 0;

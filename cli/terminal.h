@@ -15,6 +15,10 @@
 
 namespace vgyro::cli {
 
+/// Where the caller has closed one of the three standard streams, its number must not go to a file
+/// that is opened later. First of all.
+void keep_standard_streams();
+
 void put_text(std::FILE* to, std::string_view text);
 
 template <class... T>

@@ -2,7 +2,10 @@
 """What `vgyro` writes: never over what it reads, never by way of another program's syntax, and never
 lost without a word."""
 
+import json
 import os
+import resource
+import signal
 import subprocess
 import unittest
 from pathlib import Path
@@ -149,6 +152,33 @@ class Outputs(bench.Bench):
         for call in self.calls("full.svg"):
             with self.subTest(call):
                 self.assertIn("full.svg: cannot be written: No space left on device", self.bad(*call))
+
+    def limited(self, *call):
+        """What it says when no file may become larger than 2 KB: a disk that is full in the middle."""
+        def limit():
+            signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+            resource.setrlimit(resource.RLIMIT_FSIZE, (2048, 2048))
+        done = subprocess.run([bench.VGYRO, *call], stderr=subprocess.PIPE, stdout=subprocess.PIPE, cwd=self.folder, check=False,
+                              preexec_fn=limit)
+        self.assertEqual(done.returncode, 1, done.stderr)
+        return done.stderr.decode()
+
+    def test_a_disk_that_is_full_in_the_middle_of_a_file_is_told(self):
+        for call in (*self.calls("x.svg"), ("gap", "--config", "vgyro.toml", "--measured", "in.log", "--out", "found")):
+            if "compare" in call:
+                continue  # its JSON is shorter
+            with self.subTest(call):
+                self.assertRegex(self.limited(*call), "(cannot be written|no script for gnuplot): File too large")
+        self.assertFalse((self.folder / "found").exists())
+        self.assertEqual([path for path in self.folder.iterdir() if path.name.startswith(".")], [])
+
+    def test_a_closed_standard_output_is_no_place_for_a_file(self):
+        # The next file to be opened would get its number, and texts would go there.
+        done = subprocess.run([bench.VGYRO, "allan", "--config", "vgyro.toml", "--json", "a.json", "in.log"], stderr=subprocess.PIPE,
+                              cwd=self.folder, check=False, preexec_fn=lambda: os.close(1))
+        self.assertEqual(done.returncode, 1)
+        self.assertEqual(done.stderr.decode().splitlines()[-1], "error: standard output: cannot be written: Bad file descriptor")
+        json.loads(self.read("a.json"))
 
     def test_a_full_stderr_ends_nothing(self):
         # The summary is lost, the result is not.
