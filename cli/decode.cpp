@@ -19,7 +19,9 @@ namespace vgyro::cli {
 namespace {
 
 std::string json_text(std::string_view text) {
-  return nlohmann::json(text).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+  // JSON lets controls of eight bits through; as \u009b they are text to a terminal too.
+  const bool ascii_only = printable(text) != text;
+  return nlohmann::json(text).dump(-1, ' ', ascii_only, nlohmann::json::error_handler_t::replace);
 }
 
 // The texts of a signal that are the same in every line.

@@ -233,6 +233,7 @@ class Terminal(bench.Bench):
         everything = said + self.run_vgyro("check", "vgyro.toml").stdout + self.run_vgyro("decode", "--dbc", "bench.dbc", "in.log").stdout
         self.assertEqual([byte for byte in (b"\x1b", b"\x07", b"\x9b3") if byte in said], [])
         self.assertNotIn(b"\x1b", everything)
+        self.assertNotIn(b"\xc2\x9b", everything)
 
     def test_file_names_and_words_add_no_lines(self):
         for call in (("check", "no\nerror: such\x1b[2Jfile"), ("fly\x1b[2J\nhigh",), ("replay", "--method", "a\x1b[2J", "x"),
