@@ -4,12 +4,14 @@
 
 #include <fmt/core.h>
 
+#include "base/printable.h"
+
 namespace vgyro {
 
 std::string Error::message() const {
   std::string text = where.empty() ? what : fmt::format("{}: {}", where, what);
   if (!remedy.empty()) text += "; " + remedy;
-  return text;
+  return printable(text);
 }
 
 std::string system_reason(int error) {

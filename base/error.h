@@ -15,7 +15,7 @@ struct Error {
   std::string what;    ///< one sentence, no full stop
   std::string remedy;  ///< what would be right; empty when `what` implies it
 
-  /// "where: what; remedy", as the programs print it.
+  /// "where: what; remedy", as the programs print it: one printable line.
   [[nodiscard]] std::string message() const;
 };
 

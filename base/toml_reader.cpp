@@ -6,11 +6,13 @@
 #include <fmt/core.h>
 
 #include "base/nearest.h"
+#include "base/toml_bounds.h"
 
 namespace vgyro {
 
 Expected<toml::table> parse_toml(std::string_view text, const std::string& file,
                                  std::string remedy) {
+  if (auto good = check_toml_shape(text, file); !good) return tl::unexpected(good.error());
   toml::parse_result parsed = toml::parse(text, file);
   if (parsed) return std::move(parsed).table();
   const toml::parse_error& error = parsed.error();
@@ -99,11 +101,18 @@ void TomlReader::forgive(std::initializer_list<std::string_view> keys) {
 }
 
 void TomlReader::finish() {
+  // Whoever gave a wrong file wants to be told so, not all of it.
+  constexpr std::size_t kUnknownMost = 10;
+  std::size_t unknown = 0;
   for (const auto& [key, value] : table_) {
     if (std::find(asked_.begin(), asked_.end(), key.str()) != asked_.end()) continue;
+    if (++unknown > kUnknownMost) continue;
     complain(where(key.str()), fmt::format("unknown key \"{}\" in {}", key.str(), title_),
              suggest_name(key.str(), asked_));
   }
+  if (unknown <= kUnknownMost) return;
+  complain(where(),
+           fmt::format("… and {} more unknown keys in {}", unknown - kUnknownMost, title_));
 }
 
 }  // namespace vgyro

@@ -25,7 +25,8 @@
 
 namespace vgyro {
 
-/// The one way from a text to a table. `remedy` is for a text that is no TOML.
+/// The one way from a text to a table, through check_toml_shape(). `remedy` is for a text that is
+/// no TOML.
 Expected<toml::table> parse_toml(std::string_view text, const std::string& file,
                                  std::string remedy = {});
 
@@ -54,7 +55,7 @@ class TomlReader {
   /// These keys are known, but after other trouble nobody reads them.
   void forgive(std::initializer_list<std::string_view> keys);
 
-  /// Complains of every key that was not asked for.
+  /// Complains of keys that were not asked for: of the first ten, and how many more there are.
   void finish();
 
  private:

@@ -1,10 +1,10 @@
 """What bench/accuracy makes of its measurements: figures, verdicts, tables and a picture."""
 
 import math
-import subprocess
 
 import numpy as np
 
+import command_line
 from judge import motion, score
 from judge.pair import PAIRS
 
@@ -232,7 +232,6 @@ POINTS = {
 
 PREAMBLE = """\
 set terminal svg size 1200,900 dynamic font 'DejaVu Sans,13' background 'white'
-set output {output}
 set logscale y
 set format y '%g'
 set yrange [0.5:20000]
@@ -286,10 +285,10 @@ def key_lines():
 
 def draw(summaries, path):
     names = dict.fromkeys(HORIZON_NAMES[max(s["horizons"])] for s in summaries.values())
-    script = [PREAMBLE.format(output=f"'{path}'", horizons="after " + " (turn: ".join(names) + ")" * (len(names) - 1))]
+    script = [PREAMBLE.format(horizons="after " + " (turn: ".join(names) + ")" * (len(names) - 1))]
     for pair in PAIRS.values():
         cells = [(scenario, s) for (name, scenario), s in summaries.items() if name == pair.name]
         if cells:
             script += panel_lines(pair.title, cells)
     script += [*key_lines(), "unset multiplot"]
-    subprocess.run(["gnuplot"], input="\n".join(script) + "\n", text=True, check=True)
+    command_line.draw("\n".join(script) + "\n", path)

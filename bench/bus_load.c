@@ -75,14 +75,23 @@ static void send_frame(int fd, const struct can_frame *frame) {
   while (write(fd, frame, sizeof *frame) != sizeof *frame) usleep(100);
 }
 
+// Of the whole word, finite and in the range; anything else is wrong usage.
+static double number(const char *word, double low, double high) {
+  char *end = NULL;
+  const double value = strtod(word, &end);
+  if (end != word && *end == 0 && value >= low && value <= high) return value;
+  fprintf(stderr, "%s: a number from %g to %g is needed\n", word, low, high);
+  exit(2);
+}
+
 int main(int argc, char **argv) {
   if (argc < 5) return 2;
+  const double rate = number(argv[3], 0.1, 1e6);
+  const double seconds = number(argv[4], 0.0, 1e6);
+  const int others = argc > 5 ? (int)number(argv[5], 0, MOST - 1) : 0;
   const int fds[2] = {open_bus(argv[1]), open_bus(argv[2])};
-  const double rate = atof(argv[3]);
-  const int others = argc > 5 ? atoi(argv[5]) : 0;
-  if (others < 0 || others >= MOST) return 2;
   const int64_t half = (int64_t)(0.5e9 / rate);
-  const long pairs = (long)(rate * atof(argv[4]));
+  const long pairs = (long)(rate * seconds);
   struct timespec now;
   clock_gettime(CLOCK_MONOTONIC, &now);
   int64_t due = (int64_t)now.tv_sec * 1000000000 + now.tv_nsec;

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests/twin"))
+import command_line  # noqa: E402
 import paper  # noqa: E402
 
 QUANTITIES = (
@@ -25,7 +26,7 @@ RUN_NAMES = {"rest": "rest, 120 s", "turn": "50 deg/s, 900 s"}
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--seeds", type=int, default=10, help="seeds 1 … this (default %(default)s)")
+    parser.add_argument("--seeds", type=command_line.whole(1, 10_000), default=10, help="seeds 1 … this (default %(default)s)")
     count = parser.parse_args().seeds
 
     print(f"Medians over seeds 1 … {count} (in brackets: the worst seed). 1 σ: what the twin's noise lets one expect of `mutual`.\n")

@@ -15,6 +15,8 @@ import tempfile
 import time
 from pathlib import Path
 
+import command_line
+
 SOURCE = Path(__file__).resolve().parents[1]
 CONFIG = SOURCE / "examples/twin.toml"
 FRAMES_LONG, FRAMES_SHORT = 2_400_000, 240_000
@@ -122,10 +124,10 @@ def cpu_name():
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--bin", type=Path, default=SOURCE / "build/release/bin", help="where the programs are")
-    parser.add_argument("--cache", type=Path, default=SOURCE / "build/bench", help="where the logs are kept")
-    parser.add_argument("--rounds", type=int, default=5)
-    parser.add_argument("--core", type=int, help="default: the last one")
+    parser.add_argument("--bin", type=command_line.file_name, default=SOURCE / "build/release/bin", help="where the programs are")
+    parser.add_argument("--cache", type=command_line.file_name, default=SOURCE / "build/bench", help="where the logs are kept")
+    parser.add_argument("--rounds", type=command_line.whole(1, 1000), default=5)
+    parser.add_argument("--core", type=command_line.whole(0, 4095), help="default: the last one")
     a = parser.parse_args()
     cores = sorted(os.sched_getaffinity(0))
     core = cores[-1] if a.core is None else a.core

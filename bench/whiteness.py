@@ -20,6 +20,8 @@ from pathlib import Path
 
 import numpy as np
 
+import command_line
+
 SOURCE = Path(__file__).resolve().parents[1]
 RATE_ID_DEFAULT = 0x610
 
@@ -150,7 +152,6 @@ def draw(path, t, rate, difference, rows, options):
               "samples": dots("samples"), "cells": dots("cells"), "flat": dots("cells_flat")}
     inline = "".join(f"${name} << EOD\n{text}\nEOD\n" for name, text in blocks.items())
     script = f"""set terminal svg size 900,640 dynamic background rgb 'white' font 'sans,13'
-set output '{path}'
 {inline}
 set multiplot layout 3,1 margins 0.09,0.97,0.1,0.95 spacing 0.09
 set grid lc rgb '#dddddd'
@@ -165,7 +166,7 @@ set logscale y
 plot $samples with points pt 6 lc rgb '#999999' title 'samples', $cells with points pt 7 ps 0.7 lc rgb '#c03000' title 'cells of {options.cell:g} s', \\
   $flat with points pt 2 ps 0.7 lc rgb '#007040' title 'less own line', {limit:.2f} with lines dt 2 lc rgb 'black' title '99 % of white noise'
 """
-    subprocess.run(["gnuplot"], input=script, text=True, check=True)
+    command_line.draw(script, path)
 
 
 def self_check(lags):
@@ -181,18 +182,19 @@ def self_check(lags):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("config", type=Path)
-    parser.add_argument("log", type=Path)
+    parser.add_argument("config", type=command_line.file_name)
+    parser.add_argument("log", type=command_line.file_name)
     parser.add_argument("--method", default="optimal", choices=("optimal", "mutual"))
     parser.add_argument("--accept-motion", action="store_true", help='as with when_moving = "accept"')
-    parser.add_argument("--stretch", type=float, default=20.0, metavar="S", help="seconds of each stretch (20)")
-    parser.add_argument("--lags", type=int, default=10, help="even; (10)")
-    parser.add_argument("--cell", type=float, default=0.1, metavar="S", help="seconds of each mean (0.1)")
-    parser.add_argument("--quiet-dps", type=float, default=2.0, help="rms of the rate in a quiet stretch, at most (2)")
-    parser.add_argument("--gap", type=float, default=0.5, metavar="S", help="a longer silence ends a stretch (0.5)")
-    parser.add_argument("--plot", type=Path, metavar="FILE.svg", help="also draw it, with gnuplot")
+    parser.add_argument("--stretch", type=command_line.number(1.0, 1e5), default=20.0, metavar="S", help="seconds of each stretch (20)")
+    parser.add_argument("--lags", type=command_line.whole(2, 1000), default=10, help="even; (10)")
+    parser.add_argument("--cell", type=command_line.number(1e-3, 1e3), default=0.1, metavar="S", help="seconds of each mean (0.1)")
+    parser.add_argument("--quiet-dps", type=command_line.number(0.0, 1e5), default=2.0, help="rms of the rate in a quiet stretch, at most (2)")
+    parser.add_argument("--gap", type=command_line.number(1e-3, 1e5), default=0.5, metavar="S", help="a longer silence ends a stretch (0.5)")
+    parser.add_argument("--plot", type=command_line.file_name, metavar="FILE.svg", help="also draw it, with gnuplot")
     options = parser.parse_args()
-    if options.lags < 2 or options.lags % 2:
+    command_line.refuse_overwriting(parser, [options.config, options.log], [options.plot])
+    if options.lags % 2:
         parser.error("--lags must be even")
     self_check(options.lags)
     vgyro = Path(os.environ.get("VGYRO_BIN", SOURCE / "build/release/bin")) / "vgyro"

@@ -128,6 +128,20 @@ class XzSource : public LogSource {
   [[nodiscard]] tl::unexpected<Error> damaged() const {
     if (damage_ == LZMA_FORMAT_ERROR) return fail(name_, "is not an .xz file");
     if (damage_ == LZMA_BUF_ERROR) return fail(name_, "ends in the middle of its packed data");
+    if (damage_ == LZMA_MEMLIMIT_ERROR || damage_ == LZMA_MEM_ERROR) {
+      constexpr std::uint64_t kMiB = 1U << 20U;
+      return fail(
+          name_,
+          damage_ == LZMA_MEM_ERROR
+              ? std::string("cannot be unpacked: there is not enough memory")
+              : fmt::format("cannot be unpacked: its dictionary needs {} MiB of memory, {} "
+                            "MiB are the limit",
+                            (lzma_memusage(&stream_) + kMiB - 1) / kMiB, kMemoryBytesMax / kMiB),
+          "`xz -dc FILE.xz | vgyro … -` unpacks it outside");
+    }
+    if (damage_ == LZMA_OPTIONS_ERROR) {
+      return fail(name_, "is packed in a way that this version of liblzma does not know");
+    }
     return fail(name_, fmt::format("is damaged (liblzma error {})", static_cast<int>(damage_)));
   }
 

@@ -10,7 +10,9 @@
 #include "cli/commands.h"
 #include "cli/gnuplot.h"
 #include "cli/output_file.h"
+#include "cli/overwrite.h"
 #include "cli/pair_recording.h"
+#include "cli/terminal.h"
 #include "gateway/config.h"
 
 namespace vgyro::cli {
@@ -56,10 +58,14 @@ int run_allan(const AllanOptions& options) {
   if (!options.plot.empty()) {
     if (const auto good = check_picture_path(options.plot); !good) return report(good.error());
   }
+  std::vector<std::string> inputs = loaded->files;
+  inputs.push_back(options.log);
+  const auto free = check_outputs(inputs, {options.json, options.plot});
+  if (!free) return report(free.error());
   const auto judged = judge(options, loaded->plan);
   if (!judged) return report(judged.error());
   // JSON on standard output stands there alone.
-  fmt::print(options.json == "-" ? stderr : stdout, "{}", to_text(*judged));
+  put_text(options.json == "-" ? stderr : stdout, to_text(*judged));
   if (!options.json.empty()) {
     if (const auto done = write_json(options.json, *judged); !done) return report(done.error());
   }

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdio>
 #include <filesystem>
 #include <iterator>
 #include <limits>
@@ -67,11 +66,10 @@ class Picture {
 
   [[nodiscard]] bool empty() const { return deviation_.empty(); }
 
-  void write(std::FILE* to, const std::string& path) const {
+  void write(std::string& to, const std::string& path) const {
     for (std::size_t i = 0; i < 3; ++i)
       write_data(to, i);
-    fmt::print(
-        to,
+    put(to,
         "{}set multiplot layout 2,2 title {} noenhanced font ',16'\n"
         "set logscale xy\nset grid xtics ytics mxtics mytics lc rgb '#cccccc' lw 0.6, lc rgb "
         "'#eeeeee' lw 0.4\nset border lc rgb '#888888'\nset tics tc rgb '#333333'\n"
@@ -84,21 +82,20 @@ class Picture {
     overview(to);
     for (std::size_t i = 0; i < 3; ++i)
       panel(to, i);
-    fmt::print(to, "unset multiplot\n");
+    put(to, "unset multiplot\n");
   }
 
  private:
-  void write_data(std::FILE* to, std::size_t i) const {
-    fmt::print(to, "$curve{} << EOD\n", i);
+  void write_data(std::string& to, std::size_t i) const {
+    put(to, "$curve{} << EOD\n", i);
     for (const analysis::AllanPoint& point : series_[i]->allan) {
       if (!(point.deviation_dps > 0.0)) continue;
-      fmt::print(to, "{:.7g} {:.7g} {:.7g} {:.7g}\n", point.tau_s,
-                 kSecondsPerHour * point.deviation_dps, kSecondsPerHour * point.low_dps,
-                 kSecondsPerHour * point.high_dps);
+      put(to, "{:.7g} {:.7g} {:.7g} {:.7g}\n", point.tau_s, kSecondsPerHour * point.deviation_dps,
+          kSecondsPerHour * point.low_dps, kSecondsPerHour * point.high_dps);
     }
-    fmt::print(to, "EOD\n");
+    put(to, "EOD\n");
     if (!series_[i]->fit) return;
-    fmt::print(to, "$model{} << EOD\n", i);
+    put(to, "$model{} << EOD\n", i);
     for (int k = 0; k < kModelPoints; ++k) {
       const double share = static_cast<double>(k) / (kModelPoints - 1);
       // Where the fit did not look it has nothing to say.
@@ -106,14 +103,14 @@ class Picture {
           std::max(tau_s_.low,
                    series_[i]->fit->limited ? 0.5 / series_[i]->fit->frequency_max_hz : tau_s_.low);
       const double tau_s = low_s * std::pow(tau_s_.high / low_s, share);
-      fmt::print(to, "{:.7g} {:.7g}", tau_s, kSecondsPerHour * std::sqrt(whole(i, tau_s)));
+      put(to, "{:.7g} {:.7g}", tau_s, kSecondsPerHour * std::sqrt(whole(i, tau_s)));
       for (const PartOfModel& part : kParts) {
-        fmt::print(to, " {:.7g}",
-                   kSecondsPerHour * std::sqrt(series_[i]->fit->variance(part.kind, tau_s)));
+        put(to, " {:.7g}",
+            kSecondsPerHour * std::sqrt(series_[i]->fit->variance(part.kind, tau_s)));
       }
-      fmt::print(to, " {:.7g}\n", kSecondsPerHour * std::sqrt(ramp_variance(i, tau_s)));
+      put(to, " {:.7g}\n", kSecondsPerHour * std::sqrt(ramp_variance(i, tau_s)));
     }
-    fmt::print(to, "EOD\n");
+    put(to, "EOD\n");
   }
 
   [[nodiscard]] double ramp_variance(std::size_t i, double tau_s) const {
@@ -125,37 +122,35 @@ class Picture {
     return series_[i]->fit->variance(tau_s) + ramp_variance(i, tau_s);
   }
 
-  void overview(std::FILE* to) const {
-    fmt::print(to,
-               "set title 'both gyros and their difference'\nset key top center noenhanced\nplot ");
+  void overview(std::string& to) const {
+    put(to, "set title 'both gyros and their difference'\nset key top center noenhanced\nplot ");
     for (std::size_t i = 0; i < 3; ++i) {
-      fmt::print(to,
-                 "{}$curve{} u 1:2:3:4 w yerrorbars pt 7 ps 0.35 lc rgb '{}' notitle, "
-                 "'' u 1:2 w lp pt 7 ps 0.45 lw 2 lc rgb '{}' t {}",
-                 i == 0 ? "" : ", ", i, kBarColours[i], kColours[i], gnuplot_text(names_[i]));
+      put(to,
+          "{}$curve{} u 1:2:3:4 w yerrorbars pt 7 ps 0.35 lc rgb '{}' notitle, "
+          "'' u 1:2 w lp pt 7 ps 0.45 lw 2 lc rgb '{}' t {}",
+          i == 0 ? "" : ", ", i, kBarColours[i], kColours[i], gnuplot_text(names_[i]));
     }
-    fmt::print(to, "\n");
+    put(to, "\n");
   }
 
-  void panel(std::FILE* to, std::size_t i) const {
+  void panel(std::string& to, std::size_t i) const {
     const SeriesNoise& noise = *series_[i];
-    fmt::print(to, "set title {} noenhanced tc rgb '{}'\nplot ", gnuplot_text(names_[i]),
-               kColours[i]);
+    put(to, "set title {} noenhanced tc rgb '{}'\nplot ", gnuplot_text(names_[i]), kColours[i]);
     if (noise.fit) {
       for (std::size_t k = 0; k < kParts.size(); ++k) {
         if (noise.fit->variance(kParts[k].kind, 1.0) <= 0.0) continue;
-        fmt::print(to, "$model{} u 1:{} w l dt 2 lw 1.5 lc rgb '{}' t {}, ", i, 3 + k,
-                   kParts[k].colour, gnuplot_text(part_title(*noise.fit, kParts[k])));
+        put(to, "$model{} u 1:{} w l dt 2 lw 1.5 lc rgb '{}' t {}, ", i, 3 + k, kParts[k].colour,
+            gnuplot_text(part_title(*noise.fit, kParts[k])));
       }
       if (ramp_variance(i, 1.0) > 0.0) {
-        fmt::print(to, "$model{} u 1:7 w l dt 3 lw 1.5 lc rgb '#777777' t {}, ", i,
-                   gnuplot_text(fmt::format("ramp {:.2g} deg/s²", noise.fit->ramp_dps_s)));
+        put(to, "$model{} u 1:7 w l dt 3 lw 1.5 lc rgb '#777777' t {}, ", i,
+            gnuplot_text(fmt::format("ramp {:.2g} deg/s²", noise.fit->ramp_dps_s)));
       }
-      fmt::print(to, "$model{} u 1:2 w l lw 2 lc rgb '{}' t 'fitted model', ", i, kColours[i]);
+      put(to, "$model{} u 1:2 w l lw 2 lc rgb '{}' t 'fitted model', ", i, kColours[i]);
     }
-    fmt::print(to, "$curve{} u 1:2:3:4 w yerrorbars pt 7 ps 0.55 lw 1.2 lc rgb '{}' t {}\n", i,
-               noise.fit ? "#222222" : kColours[i],
-               noise.fit ? "'measured, 95 % bounds'" : "'measured; it holds motion'");
+    put(to, "$curve{} u 1:2:3:4 w yerrorbars pt 7 ps 0.55 lw 1.2 lc rgb '{}' t {}\n", i,
+        noise.fit ? "#222222" : kColours[i],
+        noise.fit ? "'measured, 95 % bounds'" : "'measured; it holds motion'");
   }
 
   static std::string part_title(const NoiseFit& fit, const PartOfModel& part) {
@@ -184,7 +179,9 @@ class Picture {
 Expected<void> draw_allan(const std::string& path, const AllanReport& report) {
   const Picture picture(report);
   if (picture.empty()) return fail(path, "there is nothing to draw: the rates never change");
-  return run_gnuplot(path, [&](std::FILE* to) { picture.write(to, path); });
+  std::string script;
+  picture.write(script, path);
+  return run_gnuplot(path, script);
 }
 
 }  // namespace vgyro::cli

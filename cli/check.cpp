@@ -1,6 +1,8 @@
 #include <fmt/core.h>
 
+#include "base/printable.h"
 #include "cli/commands.h"
+#include "cli/terminal.h"
 #include "gateway/config.h"
 #include "gateway/model_plan.h"
 
@@ -17,12 +19,12 @@ std::string id_text(const gateway::FrameMatch& match) {
 void print_row(std::string_view role, const std::string& bus, const gateway::FrameMatch& match,
                const std::string& message, const gateway::Quantity& quantity) {
   const std::string signal = message + "." + quantity.name;
-  fmt::print("  {:<14}{:<8}{:<10}{:<26}{:<8}{}\n", role, bus, id_text(match), signal, quantity.unit,
-             quantity.layout);
+  say("  {:<14}{:<8}{:<10}{:<26}{:<8}{}\n", role, bus, id_text(match), signal,
+      printable(quantity.unit), quantity.layout);
 }
 
 void detail(std::string_view what, const std::string& text) {
-  fmt::print("    {:<12}{}\n", what, text);
+  say("    {:<12}{}\n", what, text);
 }
 
 void print_e2e(const gateway::E2ePlan& e2e) {
@@ -36,12 +38,13 @@ void print_e2e(const gateway::E2ePlan& e2e) {
 
 void print_gyro(const gateway::GyroPlan& gyro) {
   print_row("gyro " + gyro.name, gyro.bus, gyro.match, gyro.message, gyro.rate);
-  detail("accepted", fmt::format("{:g} to {:g} {}{}", gyro.rate.minimum, gyro.rate.maximum,
-                                 gyro.rate.unit, gyro.rate.scale < 0 ? ", sign flipped" : ""));
+  detail("accepted",
+         fmt::format("{:g} to {:g} {}{}", gyro.rate.minimum, gyro.rate.maximum,
+                     printable(gyro.rate.unit), gyro.rate.scale < 0 ? ", sign flipped" : ""));
   if (gyro.sign) detail("sign", "from a signal of its own: 1 is negative");
   if (gyro.temperature) {
     detail("temperature", fmt::format("{} in {}, {}", gyro.temperature->name,
-                                      gyro.temperature->unit, gyro.temperature->layout));
+                                      printable(gyro.temperature->unit), gyro.temperature->layout));
   }
   print_e2e(gyro.e2e);
   if (gyro.valid) detail("valid when", gyro.valid->text);
@@ -50,18 +53,18 @@ void print_gyro(const gateway::GyroPlan& gyro) {
 
 void print_model(const gateway::Plan& plan) {
   if (!plan.model) return;
-  fmt::print("  {:<14}{}, {} effects\n", "model", plan.model->file, plan.model->effects.size());
+  say("  {:<14}{}, {} effects\n", "model", plan.model->file, plan.model->effects.size());
   for (std::size_t gyro = 0; gyro < 2; ++gyro) {
-    fmt::print("    gyro {}\n", plan.gyros[gyro].name);
+    say("    gyro {}\n", plan.gyros[gyro].name);
     for (const model::Effect& effect : gateway::effects_of(plan, gyro)) {
-      fmt::print("      {:<15}{:<28}{}\n", gateway::treatment(effect.kind),
-                 model::info(effect.kind).name, model::parameters_text(effect));
+      say("      {:<15}{:<28}{}\n", gateway::treatment(effect.kind), model::info(effect.kind).name,
+          model::parameters_text(effect));
     }
   }
 }
 
 void print_plan(const gateway::Plan& plan) {
-  fmt::print("  {:<14}{:<8}{:<10}{:<26}{:<8}{}\n", "", "bus", "id", "signal", "unit", "bits");
+  say("  {:<14}{:<8}{:<10}{:<26}{:<8}{}\n", "", "bus", "id", "signal", "unit", "bits");
   for (const gateway::GyroPlan& gyro : plan.gyros)
     print_gyro(gyro);
   if (plan.reference) {
@@ -80,26 +83,26 @@ void print_plan(const gateway::Plan& plan) {
     print_row("speed", plan.speed->bus, plan.speed->match, plan.speed->message, plan.speed->speed);
     print_e2e(plan.speed->e2e);
   }
-  fmt::print("  {:<14}", "calibration");
+  say("  {:<14}", "calibration");
   if (plan.calibration.from_reference) {
-    fmt::print("the first {:g} s against [reference]\n", plan.calibration.rest_s);
+    say("the first {:g} s against [reference]\n", plan.calibration.rest_s);
   } else {
     const bool waits = plan.calibration.when_moving == fusion::WhenMoving::kWait;
-    fmt::print("the first {:g} s{}, true rate {:g} deg/s\n", plan.calibration.rest_s,
-               waits ? " of rest" : ", taken for rest whatever moves", plan.calibration.rate_dps);
+    say("the first {:g} s{}, true rate {:g} deg/s\n", plan.calibration.rest_s,
+        waits ? " of rest" : ", taken for rest whatever moves", plan.calibration.rate_dps);
   }
-  fmt::print("  {:<14}{}", "corrector", gateway::to_string(plan.corrector.method));
+  say("  {:<14}{}", "corrector", gateway::to_string(plan.corrector.method));
   if (plan.corrector.method == gateway::Method::kMutual) {
-    fmt::print(", window {:g} s, drift polynomial of order {}", plan.corrector.window_s,
-               plan.corrector.order);
+    say(", window {:g} s, drift polynomial of order {}", plan.corrector.window_s,
+        plan.corrector.order);
   } else if (plan.corrector.method == gateway::Method::kOptimal) {
-    fmt::print(", windows of at most {:g} s", plan.corrector.window_s);
+    say(", windows of at most {:g} s", plan.corrector.window_s);
   }
-  fmt::print("\n");
+  say("\n");
   print_model(plan);
-  fmt::print("  {:<14}{:<8}VG_Rate {:03X}, VG_Bias {:03X}, VG_Model {:03X}, {}\n", "output",
-             plan.buses[plan.output.bus], plan.output.rate_id, plan.output.bias_id,
-             plan.output.model_id, plan.output.fd ? "VG_Rate as CAN FD" : "classic CAN");
+  say("  {:<14}{:<8}VG_Rate {:03X}, VG_Bias {:03X}, VG_Model {:03X}, {}\n", "output",
+      plan.buses[plan.output.bus], plan.output.rate_id, plan.output.bias_id, plan.output.model_id,
+      plan.output.fd ? "VG_Rate as CAN FD" : "classic CAN");
 }
 
 }  // namespace
@@ -109,7 +112,7 @@ int run_check(const CheckOptions& options) {
   if (!loaded) return report(loaded.error());
   for (const Error& warning : loaded->warnings)
     warn(warning);
-  fmt::print("{}: good\n", options.config);
+  say("{}: good\n", options.config);
   print_plan(loaded->plan);
   return kDone;
 }

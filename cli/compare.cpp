@@ -7,7 +7,9 @@
 #include "cli/gap_inputs.h"
 #include "cli/gap_report.h"
 #include "cli/output_file.h"
+#include "cli/overwrite.h"
 #include "cli/progress.h"
+#include "cli/terminal.h"
 #include "gap/workflow.h"
 
 namespace vgyro::cli {
@@ -35,7 +37,8 @@ Expected<void> write_json(const std::string& path, const gap::Comparison& compar
 }  // namespace
 
 int run_compare(const CompareOptions& options) {
-  const auto inputs = load_gap_inputs(options.config, options.model, options.measured, "compare");
+  const auto inputs =
+      load_gap_inputs(options.config, options.model, options.measured, "compare", {options.json});
   if (!inputs) return report(inputs.error());
   const auto comparison = judge(*inputs, options);
   if (!comparison) return report(comparison.error());
@@ -46,8 +49,7 @@ int run_compare(const CompareOptions& options) {
   }
   // JSON on standard output stands there alone.
   if (!options.quiet) {
-    fmt::print(options.json == "-" ? stderr : stdout, "{}",
-               comparison_text(inputs->subject, *comparison));
+    put_text(options.json == "-" ? stderr : stdout, comparison_text(inputs->subject, *comparison));
   }
   return kDone;
 }

@@ -6,10 +6,11 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "base/printable.h"
 #include "can/candump.h"
 #include "cli/commands.h"
 #include "cli/output_file.h"
-#include "cli/progress.h"
+#include "cli/terminal.h"
 #include "dbc/multiplex.h"
 #include "dbc/parser.h"
 
@@ -18,7 +19,9 @@ namespace vgyro::cli {
 namespace {
 
 std::string json_text(std::string_view text) {
-  return nlohmann::json(text).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+  // JSON lets controls of eight bits through; as \u009b they are text to a terminal too.
+  const bool ascii_only = printable(text) != text;
+  return nlohmann::json(text).dump(-1, ' ', ascii_only, nlohmann::json::error_handler_t::replace);
 }
 
 // The texts of a signal that are the same in every line.
@@ -138,6 +141,11 @@ void put_text(Text& out, const can::LogRecord& record, std::string_view bus,
   fmt::format_to(to, "\n");
 }
 
+// ASCII without control characters, but for the end of the line: most lines are.
+bool is_plain(std::string_view line) {
+  return std::all_of(line.begin(), line.end() - 1, [](char c) { return c >= ' ' && c <= '~'; });
+}
+
 Expected<Decoder> load_decoder(const std::vector<std::string>& files) {
   std::vector<dbc::Database> databases;
   for (const std::string& file : files) {
@@ -177,7 +185,12 @@ int run_decode(const DecodeOptions& options) {
     } else {
       put_json(line, record, bus, *message);
     }
-    output->write({line.data(), line.size()});
+    const std::string_view text(line.data(), line.size());
+    if (options.text && !is_plain(text)) {
+      output->write(printable(text.substr(0, text.size() - 1)) + "\n");
+    } else {
+      output->write(text);
+    }
     ++decoded;
   }
   if (const auto closed = output->close(); !closed) return report(closed.error());
@@ -185,8 +198,8 @@ int run_decode(const DecodeOptions& options) {
   for (const can::MalformedLine& bad : counts.first_malformed) {
     warn({fmt::format("{}:{}", options.log, bad.line), bad.why, {}});
   }
-  fmt::print(stderr, "{} of {} frames decoded, {} lines not understood\n", decoded, counts.frames,
-             counts.malformed_lines + counts.cut_off_lines);
+  tell("{} of {} frames decoded, {} lines not understood\n", decoded, counts.frames,
+       counts.malformed_lines + counts.cut_off_lines);
   if (reader.error()) return report(*reader.error());
   if (counts.frames + counts.xl_frames == 0) {
     return report(Error{options.log, "holds no CAN frame",

@@ -1,4 +1,5 @@
 #include <cstdio>
+#include <filesystem>
 
 #include <fmt/core.h>
 #include <nlohmann/json.hpp>
@@ -10,6 +11,7 @@
 #include "cli/progress.h"
 #include "cli/report_page.h"
 #include "cli/result_folder.h"
+#include "cli/terminal.h"
 #include "gap/workflow.h"
 #include "model/catalogue.h"
 #include "model/edit.h"
@@ -106,9 +108,14 @@ Expected<void> write(const std::string& folder, const GapInputs& inputs,
 }  // namespace
 
 int run_gap(const GapOptions& options) {
-  const auto free = check_result_folder(options.out, {"gap.json", "model.toml", "report.html"});
+  const std::vector<std::string> names{"gap.json", "model.toml", "report.html"};
+  const auto free = check_result_folder(options.out, names);
   if (!free) return report(free.error());
-  const auto inputs = load_gap_inputs(options.config, options.model, options.measured, "gap");
+  std::vector<std::string> outputs;
+  for (const std::string& name : names)
+    outputs.push_back(std::filesystem::path(options.out) / name);
+  const auto inputs =
+      load_gap_inputs(options.config, options.model, options.measured, "gap", outputs);
   if (!inputs) return report(inputs.error());
   const auto given_text = model_text(inputs->model);
   if (!given_text) return report(given_text.error());
@@ -118,8 +125,8 @@ int run_gap(const GapOptions& options) {
     return report(done.error());
   }
   if (options.quiet) return kDone;
-  fmt::print("{}written: {}: report.html, gap.json, model.toml\n",
-             gap_text(inputs->subject, *result), options.out);
+  say("{}written: {}: report.html, gap.json, model.toml\n", gap_text(inputs->subject, *result),
+      options.out);
   return kDone;
 }
 

@@ -1,19 +1,24 @@
 #include "cli/gap_inputs.h"
 
 #include "cli/commands.h"
+#include "cli/overwrite.h"
 #include "cli/recording.h"
 #include "gateway/config.h"
 
 namespace vgyro::cli {
 
-tl::expected<GapInputs, std::vector<Error>> load_gap_inputs(const std::string& config,
-                                                            const std::optional<std::string>& model,
-                                                            const std::string& log,
-                                                            const std::string& doing) {
+tl::expected<GapInputs, std::vector<Error>> load_gap_inputs(
+    const std::string& config, const std::optional<std::string>& model, const std::string& log,
+    const std::string& doing, const std::vector<std::string>& outputs) {
   auto loaded = gateway::load_config(config, {.model = model});
   if (!loaded) return tl::unexpected(loaded.error());
   for (const Error& warning : loaded->warnings)
     warn(warning);
+  std::vector<std::string> read = loaded->files;
+  read.push_back(log);
+  if (const auto free = check_outputs(read, outputs); !free) {
+    return tl::unexpected(std::vector<Error>{free.error()});
+  }
   const gateway::Plan& plan = loaded->plan;
   GapInputs inputs;
   if (plan.model) inputs.model = *plan.model;

@@ -22,11 +22,11 @@ struct GapInputs {
   gap::Recording recording;
 };
 
-/// `model` comes before the configuration's own; `doing` is for the line of progress.
-tl::expected<GapInputs, std::vector<Error>> load_gap_inputs(const std::string& config,
-                                                            const std::optional<std::string>& model,
-                                                            const std::string& log,
-                                                            const std::string& doing);
+/// `model` comes before the configuration's own; `doing` is for the line of progress;
+/// `outputs` must be none of the files that are read.
+tl::expected<GapInputs, std::vector<Error>> load_gap_inputs(
+    const std::string& config, const std::optional<std::string>& model, const std::string& log,
+    const std::string& doing, const std::vector<std::string>& outputs);
 
 /// An error of the workflow, which does not know the log's name.
 Error at_log(Error error, const std::string& log);

@@ -1,11 +1,20 @@
 #include "cli/gnuplot.h"
 
-#include <cstdio>
+#include <array>
+#include <cerrno>
 #include <cstdlib>
+#include <fcntl.h>
 #include <filesystem>
+#include <spawn.h>
+#include <sys/mman.h>
+#include <sys/wait.h>
 #include <unistd.h>
+#include <utility>
 
 #include <fmt/format.h>
+
+#include "base/printable.h"
+#include "cli/output_file.h"
 
 namespace vgyro::cli {
 
@@ -25,6 +34,76 @@ std::string terminal_of(const std::string& path, int width, int height) {
                        width > height ? "11.7in,8.3" : "8.3in,11.7");
   }
   return {};
+}
+
+struct Descriptor {
+  explicit Descriptor(int number = -1) : fd(number) {}
+  Descriptor(const Descriptor&) = delete;
+  Descriptor& operator=(const Descriptor&) = delete;
+  ~Descriptor() { close(); }
+  void close() {
+    if (fd >= 0) ::close(std::exchange(fd, -1));
+  }
+  int fd;
+};
+
+// A file without a name rather than a pipe, whose reader could end early and this program with it.
+bool write_script(int fd, std::string_view script) {
+  while (!script.empty()) {
+    const ssize_t written = ::write(fd, script.data(), script.size());
+    if (written < 0 && errno == EINTR) continue;
+    if (written < 0) return false;
+    script.remove_prefix(static_cast<std::size_t>(written));
+  }
+  return ::lseek(fd, 0, SEEK_SET) == 0;
+}
+
+Expected<pid_t> start_gnuplot(int input, int output) {
+  posix_spawn_file_actions_t actions;
+  ::posix_spawn_file_actions_init(&actions);
+  ::posix_spawn_file_actions_adddup2(&actions, input, STDIN_FILENO);
+  ::posix_spawn_file_actions_adddup2(&actions, output, STDOUT_FILENO);
+  std::string name = "gnuplot";
+  std::string settings = "--default-settings";  // not the user's own
+  std::string from_input = "-";
+  const std::array<char*, 4> words{name.data(), settings.data(), from_input.data(), nullptr};
+  pid_t child = 0;
+  const int error = ::posix_spawnp(&child, name.c_str(), &actions, nullptr, words.data(), environ);
+  ::posix_spawn_file_actions_destroy(&actions);
+  if (error != 0) return fail({}, "gnuplot cannot be started: " + system_reason(error));
+  return child;
+}
+
+std::string read_to_end(int fd) {
+  std::string text;
+  std::array<char, 65'536> block{};
+  while (true) {
+    const ssize_t got = ::read(fd, block.data(), block.size());
+    if (got < 0 && errno == EINTR) continue;
+    if (got <= 0) return text;  // what gnuplot could not finish, its exit status says
+    text.append(block.data(), static_cast<std::size_t>(got));
+  }
+}
+
+// What gnuplot prints for the script.
+Expected<std::string> picture_of(const std::string& script) {
+  const Descriptor input(::memfd_create("vgyro-script", MFD_CLOEXEC));
+  if (input.fd < 0 || !write_script(input.fd, script)) {
+    return fail({}, "no script for gnuplot: " + system_reason());
+  }
+  std::array<int, 2> ends{};
+  if (::pipe2(ends.data(), O_CLOEXEC) != 0) return fail({}, "no pipe: " + system_reason());
+  const Descriptor from(ends[0]);
+  Descriptor to(ends[1]);
+  const auto child = start_gnuplot(input.fd, to.fd);
+  if (!child) return tl::unexpected(child.error());
+  to.close();
+  std::string picture = read_to_end(from.fd);
+  int status = 0;
+  while (::waitpid(*child, &status, 0) < 0 && errno == EINTR) {
+  }
+  if (status != 0) return fail({}, "gnuplot failed, as it says above");
+  return picture;
 }
 
 }  // namespace
@@ -47,29 +126,27 @@ Expected<void> check_picture_path(const std::string& path) {
 }
 
 std::string picture_script(const std::string& path, int width, int height) {
-  return fmt::format("set terminal {}\nset output {}\nset encoding utf8\n",
-                     terminal_of(path, width, height), gnuplot_text(path));
+  return fmt::format("set terminal {}\nset encoding utf8\n", terminal_of(path, width, height));
 }
 
 std::string gnuplot_text(const std::string& text) {
   std::string result = "'";
-  for (const char c : text) {
+  for (const char c : printable(text)) {
     if (c == '\'') result += '\'';
-    if (c != '\n') result += c;
+    result += c;
   }
   return result + "'";
 }
 
-Expected<void> run_gnuplot(const std::string& path, const std::function<void(std::FILE*)>& write) {
+Expected<void> run_gnuplot(const std::string& path, const std::string& script) {
   if (auto good = check_picture_path(path); !good) return good;
-  std::FILE* to = std::fopen(path.c_str(), "wb");
-  if (to == nullptr) return fail(path, "cannot be written: " + system_reason());
-  std::fclose(to);
-  std::FILE* gnuplot = ::popen("gnuplot", "w");
-  if (gnuplot == nullptr) return fail(path, "cannot be drawn: gnuplot could not be started");
-  write(gnuplot);
-  if (::pclose(gnuplot) == 0) return {};
-  return fail(path, "was not drawn: gnuplot failed, as it says above");
+  const auto picture = picture_of(script);
+  if (!picture) return fail(path, "was not drawn: " + picture.error().what);
+  // gnuplot would not notice when its picture cannot be written.
+  auto file = OutputFile::open(path);
+  if (!file) return tl::unexpected(file.error());
+  file->write(*picture);
+  return file->close();
 }
 
 }  // namespace vgyro::cli

@@ -1,9 +1,13 @@
 // vgyro: replays, checks, decodes and judges recordings of the gateway's CAN traffic.
 
+#include <sstream>
+
 #include <CLI/CLI.hpp>
 
 #include "base/nearest.h"
 #include "cli/commands.h"
+#include "cli/number_option.h"
+#include "cli/terminal.h"
 #include "gateway/config.h"
 
 namespace {
@@ -90,28 +94,19 @@ CLI::App* add_simulate(CLI::App& app, SimulateOptions& options) {
       ->add_option("--profile", options.profile,
                    "motion, CSV: t_s,rate_dps[,temperature_c][,acc_x_g,acc_y_g,acc_z_g]")
       ->required();
-  command->add_option("--seed", options.seed, "of the noise; the same gives the same bytes")
-      ->capture_default_str();
+  add_number(*command, "--seed", options.seed, {}, "of the noise; the same gives the same bytes");
   command->add_option("-o,--output", options.output, "candump log; - is standard output")
       ->capture_default_str();
-  const CLI::Range rates(0.1, 10'000.0);
-  command->add_option("--gyro-rate", options.gyro_rates_hz, "samples a second, of both or A,B")
-      ->delimiter(',')
-      ->expected(1, 2)
-      ->check(rates)
-      ->capture_default_str();
-  command->add_option("--reference-rate", options.reference_rate_hz, "samples a second")
-      ->check(rates)
-      ->capture_default_str();
-  command->add_option("--accelerometer-rate", options.accelerometer_rate_hz, "samples a second")
-      ->check(rates)
-      ->capture_default_str();
-  command->add_option("--jitter", options.jitter_s, "every frame is late by |N(0, jitter)| seconds")
-      ->check(CLI::Range(0.0, 1.0))
-      ->capture_default_str();
-  command->add_option("--start", options.start_s, "stamp of the motion's beginning, seconds")
-      ->check(CLI::Range(0.0, 4e9))
-      ->capture_default_str();
+  const NumberRange<double> rates{0.1, 10'000.0};
+  add_numbers(*command, "--gyro-rate", options.gyro_rates_hz, 2, rates,
+              "samples a second, of both or A,B");
+  add_number(*command, "--reference-rate", options.reference_rate_hz, rates, "samples a second");
+  add_number(*command, "--accelerometer-rate", options.accelerometer_rate_hz, rates,
+             "samples a second");
+  add_number(*command, "--jitter", options.jitter_s, {0.0, 1.0},
+             "every frame is late by |N(0, jitter)| seconds");
+  add_number(*command, "--start", options.start_s, {0.0, 4e9},
+             "stamp of the motion's beginning, seconds");
   command->add_flag("-q,--quiet", options.quiet, "no summary on stderr");
   command->footer(
       "The forms of the files are in docs/simulate.md and docs/model-file.md.\n"
@@ -145,7 +140,7 @@ CLI::App* add_compare(CLI::App& app, CompareOptions& options) {
   add_recording(*command, options.config, options.measured);
   command->add_option("--model", options.model, "model file")->required();
   command->add_option("--json", options.json, "the same as JSON; - is standard output");
-  command->add_option("--seed", options.seed, "of the simulations; default: 1");
+  add_number(*command, "--seed", options.seed, {}, "of the simulations");
   command->add_flag("-q,--quiet", options.quiet, "no table");
   command->footer(
       "Changes nothing. What the gap means is in docs/gap.md.\n"
@@ -161,7 +156,7 @@ CLI::App* add_gap(CLI::App& app, GapOptions& options) {
                       "model file to begin with; default: the configured one, or none");
   command->add_option("--out", options.out, "folder for report.html, gap.json and model.toml")
       ->required();
-  command->add_option("--seed", options.seed, "of the simulations; default: 1");
+  add_number(*command, "--seed", options.seed, {}, "of the simulations");
   command->add_flag("-q,--quiet", options.quiet, "no summary");
   command->footer(
       "The folder is written whole or not at all; an earlier result in it is replaced.\n"
@@ -176,9 +171,8 @@ CLI::App* add_status(CLI::App& app, StatusOptions& options) {
   CLI::Option* json = command->add_flag("--json", options.json, "the same as JSON");
   command->add_flag("-w,--watch", options.watch, "a live view; into a pipe: one line each time")
       ->excludes(json);
-  command->add_option("--interval", options.interval_s, "seconds between two looks with --watch")
-      ->check(CLI::Range(0.1, 3600.0))
-      ->capture_default_str();
+  add_number(*command, "--interval", options.interval_s, {0.1, 3600.0},
+             "seconds between two looks with --watch");
   command->footer("Asks vgyrod over D-Bus. Every field is explained in docs/service.md.");
   return command;
 }
@@ -202,9 +196,8 @@ std::optional<vgyro::Error> unknown_command(const CLI::App& app, int argc, char*
                       vgyro::suggest_name(name, names)};
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
+// The exit code of the command, or of what the command line is instead of one.
+int run(int argc, char** argv) {
   CLI::App app{"vgyro: two gyros on CAN in, one better gyro out"};
   app.set_version_flag("--version", "vgyro " VGYRO_VERSION);
   app.require_subcommand(1);
@@ -227,7 +220,12 @@ int main(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? kDone : kWrongUsage;
+    std::ostringstream out;
+    std::ostringstream complaint;
+    const int code = app.exit(error, out, complaint);
+    put_text(stdout, out.str());
+    put_text(stderr, complaint.str());
+    return code == 0 ? kDone : kWrongUsage;
   }
   const auto method = vgyro::gateway::method_from(options.method);
   options.check.method = method;
@@ -245,4 +243,14 @@ int main(int argc, char** argv) {
   const bool output_given = replay->count("--output") > 0;
   if (!output_given && options.replay.json != "-") options.replay.output = "-";
   return run_replay(options.replay);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  keep_standard_streams();
+  const int code = run(argc, argv);
+  const auto finished = finish_output();
+  if (!finished) report(finished.error());
+  return code == kDone && !finished ? kBadInput : code;
 }

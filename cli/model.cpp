@@ -1,6 +1,7 @@
 #include <fmt/core.h>
 
 #include "cli/commands.h"
+#include "cli/terminal.h"
 #include "model/catalogue.h"
 #include "model/evidence.h"
 
@@ -27,15 +28,14 @@ std::string_view heading(model::Nature nature) {
 }
 
 void print_kind(const model::KindInfo& kind) {
-  fmt::print("  {:<28}{}\n", kind.name, kind.meaning);
+  say("  {:<28}{}\n", kind.name, kind.meaning);
   for (const model::Parameter& parameter : kind.parameters) {
-    fmt::print("    {:<26}{}{}\n", parameter.name, parameter.limits(),
-               parameter.preset ? fmt::format("; {:g} unless given", *parameter.preset) : "");
+    say("    {:<26}{}{}\n", parameter.name, parameter.limits(),
+        parameter.preset ? fmt::format("; {:g} unless given", *parameter.preset) : "");
   }
   const model::Evidence& evidence = model::evidence(kind.kind);
-  fmt::print("    {:<26}{}\n", "shown by", evidence.shown_by);
-  if (!evidence.taken_for.empty())
-    fmt::print("    {:<26}{}\n", "may be taken for", evidence.taken_for);
+  say("    {:<26}{}\n", "shown by", evidence.shown_by);
+  if (!evidence.taken_for.empty()) say("    {:<26}{}\n", "may be taken for", evidence.taken_for);
 }
 
 }  // namespace
@@ -45,7 +45,7 @@ int run_model_list() {
   for (const model::Nature nature :
        {model::Nature::kOffset, model::Nature::kResponse, model::Nature::kLag, model::Nature::kClip,
         model::Nature::kNoise, model::Nature::kDisturbance}) {
-    fmt::print("{}{}\n", first ? "" : "\n", heading(nature));
+    say("{}{}\n", first ? "" : "\n", heading(nature));
     first = false;
     for (const model::KindInfo& kind : model::catalogue()) {
       if (kind.nature == nature) print_kind(kind);

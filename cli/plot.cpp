@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
 #include <fmt/format.h>
 
@@ -80,18 +79,17 @@ void ReplayPlot::add_bias(TimePoint t, const std::array<double, 2>& bias_dps) {
     bucket.bias[i].add(bias_dps[i]);
 }
 
-void ReplayPlot::write_data(std::FILE* to) const {
-  fmt::print(to, "$rates << EOD\n");
+void ReplayPlot::write_data(std::string& to) const {
+  put(to, "$rates << EOD\n");
   for (std::size_t i = 0; i < buckets_.size(); ++i) {
     const Bucket& b = buckets_[i];
     if (b.average.count == 0 && b.rate.count == 0 && b.bias[0].count == 0) continue;
-    fmt::print(to, "{:.9g} {} {} {} {} {} {} {} {}\n",
-               to_seconds(width_) * (static_cast<double>(i) + 0.5), b.raw[0].text(1.0),
-               b.raw[1].text(1.0), b.average.text(1.0), b.rate.text(1.0),
-               b.excess[0].text(kSecondsPerHour), b.excess[1].text(kSecondsPerHour),
-               b.bias[0].text(kSecondsPerHour), b.bias[1].text(kSecondsPerHour));
+    put(to, "{:.9g} {} {} {} {} {} {} {} {}\n", to_seconds(width_) * (static_cast<double>(i) + 0.5),
+        b.raw[0].text(1.0), b.raw[1].text(1.0), b.average.text(1.0), b.rate.text(1.0),
+        b.excess[0].text(kSecondsPerHour), b.excess[1].text(kSecondsPerHour),
+        b.bias[0].text(kSecondsPerHour), b.bias[1].text(kSecondsPerHour));
   }
-  fmt::print(to, "EOD\n");
+  put(to, "EOD\n");
 }
 
 bool ReplayPlot::has_rates() const {
@@ -151,10 +149,10 @@ Expected<void> ReplayPlot::draw(const std::string& path, const PlotTexts& texts)
   if (buckets_.empty()) {
     return fail(path, "there is nothing to draw: no pair of samples came together");
   }
-  return run_gnuplot(path, [&](std::FILE* to) {
-    write_data(to);
-    fmt::print(to, "{}", script(path, texts));
-  });
+  std::string whole;
+  write_data(whole);
+  whole += script(path, texts);
+  return run_gnuplot(path, whole);
 }
 
 }  // namespace vgyro::cli

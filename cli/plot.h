@@ -47,7 +47,7 @@ class ReplayPlot {
   static constexpr std::size_t kBucketsMax = 2000;
 
   Bucket& bucket_at(TimePoint t);
-  void write_data(std::FILE* to) const;
+  void write_data(std::string& to) const;
   [[nodiscard]] bool has_rates() const;
   [[nodiscard]] std::string script(const std::string& path, const PlotTexts& texts) const;
   [[nodiscard]] bool has_biases() const;

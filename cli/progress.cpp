@@ -5,6 +5,9 @@
 
 #include <fmt/core.h>
 
+#include "base/printable.h"
+#include "cli/terminal.h"
+
 namespace vgyro::cli {
 
 std::string human_count(double count) {
@@ -13,8 +16,8 @@ std::string human_count(double count) {
   return fmt::format("{:.0f}", count);
 }
 
-Progress::Progress(std::string what)
-    : what_(std::move(what)),
+Progress::Progress(const std::string& what)
+    : what_(printable(what)),
       enabled_(::isatty(STDERR_FILENO) == 1),
       begin_(std::chrono::steady_clock::now()),
       last_(begin_) {}
@@ -29,7 +32,7 @@ bool Progress::due() {
 
 void Progress::update(std::string_view doing, double share) {
   if (!due()) return;
-  fmt::print(stderr, "\r\x1b[K{} {:3.0f} %  {}", what_, 100.0 * share, doing);
+  draw(stderr, fmt::format("\r\x1b[K{} {:3.0f} %  {}", what_, 100.0 * share, printable(doing)));
   std::fflush(stderr);
   drawn_ = true;
 }
@@ -41,16 +44,16 @@ void Progress::update(std::uint64_t done, std::uint64_t total, std::uint64_t fra
                                 ? std::string()
                                 : fmt::format(" {:3.0f} %", 100.0 * static_cast<double>(done) /
                                                                 static_cast<double>(total));
-  fmt::print(stderr, "\r\x1b[K{}{}  {} frames, {} frames/s", what_, share,
-             human_count(static_cast<double>(frames)),
-             human_count(static_cast<double>(frames) / elapsed_s));
+  draw(stderr, fmt::format("\r\x1b[K{}{}  {} frames, {} frames/s", what_, share,
+                           human_count(static_cast<double>(frames)),
+                           human_count(static_cast<double>(frames) / elapsed_s)));
   std::fflush(stderr);
   drawn_ = true;
 }
 
 void Progress::clear() {
   if (!drawn_) return;
-  fmt::print(stderr, "\r\x1b[K");
+  draw(stderr, "\r\x1b[K");
   std::fflush(stderr);
   drawn_ = false;
 }

@@ -12,9 +12,11 @@
 #include "cli/commands.h"
 #include "cli/gnuplot.h"
 #include "cli/output_file.h"
+#include "cli/overwrite.h"
 #include "cli/plot.h"
 #include "cli/progress.h"
 #include "cli/replay_summary.h"
+#include "cli/terminal.h"
 #include "gateway/config.h"
 #include "gateway/pipeline.h"
 #include "gateway/saved_state.h"
@@ -271,24 +273,19 @@ std::optional<Error> explain_silence(const ReplaySummary& summary, const gateway
   return explain_no_pair(summary.status, plan, logs);
 }
 
-// Before an output of an earlier run is written over: are the logs there, and is none of them the
+// Before an output of an earlier run is written over: are the logs there, and is no input an
 // output?
-Expected<void> check_files(const ReplayOptions& options) {
+Expected<void> check_files(const ReplayOptions& options, std::vector<std::string> inputs) {
   for (const std::string& log : options.logs) {
     struct stat input {};
     if (log == "-") continue;
     if (::stat(log.c_str(), &input) != 0) return fail(log, "cannot be opened: " + system_reason());
     if (!S_ISREG(input.st_mode)) continue;
     if (const auto opened = can::open_log(log); !opened) return tl::unexpected(opened.error());
-    for (const std::string& path : {options.output, options.json, options.plot}) {
-      struct stat output {};
-      const bool there = !path.empty() && path != "-" && ::stat(path.c_str(), &output) == 0;
-      if (there && output.st_dev == input.st_dev && output.st_ino == input.st_ino) {
-        return fail(path, "is also the input and would be overwritten", "choose another name");
-      }
-    }
   }
-  return {};
+  inputs.insert(inputs.end(), options.logs.begin(), options.logs.end());
+  inputs.push_back(options.state);
+  return check_outputs(inputs, {options.output, options.json, options.plot});
 }
 
 void warn_of_doubts(const ReplaySummary& summary, const gateway::Plan& plan) {
@@ -342,7 +339,7 @@ int write_results(const ReplayOptions& options, const gateway::Plan& plan,
     json->write(to_json(summary, plan).dump(2, ' ', false, kReplace) + "\n");
     if (const auto closed = json->close(); !closed) return report(closed.error());
   }
-  if (!options.quiet) fmt::print(stderr, "{}", to_text(summary, plan));
+  if (!options.quiet) put_text(stderr, to_text(summary, plan));
   if (!options.plot.empty()) {
     const PlotTexts texts{
         fmt::format("{}: {} over {:g}-s windows", options.logs.front(),
@@ -382,7 +379,7 @@ int run_replay(const ReplayOptions& options) {
   }
   auto buses = BusMap::make(options.bus_map, plan);
   if (!buses) return report(buses.error());
-  if (const auto good = check_files(options); !good) return report(good.error());
+  if (const auto good = check_files(options, loaded->files); !good) return report(good.error());
   const auto state = read_state(options.state, plan);
   if (!state) return report(state.error());
   auto output = OutputFile::open(options.output);

@@ -1,24 +1,26 @@
-#include <cstdio>
-
-#include <fmt/core.h>
+#include <algorithm>
 
 #include "cli/commands.h"
+#include "cli/terminal.h"
 
 namespace vgyro::cli {
 
 int report(const Error& error) {
-  fmt::print(stderr, "error: {}\n", error.message());
+  tell("error: {}\n", error.message());
   return kBadInput;
 }
 
 int report(const std::vector<Error>& errors) {
-  for (const Error& error : errors)
-    report(error);
+  // A wrong file can have a complaint for every line; nobody reads them.
+  constexpr std::size_t kMost = 40;
+  for (std::size_t i = 0; i < std::min(errors.size(), kMost); ++i)
+    report(errors[i]);
+  if (errors.size() > kMost) tell("error: … and {} more\n", errors.size() - kMost);
   return kBadInput;
 }
 
 void warn(const Error& warning) {
-  fmt::print(stderr, "warning: {}\n", warning.message());
+  tell("warning: {}\n", warning.message());
 }
 
 }  // namespace vgyro::cli

@@ -6,14 +6,15 @@
 #include <cmath>
 #include <limits>
 #include <optional>
-#include <sys/stat.h>
 
 #include <fmt/core.h>
 
 #include "can/candump.h"
 #include "cli/commands.h"
 #include "cli/output_file.h"
+#include "cli/overwrite.h"
 #include "cli/progress.h"
+#include "cli/terminal.h"
 #include "gateway/config.h"
 #include "gateway/input_frames.h"
 #include "simulation/simulator.h"
@@ -95,7 +96,7 @@ class Recording {
 
   /// All frames in the order of their stamps.
   void write(OutputFile& output, double start_s);
-  void tell(const SimulateOptions& options) const;
+  void summarize(const SimulateOptions& options) const;
   void warn_of_limits() const;
 
  private:
@@ -242,28 +243,26 @@ void Recording::write(OutputFile& output, double start_s) {
   }
 }
 
-void Recording::tell(const SimulateOptions& options) const {
-  fmt::print(stderr, "{:g} s of {}, {} frames, seed {}\n", simulator_.profile().length_s,
-             options.profile, frames_, options.seed);
+void Recording::summarize(const SimulateOptions& options) const {
+  tell("{:g} s of {}, {} frames, seed {}\n", simulator_.profile().length_s, options.profile,
+       frames_, options.seed);
   for (const Part part : {kGyroA, kGyroB}) {
     const auto& samples = gyros_[part];
     const auto lost = std::count_if(samples.begin(), samples.end(),
                                     [](const simulation::GyroSample& s) { return s.lost; });
-    fmt::print(stderr, "  gyro {}: {} samples{}\n", plan_.gyros[part].name, samples.size(),
-               lost == 0 ? "" : fmt::format(", {} of them lost", lost));
+    tell("  gyro {}: {} samples{}\n", plan_.gyros[part].name, samples.size(),
+         lost == 0 ? "" : fmt::format(", {} of them lost", lost));
   }
-  if (plan_.reference) fmt::print(stderr, "  reference: {} samples\n", reference_.size());
+  if (plan_.reference) tell("  reference: {} samples\n", reference_.size());
   if (plan_.accelerometer) {
-    fmt::print(stderr, "  accelerometer: {}\n",
-               acceleration_.empty()
-                   ? "no frames; the profile has no column acc_x_g, acc_y_g, acc_z_g"
-                   : fmt::format("{} samples", acceleration_.size()));
+    tell("  accelerometer: {}\n",
+         acceleration_.empty() ? "no frames; the profile has no column acc_x_g, acc_y_g, acc_z_g"
+                               : fmt::format("{} samples", acceleration_.size()));
   }
   const bool tells_temperature = plan_.gyros[0].temperature || plan_.gyros[1].temperature;
   if (tells_temperature && !simulator_.profile().temperature_c) {
-    fmt::print(stderr,
-               "  temperature: {:g} degC throughout; the profile has no column temperature_c\n",
-               simulation::Simulator::kTemperature_c);
+    tell("  temperature: {:g} degC throughout; the profile has no column temperature_c\n",
+         simulation::Simulator::kTemperature_c);
   }
 }
 
@@ -279,20 +278,12 @@ void Recording::warn_of_limits() const {
   }
 }
 
-// Before a file is written over.
-Expected<void> check_output(const SimulateOptions& options) {
+Expected<void> check_output(const SimulateOptions& options, std::vector<std::string> inputs) {
   if (options.output.ends_with(".xz")) {
     return fail(options.output, "is not compressed here", "write a .log, then `xz` compresses it");
   }
-  struct stat output {};
-  if (options.output == "-" || ::stat(options.output.c_str(), &output) != 0) return {};
-  for (const std::string& path : {options.config, options.model, options.profile}) {
-    struct stat input {};
-    if (::stat(path.c_str(), &input) != 0) continue;
-    if (input.st_dev != output.st_dev || input.st_ino != output.st_ino) continue;
-    return fail(options.output, "is also an input and would be overwritten", "choose another name");
-  }
-  return {};
+  inputs.insert(inputs.end(), {options.model, options.profile});
+  return check_outputs(inputs, {options.output});
 }
 
 }  // namespace
@@ -313,14 +304,14 @@ int run_simulate(const SimulateOptions& options) {
   const auto simulator =
       simulation::Simulator::make(*std::move(model), *std::move(profile), settings);
   if (!simulator) return report(simulator.error());
-  if (const auto good = check_output(options); !good) return report(good.error());
+  if (const auto good = check_output(options, loaded->files); !good) return report(good.error());
   auto output = OutputFile::open(options.output);
   if (!output) return report(output.error());
 
   Recording recording(plan, *simulator, std::move(senders));
   recording.write(*output, options.start_s);
   if (const auto closed = output->close(); !closed) return report(closed.error());
-  if (!options.quiet) recording.tell(options);
+  if (!options.quiet) recording.summarize(options);
   recording.warn_of_limits();
   return kDone;
 }

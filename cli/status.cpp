@@ -16,6 +16,7 @@
 #include "cli/commands.h"
 #include "cli/gateway_client.h"
 #include "cli/status_view.h"
+#include "cli/terminal.h"
 
 namespace vgyro::cli {
 namespace {
@@ -60,13 +61,13 @@ Expected<Json> ask() {
 class Watch {
  public:
   Watch() : screen_(::isatty(STDOUT_FILENO) == 1) {
-    if (screen_) fmt::print("\x1b[?25l\x1b[2J");  // no cursor, a clean screen
+    if (screen_) vgyro::cli::draw(stdout, "\x1b[?25l\x1b[2J");  // no cursor, a clean screen
   }
   Watch(const Watch&) = delete;
   Watch& operator=(const Watch&) = delete;
   ~Watch() {
-    if (screen_) fmt::print("\x1b[?25h");
-    std::fflush(stdout);
+    if (screen_) vgyro::cli::draw(stdout, "\x1b[?25h");
+    flush_output();
   }
 
   void show(const Expected<Json>& status) {
@@ -75,10 +76,8 @@ class Watch {
       draw(status ? status_table(*status, {wants_colour(), {rates_.begin(), rates_.end()}})
                   : status.error().message() + "\n");
     } else {
-      fmt::print("{} {}\n", time_of_day(),
-                 status ? status_line(*status) : status.error().message());
+      say("{} {}\n", time_of_day(), status ? status_line(*status) : status.error().message());
     }
-    std::fflush(stdout);
   }
 
  private:
@@ -96,8 +95,8 @@ class Watch {
       if (c == '\n') picture += "\x1b[K";
       picture += c;
     }
-    fmt::print("{}\x1b[J\x1b[K\n{}, Ctrl-C ends", picture, time_of_day());
-    fmt::print("\x1b[K");
+    vgyro::cli::draw(stdout,
+                     fmt::format("{}\x1b[J\x1b[K\n{}, Ctrl-C ends\x1b[K", picture, time_of_day()));
   }
 
   bool screen_;
@@ -112,7 +111,7 @@ int watch(double interval_s) {
   Watch view;
   while (interrupted == 0) {
     view.show(ask());
-    if (std::ferror(stdout) != 0) return kDone;  // nobody reads any more
+    if (!flush_output()) return kDone;  // told at the end
     sleep_s(interval_s);
   }
   return kDone;
@@ -125,9 +124,9 @@ int run_status(const StatusOptions& options) {
   const Expected<Json> status = ask();
   if (!status) return report(status.error());
   if (options.json) {
-    fmt::print("{}\n", status->dump(2));
+    draw(stdout, status->dump(2) + "\n");
   } else {
-    fmt::print("{}", status_table(*status, {wants_colour(), {}}));
+    draw(stdout, status_table(*status, {wants_colour(), {}}));
   }
   return kDone;
 }
@@ -136,8 +135,7 @@ int run_recalibrate() {
   Expected<GatewayClient> client = GatewayClient::connect();
   if (!client) return report(client.error());
   if (const Expected<void> done = client->recalibrate(); !done) return report(done.error());
-  fmt::print(
-      "the gateway has forgotten its biases and calibrates; `vgyro status` shows how far it is\n");
+  say("the gateway has forgotten its biases and calibrates; `vgyro status` shows how far it is\n");
   return kDone;
 }
 

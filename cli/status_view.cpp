@@ -10,6 +10,8 @@
 
 #include <fmt/format.h>
 
+#include "base/printable.h"
+
 namespace vgyro::cli {
 namespace {
 
@@ -23,7 +25,7 @@ Json at(const Json& object, const char* key) {
 }
 std::string text_of(const Json& object, const char* key) {
   const Json value = at(object, key);
-  return value.is_string() ? value.get<std::string>() : std::string(kNothing);
+  return value.is_string() ? printable(value.get<std::string>()) : std::string(kNothing);
 }
 std::uint64_t count_of(const Json& object, const char* key) {
   const Json value = at(object, key);
@@ -63,7 +65,8 @@ std::string counts_text(const Json& counts) {
   if (!counts.is_object()) return kNothing;
   for (const auto& [name, count] : counts.items()) {
     if (!count.is_number_unsigned() || count.get<std::uint64_t>() == 0) continue;
-    text += fmt::format("{}{} {}", text.empty() ? "" : ", ", name, count.get<std::uint64_t>());
+    text += fmt::format("{}{} {}", text.empty() ? "" : ", ", printable(name),
+                        count.get<std::uint64_t>());
   }
   std::replace(text.begin(), text.end(), '_', ' ');
   return text.empty() ? std::string(kNothing) : text;

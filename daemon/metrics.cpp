@@ -1,5 +1,6 @@
 #include "daemon/metrics.h"
 
+#include <cerrno>
 #include <cmath>
 #include <cstdio>
 #include <fcntl.h>
@@ -182,6 +183,18 @@ void add_buses(Text& text, const Snapshot& now) {
   }
 }
 
+// All of it, or errno says why not: a write that was cut short by a full disk sets it only at the
+// next try.
+bool write_whole(int fd, std::string_view text) {
+  while (!text.empty()) {
+    const ssize_t written = ::write(fd, text.data(), text.size());
+    if (written < 0 && errno == EINTR) continue;
+    if (written < 0) return false;
+    text.remove_prefix(static_cast<std::size_t>(written));
+  }
+  return true;
+}
+
 }  // namespace
 
 std::string metrics_text(const Snapshot& now) {
@@ -213,8 +226,7 @@ Expected<void> MetricsFile::replace(const std::string& text) const {
   const int fd =
       ::open(new_path_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC | O_NOFOLLOW, 0644);
   // For others to read, whatever the service's umask.
-  const bool whole = fd >= 0 && ::fchmod(fd, 0644) == 0 &&
-                     ::write(fd, text.data(), text.size()) == static_cast<ssize_t>(text.size());
+  const bool whole = fd >= 0 && ::fchmod(fd, 0644) == 0 && write_whole(fd, text);
   if (whole && ::close(fd) == 0 && ::rename(new_path_.c_str(), path_.c_str()) == 0) return {};
   auto failed = fail(path_, "metrics cannot be written: " + system_reason(),
                      "name a file in a folder that the gateway may write to (--metrics FILE)");

@@ -97,8 +97,11 @@ std::vector<Shape> shapes_of(const Study& study, const Problem& problem, std::si
   }
   const double seconds = study.recording().seconds;
   const double penalty = 2.0 * std::log(std::max(2.0, seconds / kStepEvery_s));
+  std::vector<double> steps_s;
   // NOLINTNEXTLINE(clang-analyzer-security.FloatLoopCounter): a time
   for (double at_s = kStepEvery_s; at_s < seconds - kStepEvery_s; at_s += kStepEvery_s)
+    steps_s.push_back(at_s);
+  for (const double at_s : distinct_steps(problem.layout, steps_s))
     shapes.push_back({Effect{gyro, Kind::kBiasStep, {1.0, at_s}, 0}, penalty, {}});
   return shapes;
 }

@@ -7,6 +7,7 @@
 #include <Eigen/Eigenvalues>
 #include <unsupported/Eigen/FFT>
 
+#include "gap/views.h"
 #include "model/catalogue.h"
 
 namespace vgyro::gap {
@@ -33,9 +34,9 @@ constexpr double kLineLow_hz = 0.02;
 void clamp_to_catalogue(Effect& effect) {
   const auto parameters = model::info(effect.kind).parameters;
   for (std::size_t i = 0; i < parameters.size(); ++i) {
-    double low = parameters[i].minimum;
-    if (parameters[i].above_minimum) low = std::max(low + 1e-9, 1e-6);
-    effect.parameters[i] = std::clamp(effect.parameters[i], low, parameters[i].maximum);
+    effect.parameters[i] =
+        std::clamp(effect.parameters[i], parameters[i].minimum, parameters[i].maximum);
+    if (std::abs(effect.parameters[i]) < parameters[i].least) effect.parameters[i] = 0.0;
   }
   if (effect.kind == Kind::kBandwidth)
     effect.parameters[0] = std::clamp(effect.parameters[0], 0.05, 1e4);
@@ -389,12 +390,16 @@ std::vector<Search::Score> Search::score(std::size_t problem, const Fit& null,
   return scores;
 }
 
-// Steps at places on an even grid, judged by the means of blocks.
+// Steps at places on an even grid, but none within a pause; judged by the means of blocks.
 void Search::score_steps(std::size_t problem, const Matrix& base, const PairNoise& noise,
                          std::vector<Score>& scores) const {
   const Problem& data = study_.problems()[problem];
-  const double seconds = study_.recording().seconds;
-  const auto places = static_cast<Eigen::Index>(seconds / kStepEvery_s) - 1;
+  const auto even = static_cast<int>(study_.recording().seconds / kStepEvery_s) - 1;
+  std::vector<double> even_s;
+  for (int i = 1; i <= even; ++i)
+    even_s.push_back(kStepEvery_s * i);
+  const std::vector<double> at_s = distinct_steps(data.layout, even_s);
+  const auto places = static_cast<Eigen::Index>(at_s.size());
   if (places < 2) return;
   const Eigen::Index nuisance = base.cols() - 1;
   Matrix white_base = block_means(base, data.layout);
@@ -410,7 +415,7 @@ void Search::score_steps(std::size_t problem, const Matrix& base, const PairNois
       const double share = share_of(block.channel, gyro);
       for (Eigen::Index i = 0; i < places; ++i) {
         steps(static_cast<Eigen::Index>(b), i) =
-            block.t_s >= kStepEvery_s * static_cast<double>(i + 1) ? share : 0.0;
+            block.t_s >= at_s[static_cast<std::size_t>(i)] ? share : 0.0;
       }
     }
     whiten_means(steps, data.layout, noise, Part::kFit);
@@ -430,9 +435,7 @@ void Search::score_steps(std::size_t problem, const Matrix& base, const PairNois
       if (statistic <= best.statistic) continue;
       best.statistic = statistic;
       best.candidate.term = {
-          Effect{
-              gyro, Kind::kBiasStep, {right / gram, kStepEvery_s * static_cast<double>(i + 1)}, 0},
-          {0}};
+          Effect{gyro, Kind::kBiasStep, {right / gram, at_s[static_cast<std::size_t>(i)]}, 0}, {0}};
       best.candidate.penalty = 2.0 * std::log(static_cast<double>(places)) +
                                (study_.is_coarse(gyro) ? kCoarsePenalty : 0.0);
     }

@@ -21,6 +21,10 @@ constexpr std::size_t kRemembered = 24;
 constexpr double kRecordingMin_s = 30.0;
 constexpr std::size_t kSamplesMin = 500;
 constexpr double kReferenceShareMin = 0.95;
+// Time is cut into cells from the first frame to the last: what lies between must not be much more
+// than what the gyros fill, or a clock that was set by a year would ask for a year's cells.
+constexpr double kSpanPerSecond = 10.0;
+constexpr double kPauseMost_s = 3600.0;
 constexpr double kRestMin_s = 10.0;
 /// Share of samples that repeat the last one.
 constexpr double kCoarseRepeats = 0.2;
@@ -165,7 +169,44 @@ Problem assemble(std::vector<Sample> samples, std::array<double, 2> interval_s,
   return problem;
 }
 
+std::string span_text(const GyroSeries& gyro) {
+  return fmt::format("{} from {:.1f} to {:.1f} s", gyro.name, gyro.t_s.front(), gyro.t_s.back());
+}
+
+// Whole seconds in which the gyro is there; its stamps never decrease.
+double seconds_filled(const std::vector<double>& t_s) {
+  double filled = 0.0;
+  double newest = -1.0;
+  for (const double t : t_s) {
+    const double second = std::floor(t);
+    if (second > newest || filled == 0.0) filled += 1.0;
+    newest = second;
+  }
+  return filled;
+}
+
 }  // namespace
+
+Expected<void> Study::check_spans() const {
+  const auto& [a, b] = recording_.gyros;
+  const double common_s =
+      std::min(a.t_s.back(), b.t_s.back()) - std::max(a.t_s.front(), b.t_s.front());
+  if (common_s < kRecordingMin_s) {
+    return fail(
+        "",
+        fmt::format("the gyros are not there at the same time, or too shortly: {}, {}",
+                    span_text(a), span_text(b)),
+        fmt::format("at least {:.0f} s of both, with the stamps of one clock", kRecordingMin_s));
+  }
+  const double filled_s = std::max(seconds_filled(a.t_s), seconds_filled(b.t_s));
+  if (recording_.seconds <= kSpanPerSecond * filled_s + kPauseMost_s) return {};
+  return fail(
+      "",
+      fmt::format("from the first frame to the last it is {:.0f} s, and the gyros are there "
+                  "in {:.0f} s of them: {}, {}",
+                  recording_.seconds, filled_s, span_text(a), span_text(b)),
+      "cut the recording at its pauses, or where the clock was set, and judge the parts");
+}
 
 Expected<void> Study::check() const {
   for (const GyroSeries& gyro : recording_.gyros) {
@@ -179,6 +220,7 @@ Expected<void> Study::check() const {
                       kRecordingMin_s, kSamplesMin));
     }
   }
+  if (auto good = check_spans(); !good) return good;
   if (!recording_.has_reference) return {};
   const std::vector<double>& t_s = recording_.reference_dps.t_s;
   if (t_s.size() < kSamplesMin) {

@@ -78,6 +78,7 @@ class Study {
  private:
   explicit Study(const Recording& recording) : recording_(recording) {}
   Expected<void> check() const;
+  Expected<void> check_spans() const;
   void find_spikes(const std::vector<model::Effect>& effects);
   void find_rest();
   [[nodiscard]] bool rests_at(double t_s) const;

@@ -284,6 +284,23 @@ PairNoise usable_noise(const Problem& problem, const std::vector<model::Effect>&
   return fit_pair_noise(residual, problem.layout, noise, free, problem.holds, Part::kAll).noise;
 }
 
+std::vector<double> distinct_steps(const Layout& layout, const std::vector<double>& at_s) {
+  std::vector<double> block_s;
+  block_s.reserve(layout.blocks.size());
+  for (const Block& block : layout.blocks)
+    block_s.push_back(block.t_s);
+  std::sort(block_s.begin(), block_s.end());
+  std::vector<double> distinct;
+  auto next = block_s.begin();
+  for (const double at : at_s) {
+    if (next == block_s.end()) break;
+    if (*next >= at) continue;
+    distinct.push_back(at);
+    next = std::lower_bound(next, block_s.end(), at);
+  }
+  return distinct;
+}
+
 std::vector<double> block_gains(const Layout& layout, const PairNoise& noise,
                                 const Eigen::VectorXd& without, const Eigen::VectorXd& with) {
   Matrix columns(without.size(), 2);

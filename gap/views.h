@@ -53,6 +53,10 @@ Eigen::VectorXd simulate_residual(const Problem& problem, const PairNoise& noise
 PairNoise usable_noise(const Problem& problem, const std::vector<model::Effect>& effects,
                        const Eigen::VectorXd& residual);
 
+/// Of these times, rising, those at which a step can be told from one at the time before: where
+/// nothing was recorded in between, both are the same.
+std::vector<double> distinct_steps(const Layout& layout, const std::vector<double>& at_s);
+
 /// ΔlogL of each block when `with` is left instead of `without`.
 std::vector<double> block_gains(const Layout& layout, const PairNoise& noise,
                                 const Eigen::VectorXd& without, const Eigen::VectorXd& with);

@@ -9,6 +9,7 @@
 
 #include "base/bounded_file.h"
 #include "base/nearest.h"
+#include "base/printable.h"
 #include "base/toml_reader.h"
 #include "fusion/polynomial.h"
 #include "gateway/e2e_config.h"
@@ -23,10 +24,6 @@ namespace {
 constexpr double kEarthRate_dps = 7.292115e-5 * 180.0 / std::numbers::pi;
 // A configuration takes some kB; what is so much larger is another file.
 constexpr std::size_t kConfigBytesMax = std::size_t{1} << 20U;
-constexpr double kRestMax_s = 86'400.0;
-constexpr double kWindowMax_s = 3'600.0;
-// Gyros that read more than this at rest are broken rather than biased.
-constexpr double kMaxBiasMax_dps = 100.0;
 
 struct Context {
   std::string file;
@@ -72,14 +69,30 @@ std::optional<ComparisonText> parse_comparison(std::string_view text) {
   return std::nullopt;
 }
 
+struct Limits {
+  double low = 0.0;
+  double high = 0.0;
+  bool above_low = false;  ///< the lower one itself is too little
+};
+
+// A bias from less than a second is an accident of the noise; after a day nobody waits any more.
+constexpr Limits kRest_s{1.0, 86'400.0};
+// A window needs several samples of each gyro; over an hour every drift has turned.
+constexpr Limits kWindow_s{0.1, 3'600.0};
+// Gyros that read more than this at rest are broken rather than biased.
+constexpr Limits kMaxBias_dps{0.0, 100.0, true};
+
 // A number inside limits; nothing after a complaint, or where the key is not there.
-std::optional<double> number_within(TomlReader& reader, std::string_view key, double above,
-                                    double up_to, std::string_view unit) {
+std::optional<double> number_within(TomlReader& reader, std::string_view key, const Limits& limits,
+                                    std::string_view unit) {
   const auto value = reader.number(key);
   if (!value) return std::nullopt;
-  if (*value > above && *value <= up_to) return value;
+  const bool enough = limits.above_low ? *value > limits.low : *value >= limits.low;
+  if (enough && *value <= limits.high) return value;
   reader.complain(reader.where(key), fmt::format("{} is {:g} {}", key, *value, unit),
-                  fmt::format("above {:g} and up to {:g}", above, up_to));
+                  limits.above_low
+                      ? fmt::format("above {:g} and up to {:g}", limits.low, limits.high)
+                      : fmt::format("{:g} to {:g}", limits.low, limits.high));
   return std::nullopt;
 }
 
@@ -128,6 +141,10 @@ std::optional<GyroPlan> read_gyro(const toml::table& table, std::size_t index, C
   TomlReader reader(table, context.file, "[[gyro]]", context.errors);
   const std::size_t errors_before = context.errors.size();
   const std::string name = reader.text("name").value_or(index == 0 ? "a" : "b");
+  if (printable(name) != name) {
+    reader.complain(reader.where("name"), fmt::format("the name \"{}\" is not printable", name),
+                    "letters, digits, blanks: it stands in tables and pictures");
+  }
   SignalResolver resolver(reader, context.cache, context.folder, context.resolved.plan.buses,
                           context.resolved.warnings);
   const dbc::Signal* rate_signal = resolver.signal("rate", true);
@@ -153,7 +170,7 @@ std::optional<GyroPlan> read_gyro(const toml::table& table, std::size_t index, C
     read_source_address(reader, resolver.message(), gyro->match);
     gyro->e2e = read_e2e(reader, resolver, *rate_signal);
     gyro->valid = read_condition(reader, resolver, *rate_signal);
-    gyro->max_bias_dps = number_within(reader, "max_bias_dps", 0.0, kMaxBiasMax_dps, "deg/s");
+    gyro->max_bias_dps = number_within(reader, "max_bias_dps", kMaxBias_dps, "deg/s");
     if (sign_signal != nullptr && resolver.shares_page("sign_signal", *sign_signal, *rate_signal)) {
       gyro->sign = resolver.codec(*sign_signal);
     }
@@ -279,7 +296,7 @@ void read_calibration(TomlReader& root, Context& context) {
   const toml::table* table = root.table("calibration");
   if (table == nullptr) return;
   TomlReader reader(*table, context.file, "[calibration]", context.errors);
-  plan.rest_s = number_within(reader, "rest_s", 0.0, kRestMax_s, "s").value_or(plan.rest_s);
+  plan.rest_s = number_within(reader, "rest_s", kRest_s, "s").value_or(plan.rest_s);
   const auto rate = reader.number("rate_dps");
   const auto latitude = reader.number("latitude_deg");
   if (rate && latitude) {
@@ -346,7 +363,7 @@ void read_corrector(TomlReader& root, Context& context, const ConfigOverrides& o
     const auto path = (std::filesystem::path(context.folder) / *name).lexically_normal();
     read_model(path.string(), reader.where("model"), context);
   }
-  plan.window_s = number_within(reader, "window_s", 0.0, kWindowMax_s, "s").value_or(plan.window_s);
+  plan.window_s = number_within(reader, "window_s", kWindow_s, "s").value_or(plan.window_s);
   if (const auto order = reader.integer("order")) {
     if (*order < 0 || *order > fusion::kOrderMax) {
       reader.complain(reader.where("order"), fmt::format("order is {}", *order),
@@ -467,6 +484,9 @@ ConfigResult load_config(const std::string& path, const ConfigOverrides& overrid
   root.finish();
   if (context.errors.empty()) apply_knowledge(context);
   if (!context.errors.empty()) return tl::unexpected(std::move(context.errors));
+  context.resolved.files = context.cache.paths();
+  context.resolved.files.push_back(path);
+  if (plan.model) context.resolved.files.push_back(plan.model->file);
   return std::move(context.resolved);
 }
 

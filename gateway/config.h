@@ -16,7 +16,8 @@ namespace vgyro::gateway {
 
 struct Resolved {
   Plan plan;
-  std::vector<Error> warnings;  ///< usable, but the user should know
+  std::vector<std::string> files;  ///< what was read: the file itself, DBC files, the model file
+  std::vector<Error> warnings;     ///< usable, but the user should know
 };
 
 using ConfigResult = tl::expected<Resolved, std::vector<Error>>;

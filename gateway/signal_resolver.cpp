@@ -8,6 +8,7 @@
 #include <fmt/core.h>
 
 #include "base/nearest.h"
+#include "base/printable.h"
 #include "dbc/parser.h"
 
 namespace vgyro::gateway {
@@ -55,7 +56,7 @@ can::BusIndex bus_index(std::vector<std::string>& buses, const std::string& name
 
 std::string required_bus(TomlReader& reader) {
   std::string name = reader.required_text("bus", "can0");
-  if (name.size() > kInterfaceNameMax) {
+  if (name.size() > kInterfaceNameMax || printable(name) != name) {
     reader.complain(reader.where("bus"), fmt::format("\"{}\" is no interface name", name),
                     "at most 15 characters, as `ip link` shows them");
   }
@@ -82,6 +83,13 @@ const dbc::Database* DatabaseCache::get(const std::string& path, TomlReader& rea
                          {}});
   }
   return (files_[path] = std::make_unique<dbc::Database>(std::move(*loaded))).get();
+}
+
+std::vector<std::string> DatabaseCache::paths() const {
+  std::vector<std::string> paths;
+  for (const auto& [path, database] : files_)
+    paths.push_back(path);
+  return paths;
 }
 
 SignalResolver::SignalResolver(TomlReader& reader, DatabaseCache& cache,

@@ -23,6 +23,7 @@ class DatabaseCache {
   explicit DatabaseCache(std::vector<Error>& warnings) : warnings_(warnings) {}
   /// Null after a complaint.
   const dbc::Database* get(const std::string& path, TomlReader& reader);
+  [[nodiscard]] std::vector<std::string> paths() const;
 
  private:
   std::map<std::string, std::unique_ptr<dbc::Database>> files_;

@@ -18,6 +18,19 @@ using S = Surroundings;
 
 constexpr double kRateMax_dps = 1e5;
 constexpr double kTimeMax_s = 1e9;
+// Memory shorter than the time between two samples of the fastest gyro is white noise.
+constexpr double kTauMin_s = 1e-3;
+// A slower low-pass, or line, is drift.
+constexpr double kCutoffMin_hz = 1e-2;
+constexpr double kLineMin_hz = 1e-6;
+// A gyro that reads no more than this is none.
+constexpr double kLimitMin_dps = 1e-6;
+// Finer than any signal: the Earth turns a million times faster.
+constexpr double kStepMin_dps = 1e-9;
+// The best gyros have some 1e-7, the worst some 1; squares of either end are far from the ends of
+// double precision.
+constexpr double kNoiseLeast = 1e-12;
+constexpr double kNoiseMax = 1e2;
 // No gyro is written so far off that it answers backwards or ten times too strongly.
 constexpr double kScaleMin = -0.9;
 constexpr double kScaleMax = 9.0;
@@ -33,8 +46,13 @@ constexpr Parameter number(std::string_view name, std::string_view unit, double 
 constexpr Parameter not_negative(std::string_view name, std::string_view unit, double limit) {
   return {.name = name, .unit = unit, .minimum = 0.0, .maximum = limit};
 }
-constexpr Parameter positive(std::string_view name, std::string_view unit, double limit) {
-  return {.name = name, .unit = unit, .minimum = 0.0, .maximum = limit, .above_minimum = true};
+constexpr Parameter noise(std::string_view name, std::string_view unit, double limit) {
+  return {.name = name, .unit = unit, .minimum = 0.0, .maximum = limit, .least = kNoiseLeast};
+}
+/// Something is divided by it.
+constexpr Parameter divisor(std::string_view name, std::string_view unit, double least,
+                            double limit) {
+  return {.name = name, .unit = unit, .minimum = least, .maximum = limit};
 }
 
 constexpr std::array kBias{number("value_dps", "deg/s", kRateMax_dps)};
@@ -42,7 +60,7 @@ constexpr std::array kBiasRamp{number("slope_dps_s", "(deg/s)/s", 1e3)};
 constexpr std::array kBiasStep{number("size_dps", "deg/s", kRateMax_dps),
                                number("at_s", "s", kTimeMax_s)};
 constexpr std::array kWarmUp{number("amplitude_dps", "deg/s", kRateMax_dps),
-                             positive("tau_s", "s", kTimeMax_s)};
+                             divisor("tau_s", "s", kTauMin_s, kTimeMax_s)};
 constexpr std::array kTemperatureBias{number("coefficient_dps_k", "(deg/s)/K", 1e3), kReference};
 constexpr std::array kTemperatureBiasQuadratic{number("coefficient_dps_k2", "(deg/s)/K^2", 1e3),
                                                kReference};
@@ -58,22 +76,22 @@ constexpr std::array kGSensitivity{
     number("coefficient_dps_g", "(deg/s)/g", 1e3)};
 constexpr std::array kVibrationRectification{number("coefficient_dps_g2", "(deg/s)/g^2", 1e3)};
 constexpr std::array kDelay{number("seconds", "s", kLagMax_s)};
-constexpr std::array kBandwidth{positive("cutoff_hz", "Hz", kFrequencyMax_hz)};
+constexpr std::array kBandwidth{divisor("cutoff_hz", "Hz", kCutoffMin_hz, kFrequencyMax_hz)};
 constexpr std::array kAngleHarmonic{
     Parameter{
         .name = "harmonic", .unit = "", .minimum = 1.0, .maximum = 100.0, .form = Form::kWhole},
     number("amplitude_dps", "deg/s", kRateMax_dps), number("phase_rad", "rad", 1e3)};
-constexpr std::array kLine{positive("frequency_hz", "Hz", kFrequencyMax_hz),
+constexpr std::array kLine{divisor("frequency_hz", "Hz", kLineMin_hz, kFrequencyMax_hz),
                            number("amplitude_dps", "deg/s", kRateMax_dps),
                            number("phase_rad", "rad", 1e3)};
-constexpr std::array kSaturation{positive("limit_dps", "deg/s", kRateMax_dps)};
+constexpr std::array kSaturation{divisor("limit_dps", "deg/s", kLimitMin_dps, kRateMax_dps)};
 constexpr std::array kDeadBand{not_negative("width_dps", "deg/s", kRateMax_dps)};
-constexpr std::array kQuantization{positive("step_dps", "deg/s", kRateMax_dps)};
-constexpr std::array kWhiteNoise{not_negative("density_dps_rthz", "deg/s/sqrt(Hz)", 1e3)};
-constexpr std::array kRateRandomWalk{not_negative("density_dps_rts", "deg/s/sqrt(s)", 1e3)};
-constexpr std::array kGaussMarkov{not_negative("sigma_dps", "deg/s", 1e3),
-                                  positive("tau_s", "s", kTimeMax_s)};
-constexpr std::array kRateNoise{not_negative("ratio_rthz", "1/sqrt(Hz)", 1.0)};
+constexpr std::array kQuantization{divisor("step_dps", "deg/s", kStepMin_dps, kRateMax_dps)};
+constexpr std::array kWhiteNoise{noise("density_dps_rthz", "deg/s/sqrt(Hz)", kNoiseMax)};
+constexpr std::array kRateRandomWalk{noise("density_dps_rts", "deg/s/sqrt(s)", kNoiseMax)};
+constexpr std::array kGaussMarkov{noise("sigma_dps", "deg/s", kNoiseMax),
+                                  divisor("tau_s", "s", kTauMin_s, kTimeMax_s)};
+constexpr std::array kRateNoise{noise("ratio_rthz", "1/sqrt(Hz)", 1.0)};
 constexpr std::array kSpikes{not_negative("rate_hz", "1/s", kFrequencyMax_hz),
                              number("size_dps", "deg/s", kRateMax_dps)};
 constexpr std::array kStuck{number("from_s", "s", kTimeMax_s), number("to_s", "s", kTimeMax_s)};
@@ -174,18 +192,42 @@ constexpr bool in_order_of_kind() {
 }
 static_assert(in_order_of_kind());
 
+// Products, quotients and squares of a few of them, and of times, stay finite and are not lost.
+constexpr bool is_sane(const Parameter& parameter) {
+  constexpr double kMagnitudeMax = 1e9;
+  constexpr double kDivisorMin = 1e-9;
+  const bool ordered = parameter.minimum < parameter.maximum;
+  const bool bounded = parameter.minimum >= -kMagnitudeMax && parameter.maximum <= kMagnitudeMax;
+  const bool divides = parameter.minimum <= 0.0 || parameter.minimum >= kDivisorMin;
+  const bool presets = !parameter.preset || (*parameter.preset >= parameter.minimum &&
+                                             *parameter.preset <= parameter.maximum);
+  return ordered && bounded && divides && presets;
+}
+
+constexpr bool all_are_sane() {
+  for (const KindInfo& row : kCatalogue) {
+    for (const Parameter& parameter : row.parameters) {
+      if (!is_sane(parameter)) return false;
+      if (row.nature == Nature::kNoise && parameter.minimum == 0.0 && parameter.least <= 0.0) {
+        return false;  // a density that is not 0 but whose square is
+      }
+    }
+  }
+  return true;
+}
+static_assert(all_are_sane());
+
 }  // namespace
 
 bool Parameter::allows(double value) const {
   if (form == Form::kWhole && value != std::floor(value)) return false;
-  return value <= maximum && (above_minimum ? value > minimum : value >= minimum);
+  return value >= minimum && value <= maximum && (value == 0.0 || std::abs(value) >= least);
 }
 
 std::string Parameter::limits() const {
   if (form == Form::kAxis) return "\"x\", \"y\" or \"z\"";
   const std::string space = unit.empty() ? "" : " ";
-  if (above_minimum)
-    return fmt::format("above {:g} and up to {:g}{}{}", minimum, maximum, space, unit);
+  if (least > 0.0) return fmt::format("0, or {:g} to {:g}{}{}", least, maximum, space, unit);
   return fmt::format("{}{:g} to {:g}{}{}", form == Form::kWhole ? "a whole number, " : "", minimum,
                      maximum, space, unit);
 }

@@ -38,11 +38,11 @@ struct Parameter {
   std::string_view unit;
   double minimum = 0.0;
   double maximum = 0.0;
-  bool above_minimum = false;  ///< the minimum itself is too little
+  double least = 0.0;  ///< what is not 0 is at least this large
   std::optional<double> preset = {};
   Form form = Form::kNumber;
 
-  /// "above 0 and up to 1e+06 s"
+  /// "0.001 to 1e+09 s"
   [[nodiscard]] std::string limits() const;
   [[nodiscard]] bool allows(double value) const;
 };

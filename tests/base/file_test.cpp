@@ -1,5 +1,6 @@
 #include "base/file.h"
 
+#include <array>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
@@ -55,6 +56,29 @@ TEST_F(ReadFile, RefusesADirectory) {
   const auto directory = read_file(folder_);
   ASSERT_FALSE(directory);
   EXPECT_EQ(directory.error().message(), folder_ + ": is a directory, not a file");
+}
+
+// The first pages of a process's memory belong to nobody: the system opens the file and then fails
+// in the middle of it. What was read until then is not the file.
+TEST_F(ReadFile, TakesNoErrorForTheEnd) {
+  const auto broken = read_file("/proc/self/mem");
+  ASSERT_FALSE(broken);
+  EXPECT_EQ(broken.error().message(),
+            "/proc/self/mem: cannot be read to its end: Input/output error");
+}
+
+// `vgyro check <(generate)`: what has no size is read to its end, and no further than a file.
+TEST_F(ReadFile, ReadsPipesAndRefusesEndlessOnes) {
+  std::array<int, 2> ends{};
+  ASSERT_EQ(::pipe(ends.data()), 0);
+  const std::string bytes(50'000, 'x');
+  ASSERT_EQ(::write(ends[1], bytes.data(), bytes.size()), static_cast<ssize_t>(bytes.size()));
+  ::close(ends[1]);
+  EXPECT_EQ(read_file("/proc/self/fd/" + std::to_string(ends[0])).value(), bytes);
+  ::close(ends[0]);
+  const auto endless = read_file("/dev/zero");
+  ASSERT_FALSE(endless);
+  EXPECT_EQ(endless.error().message(), "/dev/zero: is larger than 64 MiB");
 }
 
 // A recording given by mistake in place of a config must not fill the memory.

@@ -71,5 +71,20 @@ TEST(ParseToml, SurvivesAnyText) {
   }
 }
 
+// The wrong file has thousands of them.
+TEST(TomlReader, NamesTheFirstUnknownKeysAndCountsTheRest) {
+  std::string text = "known = 1\n";
+  for (int i = 0; i < 47; ++i)
+    text += "key_" + std::to_string(i) + " = 1\n";
+  const auto table = parse_toml(text, "a.toml");
+  ASSERT_TRUE(table);
+  std::vector<Error> errors;
+  TomlReader reader(*table, "a.toml", "[a]", errors);
+  (void)reader.integer("known");
+  reader.finish();
+  ASSERT_EQ(errors.size(), 11U);
+  EXPECT_EQ(errors[10].what, "… and 37 more unknown keys in [a]");
+}
+
 }  // namespace
 }  // namespace vgyro

@@ -185,6 +185,39 @@ TEST_F(OpenLog, DeliversWhatIsBeforeTheDamageOfAnXz) {
   }
 }
 
+// The block says in its header how large its dictionary is; the byte behind filter and size of the
+// filter's properties (xz file format 5.3.1). The header's own check value is made anew.
+std::string with_dictionary(std::string xz, std::uint8_t size_code) {
+  constexpr std::size_t kBlock = LZMA_STREAM_HEADER_SIZE;
+  const std::size_t filter = xz.find("\x21\x01", kBlock + 2);  // LZMA2, one byte of properties
+  EXPECT_NE(filter, xz.npos);
+  const std::size_t bytes = (static_cast<std::uint8_t>(xz[kBlock]) + 1U) * 4U;
+  xz[filter + 2] = static_cast<char>(size_code);
+  const std::uint32_t crc =
+      lzma_crc32(reinterpret_cast<const std::uint8_t*>(xz.data()) + kBlock, bytes - 4, 0);
+  for (std::size_t i = 0; i < 4; ++i)
+    xz[kBlock + bytes - 4 + i] = static_cast<char>(crc >> 8U * i);
+  return xz;
+}
+
+// `xz --lzma2=dict=1GiB` is no damage, and its user can do something about it.
+TEST_F(OpenLog, TellsADictionaryThatIsTooLargeFromDamage) {
+  constexpr std::uint8_t k64MiB = 28;
+  constexpr std::uint8_t k1GiB = 36;
+  const std::string xz = packed(log_text(100));
+  EXPECT_EQ(read(file_with("usual.log.xz", with_dictionary(xz, k64MiB))).error, "");
+  const std::string path = file_with("large.log.xz", with_dictionary(xz, k1GiB));
+  EXPECT_EQ(read(path).error,
+            path +
+                ": cannot be unpacked: its dictionary needs 1025 MiB of memory, 256 MiB are the "
+                "limit; `xz -dc FILE.xz | vgyro … -` unpacks it outside");
+}
+
+// An error in the middle is none of the log's ends.
+TEST_F(OpenLog, TellsAnErrorFromTheEnd) {
+  EXPECT_EQ(read("/proc/self/mem").error, "/proc/self/mem: cannot be read: Input/output error");
+}
+
 // A plain log under a packed name, or nothing at all, is told apart from damage.
 TEST_F(OpenLog, TellsAFileThatIsNoXz) {
   const std::string plain = file_with("plain.log.xz", log_text(10));

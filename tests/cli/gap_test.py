@@ -3,6 +3,7 @@
 gets. Whether the right effects are found is the blind test's business."""
 
 import json
+import resource
 import struct
 import tomllib
 import unittest
@@ -293,6 +294,17 @@ class BadInput(GapBench):
     def test_gyro_that_is_missing(self):
         self.write("one.log", recording(seconds=60.0, gyros=(1,)))
         self.refused(r"one\.log: no frame of gyro right \(GYRO_B 102 on can1\)", r"interfaces are: can0", log="one.log")
+
+    def test_one_gyro_whose_clock_is_years_off(self):
+        # Both spans are told, and no memory is taken for the years between.
+        for years in (1, -1, 10, 100):
+            off_s = years * 365 * 86_400
+            lines = (line if " can1 " not in line else bench.stamp(int(line[1:11]) * 1_000_000 + int(line[12:18]) + off_s * 1_000_000)
+                     + line[19:] for line in LOG.splitlines(keepends=True))
+            self.write("off.log", "".join(lines))
+            self.refused(r"off\.log: .*(at the same time.*left from .* right from|never)", log="off.log")
+            used_kb = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss
+            self.assertLess(used_kb, 300_000 if not bench.SANITIZED else 3_000_000, years)
 
     def test_no_rest_and_no_reference(self):
         self.write("vgyro.toml", GYROS)

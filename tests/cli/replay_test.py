@@ -366,7 +366,7 @@ class BadInput(Replay):
         os.link(self.folder / "in.log", self.folder / "other_name.log")
         for arguments in (("-o", "in.log", "in.log"), ("-o", "other_name.log", "in.log"), ("--json", "in.log", "in.log"),
                           ("-o", "./in.log", "in.log")):
-            self.assertIn("is also the input", self.refuse(*arguments))
+            self.assertIn("is also an input", self.refuse(*arguments))
             self.assertEqual(self.read("in.log"), before)
 
     def test_bad_map(self):

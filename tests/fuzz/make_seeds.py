@@ -75,7 +75,7 @@ dbc = "201"
 message = "WHEEL"
 signal = "Speed"
 [calibration]
-rest_s = 0.5
+rest_s = 1.0
 latitude_deg = -50.45
 source = "reference"
 when_moving = "accept"

@@ -645,15 +645,23 @@ TEST_F(Config, ReferenceCalibrationNeedsAReference) {
   EXPECT_NE(messages[0].find("needs a [reference] table"), std::string::npos) << messages[0];
 }
 
+// They stand in tables, in pictures and on terminals.
+TEST_F(Config, RefusesNamesThatAreNotPrintable) {
+  expect_error("name = \"left\"", "name = \"l\\u001b[2J\"", "name = \"l",
+               {"the name \"l\\x1b[2J\" is not printable"});
+  expect_error("name = \"left\"", "name = \"l\\neft\"", "name = \"l", {"l\\x0aeft"});
+  expect_error("bus = \"can2\"", "bus = \"can\\t2\"", "bus = \"can\\t", {"no interface name"});
+}
+
 // Numbers outside what can work, each with its limits.
 TEST_F(Config, RefusesNumbersOutsideTheirLimits) {
-  for (const char* value : {"0", "-1.0", "86401", "inf", "nan"}) {
+  for (const char* value : {"0", "-1.0", "1e-9", "0.99", "86401", "inf", "nan"}) {
     expect_error("rest_s = 30.0", fmt::format("rest_s = {}", value), "rest_s",
-                 {"rest_s is", "above 0 and up to 86400"});
+                 {"rest_s is", "1 to 86400"});
   }
-  for (const char* value : {"0.0", "3601", "-inf"}) {
+  for (const char* value : {"0.0", "5e-324", "0.09", "3601", "-inf"}) {
     expect_error("window_s = 5", fmt::format("window_s = {}", value), "window_s",
-                 {"window_s is", "above 0 and up to 3600"});
+                 {"window_s is", "0.1 to 3600"});
   }
   for (const char* value : {"-1", "4", "9223372036854775807"}) {
     expect_error("order = 2", fmt::format("order = {}", value), "order",

@@ -1,7 +1,12 @@
 #include "gateway/model_plan.h"
 
+#include <algorithm>
+#include <cmath>
+
 #include <gtest/gtest.h>
 
+#include "gateway/pipeline.h"
+#include "model/catalogue.h"
 #include "tests/gateway/rig.h"
 
 namespace vgyro::gateway {
@@ -42,6 +47,53 @@ TEST(ModelPlan, GivesNoiseToTheCorrector) {
   EXPECT_EQ(b.walk_dps_rts, 5e-6);
   EXPECT_EQ(b.rate_noise_rthz, 1e-5);
   EXPECT_EQ(b.resolution_dps, 1e-2);
+}
+
+/// After the calibration, whose rates are not valid.
+struct Finite final : RateObserver {
+  void on_rate(TimePoint t, const std::array<double, 2>& raw_dps, double virtual_dps) override {
+    (void)raw_dps;
+    if (t < TimePoint{rig::ms(3000)}) return;
+    ++rates;
+    all = all && std::isfinite(virtual_dps);
+  }
+  std::size_t rates = 0;
+  bool all = true;
+};
+
+// The weakest and the strongest noise that a model file may name: of either gyro, of both, in any
+// mix.
+TEST(ModelPlan, AnyNoiseOfTheCatalogueGivesFiniteRates) {
+  const auto turn = [](double t_s) { return t_s < 5.0 ? 0.0 : 20.0 * std::sin(t_s); };
+  const rig::Recording recording = rig::merge(
+      {rig::stream_a({}, rig::ms(15000), turn), rig::stream_b({}, rig::ms(15000), turn)});
+  for (const Kind kind : {Kind::kWhiteNoise, Kind::kRateRandomWalk, Kind::kGaussMarkov,
+                          Kind::kRateNoise, Kind::kQuantization}) {
+    const auto parameters = model::info(kind).parameters;
+    for (unsigned corner = 0; corner < 16; ++corner) {
+      model::Model model{.file = "known.toml", .effects = {}};
+      for (std::size_t gyro = 0; gyro < 2; ++gyro) {
+        model::Effect effect{gyro, kind, {}, 3};
+        for (std::size_t i = 0; i < parameters.size(); ++i) {
+          const model::Parameter& p = parameters[i];
+          const bool most = (corner >> (2 * gyro + i) & 1U) != 0;
+          effect.parameters[i] = most ? p.maximum : std::max(p.minimum, p.least);
+        }
+        model.effects.push_back(effect);
+      }
+      Plan plan = rig::two_gyros();
+      ASSERT_TRUE(apply(model, plan).empty());
+      Pipeline pipeline(plan);
+      Finite finite;
+      pipeline.observe(&finite);
+      rig::Collector sink;
+      rig::play(pipeline, recording, sink);
+      EXPECT_GT(finite.rates, 1000U);
+      EXPECT_TRUE(finite.all) << model::info(kind).name << " corner " << corner;
+      for (const GyroStatus& gyro : pipeline.status().gyros)
+        EXPECT_TRUE(std::isfinite(gyro.bias_dps)) << model::info(kind).name << " " << corner;
+    }
+  }
 }
 
 TEST(ModelPlan, GivesLimitsToTheGyros) {

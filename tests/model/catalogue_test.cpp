@@ -1,5 +1,6 @@
 #include "model/catalogue.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -84,6 +85,28 @@ TEST(Catalogue, LagOfALowPassIsItsGroupDelay) {
   EXPECT_DOUBLE_EQ(lag_s({.gyro = 0, .kind = Kind::kDelay, .parameters = {0.004}}), 0.004);
   EXPECT_DOUBLE_EQ(lag_s({.gyro = 0, .kind = Kind::kBandwidth, .parameters = {10.0}}),
                    1.0 / (20.0 * std::numbers::pi));
+}
+
+// Every parameter at either end of what it may be, in any surroundings: nothing overflows.
+TEST(Catalogue, StaysFiniteAtTheLimitsOfItsParameters) {
+  for (const KindInfo& row : catalogue()) {
+    for (unsigned corner = 0; corner < 1U << row.parameters.size(); ++corner) {
+      Effect effect{.gyro = 0, .kind = row.kind};
+      for (std::size_t i = 0; i < row.parameters.size(); ++i) {
+        const Parameter& p = row.parameters[i];
+        effect.parameters[i] = (corner >> i & 1U) != 0 ? p.maximum : std::max(p.minimum, p.least);
+        EXPECT_TRUE(p.allows(effect.parameters[i])) << row.name << " " << p.name;
+      }
+      for (const double rate_dps : {-1e5, 0.0, 1e5}) {
+        double sum_dps = 0.0;
+        if (row.added != nullptr) sum_dps += added_dps(effect, rate_dps, a_day_in_the_car());
+        if (row.slope != nullptr) sum_dps += slope(effect, rate_dps, a_day_in_the_car());
+        if (row.nature == Nature::kClip) sum_dps += clipped_dps(effect, rate_dps);
+        if (row.nature == Nature::kLag) sum_dps += lag_s(effect);
+        EXPECT_TRUE(std::isfinite(sum_dps)) << row.name << " corner " << corner;
+      }
+    }
+  }
 }
 
 // The names are a format: files and other programs depend on them.

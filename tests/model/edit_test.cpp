@@ -1,5 +1,6 @@
 #include "model/edit.h"
 
+#include <algorithm>
 #include <random>
 
 #include <gtest/gtest.h>
@@ -17,8 +18,10 @@ double any_value(const Parameter& parameter, std::mt19937_64& random) {
   if (parameter.form == Parameter::Form::kAxis) return static_cast<double>(random() % 3);
   if (parameter.form == Parameter::Form::kWhole) return static_cast<double>(1 + random() % 100);
   const double magnitude = std::pow(10.0, -12.0 * uniform());
-  return random() % 2 == 0 || parameter.minimum >= 0.0 ? parameter.maximum * magnitude
-                                                       : parameter.minimum * magnitude;
+  const double value = random() % 2 == 0 || parameter.minimum >= 0.0
+                           ? parameter.maximum * magnitude
+                           : parameter.minimum * magnitude;
+  return std::max(value, parameter.minimum);
 }
 
 Effect any_effect(Kind kind, std::mt19937_64& random) {
@@ -174,7 +177,7 @@ TEST(ModelEdit, ChangesNothingThatIsNotThere) {
             std::string::npos);
   EXPECT_NE(refusal(replace_parameter(kThree, 3, "tau_s", 1.0)).find("has no parameter tau_s"),
             std::string::npos);
-  EXPECT_NE(refusal(replace_parameter(kThree, 12, "tau_s", -1.0)).find("above 0"),
+  EXPECT_NE(refusal(replace_parameter(kThree, 12, "tau_s", -1.0)).find("0.001 to"),
             std::string::npos);
   const char* two =
       "format = 1\neffect = [{gyro=1,kind=\"bias\",value_dps=1}, "

@@ -1,0 +1,69 @@
+// What becomes of the metrics when they cannot be written.
+
+#include "daemon/metrics.h"
+
+#include <chrono>
+#include <csignal>
+#include <string>
+#include <sys/resource.h>
+#include <thread>
+
+#include <gtest/gtest.h>
+
+#include "tests/daemon/scratch.h"
+#include "tests/gateway/rig.h"
+
+namespace vgyro::daemon {
+namespace {
+
+std::string& told() {
+  static std::string message;
+  return message;
+}
+
+int keep(const iovec* fields, int count) {
+  if (count > 0) told().assign(static_cast<const char*>(fields[0].iov_base), fields[0].iov_len);
+  return 0;
+}
+
+/// As of a disk that is full in the middle of a file.
+class SmallFiles {
+ public:
+  SmallFiles() {
+    ::getrlimit(RLIMIT_FSIZE, &before_);
+    const rlimit small{64, before_.rlim_max};
+    ::setrlimit(RLIMIT_FSIZE, &small);
+    handler_ = std::signal(SIGXFSZ, SIG_IGN);
+  }
+  SmallFiles(const SmallFiles&) = delete;
+  SmallFiles& operator=(const SmallFiles&) = delete;
+  ~SmallFiles() {
+    ::setrlimit(RLIMIT_FSIZE, &before_);
+    std::signal(SIGXFSZ, handler_);
+  }
+
+ private:
+  rlimit before_{};
+  void (*handler_)(int) = SIG_DFL;
+};
+
+// The first write is cut short without an error; only the next one says why.
+TEST(MetricsFile, TellsWhyAFileWasCutShort) {
+  const Scratch scratch;
+  const SmallFiles small;
+  Log log(&keep);
+  told().clear();
+  MetricsFile metrics(scratch.path("metrics.prom"), log);
+  const gateway::Plan plan = gateway::rig::two_gyros();
+  Snapshot now;
+  now.plan = &plan;
+  metrics.write(now);
+  while (told().empty()) {
+    metrics.second_passed();
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  EXPECT_NE(told().find("metrics cannot be written: File too large"), std::string::npos) << told();
+}
+
+}  // namespace
+}  // namespace vgyro::daemon

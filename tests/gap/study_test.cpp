@@ -1,0 +1,76 @@
+#include "gap/study.h"
+
+#include <gtest/gtest.h>
+
+#include "gap/views.h"
+#include "tests/gap/made_recording.h"
+
+namespace vgyro::gap {
+namespace {
+
+constexpr double kYear_s = 365.0 * 86'400.0;
+
+std::string refusal(const Recording& recording) {
+  const auto begun = Study::begin(recording, {});
+  return begun ? std::string() : begun.error().message();
+}
+
+Recording recording_of(double seconds) {
+  Making making;
+  making.seconds = seconds;
+  return make_recording(making);
+}
+
+// One logger's clock was not set: there is nothing to compare, and no year to allot memory for.
+TEST(Study, SaysWhenEachGyroIsThereWhenTheyNeverAreTogether) {
+  Recording recording = recording_of(120.0);
+  for (double& t : recording.gyros[1].t_s)
+    t += kYear_s;
+  recording.seconds += kYear_s;
+  EXPECT_EQ(refusal(recording),
+            "the gyros are not there at the same time, or too shortly: a from 0.0 to 120.0 s, b "
+            "from 31536000.0 to 31536120.0 s; at least 30 s of both, with the stamps of one clock");
+}
+
+// The clock was set in the middle, or two drives are in one log.
+TEST(Study, RefusesMuchMoreTimeThanTheGyrosFill) {
+  Recording recording = recording_of(120.0);
+  for (GyroSeries& gyro : recording.gyros) {
+    for (std::size_t i = gyro.t_s.size() / 2; i < gyro.t_s.size(); ++i)
+      gyro.t_s[i] += 10.0 * kYear_s;
+  }
+  recording.seconds += 10.0 * kYear_s;
+  EXPECT_EQ(
+      refusal(recording).substr(0, 89),
+      "from the first frame to the last it is 315360120 s, and the gyros are there in 120 s of t");
+}
+
+// A stop for coffee is none of that, nor are frames of others before and after.
+TEST(Study, BearsPauses) {
+  Recording recording = recording_of(120.0);
+  for (GyroSeries& gyro : recording.gyros) {
+    for (std::size_t i = gyro.t_s.size() / 2; i < gyro.t_s.size(); ++i)
+      gyro.t_s[i] += 1800.0;
+  }
+  for (std::size_t i = recording.reference_dps.t_s.size() / 2;
+       i < recording.reference_dps.t_s.size(); ++i)
+    recording.reference_dps.t_s[i] += 1800.0;
+  recording.seconds += 1800.0;
+  EXPECT_EQ(refusal(recording), "");
+}
+
+// An hour without a sample is one place for a step, not a thousand.
+TEST(Study, StepsWithinAPauseAreOne) {
+  Layout layout;
+  for (const double t_s : {0.5, 1.5, 2.5, 3600.5, 3601.5}) {
+    layout.blocks.emplace_back();
+    layout.blocks.back().t_s = t_s;
+  }
+  std::vector<double> even_s;
+  for (int k = 1; k < 3602; ++k)
+    even_s.push_back(k);
+  EXPECT_EQ(distinct_steps(layout, even_s), (std::vector<double>{1.0, 2.0, 3.0, 3601.0}));
+}
+
+}  // namespace
+}  // namespace vgyro::gap
