@@ -141,6 +141,15 @@ def draw_faults(rng, pair, duration_s, rest_s):
     return kind + (" from the start" if begin_s == 0.0 else "")
 
 
+def spare_the_last(pair):
+    """A step of the only gyro that is left is a turn for all that anybody can know."""
+    for k, gyro in enumerate(pair):
+        for fault in gyro.faults:
+            if fault.end_s == math.inf:
+                other = pair[1 - k]
+                other.drifts = [d for d in other.drifts if d.kind != "bias step" or d.begin_s < fault.begin_s]
+
+
 def sample_sigma_dps(pair):
     return sum(1 / (g.density**2 * g.rate_hz) for g in pair) ** -0.5
 
@@ -197,6 +206,7 @@ def draw(seed, without=()):
         g.drifts = [] if "drift" in without else g.drifts
         g.faults = [] if "faults" in without else g.faults
         g.scale = 0.0 if "scale" in without else g.scale
+    spare_the_last(pair)
     rng = stream(seed, 4)
     wheels = Wheels(rng.choice([10.0, 20.0, 50.0]), rng.uniform(0, 0.02), rng.uniform(0.05, 0.4), rng.random() < 0.03)
     wheels = wheels if rng.random() < 0.6 and "wheels" not in without else None
