@@ -54,6 +54,8 @@ constexpr double kJumpSigma = 6.0;
 // … it is a step where it stays within this share of itself, or a drift after so many blocks.
 constexpr double kStepTolerance = 0.05;
 constexpr int kDriftBlocks = 6;
+// After so long without a contradiction the last one is over.
+constexpr double kCalm_s = 120.0;
 // While turning, this much of the rate may be the gyros' own disagreement about it.
 constexpr double kTurnTolerance = 0.02;
 constexpr double kTurnTolerance_s = 0.02;  ///< the same of its derivative
@@ -153,7 +155,8 @@ class OptimalCorrector final : public Corrector {
       : settings_(settings),
         window_s_(settings.window_s),
         readings_(settings.gyros),
-        noise_(settings.gyros) {
+        noise_(settings.gyros),
+        before_(settings.gyros) {
     for (const GyroParameters& gyro : settings.gyros) {
       for (std::size_t i = 0; i < gyro.gauss_markov_count; ++i)
         window_s_ = std::min(window_s_, kShareOfTau * gyro.gauss_markov[i].tau_s);
@@ -230,6 +233,8 @@ class OptimalCorrector final : public Corrector {
   void learn_from(const Block& block, bool steady);
   bool has_jumped(const Block& block);
   bool is_step(double away_dps, double variance);
+  void keep_before();
+  void forget_blind_time();
   void end_steady();
   void note_run(Run run);
 
@@ -304,7 +309,12 @@ class OptimalCorrector final : public Corrector {
   double recent_until_s_ = 0.0;
   bool held_steady_ = false;
   bool held_begins_ = false;  ///< the first of them begins a run of steady ones
-  int jump_blocks_ = 0;       ///< in a row that contradict what is foretold
+  /// What was known before the gyros began to contradict each other.
+  DriftBank before_;
+  bool has_before_ = false;
+  double before_s_ = 0.0;
+  double contradicted_s_ = 0.0;  ///< they did so last
+  int jump_blocks_ = 0;          ///< in a row that contradict what is foretold
   double suspected_jump_dps_ = 0.0;
   Run run_ = Run::kMoving;
   bool run_open_ = false;  ///< both readings of the run are likely
@@ -329,6 +339,7 @@ class OptimalCorrector final : public Corrector {
   double fast_difference_ = 0.0;
   double blame_ = 0.0;  ///< variance of the virtual rate per squared excess difference
   std::array<double, 2> blind_{};
+  bool blind_before_ = false;  ///< at the last block one gyro counted as blind
 
   WindowCounts windows_;
   Condition condition_;
@@ -623,6 +634,9 @@ void OptimalCorrector::judge_coherence(const Block& block) {
 void OptimalCorrector::close_block(const Block& block) {
   judge_coherence(block);
   const Present present = trusted(block);
+  if (block.present == Present::kBoth && present != Present::kBoth && !blind_before_)
+    forget_blind_time();
+  blind_before_ = block.present == Present::kBoth && present != Present::kBoth;
   if (present != weights_for_) set_weights(present);
   if (present == Present::kBoth) {
     noise_.watch(block);
@@ -739,11 +753,33 @@ bool OptimalCorrector::is_step(double away_dps, double variance) {
   if (!constant && jump_blocks_ < kDriftBlocks) return false;
   jump_blocks_ = 0;
   close_window();
+  keep_before();
   const double doubt = constant ? variance : squared(kShareMin * away_dps) + variance;
   readings_.split_step(away_dps, doubt, suspicion_of_first());
   fast_difference_ = 0.0;
   refresh();
   return true;
+}
+
+// A gyro that is blind contradicts the other one before it is known for what it is: what was
+// learned in that time may be wrong for both.
+void OptimalCorrector::keep_before() {
+  if (!has_before_ || learned_until_s_ - contradicted_s_ > kCalm_s) {
+    readings_.copy_likeliest(before_);
+    before_s_ = learned_until_s_;
+    has_before_ = true;
+  }
+  contradicted_s_ = learned_until_s_;
+}
+
+void OptimalCorrector::forget_blind_time() {
+  if (!has_before_ || learned_until_s_ - contradicted_s_ > kCalm_s) return;
+  close_window();
+  readings_.go_back(before_, std::max(learned_until_s_ - before_s_, 0.0));
+  run_ = Run::kMoving;
+  run_open_ = false;
+  has_before_ = false;
+  refresh();
 }
 
 // --- windows -------------------------------------------------------------------------------------
@@ -837,6 +873,7 @@ void OptimalCorrector::learn_difference(double length_s) {
   DriftMeasurement doubted = measurement;
   if (found.per_row > kContradiction) doubted.noise *= found.per_row / kContradiction;
   if (squared(found.bias_dps) > squared(kStepSigma) * found.bias_variance) {
+    keep_before();
     readings_.learn_maybe_step(length_s, measurement, doubted, found.bias_dps, found.bias_variance,
                                suspicion_of_first());
   } else {

@@ -27,7 +27,7 @@ constexpr double kTurnWalk_dps_rts = 0.002;
 constexpr double kTurnWalkShare_rts = 0.02;
 
 // A step is of one gyro; one that has stepped is the one to step again, or back.
-constexpr double kSameGyroAgain = 0.9;
+constexpr double kSameGyroAgain = 0.97;
 // How likely a step is in a window that contradicts what is foretold.
 constexpr double kStepInWindow = 1e-2;
 // A gyro that contradicts the other one and then falls out was the wrong one, but for this share.
@@ -84,6 +84,16 @@ void Readings::begin(const std::array<double, 2>& white_dps_rthz,
 void Readings::resume(const DriftMemory& memory, double age_s) {
   begin({1.0, 1.0}, {0.0, 0.0}, {1.0, 0.0, 1.0});
   slots_[0].bank.resume(memory, age_s);
+}
+
+void Readings::go_back(const DriftBank& bank, double gone_s) {
+  slots_[0].bank = bank;
+  slots_[0].log_weight = 0.0;
+  slots_[0].steady = Steady::kNo;
+  slots_[0].stepped = kNoGyro;
+  slots_[0].last = Steady::kNo;
+  count_ = 1;
+  predict(gone_s);
 }
 
 void Readings::predict(double length_s) {
@@ -158,8 +168,7 @@ double Readings::log_turning(const Reading& reading, const SteadyWindow& window)
 void Readings::begin_steady(const SteadyWindow& window) {
   const std::size_t before = count_;
   if (!window.elsewhere) {
-    swell_variance_ +=
-        kSwellGain * (squared(window.level_dps - last_level_dps_) - swell_variance_);
+    swell_variance_ += kSwellGain * (squared(window.level_dps - last_level_dps_) - swell_variance_);
   } else {
     swell_variance_ = 0.0;
   }
@@ -186,14 +195,17 @@ void Readings::begin_steady(const SteadyWindow& window) {
 }
 
 void Readings::go_on_steady(const SteadyWindow& window) {
+  // One for all: else the reading in which the turn is slowest would be the likeliest.
+  double turn_dps = 0.0;
+  for (std::size_t i = 0; i < count_ && turn_dps == 0.0; ++i)
+    turn_dps = slots_[i].steady == Steady::kTurns ? slots_[i].last_turn_dps : 0.0;
+  const double walk = squared(kTurnWalk_dps_rts) + squared(kTurnWalkShare_rts * turn_dps);
   for (std::size_t i = 0; i < count_; ++i) {
     Reading& one = slots_[i];
     if (one.steady == Steady::kStands) {
       one.log_weight += one.bank.learn(window.length_s, window.standing);
       continue;
     }
-    const double walk =
-        squared(kTurnWalk_dps_rts) + squared(kTurnWalkShare_rts * one.last_turn_dps);
     one.log_weight += window.log_turning + log_normal(window.level_dps - one.turn_dps,
                                                       window.level_variance + one.turn_variance +
                                                           walk * window.length_s);

@@ -45,6 +45,10 @@ class Readings {
   void begin(const std::array<double, 2>& white_dps_rthz, const std::array<double, 2>& bias_dps,
              const Symmetric& covariance);
   void resume(const DriftMemory& memory, double age_s);
+  /// The likeliest reading as it stands, to go back to.
+  void copy_likeliest(DriftBank& bank) const { bank = slots_[likeliest()].bank; }
+  /// Back to it; `gone_s` have passed since, of which nothing is known.
+  void go_back(const DriftBank& bank, double gone_s);
   void save(DriftMemory& memory) const { slots_[likeliest()].bank.save(memory); }
 
   void predict(double length_s);
@@ -111,7 +115,8 @@ class Readings {
   [[nodiscard]] std::size_t likeliest() const;
 
   std::array<GyroParameters, 2> gyros_;
-  double swell_variance_ = 0.0;  ///< of the level from run to run of a platform that does not move on
+  double swell_variance_ =
+      0.0;  ///< of the level from run to run of a platform that does not move on
   double last_level_dps_ = 0.0;
   std::array<Reading, 3 * kKept> slots_;
   std::size_t count_ = 0;
