@@ -16,11 +16,23 @@ constexpr double kExcited = 5.0;
 // Within a cell the two gyros need not have met an acceleration at quite the same time.
 constexpr double kTimingDoubt_s = 0.0005;
 
+// Scale factors bend, and a skew is not quite the derivative's multiple: so much is left of either.
+constexpr double kScaleLeft = 5e-4;
+constexpr double kTimingLeft_s = 1e-3;
+
 }  // namespace
 
 void DifferenceWindow::clear() {
   normal_.setZero();
   right_.setZero();
+  rate_squares_ = 0.0;
+  slope_squares_ = 0.0;
+  cells_ = 0.0;
+}
+
+double DifferenceWindow::motion_variance() const {
+  if (cells_ == 0.0) return 0.0;
+  return (squared(kScaleLeft) * rate_squares_ + squared(kTimingLeft_s) * slope_squares_) / cells_;
 }
 
 void DifferenceWindow::add(const RateCell& cell, const RateNoise& noise) {
@@ -39,6 +51,9 @@ void DifferenceWindow::regress(const RateNoise& noise) {
   const double span_s = 12.0 * cell.length_s;
   const double slope =
       (8.0 * (after.rate_dps - before.rate_dps) - (last.rate_dps - first.rate_dps)) / span_s;
+  rate_squares_ += squared(cell.rate_dps);
+  slope_squares_ += squared(slope);
+  cells_ += 1.0;
   const double rate_variance = noise.rate_density / cell.length_s;
   const double slope_variance = 130.0 * rate_variance / squared(span_s);
   const bool turns = squared(cell.rate_dps) > squared(kExcited) * rate_variance;

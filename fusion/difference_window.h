@@ -1,8 +1,8 @@
 #pragma once
 
 // What one window of the two gyros' difference measures: its regression on (1, Ω, dΩ/dt), cell by
-// cell, kept as normal equations. Ω is the gyros' own virtual rate, so a cell's rate or its derivative
-// counts only where it is far above its noise. Knows no drift and no time.
+// cell, kept as normal equations. Ω is the gyros' own virtual rate, so a cell's rate or its
+// derivative counts only where it is far above its noise. Knows no drift and no time.
 
 #include <array>
 #include <cstddef>
@@ -37,6 +37,8 @@ class DifferenceWindow {
   void clear();
   /// Rows of unit noise; none for what was not excited.
   [[nodiscard]] DriftMeasurement measure() const;
+  /// What turning alone may leave of the difference beyond scale factor and skew, (deg/s)².
+  [[nodiscard]] double motion_variance() const;
   /// How much is known of scale factor and skew: 1/variance.
   [[nodiscard]] double scale_information() const { return normal_(1, 1); }
   [[nodiscard]] double skew_information() const { return normal_(2, 2); }
@@ -48,6 +50,9 @@ class DifferenceWindow {
   std::size_t count_ = 0;
   Eigen::Matrix3d normal_ = Eigen::Matrix3d::Zero();
   Eigen::Vector3d right_ = Eigen::Vector3d::Zero();
+  double rate_squares_ = 0.0;   ///< of the window's cells
+  double slope_squares_ = 0.0;  ///< the same of dΩ/dt
+  double cells_ = 0.0;
 };
 
 }  // namespace vgyro::fusion

@@ -41,6 +41,11 @@ constexpr std::array<DriftKind, kDriftKinds> kKinds{{
 
 // A coefficient before anything is known of it, in units of N per kelvin.
 constexpr double kCoefficientWhite_per_k = 1.5;
+// It grows with this power of K over its usual value, within limits.
+constexpr double kUsualRatio_per_s = 0.02;
+constexpr double kCoefficientPower = 0.7;
+constexpr double kCoefficientLeast = 0.2;
+constexpr double kCoefficientMost = 5.0;
 // What a bias does with temperature besides: bends and hysteresis, a walk over kelvins.
 constexpr double kBendWhite_per_rtk = 0.05;
 
@@ -120,6 +125,13 @@ double share_of_place(const DriftKind& kind, std::size_t from, std::size_t to) {
   return std::max(1.0 - away, 0.0);
 }
 
+// What drifts more feels heat more.
+double usual_coefficient(double white_dps_rthz, double walk_dps_rts) {
+  const double ratio = walk_dps_rts / (white_dps_rthz * kUsualRatio_per_s);
+  return kCoefficientWhite_per_k * white_dps_rthz *
+         std::clamp(std::pow(ratio, kCoefficientPower), kCoefficientLeast, kCoefficientMost);
+}
+
 using Moments = Eigen::Matrix<double, 6, 1>;
 using MomentSquare = Eigen::Matrix<double, 6, 6>;
 
@@ -190,14 +202,17 @@ void DriftBank::make_kind(std::size_t kind, const std::array<double, 2>& white_d
   for (std::size_t gyro = 0; gyro < 2; ++gyro) {
     model.gauss_markov[gyro] = gyros_[gyro].gauss_markov;
     model.gauss_markov_count[gyro] = gyros_[gyro].gauss_markov_count;
-    if (gyros_[gyro].learns_temperature)
-      model.temperature_dps_k[gyro] = kCoefficientWhite_per_k * white_dps_rthz[gyro];
   }
   for (std::size_t i = 0; i < firsts.count; ++i) {
     for (std::size_t j = 0; j < seconds.count; ++j) {
       const WalkChoice& first = firsts.choice[i];
       const WalkChoice& second = seconds.choice[j];
       model.walk_dps_rts = {first.walk_dps_rts, second.walk_dps_rts};
+      for (std::size_t gyro = 0; gyro < 2; ++gyro) {
+        if (!gyros_[gyro].learns_temperature) continue;
+        model.temperature_dps_k[gyro] =
+            usual_coefficient(white_dps_rthz[gyro], model.walk_dps_rts[gyro]);
+      }
       const double log_weight = std::log(which.prior) + first.log_weight + second.log_weight;
       DriftFilter filter(model, mean, covariance);
       const auto growth = filter.growth_per_s();

@@ -732,8 +732,8 @@ bool OptimalCorrector::has_jumped(const Block& block) {
                     of_difference(noise_.density()) / length +
                     (rate_density(0, rate) + rate_density(1, rate)) / length +
                     noise_.rounding_variance(0) + noise_.rounding_variance(1);
-  if (rate_square > squared(kTurning_dps))
-    variance += squared(kTurnTolerance) * rate_square + squared(kTurnTolerance_s * slope);
+  variance += squared(kTurnTolerance_s * slope);
+  if (rate_square > squared(kTurning_dps)) variance += squared(kTurnTolerance) * rate_square;
   if (squared(away) <= squared(kJumpSigma) * variance) {
     jump_blocks_ = 0;
     return false;
@@ -974,7 +974,7 @@ OptimalCorrector::Contradiction OptimalCorrector::contradiction(const DriftMeasu
   const double unit = measurement.rows(0, kBias1);
   if (unit > 0.0) {
     found.bias_dps = away(0) / unit;
-    found.bias_variance = expected(0, 0) / squared(unit);
+    found.bias_variance = expected(0, 0) / squared(unit) + difference_.motion_variance();
   }
   return found;
 }

@@ -22,9 +22,11 @@ constexpr double kGoesOnWithin = 0.05;
 // How fast the level's scatter from run to run is followed.
 constexpr double kSwellGain = 0.3;
 
-// How a steady turn wanders, per √s: a helmsman's and a driver's hands.
-constexpr double kTurnWalk_dps_rts = 0.002;
-constexpr double kTurnWalkShare_rts = 0.02;
+// How a steady turn wanders, per √s: hardly on a turntable or a ship's slow circle, more in a
+// helmsman's and a driver's hands. How common the first is.
+constexpr std::array<double, 2> kTurnWalk_dps_rts{2e-4, 0.002};
+constexpr std::array<double, 2> kTurnWalkShare_rts{0.0, 0.02};
+constexpr double kPlatform = 0.3;
 
 // A step is of one gyro; one that has stepped is the one to step again, or back.
 constexpr double kSameGyroAgain = 0.97;
@@ -182,8 +184,7 @@ void Readings::begin_steady(const SteadyWindow& window) {
     stands.log_weight += stands.bank.learn(window.length_s, window.standing);
     stands.log_weight -= beyond_limits(stands.bank.estimate());
     turns.steady = Steady::kTurns;
-    turns.turn_dps = window.level_dps;
-    turns.turn_variance = window.level_variance;
+    begin_turn(turns, window);
     turns.log_weight += log_turning(turns, window) + std::log(turn_density(turns, window, known));
     turns.last_turn_dps = window.level_dps - of_level(window.weight, known);
     if (window.turning.values.size() == 0) {
@@ -194,23 +195,48 @@ void Readings::begin_steady(const SteadyWindow& window) {
   }
 }
 
+void Readings::begin_turn(Reading& reading, const SteadyWindow& window) {
+  for (SteadyTurn& turn : reading.turn)
+    turn = {window.level_dps, window.level_variance, kPlatform};
+  reading.turn[1].weight = 1.0 - kPlatform;
+}
+
+// Log density of the next level, if the platform turns on.
+double Readings::follow_turn(Reading& reading, const SteadyWindow& window, double turn_dps) {
+  double greatest = 0.0;
+  std::array<double, 2> log_density{};
+  for (std::size_t i = 0; i < 2; ++i) {
+    SteadyTurn& turn = reading.turn[i];
+    const double walk = squared(kTurnWalk_dps_rts[i]) + squared(kTurnWalkShare_rts[i] * turn_dps);
+    turn.variance += walk * window.length_s;
+    const double away = window.level_dps - turn.level_dps;
+    const double expected = turn.variance + window.level_variance;
+    log_density[i] = std::log(std::max(turn.weight, kGone)) + log_normal(away, expected);
+    const double gain = turn.variance / expected;
+    turn.level_dps += gain * away;
+    turn.variance *= 1.0 - gain;
+    greatest = i == 0 ? log_density[i] : std::max(greatest, log_density[i]);
+  }
+  double sum = 0.0;
+  for (std::size_t i = 0; i < 2; ++i)
+    sum += std::exp(log_density[i] - greatest);
+  for (std::size_t i = 0; i < 2; ++i)
+    reading.turn[i].weight = std::exp(log_density[i] - greatest) / sum;
+  return greatest + std::log(sum);
+}
+
 void Readings::go_on_steady(const SteadyWindow& window) {
   // One for all: else the reading in which the turn is slowest would be the likeliest.
   double turn_dps = 0.0;
   for (std::size_t i = 0; i < count_ && turn_dps == 0.0; ++i)
     turn_dps = slots_[i].steady == Steady::kTurns ? slots_[i].last_turn_dps : 0.0;
-  const double walk = squared(kTurnWalk_dps_rts) + squared(kTurnWalkShare_rts * turn_dps);
   for (std::size_t i = 0; i < count_; ++i) {
     Reading& one = slots_[i];
     if (one.steady == Steady::kStands) {
       one.log_weight += one.bank.learn(window.length_s, window.standing);
       continue;
     }
-    one.log_weight += window.log_turning + log_normal(window.level_dps - one.turn_dps,
-                                                      window.level_variance + one.turn_variance +
-                                                          walk * window.length_s);
-    one.turn_dps = window.level_dps;
-    one.turn_variance = window.level_variance;
+    one.log_weight += window.log_turning + follow_turn(one, window, turn_dps);
     if (window.turning.values.size() == 0) {
       one.bank.predict(window.length_s);
     } else {

@@ -92,14 +92,19 @@ class Readings {
                                                 std::index_sequence<I...> numbers);
 
   enum class Steady : std::uint8_t { kNo, kStands, kTurns };
+  /// The level of a steady turn, followed by a filter of its own.
+  struct SteadyTurn {
+    double level_dps = 0.0;
+    double variance = 0.0;
+    double weight = 0.5;
+  };
   struct Reading {
     DriftBank bank;
     double log_weight = 0.0;
     Steady steady = Steady::kNo;
-    double turn_dps = 0.0;  ///< level of the last window, where it turns
-    double turn_variance = 0.0;
-    Steady last = Steady::kNo;   ///< the last run, while the platform has not moved on
-    double last_turn_dps = 0.0;  ///< its rate, where it turned
+    std::array<SteadyTurn, 2> turn{};  ///< the level while it turns: as a platform does, as a car
+    Steady last = Steady::kNo;         ///< the last run, while the platform has not moved on
+    double last_turn_dps = 0.0;        ///< its rate, where it turned
     std::size_t stepped = kNoGyro;
   };
   [[nodiscard]] double turn_density(const Reading& reading, const SteadyWindow& window,
@@ -107,6 +112,8 @@ class Readings {
   static double log_turning(const Reading& reading, const SteadyWindow& window);
   [[nodiscard]] bool goes_on(const SteadyWindow& window);
   void step(Reading& reading, std::size_t gyro, double away_dps, double doubt, double share);
+  static void begin_turn(Reading& reading, const SteadyWindow& window);
+  static double follow_turn(Reading& reading, const SteadyWindow& window, double turn_dps);
   void begin_steady(const SteadyWindow& window);
   void go_on_steady(const SteadyWindow& window);
   [[nodiscard]] double beyond_limits(const DriftEstimate& estimate) const;
