@@ -36,7 +36,7 @@ constexpr double kGap_s = 1.0;
 }  // namespace
 
 void Coherence::judge(const std::array<double, 2>& mean_dps, double from_s, double to_s,
-                      const Symmetric& density, double changing_dps_s2_allowance) {
+                      const Symmetric& density, double skew_allowance_dps) {
   now_s_ = to_s;
   if (count_ > 0 && from_s - before_[count_ - 1].to_s > kGap_s) count_ = 0;
   const Mean now{mean_dps, to_s - from_s, to_s};
@@ -54,8 +54,7 @@ void Coherence::judge(const std::array<double, 2>& mean_dps, double from_s, doub
   const double greatest = std::max(std::abs(change[0]), std::abs(change[1]));
   const double unlike = change[0] - change[1];
   const double unlike_variance = of_difference(density) * per_s +
-                                 squared(kChangeTolerance * greatest) +
-                                 squared(changing_dps_s2_allowance);
+                                 squared(kChangeTolerance * greatest) + squared(skew_allowance_dps);
   const double log_alike = -0.5 * (squared(unlike) / unlike_variance + std::log(unlike_variance));
   std::array<bool, 2> moved{};
   for (std::size_t gyro = 0; gyro < 2; ++gyro)

@@ -15,9 +15,10 @@ namespace vgyro::fusion {
 
 class Coherence {
  public:
-  /// A block of both gyros: their means less the known drifts, its length, their noise densities.
+  /// A block of both gyros: their means, its span, their noise densities, and how far a skew may
+  /// set the two apart.
   void judge(const std::array<double, 2>& mean_dps, double from_s, double to_s,
-             const Symmetric& density, double changing_dps_s2_allowance);
+             const Symmetric& density, double skew_allowance_dps);
   /// What came before says nothing of what follows.
   void break_off() { count_ = 0; }
   void clear() { *this = {}; }

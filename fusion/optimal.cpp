@@ -61,7 +61,7 @@ constexpr double kTurnTolerance = 0.02;
 constexpr double kTurnTolerance_s = 0.02;  ///< the same of its derivative
 constexpr double kTurning_dps = 1.0;
 // Who jumped cannot be seen; neither gyro is above suspicion.
-constexpr double kShareMin = 0.1;
+constexpr double kShareMin = 1.0 / 3.0;
 
 // A window that contradicts the filter by this much, per row, is believed less.
 constexpr double kContradiction = 9.0;
@@ -614,9 +614,8 @@ void OptimalCorrector::judge_coherence(const Block& block) {
     coherence_.break_off();
     return;
   }
-  const double middle_s = 0.5 * (block.from_s + block.to_s);
-  const std::array<double, 2> mean{(block.mean_dps(0) - bias(0, middle_s)) * gain_[0],
-                                   (block.mean_dps(1) - bias(1, middle_s)) * gain_[1]};
+  // Raw means: what is learned meanwhile must not look like motion.
+  const std::array<double, 2> mean{block.mean_dps(0) * gain_[0], block.mean_dps(1) * gain_[1]};
   // A time skew shows where the rate's own slope changes within the block.
   double bend = 0.0;
   for (std::size_t i = 1; i < block.count; ++i) {
@@ -665,17 +664,16 @@ void OptimalCorrector::close_block(const Block& block) {
 
 void OptimalCorrector::learn_from(const Block& block, bool steady) {
   const Present present = trusted(block);
+  if (present == Present::kBoth && (coherence_.suspects() || has_jumped(block))) return;
   if (steady) {
     if (readings_.standing() > kDecided && detector_.sway_variance() == 0.0 &&
         noise_.usual(block)) {
       noise_.measure(block, false);
       noise_.settle(cells_.interval_s());
     }
-    jump_blocks_ = 0;
     add_steady(block, present);
     return;
   }
-  if (present == Present::kBoth && (coherence_.suspects() || has_jumped(block))) return;
   add_difference(block, present);
 }
 

@@ -198,8 +198,10 @@ double Habit::chance_of_run(std::uint64_t times) const {
 void Habit::close_block() {
   // Of white noise they have six times its variance.
   const double noise_dps = std::sqrt(bends_ / (6.0 * (kChangesPerBlock - 1)));
-  ++blocks_;
-  if (noise_dps <= kFineSteps * smallest_ || turns_ < kTurnsMin) ++coarse_blocks_;
+  // Smooth motion that is far above the steps says nothing of the noise.
+  const bool coarse = noise_dps <= kFineSteps * smallest_;
+  if (coarse || turns_ >= kTurnsMin) ++blocks_;
+  if (coarse) ++coarse_blocks_;
   if (std::isfinite(smallest_)) {
     step_dps_ = step_known_ ? step_dps_ + (smallest_ - step_dps_) / 8.0 : smallest_;
     step_known_ = true;
