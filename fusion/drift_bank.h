@@ -83,6 +83,10 @@ class DriftBank {
   void observe_at(const std::array<double, 2>& temperature_c);
 
   [[nodiscard]] DriftEstimate estimate() const;
+  /// N² of a gyro, as the bank was begun with.
+  [[nodiscard]] double white_density(std::size_t gyro) const {
+    return squared(white_dps_rthz_[gyro]);
+  }
   [[nodiscard]] bool few() const { return hypotheses_.size() <= kDriftKinds; }
   [[nodiscard]] bool empty() const { return hypotheses_.empty(); }
   void save(DriftMemory& memory) const;

@@ -946,12 +946,19 @@ SteadyWindow OptimalCorrector::steady_window() {
 
 void OptimalCorrector::learn_steady(double length_s) {
   static_cast<void>(length_s);
-  readings_.learn_steady(steady_window());
+  const SteadyWindow window = steady_window();
+  const bool contradicted = has_before_ && learned_until_s_ - contradicted_s_ <= kCalm_s;
+  if (run_ == Run::kMoving && contradicted && window_.present == Present::kBoth)
+    readings_.add_back(before_, std::max(learned_until_s_ - before_s_, 0.0));
+  readings_.learn_steady(window);
   ++windows_.completed;
   const double standing = readings_.standing();
   note_run(standing > kDecided ? Run::kStop : Run::kTurn);
   run_open_ = std::min(standing, 1.0 - standing) > Readings::kWorthTelling;
-  if (standing > 1.0 - Readings::kWorthTelling) follow_still_vibration();
+  if (standing > 1.0 - Readings::kWorthTelling) {
+    follow_still_vibration();
+    has_before_ = false;
+  }
 }
 
 // Turns that neither scale factor nor skew explains, and drift that is faster than its model.

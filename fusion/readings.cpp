@@ -22,16 +22,23 @@ constexpr double kGoesOnWithin = 0.05;
 // How fast the level's scatter from run to run is followed.
 constexpr double kSwellGain = 0.3;
 
-// How a steady turn wanders, per √s: hardly on a turntable or a ship's slow circle, more in a
-// helmsman's and a driver's hands. How common the first is.
-constexpr std::array<double, 2> kTurnWalk_dps_rts{2e-4, 0.002};
-constexpr std::array<double, 2> kTurnWalkShare_rts{0.0, 0.02};
-constexpr double kPlatform = 0.3;
+// How a steady turn wanders, per √s: not at all on a turntable, little on a ship's slow circle,
+// more in a helmsman's and a driver's hands. How common each is.
+constexpr std::array<double, Readings::kTurnKinds> kTurnWalk_dps_rts{0.0, 2e-4, 0.002};
+constexpr std::array<double, Readings::kTurnKinds> kTurnWalkShare_rts{0.0, 0.0, 0.02};
+constexpr std::array<double, Readings::kTurnKinds> kTurnPrior{0.15, 0.25, 0.6};
 
 // A step is of one gyro; one that has stepped is the one to step again, or back.
 constexpr double kSameGyroAgain = 0.97;
 // How likely a step is in a window that contradicts what is foretold.
 constexpr double kStepInWindow = 1e-2;
+// At a stop the drifts are not where they can be: how likely, and how far they are off at least,
+// over N per √1 s, and at most.
+constexpr double kSurprise = 1e-5;
+constexpr double kSurpriseWhite = 30.0;
+constexpr double kSurpriseMost_dps = 1.0;
+// What contradicted was no drift of either: frames of somebody else, bits that fell over.
+constexpr double kNobodysDrift = 1e-3;
 // A gyro that contradicts the other one and then falls out was the wrong one, but for this share.
 constexpr double kStepOfTheOther = 0.02;
 // How far a step is known when it is seen: by the blocks that show it, and this share of it.
@@ -71,7 +78,7 @@ std::array<Readings::Reading, Count> Readings::empty_slots(
 }
 
 Readings::Readings(const std::array<GyroParameters, 2>& gyros)
-    : gyros_(gyros), slots_(empty_slots<3 * kKept>(gyros, std::make_index_sequence<3 * kKept>())) {}
+    : gyros_(gyros), slots_(empty_slots<kSlots>(gyros, std::make_index_sequence<kSlots>())) {}
 
 void Readings::begin(const std::array<double, 2>& white_dps_rthz,
                      const std::array<double, 2>& bias_dps, const Symmetric& covariance) {
@@ -96,6 +103,16 @@ void Readings::go_back(const DriftBank& bank, double gone_s) {
   slots_[0].last = Steady::kNo;
   count_ = 1;
   predict(gone_s);
+}
+
+void Readings::add_back(const DriftBank& bank, double gone_s) {
+  Reading& back = slots_[count_++];
+  back.bank = bank;
+  back.bank.predict(gone_s);
+  back.log_weight = std::log(kNobodysDrift);
+  back.steady = Steady::kNo;
+  back.stepped = kNoGyro;
+  back.last = Steady::kNo;
 }
 
 void Readings::predict(double length_s) {
@@ -168,21 +185,21 @@ double Readings::log_turning(const Reading& reading, const SteadyWindow& window)
 }
 
 void Readings::begin_steady(const SteadyWindow& window) {
+  follow_swell(window);
   const std::size_t before = count_;
-  if (!window.elsewhere) {
-    swell_variance_ += kSwellGain * (squared(window.level_dps - last_level_dps_) - swell_variance_);
-  } else {
-    swell_variance_ = 0.0;
-  }
-  last_level_dps_ = window.level_dps;
   for (std::size_t i = 0; i < before; ++i) {
-    Reading& stands = slots_[count_++];
     Reading& turns = slots_[i];
     const DriftEstimate known = turns.bank.estimate();
+    Reading& stands = slots_[count_++];
     stands = turns;
-    stands.steady = Steady::kStands;
-    stands.log_weight += stands.bank.learn(window.length_s, window.standing);
-    stands.log_weight -= beyond_limits(stands.bank.estimate());
+    stand(stands, window);
+    Reading& surprised = slots_[count_++];
+    surprised = turns;
+    if (surprise(surprised, window, known)) {
+      stand(surprised, window);
+    } else {
+      --count_;
+    }
     turns.steady = Steady::kTurns;
     begin_turn(turns, window);
     turns.log_weight += log_turning(turns, window) + std::log(turn_density(turns, window, known));
@@ -195,17 +212,49 @@ void Readings::begin_steady(const SteadyWindow& window) {
   }
 }
 
+void Readings::follow_swell(const SteadyWindow& window) {
+  if (window.elsewhere) {
+    swell_variance_ = 0.0;
+  } else {
+    swell_variance_ += kSwellGain * (squared(window.level_dps - last_level_dps_) - swell_variance_);
+  }
+  last_level_dps_ = window.level_dps;
+}
+
+void Readings::stand(Reading& reading, const SteadyWindow& window) {
+  reading.steady = Steady::kStands;
+  reading.log_weight += reading.bank.learn(window.length_s, window.standing);
+  reading.log_weight -= beyond_limits(reading.bank.estimate());
+}
+
+// The platform stands, and what was thought to be known of the drifts is wrong: no model of drift
+// holds for ever, and without this a stop once refused would be refused for ever. The doubt is as
+// wide as what was found, so that its density falls with it; false where no gyro drifts so far.
+bool Readings::surprise(Reading& reading, const SteadyWindow& window, const DriftEstimate& known) {
+  if (!window.elsewhere) return false;
+  std::array<double, 2> variance{};
+  for (int row = 0; row < window.standing.values.size(); ++row) {
+    const int bias = window.standing.rows(row, kBias1) > 0.0 ? kBias1 : kBias2;
+    const auto gyro = static_cast<std::size_t>(bias);
+    const double away = window.standing.values(row) - known.mean(bias);
+    if (std::abs(away) > kSurpriseMost_dps) return false;
+    variance[gyro] =
+        std::max(squared(kSurpriseWhite) * reading.bank.white_density(gyro), squared(away));
+  }
+  reading.bank.widen(variance[0], 0.0, variance[1]);
+  reading.log_weight += std::log(kSurprise);
+  return true;
+}
+
 void Readings::begin_turn(Reading& reading, const SteadyWindow& window) {
-  for (SteadyTurn& turn : reading.turn)
-    turn = {window.level_dps, window.level_variance, kPlatform};
-  reading.turn[1].weight = 1.0 - kPlatform;
+  for (std::size_t i = 0; i < kTurnKinds; ++i)
+    reading.turn[i] = {window.level_dps, window.level_variance, kTurnPrior[i]};
 }
 
 // Log density of the next level, if the platform turns on.
 double Readings::follow_turn(Reading& reading, const SteadyWindow& window, double turn_dps) {
-  double greatest = 0.0;
-  std::array<double, 2> log_density{};
-  for (std::size_t i = 0; i < 2; ++i) {
+  std::array<double, kTurnKinds> log_density{};
+  for (std::size_t i = 0; i < kTurnKinds; ++i) {
     SteadyTurn& turn = reading.turn[i];
     const double walk = squared(kTurnWalk_dps_rts[i]) + squared(kTurnWalkShare_rts[i] * turn_dps);
     turn.variance += walk * window.length_s;
@@ -215,12 +264,12 @@ double Readings::follow_turn(Reading& reading, const SteadyWindow& window, doubl
     const double gain = turn.variance / expected;
     turn.level_dps += gain * away;
     turn.variance *= 1.0 - gain;
-    greatest = i == 0 ? log_density[i] : std::max(greatest, log_density[i]);
   }
+  const double greatest = *std::max_element(log_density.begin(), log_density.end());
   double sum = 0.0;
-  for (std::size_t i = 0; i < 2; ++i)
-    sum += std::exp(log_density[i] - greatest);
-  for (std::size_t i = 0; i < 2; ++i)
+  for (const double one : log_density)
+    sum += std::exp(one - greatest);
+  for (std::size_t i = 0; i < kTurnKinds; ++i)
     reading.turn[i].weight = std::exp(log_density[i] - greatest) / sum;
   return greatest + std::log(sum);
 }
@@ -267,6 +316,7 @@ void Readings::step(Reading& reading, std::size_t gyro, double away_dps, double 
 
 void Readings::split_step(double away_dps, double variance, double first_share) {
   const std::size_t before = count_;
+  suspected_ = {};
   const double doubt = variance + squared(kStepDoubt * away_dps);
   for (std::size_t i = 0; i < before; ++i) {
     Reading& second = slots_[count_++];
@@ -296,6 +346,9 @@ void Readings::learn_maybe_step(double length_s, const DriftMeasurement& measure
 }
 
 void Readings::suspect(std::size_t gyro) {
+  // Once: a gyro that comes and goes proves no more than one that has gone.
+  if (suspected_[gyro]) return;
+  suspected_[gyro] = true;
   for (std::size_t i = 0; i < count_; ++i) {
     if (slots_[i].stepped == 1 - gyro) slots_[i].log_weight += std::log(kStepOfTheOther);
   }

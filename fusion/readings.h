@@ -38,6 +38,10 @@ class Readings {
   /// What is worth telling.
   static constexpr double kWorthTelling = 0.05;
   static constexpr std::size_t kNoGyro = 2;
+  /// How steady turns are: perfectly, as a ship's, as a car's.
+  static constexpr std::size_t kTurnKinds = 3;
+  /// Every reading may become three, and one that was given up may come back.
+  static constexpr std::size_t kSlots = 3 * (kKept + 1);
 
   explicit Readings(const std::array<GyroParameters, 2>& gyros);
 
@@ -49,6 +53,8 @@ class Readings {
   void copy_likeliest(DriftBank& bank) const { bank = slots_[likeliest()].bank; }
   /// Back to it; `gone_s` have passed since, of which nothing is known.
   void go_back(const DriftBank& bank, double gone_s);
+  /// One reading more: nothing of what came in the last `gone_s` was either gyro's drift.
+  void add_back(const DriftBank& bank, double gone_s);
   void save(DriftMemory& memory) const { slots_[likeliest()].bank.save(memory); }
 
   void predict(double length_s);
@@ -102,9 +108,9 @@ class Readings {
     DriftBank bank;
     double log_weight = 0.0;
     Steady steady = Steady::kNo;
-    std::array<SteadyTurn, 2> turn{};  ///< the level while it turns: as a platform does, as a car
-    Steady last = Steady::kNo;         ///< the last run, while the platform has not moved on
-    double last_turn_dps = 0.0;        ///< its rate, where it turned
+    std::array<SteadyTurn, kTurnKinds> turn{};  ///< the level while it turns
+    Steady last = Steady::kNo;   ///< the last run, while the platform has not moved on
+    double last_turn_dps = 0.0;  ///< its rate, where it turned
     std::size_t stepped = kNoGyro;
   };
   [[nodiscard]] double turn_density(const Reading& reading, const SteadyWindow& window,
@@ -112,6 +118,9 @@ class Readings {
   static double log_turning(const Reading& reading, const SteadyWindow& window);
   [[nodiscard]] bool goes_on(const SteadyWindow& window);
   void step(Reading& reading, std::size_t gyro, double away_dps, double doubt, double share);
+  void follow_swell(const SteadyWindow& window);
+  void stand(Reading& reading, const SteadyWindow& window);
+  static bool surprise(Reading& reading, const SteadyWindow& window, const DriftEstimate& known);
   static void begin_turn(Reading& reading, const SteadyWindow& window);
   static double follow_turn(Reading& reading, const SteadyWindow& window, double turn_dps);
   void begin_steady(const SteadyWindow& window);
@@ -125,7 +134,7 @@ class Readings {
   double swell_variance_ =
       0.0;  ///< of the level from run to run of a platform that does not move on
   double last_level_dps_ = 0.0;
-  std::array<Reading, 3 * kKept> slots_;
+  std::array<Reading, kSlots> slots_;
   std::size_t count_ = 0;
 };
 

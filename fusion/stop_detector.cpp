@@ -11,9 +11,9 @@ namespace {
 
 // A rate that no drift explains: only so much counts as an angle that was turned.
 constexpr double kTurning_dps = 2.0;
-// So much of it, or so long without a steady block, and the platform has moved on.
+// So much of it, or so long in unsteady blocks, and the platform has moved on.
 constexpr double kTurned_deg = 30.0;
-constexpr double kMovedOn_s = 15.0;
+constexpr double kMovedOn_s = 20.0;
 
 // Wheels that stand while the platform does this are broken, or the platform is carried.
 constexpr double kNoStand_dps = 1.0;
@@ -86,8 +86,6 @@ StopDetector::Verdict StopDetector::judge(const BlockLevel& block, Wheels wheels
                 moving_s_ > kMovedOn_s;
     return Verdict::kMoving;
   }
-  turned_deg_ = 0.0;
-  moving_s_ = 0.0;
   const double weight = block.length_s / (run_s_ + block.length_s);
   const double recent = std::max(kRecent, weight);
   for (std::size_t gyro = 0; gyro < 2; ++gyro)

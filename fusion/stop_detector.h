@@ -1,9 +1,10 @@
 #pragma once
 
-// Is the platform steady: standing, or turning at a constant rate? Judged block by block (about half
-// a second) from how the gyros' cells scatter and whether their means stay where they were, and from
-// the wheels where there are any. Which of the two it is, is for others to weigh (readings.h): this
-// says only that nothing changes, and how much the wheels and time speak for a turn.
+// Is the platform steady: standing, or turning at a constant rate? Judged block by block (about
+// half a second) from how the gyros' cells scatter and whether their means stay where they were,
+// and from the wheels where there are any. Which of the two it is, is for others to weigh
+// (readings.h): this says only that nothing changes, and how much the wheels and time speak for a
+// turn.
 
 #include <array>
 #include <cstdint>
@@ -53,7 +54,11 @@ class StopDetector {
   /// Since the last run the platform has moved on: it turned, rolled, or moved for long.
   [[nodiscard]] bool moved_on() const { return moved_on_; }
   /// A run has been made use of.
-  void stay() { moved_on_ = false; }
+  void stay() {
+    moved_on_ = false;
+    turned_deg_ = 0.0;
+    moving_s_ = 0.0;
+  }
   /// The wheels stood while the platform turned, and have not rolled since.
   [[nodiscard]] bool wheels_distrusted() const { return wheels_distrusted_; }
 
@@ -66,8 +71,8 @@ class StopDetector {
   double run_s_ = 0.0;
   int run_blocks_ = 0;
   std::array<double, 2> recent_{};  ///< excess of the last blocks
-  double turned_deg_ = 0.0;  ///< since the last steady block
-  double moving_s_ = 0.0;    ///< the same
+  double turned_deg_ = 0.0;         ///< since the last run
+  double moving_s_ = 0.0;           ///< the same
   bool moved_on_ = true;
 };
 

@@ -365,7 +365,7 @@ TEST(Recovery, AnyHostileMinuteIsForgottenByMutual) {
 
 TEST(Recovery, AnyHostileMinuteIsForgottenByOptimal) {
   for (const Rates& rates : kQuickRates)
-    expect_recoveries(rates, Method::kOptimal, 20);
+    expect_recoveries(rates, Method::kOptimal, 60);
 }
 
 // The guard of the stamps and the time-outs know that they are slow.
