@@ -131,6 +131,7 @@ class Readings {
   [[nodiscard]] std::size_t likeliest() const;
 
   std::array<GyroParameters, 2> gyros_;
+  std::array<bool, 2> suspected_{};  ///< since the last step
   double swell_variance_ =
       0.0;  ///< of the level from run to run of a platform that does not move on
   double last_level_dps_ = 0.0;
