@@ -39,6 +39,9 @@ constexpr std::array<DriftKind, kDriftKinds> kKinds{{
     {0.01, 0.0, 0.1, 300.0, 0.98, 0.0, true, 2, 2},
 }};
 
+// So much less likely are all but the first where the model gives K.
+constexpr double kMeasured = 0.2;
+
 // A coefficient before anything is known of it, in units of N per kelvin.
 constexpr double kCoefficientWhite_per_k = 1.5;
 // It grows with this power of K over its usual value, within limits.
@@ -191,6 +194,14 @@ DriftBank::DriftBank(const std::array<GyroParameters, 2>& gyros) : gyros_(gyros)
   hypotheses_.reserve(kHypothesesMax);
 }
 
+// Who gives K has measured the drift, and would have seen more of it.
+double DriftBank::prior_of(std::size_t kind) const {
+  const bool measured = gyros_[0].walk_dps_rts && gyros_[1].walk_dps_rts;
+  if (!measured) return kKinds[kind].prior;
+  const double others = kMeasured * (1.0 - kKinds[0].prior);
+  return kind == 0 ? 1.0 - others : kMeasured * kKinds[kind].prior;
+}
+
 void DriftBank::make_kind(std::size_t kind, const std::array<double, 2>& white_dps_rthz,
                           const DriftFilter::Observables& mean,
                           const DriftFilter::Covariance& covariance) {
@@ -213,7 +224,7 @@ void DriftBank::make_kind(std::size_t kind, const std::array<double, 2>& white_d
         model.temperature_dps_k[gyro] =
             usual_coefficient(white_dps_rthz[gyro], model.walk_dps_rts[gyro]);
       }
-      const double log_weight = std::log(which.prior) + first.log_weight + second.log_weight;
+      const double log_weight = std::log(prior_of(kind)) + first.log_weight + second.log_weight;
       DriftFilter filter(model, mean, covariance);
       const auto growth = filter.growth_per_s();
       const double quality_1 = white_dps_rthz[0] * std::sqrt(growth[0]);
@@ -273,7 +284,7 @@ void DriftBank::weigh_as(const DriftMemory& memory) {
   const bool walks_are_known = !gyros_[0].walk_dps_rts && !gyros_[1].walk_dps_rts;
   for (Hypothesis& one : hypotheses_) {
     const DriftKind& kind = kKinds[one.kind];
-    double weight = kinds > 0.0 ? memory.kind_weight[one.kind] / kinds : kind.prior;
+    double weight = kinds > 0.0 ? memory.kind_weight[one.kind] / kinds : prior_of(one.kind);
     if (walks_are_known) {
       double walk = 0.0;
       for (std::size_t place = 0; place < kWalkPairs; ++place) {
@@ -283,7 +294,7 @@ void DriftBank::weigh_as(const DriftMemory& memory) {
       }
       weight *= walk;
     } else {
-      weight *= std::exp(one.log_prior) / kind.prior;
+      weight *= std::exp(one.log_prior) / prior_of(one.kind);
     }
     one.log_weight = std::log(std::max(weight, kNever));
   }

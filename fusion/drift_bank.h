@@ -104,6 +104,7 @@ class DriftBank {
             const DriftFilter::Covariance& covariance);
   void make_kind(std::size_t kind, const std::array<double, 2>& white_dps_rthz,
                  const DriftFilter::Observables& mean, const DriftFilter::Covariance& covariance);
+  [[nodiscard]] double prior_of(std::size_t kind) const;
   void weigh_as(const DriftMemory& memory);
   [[nodiscard]] double usual_scale_doubt(double difference, double variance) const;
   void take_slopes(const DriftMemory& memory);
