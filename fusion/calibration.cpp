@@ -59,6 +59,20 @@ bool Calibrator::finish(const Sums& sums, double t_s, double used_until_s) {
   return true;
 }
 
+bool Calibrator::plausible(const std::array<double, 2>& max_bias_dps) const {
+  const double first = result_.bias_dps(0, result_.used_until_s);
+  const double second = result_.bias_dps(1, result_.used_until_s);
+  if (std::abs(first) > max_bias_dps[0] || std::abs(second) > max_bias_dps[1]) return false;
+  const double smaller = std::min(std::abs(first), std::abs(second));
+  return smaller < kLargeBias_dps || std::abs(first - second) > kSameBias * smaller;
+}
+
+void Calibrator::reject() {
+  ++restarts_;
+  started_ = false;
+  covered_s_ = 0.0;
+}
+
 bool Calibrator::add(double t_s, const std::array<double, 2>& rate_dps, double true_rate_dps) {
   if (!started_) begin(t_s);
   const bool complete = t_s - from_s_ >= rest_s_;

@@ -44,6 +44,10 @@ class Calibrator {
   static constexpr std::uint64_t kBlockPairsMin = 8;
   /// Motion that begins after this share of rest_s ends the calibration instead of spoiling it.
   static constexpr double kEnoughShare = 0.9;
+  /// Two sensors of one type may both be biased, but not both by so much and by the same within
+  /// this share of it.
+  static constexpr double kLargeBias_dps = 5.0;
+  static constexpr double kSameBias = 0.1;
 
   /// order 0…kOrderMax, rest_s > 0.
   Calibrator(int order, double rest_s, WhenMoving when_moving = WhenMoving::kWait);
@@ -58,6 +62,12 @@ class Calibrator {
   [[nodiscard]] std::uint64_t restarts() const { return restarts_; }
   /// Precondition: add() has returned false.
   [[nodiscard]] const Calibration& result() const { return result_; }
+  /// Precondition: add() has returned false. Can what both gyros read at rest be their biases? Not
+  /// where one is larger than `max_bias_dps` says (infinite: nothing is said), nor where both are
+  /// large and the same: that is a platform that turns steadily.
+  [[nodiscard]] bool plausible(const std::array<double, 2>& max_bias_dps) const;
+  /// The result is not believed: begin again with the next pair.
+  void reject();
 
  private:
   struct Sums {

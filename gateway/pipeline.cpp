@@ -99,6 +99,7 @@ struct Pipeline::Impl {
   void tell_corrector(TimePoint t);
   void calibrate(const fusion::AlignedPair& pair);
   void calibrate_with(const fusion::AlignedPair& pair, double true_rate_dps);
+  [[nodiscard]] std::array<double, 2> max_bias() const;
 
   void take_up_memory(TimePoint t);
   void look_for_confirmation();
@@ -466,6 +467,11 @@ void Pipeline::Impl::calibrate(const fusion::AlignedPair& pair) {
   }
 }
 
+std::array<double, 2> Pipeline::Impl::max_bias() const {
+  constexpr double kAny = std::numeric_limits<double>::infinity();
+  return {plan.gyros[0].max_bias_dps.value_or(kAny), plan.gyros[1].max_bias_dps.value_or(kAny)};
+}
+
 void Pipeline::Impl::calibrate_with(const fusion::AlignedPair& pair, double true_rate_dps) {
   const bool used = calibrator.add(seconds(pair.t), pair.rate_dps, true_rate_dps);
   if (calibrator.restarts() != status.calibration_restarts) corrector->restart_calibration();
@@ -473,6 +479,15 @@ void Pipeline::Impl::calibrate_with(const fusion::AlignedPair& pair, double true
   status.calibration_restarts = calibrator.restarts();
   if (used) {
     corrector->calibrate({seconds(pair.t), pair.rate_dps, pair.noise_gain}, true_rate_dps);
+    return;
+  }
+  if (!plan.calibration.from_reference &&
+      plan.calibration.when_moving == fusion::WhenMoving::kWait &&
+      !calibrator.plausible(max_bias())) {
+    calibrator.reject();
+    corrector->restart_calibration();
+    status.calibration_restarts = calibrator.restarts();
+    status.calibrated_s = 0.0;
     return;
   }
   corrector->start(calibrator.result());

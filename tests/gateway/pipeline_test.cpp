@@ -980,5 +980,39 @@ TEST(PipelineDeadline, NoticesASilentGyroInTime) {
   EXPECT_EQ(run.pipeline.status().state, State::kLost);
 }
 
+// --- a calibration that cannot be one
+// --------------------------------------------------------------
+
+// Switched on in a roundabout: what both read alike is no bias, however steady it is.
+TEST(PipelineCalibration, TakesNoSteadyTurnForRest) {
+  Plan plan = rig::two_gyros();
+  plan.calibration.rest_s = 4.0;
+  Bench bench(plan);
+  const auto from_turn_to = [](double turn_dps, double bias_dps) -> RateOf {
+    return [=](double t_s) { return t_s < 5.5 ? turn_dps : bias_dps; };
+  };
+  bench.play(merge({stream_a(ms(0), ms(14'000), from_turn_to(20.03, kBiasA_dps)),
+                    stream_b(ms(0), ms(14'000), from_turn_to(19.97, kBiasB_dps))}));
+  EXPECT_GE(bench.pipeline.status().calibration_restarts, 2U);
+  EXPECT_EQ(bench.pipeline.status().state, State::kRunning) << "and the rest behind it is one";
+  EXPECT_NEAR(bench.pipeline.status().gyros[0].bias_dps, kBiasA_dps, 0.01);
+  EXPECT_NEAR(bench.pipeline.status().gyros[1].bias_dps, kBiasB_dps, 0.01);
+}
+
+// One cheap gyro may well read 20 deg/s at rest, as long as nothing says that it cannot.
+TEST(PipelineCalibration, BelievesALargeBiasOfOneGyroUnlessToldOtherwise) {
+  Plan plan = rig::two_gyros();
+  const Recording rest = merge({stream_a(ms(0), ms(4000), [](double /*t_s*/) { return 20.0; }),
+                                stream_b(ms(0), ms(4000), [](double /*t_s*/) { return -0.3; })});
+  Bench any(plan);
+  any.play(rest);
+  EXPECT_EQ(any.pipeline.status().state, State::kRunning);
+  plan.gyros[0].max_bias_dps = 5.0;
+  Bench told(plan);
+  told.play(rest);
+  EXPECT_EQ(told.pipeline.status().state, State::kCalibrating);
+  EXPECT_GE(told.pipeline.status().calibration_restarts, 1U);
+}
+
 }  // namespace
 }  // namespace vgyro::gateway
