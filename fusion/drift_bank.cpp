@@ -17,6 +17,8 @@ constexpr double kRatioSpreadLog10 = 0.7;
 // have been off for that.
 constexpr double kRunToRunWhite = 3.0;
 constexpr double kRunToRunAge_s = 60.0;
+// Slopes of before go on for so long.
+constexpr double kSlopesGoOn_s = 600.0;
 
 /// Slopes go with a sensor's class, as N does: σ in units of N.
 struct DriftKind {
@@ -266,7 +268,15 @@ void DriftBank::resume(const DriftMemory& memory, double age_s) {
   take_slopes(memory);
   take_coefficients(memory);
   normalize();
-  predict(age_s);
+  // Heat that comes and goes does not add up for days.
+  const double sloping_s = std::min(age_s, kSlopesGoOn_s);
+  for (Hypothesis& one : hypotheses_) {
+    one.filter.predict(one.filter.has_slopes() ? sloping_s : age_s);
+    if (!one.filter.has_slopes()) continue;
+    const auto growth = one.filter.growth_per_s();
+    const double rest_s = age_s - sloping_s;
+    one.filter.widen(growth[0] * rest_s, 0.0, growth[1] * rest_s);
+  }
   const double share = std::min(age_s / kRunToRunAge_s, 1.0);
   const auto spread = [&](std::size_t gyro) {
     const double sigma = kRunToRunWhite * white[gyro];

@@ -58,7 +58,9 @@ constexpr int kDriftBlocks = 6;
 constexpr double kCalm_s = 120.0;
 // While turning, this much of the rate may be the gyros' own disagreement about it.
 constexpr double kTurnTolerance = 0.02;
-constexpr double kTurnTolerance_s = 0.02;  ///< the same of its derivative
+constexpr double kTurnTolerance_s = 0.02;  ///< the same of its derivative, at most
+// … and at least this beyond what is known of the skew.
+constexpr double kSkewTolerance_s = 0.001;
 constexpr double kTurning_dps = 1.0;
 // Who jumped cannot be seen; neither gyro is above suspicion.
 constexpr double kShareMin = 1.0 / 3.0;
@@ -730,7 +732,9 @@ bool OptimalCorrector::has_jumped(const Block& block) {
                     of_difference(noise_.density()) / length +
                     (rate_density(0, rate) + rate_density(1, rate)) / length +
                     noise_.rounding_variance(0) + noise_.rounding_variance(1);
-  variance += squared(kTurnTolerance_s * slope);
+  const double skew_s = std::abs(estimate_.mean(kSkew)) +
+                        std::sqrt(estimate_.covariance(kSkew, kSkew)) + kSkewTolerance_s;
+  variance += squared(std::min(skew_s, kTurnTolerance_s) * slope);
   if (rate_square > squared(kTurning_dps)) variance += squared(kTurnTolerance) * rate_square;
   if (squared(away) <= squared(kJumpSigma) * variance) {
     jump_blocks_ = 0;

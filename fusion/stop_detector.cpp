@@ -67,6 +67,12 @@ void StopDetector::end_run() {
   run_blocks_ = 0;
 }
 
+void StopDetector::note_motion(double level_dps, double length_s, bool rolls) {
+  if (std::abs(level_dps) > kTurning_dps) turned_deg_ += std::abs(level_dps) * length_s;
+  moving_s_ += length_s;
+  moved_on_ = moved_on_ || rolls || turned_deg_ > kTurned_deg || moving_s_ > kMovedOn_s;
+}
+
 StopDetector::Verdict StopDetector::judge(const BlockLevel& block, Wheels wheels) {
   double level = 0.0;
   for (std::size_t gyro = 0; gyro < 2; ++gyro)
@@ -78,14 +84,11 @@ StopDetector::Verdict StopDetector::judge(const BlockLevel& block, Wheels wheels
     wheels_distrusted_ = true;
   }
   const bool on_wheels = wheels == Wheels::kStanding && !wheels_distrusted_;
-  if (wheels == Wheels::kRolling || !steady(block, on_wheels)) {
-    end_run();
-    if (std::abs(level) > kTurning_dps) turned_deg_ += std::abs(level) * block.length_s;
-    moving_s_ += block.length_s;
-    moved_on_ = moved_on_ || wheels == Wheels::kRolling || turned_deg_ > kTurned_deg ||
-                moving_s_ > kMovedOn_s;
-    return Verdict::kMoving;
-  }
+  const bool moves = wheels == Wheels::kRolling || !steady(block, on_wheels);
+  if (moves) end_run();
+  const bool rolls = moves && wheels == Wheels::kRolling;
+  if (run_s_ < kRun_s) note_motion(level, block.length_s, rolls);
+  if (moves) return Verdict::kMoving;
   const double weight = block.length_s / (run_s_ + block.length_s);
   const double recent = std::max(kRecent, weight);
   for (std::size_t gyro = 0; gyro < 2; ++gyro)

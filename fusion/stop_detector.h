@@ -65,6 +65,7 @@ class StopDetector {
  private:
   [[nodiscard]] bool steady(const BlockLevel& block, bool on_wheels);
   void end_run();
+  void note_motion(double level_dps, double length_s, bool rolls);
 
   bool wheels_distrusted_ = false;
   double sway_variance_ = 0.0;

@@ -81,8 +81,8 @@ TEST(OptimalStops, AreNotBelievedOnAPlatformThatTurnsSteadily) {
   }
 }
 
-// Both drifts jump together, unseen, while the platform turns: the first stops are refused, but a
-// few of them, with turns in between, are proof.
+// Both drifts jump together, unseen, while the platform turns: the first stop may be a slow turn,
+// but a few of them, with turns in between, are proof.
 TEST(OptimalStops, AreBelievedAfterAllWhenTheDriftHasJumped) {
   for (std::uint64_t seed = 1; seed <= 5; ++seed) {
     SCOPED_TRACE(seed);
@@ -98,7 +98,7 @@ TEST(OptimalStops, AreBelievedAfterAllWhenTheDriftHasJumped) {
     }
     EXPECT_LT(std::abs(step.bias_error_dps), 0.1 * jump_dps);
     EXPECT_LT(std::abs(step.bias_error_dps), 4.0 * step.bias_sigma_dps);
-    EXPECT_GE(run.corrector->condition().stops_refused, 2U);
+    EXPECT_GE(run.corrector->condition().stops_refused, 1U) << "the first one could be a turn";
   }
 }
 
