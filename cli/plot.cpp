@@ -18,9 +18,8 @@ struct ShadeStyle {
   const char* colour;
   const char* legend;
 };
-constexpr std::array<ShadeStyle, 3> kShadeStyles{{{"#d8efd8", "learned as a stop"},
-                                                  {"#f3d9b8", "steady, refused: turning together"},
-                                                  {"#d9c8ee", "ambiguous: two readings"}}};
+constexpr std::array<ShadeStyle, 3> kShadeStyles{
+    {{"#d8efd8", "learned as a stop"}, {"#f3d9b8", "refused: turning"}, {"#d9c8ee", "ambiguous"}}};
 
 }  // namespace
 
@@ -196,16 +195,16 @@ std::string ReplayPlot::script(const std::string& path, const PlotTexts& texts) 
       "set lmargin 12\nset rmargin 3\nset xrange [0:{:.9g}]\nset datafile missing 'NaN'\n"
       "set ylabel 'rate, deg/s'\n{}{}"
       "plot $rates u 1:2 w l lc rgb '{}' t {}, '' u 1:3 w l lc rgb '{}' t {}, "
-      "'' u 1:4 w l lc rgb '#909090' t 'mean'{}",
+      "'' u 1:4 w l lc rgb '#909090' t 'mean'",
       picture_script(path, 1200, 1250), panels,
       gnuplot_text(texts.title + (rates ? "" : " (no valid virtual rate)")),
       to_seconds(width_) * static_cast<double>(buckets_.size()), shades_script(),
       rates ? "" : "set xlabel 'time since the first pair, s'\n", kColours[0],
       gnuplot_text("gyro " + texts.gyro_names[0]), kColours[1],
-      gnuplot_text("gyro " + texts.gyro_names[1]), shades_legend());
-  if (rates) {
-    text += ", '' u 1:5 w l lw 1.5 lc rgb '#b00020' t 'virtual gyro'\n" + drift_script(texts);
-  }
+      gnuplot_text("gyro " + texts.gyro_names[1]));
+  if (rates) text += ", '' u 1:5 w l lw 1.5 lc rgb '#b00020' t 'virtual gyro'";
+  text += shades_legend() + '\n';
+  if (rates) text += drift_script(texts);
   return text + "\nunset multiplot\n";
 }
 

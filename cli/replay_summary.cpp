@@ -242,6 +242,10 @@ void put_faults(fmt::memory_buffer& text, const gateway::GyroStatus& gyro, doubl
   }
 }
 
+std::string how_often(std::uint64_t times) {
+  return times == 1 ? "once" : fmt::format("{} times", times);
+}
+
 // What the plain mean of the two would have done over the same instants.
 void put_plain_mean(fmt::memory_buffer& text, const ReplaySummary& summary) {
   if (summary.rates == 0 || summary.raws[0] != summary.rates || summary.raws[1] != summary.rates) {
@@ -353,9 +357,9 @@ std::string to_text(const ReplaySummary& summary, const gateway::Plan& plan) {
                    status.windows_skipped);
   }
   if (status.disagreements > 0)
-    fmt::format_to(to, "; the gyros disagreed {} times", status.disagreements);
+    fmt::format_to(to, "; the gyros disagreed {}", how_often(status.disagreements));
   if (status.clock_steps > 0)
-    fmt::format_to(to, "; the clock was set back {} times", status.clock_steps);
+    fmt::format_to(to, "; the clock was set back {}", how_often(status.clock_steps));
   if (summary.gaps > 0) {
     fmt::format_to(to, "; {} gaps, the longest {:.2f} s", summary.gaps,
                    summary.longest_gaps.front().length_s);
