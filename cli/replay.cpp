@@ -335,8 +335,12 @@ void warn_of_data(const ReplaySummary& summary, const gateway::Plan& plan) {
     warn({"stops", gateway::stretches_text(stretches), advice});
   for (std::size_t i = 0; i < 2; ++i) {
     const auto& blind = status.gyros[i].faults[static_cast<std::size_t>(gateway::Fault::kBlind)];
-    if (blind.times > 0)
-      warn({"gyro " + plan.gyros[i].name, gateway::blind_text(), gateway::blind_advice()});
+    if (blind.times == 0) continue;
+    const bool still = status.gyros[i].fault == gateway::Fault::kBlind;
+    warn({"gyro " + plan.gyros[i].name,
+          still ? gateway::blind_text()
+                : "for a while it did not feel the rotation that the other one felt",
+          gateway::blind_advice()});
   }
   if (status.rates_too_far_apart && status.pairs > 0)
     warn({"sample rates", gateway::rates_too_far_apart_text(), ""});

@@ -230,20 +230,20 @@ Json to_json(const ReplaySummary& summary, const gateway::Plan& plan) {
 
 namespace {
 
+std::string how_often(std::uint64_t times) {
+  return times == 1 ? "once" : fmt::format("{} times", times);
+}
+
 void put_faults(fmt::memory_buffer& text, const gateway::GyroStatus& gyro, double first_s) {
   const char* separator = "\n  faults:";
   for (std::size_t i = 0; i < gateway::kFaultCount; ++i) {
     const gateway::FaultRecord& record = gyro.faults[i];
     if (record.times == 0) continue;
-    fmt::format_to(std::back_inserter(text), "{} {} {} times, last at {:.2f} s", separator,
-                   to_string(static_cast<gateway::Fault>(i)), record.times,
+    fmt::format_to(std::back_inserter(text), "{} {} {}, last at {:.2f} s", separator,
+                   to_string(static_cast<gateway::Fault>(i)), how_often(record.times),
                    to_seconds(record.last.time_since_epoch()) - first_s);
     separator = ";";
   }
-}
-
-std::string how_often(std::uint64_t times) {
-  return times == 1 ? "once" : fmt::format("{} times", times);
 }
 
 // What the plain mean of the two would have done over the same instants.
