@@ -32,7 +32,9 @@ void add_likely(std::string& text, const char* separator, const std::string& wor
 // To the second digit of its doubt, and without an exponent.
 std::string with_doubt(double value, double sigma) {
   const int decimals = std::clamp(1 - static_cast<int>(std::floor(std::log10(sigma))), 0, 6);
-  return fmt::format("{:+.{}f} ± {:.{}f}", value, decimals, sigma, decimals);
+  const double step = std::pow(10.0, -decimals);
+  const double rounded = std::round(value / step) * step + 0.0;  // no "-0"
+  return fmt::format("{:+.{}f} ± {:.{}f}", rounded, decimals, sigma, decimals);
 }
 
 }  // namespace

@@ -80,6 +80,8 @@ TEST(ConditionText, TellsSlopesToTheSecondDigitOfTheirDoubt) {
             "fog +3.14 ± 0.41, mems -2100 ± 312 deg/h an hour");
   EXPECT_EQ(slopes_text({NAN, 1.0 * kUnit}, {NAN, 2.3 * kUnit}, kNames),
             "mems +1.0 ± 2.3 deg/h an hour");
+  EXPECT_EQ(slopes_text({-0.3 * kUnit, NAN}, {559.0 * kUnit, NAN}, kNames),
+            "fog +0 ± 559 deg/h an hour");
   EXPECT_EQ(slopes_text({1.0, 1.0}, {0.0, NAN}, kNames), "") << "0 stands for not known";
 }
 
