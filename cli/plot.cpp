@@ -14,7 +14,44 @@ namespace {
 constexpr double kSecondsPerHour = 3600.0;
 constexpr std::array<const char*, 2> kColours{"#e0a030", "#70a0d0"};
 
+struct ShadeStyle {
+  const char* colour;
+  const char* legend;
+};
+constexpr std::array<ShadeStyle, 3> kShadeStyles{
+    {{"#d8efd8", "learned as a stop"}, {"#f3d9b8", "refused: turning"}, {"#d9c8ee", "ambiguous"}}};
+
 }  // namespace
+
+void ReplayPlot::Stretches::follow(TimePoint t, bool is_so) {
+  if (is_so && !open_) stretches_.push_back({t, t});
+  if (open_ || is_so) stretches_.back().to = t;
+  open_ = is_so;
+  if (!is_so && stretches_.size() > kMax) join_nearest();
+}
+
+void ReplayPlot::Stretches::join_nearest() {
+  std::size_t nearest = 1;
+  for (std::size_t i = 1; i < stretches_.size(); ++i) {
+    const auto between = [&](std::size_t at) {
+      return stretches_[at].from - stretches_[at - 1].to;
+    };
+    if (between(i) < between(nearest)) nearest = i;
+  }
+  stretches_[nearest - 1].to = stretches_[nearest].to;
+  stretches_.erase(stretches_.begin() + static_cast<std::ptrdiff_t>(nearest));
+}
+
+// A stretch that is held for a turn has `turning` without `stopped`.
+void ReplayPlot::add_condition(TimePoint t, const fusion::Condition& condition) {
+  const auto likely = [&](fusion::Hypothesis which) {
+    return condition.probability[static_cast<std::size_t>(which)] > 0.5;
+  };
+  const bool refused = !condition.stopped && likely(fusion::Hypothesis::kTurning);
+  stretches_[static_cast<std::size_t>(Shade::kStop)].follow(t, condition.stopped);
+  stretches_[static_cast<std::size_t>(Shade::kRefused)].follow(t, refused);
+  stretches_[static_cast<std::size_t>(Shade::kAmbiguous)].follow(t, condition.ambiguous);
+}
 
 void ReplayPlot::Mean::add(double value) {
   if (!std::isfinite(value)) return;
@@ -123,6 +160,32 @@ std::string ReplayPlot::drift_script(const PlotTexts& texts) const {
   return text;
 }
 
+// Rectangles over the whole height of every panel, behind the curves.
+std::string ReplayPlot::shades_script() const {
+  std::string text;
+  for (std::size_t shade = 0; shade < kShades; ++shade) {
+    for (const Stretch& stretch : stretches_[shade].all()) {
+      put(text,
+          "set object rectangle from first {:.9g},graph 0 to first {:.9g},graph 1 behind fs solid "
+          "noborder fc rgb '{}'\n",
+          std::max(to_seconds(stretch.from - begin_), 0.0),
+          std::max(to_seconds(stretch.to - begin_), 0.0), kShadeStyles[shade].colour);
+    }
+  }
+  return text;
+}
+
+// An object has no place in the legend: a curve of nothing stands there for it.
+std::string ReplayPlot::shades_legend() const {
+  std::string text;
+  for (std::size_t shade = 0; shade < kShades; ++shade) {
+    if (stretches_[shade].all().empty()) continue;
+    put(text, ", NaN w boxes fs solid noborder fc rgb '{}' t '{}'", kShadeStyles[shade].colour,
+        kShadeStyles[shade].legend);
+  }
+  return text;
+}
+
 std::string ReplayPlot::script(const std::string& path, const PlotTexts& texts) const {
   const bool rates = has_rates();
   const int panels = !rates ? 1 : has_biases() ? 4 : 2;
@@ -130,18 +193,18 @@ std::string ReplayPlot::script(const std::string& path, const PlotTexts& texts) 
       "{}set multiplot layout {},1 title {} noenhanced\n"
       "set grid lc rgb '#dddddd'\nset key outside top right horizontal noenhanced\n"
       "set lmargin 12\nset rmargin 3\nset xrange [0:{:.9g}]\nset datafile missing 'NaN'\n"
-      "set ylabel 'rate, deg/s'\n{}"
+      "set ylabel 'rate, deg/s'\n{}{}"
       "plot $rates u 1:2 w l lc rgb '{}' t {}, '' u 1:3 w l lc rgb '{}' t {}, "
       "'' u 1:4 w l lc rgb '#909090' t 'mean'",
       picture_script(path, 1200, 1250), panels,
       gnuplot_text(texts.title + (rates ? "" : " (no valid virtual rate)")),
-      to_seconds(width_) * static_cast<double>(buckets_.size()),
+      to_seconds(width_) * static_cast<double>(buckets_.size()), shades_script(),
       rates ? "" : "set xlabel 'time since the first pair, s'\n", kColours[0],
       gnuplot_text("gyro " + texts.gyro_names[0]), kColours[1],
       gnuplot_text("gyro " + texts.gyro_names[1]));
-  if (rates) {
-    text += ", '' u 1:5 w l lw 1.5 lc rgb '#b00020' t 'virtual gyro'\n" + drift_script(texts);
-  }
+  if (rates) text += ", '' u 1:5 w l lw 1.5 lc rgb '#b00020' t 'virtual gyro'";
+  text += shades_legend() + '\n';
+  if (rates) text += drift_script(texts);
   return text + "\nunset multiplot\n";
 }
 

@@ -17,6 +17,7 @@
 #include "cli/progress.h"
 #include "cli/replay_summary.h"
 #include "cli/terminal.h"
+#include "gateway/condition_text.h"
 #include "gateway/config.h"
 #include "gateway/pipeline.h"
 #include "gateway/saved_state.h"
@@ -64,6 +65,10 @@ class Totals final : public gateway::RateObserver {
       summary_.raw_sum_dps[i] += raw_dps[i];
       ++summary_.raws[i];
     }
+  }
+
+  void on_condition(TimePoint t, const fusion::Condition& condition) override {
+    if (plot_ != nullptr) plot_->add_condition(t, condition);
   }
 
  private:
@@ -159,6 +164,14 @@ class Replay {
   ReplaySummary& finish() {
     summary_.status = pipeline_.status();
     summary_.frames_out = sink_.frames;
+    summary_.slope_dps_s.fill(std::numeric_limits<double>::quiet_NaN());
+    summary_.slope_sigma_dps_s = summary_.slope_dps_s;
+    const std::optional<gateway::SavedState> known = pipeline_.memory();
+    for (std::size_t i = 0; known && i < 2; ++i) {
+      if (!(known->drift.slope_sigma_dps_s[i] > 0.0)) continue;  // 0 stands for "not known"
+      summary_.slope_dps_s[i] = known->drift.slope_dps_s[i];
+      summary_.slope_sigma_dps_s[i] = known->drift.slope_sigma_dps_s[i];
+    }
     return summary_;
   }
 
@@ -314,6 +327,27 @@ void warn_of_doubts(const ReplaySummary& summary, const gateway::Plan& plan) {
   }
 }
 
+// What the corrector could not make sense of, with what to look at.
+void warn_of_data(const ReplaySummary& summary, const gateway::Plan& plan) {
+  const gateway::Status& status = summary.status;
+  const gateway::SteadyStretches stretches = gateway::steady_stretches(status);
+  if (const std::string advice = gateway::stretches_advice(stretches); !advice.empty())
+    warn({"stops", gateway::stretches_text(stretches), advice});
+  for (std::size_t i = 0; i < 2; ++i) {
+    const auto& blind = status.gyros[i].faults[static_cast<std::size_t>(gateway::Fault::kBlind)];
+    if (blind.times == 0) continue;
+    const bool still = status.gyros[i].fault == gateway::Fault::kBlind;
+    warn({"gyro " + plan.gyros[i].name,
+          still ? gateway::blind_text()
+                : "for a while it did not feel the rotation that the other one felt",
+          gateway::blind_advice()});
+  }
+  if (status.rates_too_far_apart && status.pairs > 0)
+    warn({"sample rates", gateway::rates_too_far_apart_text(), ""});
+  if (status.estimate_restarts > 0)
+    warn({"estimate", gateway::restarts_text(status.estimate_restarts), ""});
+}
+
 // Two senders of one identifier: whoever reads VG_Rate would get both.
 void warn_of_other_senders(const ReplaySummary& summary, const gateway::Plan& plan) {
   const gateway::OutputPlan& output = plan.output;
@@ -401,6 +435,7 @@ int run_replay(const ReplayOptions& options) {
   if (!trouble) trouble = explain_silence(summary, plan, options.logs.front());
   const int written = write_results(options, plan, summary, replay.plot());
   warn_of_doubts(summary, plan);
+  warn_of_data(summary, plan);
   warn_of_other_senders(summary, plan);
   if (trouble) return report(*trouble);
   return written;

@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "gateway/condition_text.h"
 #include "gateway/config.h"
 #include "gateway/model_plan.h"
 
@@ -82,6 +83,8 @@ Json gyro_json(const ReplaySummary& summary, const gateway::Plan& plan, std::siz
           {"faults", faults_json(gyro)},
           {"mean_rate_dps", number(mean_of(summary.raw_sum_dps[index], summary.raws[index]))},
           {"bias_dps", number(gyro.bias_dps)},
+          {"slope_dps_s", number(summary.slope_dps_s[index])},
+          {"slope_sigma_dps_s", number(summary.slope_sigma_dps_s[index])},
           {"temperature_c", number(gyro.temperature_c)}};
 }
 
@@ -100,6 +103,17 @@ Json model_json(const ReplaySummary& summary, const gateway::Plan& plan) {
       waits_for.push_back({{"gyro", gyro + 1}, {"input", input}});
   }
   return {{"file", plan.model->file}, {"effects", effects}, {"waits_for", waits_for}};
+}
+
+// As the recording ended; what is less likely than a twentieth is left out.
+Json hypotheses_json(const gateway::Status& status) {
+  Json hypotheses = Json::object();
+  for (std::size_t i = 0; i < status.probability.size(); ++i) {
+    if (!(status.probability[i] > gateway::kWorthTelling)) continue;
+    hypotheses[std::string(gateway::to_string(static_cast<fusion::Hypothesis>(i)))] =
+        status.probability[i];
+  }
+  return hypotheses;
 }
 
 const gateway::GyroPlan* gyro_of(const gateway::Plan& plan, const std::string& interface,
@@ -193,7 +207,12 @@ Json to_json(const ReplaySummary& summary, const gateway::Plan& plan) {
       {"gaps",
        {{"longer_than_s", ReplaySummary::kGap_s}, {"count", summary.gaps}, {"longest", gaps}}},
       {"windows", {{"completed", status.windows}, {"skipped", status.windows_skipped}}},
-      {"stops", {{"learned", status.stops}, {"refused", status.stops_refused}}},
+      {"stops",
+       {{"learned", status.stops}, {"refused", status.stops_refused}, {"open", status.stops_open}}},
+      {"hypotheses", hypotheses_json(status)},
+      {"ambiguous", status.ambiguous},
+      {"estimate_restarts", status.estimate_restarts},
+      {"rates_too_far_apart", status.rates_too_far_apart},
       {"disagreements", status.disagreements},
       {"calibration",
        {{"covered_s", status.calibrated_s},
@@ -211,13 +230,17 @@ Json to_json(const ReplaySummary& summary, const gateway::Plan& plan) {
 
 namespace {
 
+std::string how_often(std::uint64_t times) {
+  return times == 1 ? "once" : fmt::format("{} times", times);
+}
+
 void put_faults(fmt::memory_buffer& text, const gateway::GyroStatus& gyro, double first_s) {
   const char* separator = "\n  faults:";
   for (std::size_t i = 0; i < gateway::kFaultCount; ++i) {
     const gateway::FaultRecord& record = gyro.faults[i];
     if (record.times == 0) continue;
-    fmt::format_to(std::back_inserter(text), "{} {} {} times, last at {:.2f} s", separator,
-                   to_string(static_cast<gateway::Fault>(i)), record.times,
+    fmt::format_to(std::back_inserter(text), "{} {} {}, last at {:.2f} s", separator,
+                   to_string(static_cast<gateway::Fault>(i)), how_often(record.times),
                    to_seconds(record.last.time_since_epoch()) - first_s);
     separator = ";";
   }
@@ -238,6 +261,27 @@ void put_plain_mean(fmt::memory_buffer& text, const ReplaySummary& summary) {
       "\nplain mean    {:+.6f} deg/s, {:+.3f} deg/h off the virtual gyro: {:+.4f} deg of "
       "heading over {:.0f} s",
       mean_dps, excess_dps * kSecondsPerHour, excess_dps * valid_s, valid_s);
+}
+
+// What the corrector made of it, as the recording ended.
+void put_opinion(fmt::memory_buffer& text, const ReplaySummary& summary,
+                 const gateway::Plan& plan) {
+  const gateway::Status& status = summary.status;
+  const gateway::GyroNames names{plan.gyros[0].name, plan.gyros[1].name};
+  auto to = std::back_inserter(text);
+  const auto line = [&](const char* title, const std::string& words) {
+    if (!words.empty()) fmt::format_to(to, "\n{:<13} {}", title, words);
+  };
+  line("stops", gateway::stretches_text(gateway::steady_stretches(status)));
+  line("at the end", status.ambiguous ? gateway::ambiguity_text(status.probability, names)
+                                      : gateway::hypotheses_text(status.probability, names));
+  const std::string kind = gateway::drift_kind_text(status.probability);
+  line("drifts", kind);
+  if (!kind.empty()) {
+    const std::string slopes =
+        gateway::slopes_text(summary.slope_dps_s, summary.slope_sigma_dps_s, names);
+    if (!slopes.empty()) fmt::format_to(to, "; the biases move by {}", slopes);
+  }
 }
 
 }  // namespace
@@ -312,17 +356,15 @@ std::string to_text(const ReplaySummary& summary, const gateway::Plan& plan) {
     fmt::format_to(to, ", {} windows, {} skipped for want of pairs", status.windows,
                    status.windows_skipped);
   }
-  if (status.stops + status.stops_refused > 0) {
-    fmt::format_to(to, "; {} stops learned from, {} refused", status.stops, status.stops_refused);
-  }
   if (status.disagreements > 0)
-    fmt::format_to(to, "; the gyros disagreed {} times", status.disagreements);
+    fmt::format_to(to, "; the gyros disagreed {}", how_often(status.disagreements));
   if (status.clock_steps > 0)
-    fmt::format_to(to, "; the clock was set back {} times", status.clock_steps);
+    fmt::format_to(to, "; the clock was set back {}", how_often(status.clock_steps));
   if (summary.gaps > 0) {
     fmt::format_to(to, "; {} gaps, the longest {:.2f} s", summary.gaps,
                    summary.longest_gaps.front().length_s);
   }
+  put_opinion(text, summary, plan);
   fmt::format_to(to, "\nended in state {}\n", to_string(status.state));
   return fmt::to_string(text);
 }

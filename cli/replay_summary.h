@@ -64,6 +64,8 @@ struct ReplaySummary {
   std::vector<std::string> interfaces;
   IdCounts ids;
   gateway::Status status;
+  std::array<double, 2> slope_dps_s{};        ///< of the biases, at the end
+  std::array<double, 2> slope_sigma_dps_s{};  ///< of these; NaN where they are not known
   std::uint64_t frames_out = 0;
   double first_s = 0.0;  ///< stamps of the first and the last frame
   double last_s = 0.0;

@@ -11,6 +11,7 @@
 #include <fmt/format.h>
 
 #include "base/printable.h"
+#include "gateway/condition_text.h"
 
 namespace vgyro::cli {
 namespace {
@@ -181,6 +182,86 @@ std::string buses_table(const Json& status, const Paint& paint) {
   return table(rows, paint);
 }
 
+// --- what the corrector thinks ---
+
+gateway::GyroNames names_of(const Json& status) {
+  gateway::GyroNames names{kNothing, kNothing};
+  std::size_t at_name = 0;
+  for (const Json& gyro : at(status, "gyros")) {
+    if (at_name < names.size()) names[at_name++] = text_of(gyro, "name");
+  }
+  return names;
+}
+
+std::array<double, 2> of_gyros(const Json& status, const char* key) {
+  std::array<double, 2> values{};
+  values.fill(std::numeric_limits<double>::quiet_NaN());
+  std::size_t at_value = 0;
+  for (const Json& gyro : at(status, "gyros")) {
+    if (at_value < values.size()) values[at_value++] = number_of(gyro, key);
+  }
+  return values;
+}
+
+/// What is not there is not likely.
+gateway::Probabilities probabilities_of(const Json& status) {
+  const Json told = at(status, "hypotheses");
+  gateway::Probabilities probability{};
+  for (std::size_t i = 0; i < probability.size(); ++i) {
+    const std::string name(gateway::to_string(static_cast<fusion::Hypothesis>(i)));
+    const double value = number_of(told, name.c_str());
+    if (value >= 0.0 && value <= 1.0) probability[i] = value;
+  }
+  return probability;
+}
+
+gateway::SteadyStretches stretches_of(const Json& status) {
+  const Json counters = at(status, "counters");
+  return {count_of(counters, "stops"), count_of(counters, "stops_refused"),
+          count_of(counters, "stops_open")};
+}
+
+std::string opinion(const Json& status, const Paint& paint) {
+  const gateway::GyroNames names = names_of(status);
+  const gateway::Probabilities probability = probabilities_of(status);
+  const gateway::SteadyStretches stretches = stretches_of(status);
+  std::string text;
+  const auto line = [&](Mood mood, const char* title, const std::string& words) {
+    if (!words.empty()) text += paint(mood, title + words) + '\n';
+  };
+  if (flag_of(status, "ambiguous")) {
+    line(Mood::kDoubtful, "", gateway::ambiguity_text(probability, names));
+  } else {
+    line(Mood::kPlain, "it seems: ", gateway::hypotheses_text(probability, names));
+  }
+  const std::string kind = gateway::drift_kind_text(probability);
+  line(Mood::kPlain, "the drifts: ", kind);
+  if (!kind.empty()) {
+    line(Mood::kPlain, "the biases move by ",
+         gateway::slopes_text(of_gyros(status, "slope_dps_s"),
+                              of_gyros(status, "slope_sigma_dps_s"), names));
+  }
+  line(Mood::kPlain, "", gateway::stretches_text(stretches));
+  line(Mood::kDoubtful, "", gateway::stretches_advice(stretches));
+  return text;
+}
+
+/// What is wrong with the gyros or with us, and what to do about it.
+std::string troubles(const Json& status, const Paint& paint) {
+  std::string text;
+  for (const Json& gyro : at(status, "gyros")) {
+    if (text_of(gyro, "health") != gateway::to_string(gateway::Fault::kBlind)) continue;
+    text += paint(Mood::kBad, "gyro " + text_of(gyro, "name") + ' ' + gateway::blind_text() + ": " +
+                                  gateway::blind_advice()) +
+            '\n';
+  }
+  if (flag_of(status, "rates_too_far_apart"))
+    text += paint(Mood::kBad, gateway::rates_too_far_apart_text()) + '\n';
+  const std::uint64_t restarts = count_of(at(status, "counters"), "estimate_restarts");
+  if (restarts > 0) text += paint(Mood::kBad, gateway::restarts_text(restarts)) + '\n';
+  return text;
+}
+
 std::string head(const Json& status, const ViewOptions& options, const Paint& paint) {
   const std::string state = text_of(status, "state");
   std::string text = paint(mood_of_state(state), state);
@@ -201,6 +282,7 @@ std::string head(const Json& status, const ViewOptions& options, const Paint& pa
   if (std::isfinite(bias_sigma_dps)) {
     text += fmt::format("its drift is known to ± {:.2f} deg/h\n", bias_sigma_dps * kDegPerHour);
   }
+  text += opinion(status, paint);
   const auto remark = [&](bool applies, Mood mood, const char* words) {
     if (applies) text += paint(mood, words) + '\n';
   };
@@ -208,6 +290,7 @@ std::string head(const Json& status, const ViewOptions& options, const Paint& pa
          "on biases of an earlier run, which no stop has confirmed");
   remark(flag_of(status, "disagree"), Mood::kBad,
          "the gyros disagree; which one is wrong cannot be told");
+  text += troubles(status, paint);
   remark(flag_of(status, "config_refused"), Mood::kBad,
          "the new configuration was refused; journalctl -u vgyrod says why");
   for (const Json& bus : at(status, "buses")) {

@@ -8,6 +8,7 @@
 #include <string_view>
 #include <utility>
 
+#include "gateway/condition_text.h"
 #include "gateway/config.h"
 
 namespace vgyro::daemon {
@@ -35,6 +36,9 @@ class Dictionary {
   }
   void put(const char* key, std::uint64_t value) {
     keep(sd_bus_message_append(message_, "{sv}", key, "t", value));
+  }
+  void put_number(std::string_view key, double value) {
+    keep(sd_bus_message_append(message_, "{sd}", std::string(key).c_str(), value));
   }
   void put_count(std::string_view key, std::uint64_t value) {
     keep(sd_bus_message_append(message_, "{st}", std::string(key).c_str(), value));
@@ -83,6 +87,8 @@ int append_gyro(sd_bus_message* reply, const Snapshot& now, std::size_t k) {
   fields.put("rate_dps", gyro.last_rate_dps);
   fields.put("bias_dps", gyro.bias_dps);
   fields.put("bias_sigma_dps", now.bias_sigma_dps[k]);
+  fields.put("slope_dps_s", now.slope_dps_s[k]);
+  fields.put("slope_sigma_dps_s", now.slope_sigma_dps_s[k]);
   fields.put("temperature_c", gyro.temperature_c);
   fields.put("frames", gyro.frames);
   fields.put("samples", gyro.samples);
@@ -140,6 +146,8 @@ int append_counters(sd_bus_message* reply, const Snapshot& now) {
       {"windows_skipped", status.windows_skipped},
       {"stops", status.stops},
       {"stops_refused", status.stops_refused},
+      {"stops_open", status.stops_open},
+      {"estimate_restarts", status.estimate_restarts},
       {"disagreements", status.disagreements},
       {"calibration_restarts", status.calibration_restarts},
       {"clock_steps", status.clock_steps},
@@ -159,6 +167,16 @@ int append_counters(sd_bus_message* reply, const Snapshot& now) {
   Dictionary fields(reply, "{st}");
   for (const auto& [name, count] : counters)
     fields.put_count(name, count);
+  return fields.close();
+}
+
+int append_hypotheses(sd_bus_message* reply, const Snapshot& now) {
+  Dictionary fields(reply, "{sd}");
+  for (std::size_t i = 0; i < now.status.probability.size(); ++i) {
+    if (now.status.probability[i] <= gateway::kWorthTelling) continue;
+    fields.put_number(gateway::to_string(static_cast<fusion::Hypothesis>(i)),
+                      now.status.probability[i]);
+  }
   return fields.close();
 }
 
@@ -213,6 +231,13 @@ constexpr Property kProperties[] = {
      }},
     {"Disagree",
      [](sd_bus_message* m, const Snapshot& now) { return append_flag(m, now.status.disagree); }},
+    {"Ambiguous",
+     [](sd_bus_message* m, const Snapshot& now) { return append_flag(m, now.status.ambiguous); }},
+    {"RatesTooFarApart",
+     [](sd_bus_message* m, const Snapshot& now) {
+       return append_flag(m, now.status.rates_too_far_apart);
+     }},
+    {"Hypotheses", append_hypotheses},
     {"RateDps",
      [](sd_bus_message* m, const Snapshot& now) { return append_number(m, now.status.rate_dps); }},
     {"SigmaDps",
@@ -245,6 +270,9 @@ const sd_bus_vtable Control::kInterface[] = {
     SD_BUS_PROPERTY("Restored", "s", on_get, 0, SD_BUS_VTABLE_PROPERTY_EMITS_CHANGE),
     SD_BUS_PROPERTY("Valid", "b", on_get, 0, SD_BUS_VTABLE_PROPERTY_EMITS_CHANGE),
     SD_BUS_PROPERTY("Disagree", "b", on_get, 0, SD_BUS_VTABLE_PROPERTY_EMITS_CHANGE),
+    SD_BUS_PROPERTY("Ambiguous", "b", on_get, 0, SD_BUS_VTABLE_PROPERTY_EMITS_CHANGE),
+    SD_BUS_PROPERTY("RatesTooFarApart", "b", on_get, 0, SD_BUS_VTABLE_PROPERTY_EMITS_CHANGE),
+    SD_BUS_PROPERTY("Hypotheses", "a{sd}", on_get, 0, SD_BUS_VTABLE_PROPERTY_EMITS_CHANGE),
     SD_BUS_PROPERTY("RateDps", "d", on_get, 0, SD_BUS_VTABLE_PROPERTY_EMITS_CHANGE),
     SD_BUS_PROPERTY("SigmaDps", "d", on_get, 0, SD_BUS_VTABLE_PROPERTY_EMITS_CHANGE),
     SD_BUS_PROPERTY("BiasSigmaDps", "d", on_get, 0, SD_BUS_VTABLE_PROPERTY_EMITS_CHANGE),
@@ -329,7 +357,8 @@ void Control::tell_changes() {
   std::uint64_t queued = 0;
   if (sd_bus_get_n_queued_write(bus_, &queued) < 0 || queued > kQueuedMost) return;
   sd_bus_emit_properties_changed(bus_, kPath, kName, "State", "Quality", "Restored", "Valid",
-                                 "Disagree", "RateDps", "SigmaDps", "BiasSigmaDps", "CalibratedS",
+                                 "Disagree", "Ambiguous", "RatesTooFarApart", "Hypotheses",
+                                 "RateDps", "SigmaDps", "BiasSigmaDps", "CalibratedS",
                                  "ConfigRefused", "Gyros", "Buses", "Counters", nullptr);
 }
 

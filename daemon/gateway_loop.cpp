@@ -444,11 +444,18 @@ const Snapshot& GatewayLoop::snapshot() {
   snapshot_.config_refused = reload_refused_;
   snapshot_.log_lines_lost = log_.lost();
   snapshot_.service_messages_lost = notifier_.failures();
-  snapshot_.bias_sigma_dps.fill(std::numeric_limits<double>::quiet_NaN());
+  for (auto* values :
+       {&snapshot_.bias_sigma_dps, &snapshot_.slope_dps_s, &snapshot_.slope_sigma_dps_s})
+    values->fill(std::numeric_limits<double>::quiet_NaN());
   const std::optional<gateway::SavedState> known = setup_->pipeline.memory();
   if (known && std::isfinite(snapshot_.status.gyros[0].bias_dps)) {
     const std::array<double, 3>& covariance = known->drift.bias_covariance;
     snapshot_.bias_sigma_dps = {std::sqrt(covariance[0]), std::sqrt(covariance[2])};
+    for (std::size_t k = 0; k < 2; ++k) {
+      if (!(known->drift.slope_sigma_dps_s[k] > 0.0)) continue;  // 0 stands for "not known"
+      snapshot_.slope_dps_s[k] = known->drift.slope_dps_s[k];
+      snapshot_.slope_sigma_dps_s[k] = known->drift.slope_sigma_dps_s[k];
+    }
   }
   return snapshot_;
 }

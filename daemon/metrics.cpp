@@ -79,6 +79,17 @@ void add_rate(Text& text, const Snapshot& now) {
   text.sample({}, status.bias_sigma_dps);
   text.family("vgyro_gyros_disagree", "gauge", "1 while the gyros contradict each other.");
   text.sample({}, status.disagree);
+  text.family("vgyro_ambiguous", "gauge",
+              "1 while the data can be read in two ways; sigma spans both.");
+  text.sample({}, status.ambiguous);
+  text.family("vgyro_hypothesis_probability", "gauge", "Of what may be the case.");
+  for (std::size_t i = 0; i < status.probability.size(); ++i) {
+    text.sample({{"hypothesis", gateway::to_string(static_cast<fusion::Hypothesis>(i))}},
+                status.probability[i]);
+  }
+  text.family("vgyro_rates_too_far_apart", "gauge",
+              "1 while no pairs can be made: one gyro speaks too much more often.");
+  text.sample({}, status.rates_too_far_apart);
   text.family("vgyro_uptime_seconds", "gauge", "Since the start of the process.");
   text.sample({}, now.uptime_s);
   text.family("vgyro_config_refused", "gauge", "1 while a configuration is refused.");
@@ -95,6 +106,15 @@ void add_counters(Text& text, const Snapshot& now) {
   text.sample({{"valid", "no"}}, status.rates_out - status.rates_out_valid);
   text.family("vgyro_stops_total", "counter", "Stops that the drifts were learned from.");
   text.sample({}, status.stops);
+  text.family("vgyro_stops_refused_total", "counter",
+              "Steady stretches that were taken for a turn of both gyros together.");
+  text.sample({}, status.stops_refused);
+  text.family("vgyro_stops_open_total", "counter",
+              "Steady stretches that ended before a stop could be told from a turn.");
+  text.sample({}, status.stops_open);
+  text.family("vgyro_estimate_restarts_total", "counter",
+              "Times that the estimate was not finite and began anew: a fault of vgyro.");
+  text.sample({}, status.estimate_restarts);
   text.family("vgyro_clock_steps_total", "counter", "Times that the stamps were set back.");
   text.sample({}, status.clock_steps);
   text.family("vgyro_sent_frames_total", "counter", "Frames that the bus took.");
@@ -128,6 +148,14 @@ void add_gyros(Text& text, const Snapshot& now) {
   text.family("vgyro_gyro_bias_sigma_degrees_per_second", "gauge", "How well that is known.");
   each([&](Name name, Gyro, std::size_t k) {
     text.sample({{"gyro", name}}, now.bias_sigma_dps[k]);
+  });
+  text.family("vgyro_gyro_bias_slope_degrees_per_second_squared", "gauge",
+              "How fast its drift moves; NaN where that is not known.");
+  each([&](Name name, Gyro, std::size_t k) { text.sample({{"gyro", name}}, now.slope_dps_s[k]); });
+  text.family("vgyro_gyro_bias_slope_sigma_degrees_per_second_squared", "gauge",
+              "How well that is known.");
+  each([&](Name name, Gyro, std::size_t k) {
+    text.sample({{"gyro", name}}, now.slope_sigma_dps_s[k]);
   });
   text.family("vgyro_gyro_temperature_celsius", "gauge", "NaN where it tells none.");
   each([&](Name name, Gyro gyro, std::size_t) {

@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include "gateway/condition_text.h"
 #include "gateway/model_plan.h"
 
 namespace vgyro::daemon {
@@ -26,7 +27,7 @@ std::string age_text(double age_s) {
 }
 
 // What is wrong, as the rest of the sentence "gyro left ...".
-const char* sentence(gateway::Fault fault) {
+std::string sentence(gateway::Fault fault) {
   switch (fault) {
     case gateway::Fault::kSilent:
       return "is silent";
@@ -45,7 +46,7 @@ const char* sentence(gateway::Fault fault) {
     case gateway::Fault::kNoisy:
       return "has far more noise than before";
     case gateway::Fault::kBlind:
-      return "does not feel the rotation that the other one feels";
+      return gateway::blind_text() + ": " + gateway::blind_advice();
   }
   return "";
 }
@@ -157,6 +158,18 @@ void Reporter::disagreement_changed(const gateway::Status& status) {
   }
 }
 
+void Reporter::ambiguity_changed(const gateway::Status& status) {
+  ambiguous_ = status.ambiguous;
+  if (!health_lines_.take()) return;
+  if (ambiguous_) {
+    log_.tell(Severity::kWarning, {.cause = "ambiguous"}, "{}",
+              gateway::ambiguity_text(status.probability, names_));
+  } else {
+    const std::string seems = gateway::hypotheses_text(status.probability, names_);
+    log_.notice("what the gyros show is clear again{}{}", seems.empty() ? "" : ": ", seems);
+  }
+}
+
 std::string Reporter::second_passed(const gateway::Status& status, const Traffic& traffic) {
   ++second_;
   if (const std::uint64_t held = state_lines_.second_passed(); held > 0) {
@@ -169,6 +182,7 @@ std::string Reporter::second_passed(const gateway::Status& status, const Traffic
     tell_gyro(names_[k], status.gyros[k], gyros_[k]);
   }
   tell_pipeline(status);
+  tell_corrector(status);
   tell_restored(status);
   tell_sent(traffic.transmitted);
   for (const BusStatus& bus : traffic.buses)
@@ -182,6 +196,10 @@ std::string Reporter::second_passed(const gateway::Status& status, const Traffic
   }
   if (status.restored == gateway::Restored::kTakenUp) {
     doing += fmt::format(", on biases of {} before the start", age_text(status.restored_age_s));
+  }
+  if (status.ambiguous) {
+    const std::string seems = gateway::hypotheses_text(status.probability, names_);
+    doing += fmt::format(", ambiguous{}{}", seems.empty() ? "" : ": ", seems);
   }
   for (const BusStatus& bus : traffic.buses)
     doing += trouble_of(bus);
@@ -256,6 +274,23 @@ void Reporter::tell_pipeline(const gateway::Status& status) {
   }
 }
 
+void Reporter::tell_corrector(const gateway::Status& status) {
+  if (news(estimate_restarts_, status.estimate_restarts) > 0) {
+    log_.tell(Severity::kError, {.cause = "estimate_lost"}, "{}",
+              gateway::restarts_text(status.estimate_restarts));
+  }
+  if (status.rates_too_far_apart && !std::exchange(told_of_far_rates_, true)) {
+    log_.tell(Severity::kWarning, {.cause = "rates_too_far_apart"}, "{}",
+              gateway::rates_too_far_apart_text());
+  }
+  const gateway::SteadyStretches stretches = gateway::steady_stretches(status);
+  const std::string advice = gateway::stretches_advice(stretches);
+  if (!advice.empty() && !std::exchange(told_of_stretches_, true)) {
+    log_.tell(Severity::kWarning, {.cause = "stops_refused"}, "{}; {}",
+              gateway::stretches_text(stretches), advice);
+  }
+}
+
 void Reporter::tell_restored(const gateway::Status& status) {
   const gateway::Restored before = std::exchange(restored_, status.restored);
   if (status.restored == before) return;
@@ -327,12 +362,13 @@ std::string Reporter::biases(const gateway::Status& status) const {
 
 void Reporter::summarize(const gateway::Status& status, const Traffic& traffic) {
   const can::TransmitCounts& sent = traffic.transmitted;
+  const std::string stretches = gateway::stretches_text(gateway::steady_stretches(status));
   log_.notice(
       "stopped: {} frames in ({} lost by the kernel), {} pairs, {} virtual rates ({} valid), "
-      "{} frames out ({} stale, {} overflowed, {} refused, {} retries); bias {} deg/h",
+      "{} frames out ({} stale, {} overflowed, {} refused, {} retries); {}{}bias {} deg/h",
       traffic.received(), traffic.lost(), status.pairs, status.rates_out, status.rates_out_valid,
       sent.sent, sent.dropped_stale, sent.dropped_overflow, sent.dropped_failed, sent.retries,
-      biases(status));
+      stretches, stretches.empty() ? "" : "; ", biases(status));
 }
 
 }  // namespace vgyro::daemon

@@ -46,6 +46,7 @@ class Reporter {
     if (status.gyros[0].fault != faults_[0]) fault_changed(0, status);
     if (status.gyros[1].fault != faults_[1]) fault_changed(1, status);
     if (status.disagree != disagree_) disagreement_changed(status);
+    if (status.ambiguous != ambiguous_) ambiguity_changed(status);
   }
 
   /// To be called about once a second: logs troubles that are new, returns the status line.
@@ -75,10 +76,12 @@ class Reporter {
   void state_changed(const gateway::Status& status);
   void fault_changed(std::size_t gyro, const gateway::Status& status);
   void disagreement_changed(const gateway::Status& status);
+  void ambiguity_changed(const gateway::Status& status);
   std::uint64_t news(Told& told, std::uint64_t count) const;
   void tell_gyro(const std::string& name, const gateway::GyroStatus& gyro, GyroTold& told);
   void tell_waiting(const std::string& name, const gateway::GyroStatus& gyro, GyroTold& told);
   void tell_pipeline(const gateway::Status& status);
+  void tell_corrector(const gateway::Status& status);
   void tell_restored(const gateway::Status& status);
   void tell_sent(const can::TransmitCounts& sent);
   void tell_bus(const BusStatus& bus, BusTold& told);
@@ -92,14 +95,17 @@ class Reporter {
   LineBudget state_lines_;
   std::array<std::optional<gateway::Fault>, 2> faults_;
   bool disagree_ = false;
+  bool ambiguous_ = false;
   LineBudget health_lines_;
   std::uint64_t second_ = 0;
   std::array<GyroTold, 2> gyros_;
   Told clock_steps_, rates_out_of_range_, reference_rejected_, accelerometer_rejected_,
-      speed_rejected_, windows_skipped_, restarts_;
+      speed_rejected_, windows_skipped_, restarts_, estimate_restarts_;
   Told stale_, overflow_, failed_;
   std::map<std::string, BusTold> buses_;
   bool told_of_motion_ = false;
+  bool told_of_stretches_ = false;
+  bool told_of_far_rates_ = false;
   std::uint64_t last_received_ = 0;
   std::uint64_t last_sent_ = 0;
 };

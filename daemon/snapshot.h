@@ -15,7 +15,9 @@ namespace vgyro::daemon {
 struct Snapshot {
   const gateway::Plan* plan = nullptr;  ///< lives as long as the snapshot is the newest
   gateway::Status status;
-  std::array<double, 2> bias_sigma_dps{};  ///< of each gyro; NaN where it is not known
+  std::array<double, 2> bias_sigma_dps{};     ///< of each gyro; NaN where it is not known
+  std::array<double, 2> slope_dps_s{};        ///< of its bias; likewise
+  std::array<double, 2> slope_sigma_dps_s{};  ///< likewise
   Traffic traffic;
   double uptime_s = 0.0;
   std::uint64_t log_lines_lost = 0;         ///< nobody took them

@@ -412,6 +412,7 @@ void Pipeline::Impl::note_condition(TimePoint t) {
   condition = corrector->condition();
   for (std::size_t gyro = 0; gyro < 2; ++gyro)
     health_of[gyro].set_opinion(t, condition.noisy[gyro], condition.blind[gyro]);
+  if (observer != nullptr) observer->on_condition(t - guard.offset(), condition);
 }
 
 void Pipeline::Impl::take_single(std::size_t gyro, TimePoint t, double rate_dps, Duration age,

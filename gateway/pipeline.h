@@ -40,6 +40,8 @@ class RateObserver {
  public:
   virtual ~RateObserver() = default;
   virtual void on_rate(TimePoint t, const std::array<double, 2>& raw_dps, double virtual_dps) = 0;
+  /// What the corrector thinks of its data, at every rate once it is calibrated; before on_rate().
+  virtual void on_condition(TimePoint /*t*/, const fusion::Condition& /*condition*/) {}
 };
 
 class Pipeline {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <lzma.h>
+#include <numeric>
 #include <span>
 #include <vector>
 
@@ -26,9 +27,13 @@ constexpr std::size_t kSealBytes = kSealHead.size() + 8 + kSealTail.size();
 constexpr double kRateMax_dps = 1e5;
 constexpr double kVarianceMax = kRateMax_dps * kRateMax_dps;
 constexpr double kSkewMax_s = 10.0;
+// Nor changes by so much in a second, or with a kelvin.
+constexpr double kChangeMax_dps = kRateMax_dps;
 constexpr double kTemperatureMin_c = -273.15;
 constexpr double kTemperatureMax_c = 1000.0;
 constexpr double kWeightSumTolerance = 1e-6;
+// Probabilities that were added up may come to a rounding more than 1.
+constexpr double kWeightMax = 1.0 + kWeightSumTolerance;
 
 std::string seal(std::string_view content) {
   const std::uint32_t crc =
@@ -65,6 +70,32 @@ std::string listed(std::span<const double> values) {
     out += shortest(values[i]);
   }
   return out + "]";
+}
+
+std::string temperature_key(std::size_t gyro) {
+  return fmt::format("temperature_{}_c", gyro + 1);
+}
+
+double sum_of(std::span<const double> values) {
+  return std::accumulate(values.begin(), values.end(), 0.0);
+}
+
+// What is not known is not written, and so is read as by a version that did not know of it.
+std::string kinds_and_slopes(const fusion::DriftMemory& drift) {
+  std::string text;
+  if (sum_of(drift.kind_weight) > 0.0)
+    text += fmt::format("kind_weight = {}\n", listed(drift.kind_weight));
+  if (sum_of(drift.slope_sigma_dps_s) > 0.0) {
+    text += fmt::format("slope_dps_s = {}\nslope_sigma_dps_s = {}\n", listed(drift.slope_dps_s),
+                        listed(drift.slope_sigma_dps_s));
+  }
+  if (!drift.has_temperature[0] && !drift.has_temperature[1]) return text;
+  for (std::size_t gyro = 0; gyro < 2; ++gyro) {
+    if (!drift.has_temperature[gyro]) continue;
+    text += fmt::format("{} = {}\n", temperature_key(gyro), shortest(drift.temperature_c[gyro]));
+  }
+  return text + fmt::format("coefficient_dps_k = {}\ncoefficient_sigma_dps_k = {}\n",
+                            listed(drift.coefficient_dps_k), listed(drift.coefficient_sigma_dps_k));
 }
 
 // --- reading -------------------------------------------------------------------------------------
@@ -111,6 +142,8 @@ class Numbers {
     if (!holds) reader_.complain(reader_.where(key), fmt::format("{} {}", key, what));
   }
 
+  [[nodiscard]] bool has(std::string_view key) const { return reader_.has(key); }
+
   void pass_over(std::string_view key) { reader_.forgive({key}); }
 
   [[nodiscard]] std::optional<Error> finish() {
@@ -143,6 +176,33 @@ bool is_positive_definite(const std::array<double, 3>& m) {
   return m[0] > 0.0 && m[2] > 0.0 && m[1] * m[1] < m[0] * m[2];
 }
 
+// What older states do not hold. A pair stands there whole or not at all.
+void add_kinds(Numbers& table, fusion::DriftMemory& drift) {
+  if (!table.has("kind_weight")) return;
+  drift.kind_weight = table.numbers<fusion::kDriftKinds>("kind_weight", 0.0, kWeightMax);
+  table.require(sum_of(drift.kind_weight) > 0.0, "kind_weight", "adds up to nothing");
+}
+
+void add_slopes(Numbers& table, fusion::DriftMemory& drift) {
+  if (!table.has("slope_dps_s") && !table.has("slope_sigma_dps_s")) return;
+  drift.slope_dps_s = table.numbers<2>("slope_dps_s", -kChangeMax_dps, kChangeMax_dps);
+  drift.slope_sigma_dps_s = table.numbers<2>("slope_sigma_dps_s", 0.0, kChangeMax_dps);
+}
+
+void add_temperatures(Numbers& table, fusion::DriftMemory& drift) {
+  for (std::size_t gyro = 0; gyro < 2; ++gyro) {
+    const std::optional<double> temperature_c =
+        table.optional_number(temperature_key(gyro), kTemperatureMin_c, kTemperatureMax_c);
+    drift.has_temperature[gyro] = temperature_c.has_value();
+    drift.temperature_c[gyro] = temperature_c.value_or(0.0);
+  }
+  const bool any = drift.has_temperature[0] || drift.has_temperature[1];
+  if (!any && !table.has("coefficient_dps_k") && !table.has("coefficient_sigma_dps_k")) return;
+  drift.coefficient_dps_k = table.numbers<2>("coefficient_dps_k", -kChangeMax_dps, kChangeMax_dps);
+  drift.coefficient_sigma_dps_k = table.numbers<2>("coefficient_sigma_dps_k", 0.0, kChangeMax_dps);
+  table.require(any, "coefficient_dps_k", "stands without a temperature");
+}
+
 fusion::DriftMemory drift_from(Numbers& table) {
   fusion::DriftMemory drift;
   drift.bias_dps = table.numbers<2>("bias_dps", -kRateMax_dps, kRateMax_dps);
@@ -154,15 +214,16 @@ fusion::DriftMemory drift_from(Numbers& table) {
   drift.sample_variance = table.numbers<2>("sample_variance", 0.0, kVarianceMax);
   const auto ratios = table.numbers<fusion::kWalkRatios_per_s.size()>("walk_ratio_per_s", 0.0, 1e9);
   table.require(ratios == fusion::kWalkRatios_per_s, "walk_ratio_per_s", "are of another version");
-  drift.walk_weight = table.numbers<fusion::kWalkPairs>("walk_weight", 0.0, 1.0);
-  double sum = 0.0;
-  for (const double weight : drift.walk_weight)
-    sum += weight;
-  table.require(std::abs(sum - 1.0) <= kWeightSumTolerance, "walk_weight", "does not add up to 1");
+  drift.walk_weight = table.numbers<fusion::kWalkPairs>("walk_weight", 0.0, kWeightMax);
+  table.require(std::abs(sum_of(drift.walk_weight) - 1.0) <= kWeightSumTolerance, "walk_weight",
+                "does not add up to 1");
   drift.scale_difference = table.number("scale_difference", -1.0, 1.0);
   drift.scale_difference_sigma = table.number("scale_difference_sigma", 0.0, kRateMax_dps);
   drift.skew_s = table.number("skew_s", -kSkewMax_s, kSkewMax_s);
   drift.skew_sigma_s = table.number("skew_sigma_s", 0.0, kRateMax_dps);
+  add_kinds(table, drift);
+  add_slopes(table, drift);
+  add_temperatures(table, drift);
   return drift;
 }
 
@@ -224,8 +285,7 @@ std::string to_text(const SavedState& state) {
   for (std::size_t gyro = 0; gyro < 2; ++gyro) {
     text += fmt::format("device_{} = {}\n", gyro + 1, quoted(state.devices[gyro]));
     if (state.temperature_c[gyro]) {
-      text +=
-          fmt::format("temperature_{}_c = {}\n", gyro + 1, shortest(*state.temperature_c[gyro]));
+      text += fmt::format("{} = {}\n", temperature_key(gyro), shortest(*state.temperature_c[gyro]));
     }
   }
   text += fmt::format(
@@ -237,6 +297,7 @@ std::string to_text(const SavedState& state) {
       listed(drift.sample_variance), listed(fusion::kWalkRatios_per_s), listed(drift.walk_weight),
       shortest(drift.scale_difference), shortest(drift.scale_difference_sigma),
       shortest(drift.skew_s), shortest(drift.skew_sigma_s));
+  text += kinds_and_slopes(drift);
   return text + seal(text);
 }
 
@@ -260,8 +321,8 @@ Expected<SavedState> saved_state_from(std::string_view text, const std::string& 
   state.rest_rate_dps = top.number("rest_rate_dps", -kRateMax_dps, kRateMax_dps);
   for (std::size_t gyro = 0; gyro < 2; ++gyro) {
     state.devices[gyro] = top.text(fmt::format("device_{}", gyro + 1));
-    state.temperature_c[gyro] = top.optional_number(fmt::format("temperature_{}_c", gyro + 1),
-                                                    kTemperatureMin_c, kTemperatureMax_c);
+    state.temperature_c[gyro] =
+        top.optional_number(temperature_key(gyro), kTemperatureMin_c, kTemperatureMax_c);
   }
   top.pass_over("drift");
   if (const std::optional<Error> error = top.finish()) return tl::unexpected(*error);

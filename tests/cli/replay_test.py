@@ -4,7 +4,9 @@
 import collections
 import json
 import lzma
+import math
 import os
+import random
 import re
 import resource
 import struct
@@ -275,6 +277,111 @@ class Summary(Replay):
     def test_summary_does_not_depend_on_the_run(self):
         # Nothing of the machine or the hour is in it.
         self.assertEqual(self.summary(), self.summary())
+
+
+def stops_and_turns(turns, begin_us=1_700_000_000_000_000):
+    """Lines of two gyros with noise: 15 s of rest, a stop of 10 s, and as many steady turns of 10 s at 20 deg/s, with
+    bends between them."""
+    rng = random.Random(20240917)
+    stretches = [(15, 0.0)] + [(6, None), (10, 0.0)] + [(6, None), (10, 20.0)] * turns + [(6, None)]
+    lines, i, offset = [], 0, 0.0
+    for seconds, level in stretches:
+        if level:
+            offset = level
+        for k in range(round(seconds * 100)):
+            rate = 0.0032 + (offset + 8.0 * math.sin(2.0 * math.pi * k / 300) if level is None else level)
+            at = begin_us + i * 10_000
+            lines.append(bench.line_a(at, rate + 0.5 + rng.gauss(0.0, 0.01), i))
+            lines.append(bench.line_b(at + 3_000, -(rate - 0.3 + rng.gauss(0.0, 0.01))))
+            i += 1
+    return lines
+
+
+class Thoughts(Replay):
+    """What the corrector makes of its data is said in the text, in the JSON, and drawn."""
+
+    def setUp(self):
+        super().setUp()
+        self.write("vgyro.toml", bench.CONFIG.replace('"mutual"', '"optimal"').replace("rest_s = 1.0", "rest_s = 10.0"))
+
+    def test_stops_learned_and_refused_are_counted_and_said_alike(self):
+        self.write("in.log", "".join(stops_and_turns(4)))
+        done = self.replay("--json", "sum.json", "-o", "out.log", "in.log")
+        found = json.loads(self.read("sum.json"))
+        stops, said = found["stops"], done.stderr.decode()
+        self.assertEqual(set(stops), {"learned", "refused", "open"})
+        self.assertGreaterEqual(stops["learned"], 1)
+        self.assertGreaterEqual(stops["refused"], 3)
+        number = stops["learned"]
+        self.assertIn(f"{number + stops['refused']} steady stretches: {number} stop{'s' if number > 1 else ''} learned, "
+                      f"{stops['refused']} refused: turning together", said)
+        # Most were refused: a warning that says what to check.
+        warnings = [line for line in said.splitlines() if line.startswith("warning: stops: ")]
+        self.assertEqual(len(warnings), 1, said)
+        for part in ("rate_dps", "latitude_deg", "max_bias_dps"):
+            self.assertIn(part, warnings[0])
+
+    def test_no_warning_where_few_are_refused(self):
+        self.write("in.log", "".join(stops_and_turns(1)))
+        self.assertNotIn("warning", self.replay("-o", "out.log", "in.log").stderr.decode())
+
+    def test_hypotheses_are_probabilities_with_a_name(self):
+        # The log ends within the stop of its beginning: standing.
+        found = self.summary(lines=stops_and_turns(0)[:2 * 3000])
+        self.assertGreater(found["hypotheses"]["standing"], 0.9)
+        for name, probability in found["hypotheses"].items():
+            self.assertRegex(name, "^[a-z_0-9]+$")
+            self.assertGreater(probability, 0.05)
+            self.assertLessEqual(probability, 1.0 + 1e-9)
+        self.assertIs(found["ambiguous"], False)
+        self.assertEqual((found["estimate_restarts"], found["rates_too_far_apart"]), (0, False))
+        self.assertRegex(self.replay("-o", "out.log", "in.log").stderr.decode(), r"(?m)^at the end +standing (9\d|100) %")
+
+    def test_methods_that_think_nothing_say_nothing(self):
+        self.write("in.log", "".join(stops_and_turns(0)))
+        said = self.replay("--method", "mutual", "-o", "out.log", "in.log").stderr.decode()
+        for words in ("steady stretch", "at the end", "drifts "):
+            self.assertNotIn(words, said)
+        self.assertEqual(self.summary(arguments=("--method", "mean"))["hypotheses"], {})
+
+    def test_slopes_are_numbers_or_null(self):
+        found = self.summary(lines=stops_and_turns(1))
+        for gyro in found["gyros"]:
+            self.assertEqual(gyro["slope_dps_s"] is None, gyro["slope_sigma_dps_s"] is None)
+        found = self.summary(arguments=("--method", "mean"))
+        self.assertEqual([g["slope_dps_s"] for g in found["gyros"]], [None, None])
+
+    def test_picture_shades_what_was_learned_and_what_was_refused(self):
+        self.write("in.log", "".join(stops_and_turns(4)))
+        self.replay("-q", "-o", "out.log", "--plot", "a.svg", "in.log")
+        svg = self.read("a.svg")
+        self.assertIn("learned as a stop", svg)
+        self.assertIn("refused: turning", svg)
+        self.assertNotIn("ambiguous", svg, "nothing here is")
+        for colour in ("rgb(216, 239, 216)", "rgb(243, 217, 184)"):
+            # In each of the four panels, and once in the legend.
+            self.assertGreaterEqual(svg.count(colour), 5, colour)
+
+    def test_a_step_of_a_gyro_is_told_as_such_until_it_is_settled(self):
+        # In motion nobody can tell whose step it was: either gyro's is likely, and σ spans both.
+        rng, stepped = random.Random(3), []
+        for k in range(3000):
+            at, rate = 1_700_000_015_000_000 + k * 10_000, 8.0 * math.sin(2.0 * math.pi * k / 300)
+            step = 0.3 if k >= 1500 else 0.0
+            stepped.append(bench.line_a(at, rate + 0.5 + rng.gauss(0.0, 0.01), 1500 + k))
+            stepped.append(bench.line_b(at + 3_000, -(rate - 0.3 + step + rng.gauss(0.0, 0.01))))
+        found = self.summary(lines=stops_and_turns(0)[:2 * 1500] + stepped, arguments=("--plot", "a.svg"))
+        self.assertIs(found["ambiguous"], True)
+        self.assertGreater(found["hypotheses"]["gyro_1_stepped"], 0.05)
+        self.assertGreater(found["hypotheses"]["gyro_2_stepped"], 0.05)
+        self.assertIn("ambiguous", self.read("a.svg"))
+        said = self.replay("-o", "out.log", "in.log").stderr.decode()
+        self.assertRegex(said, r"can be read in two ways, and σ spans both: gyro left has stepped \d+ %; gyro right has stepped \d+ %")
+
+    def test_picture_without_stretches_has_no_legend_of_them(self):
+        self.write("in.log", "".join(self.lines))
+        self.replay("-q", "-o", "out.log", "--method", "mutual", "--plot", "a.svg", "in.log")
+        self.assertNotIn("learned as a stop", self.read("a.svg"))
 
 
 class BadInput(Replay):

@@ -36,6 +36,16 @@ struct Sample {
     now.status.pairs = 1ULL << 40U;
     now.status.accelerometer_rejected = 4;
     now.status.speed_rejected = 2;
+    now.status.ambiguous = true;
+    now.status.probability[static_cast<std::size_t>(fusion::Hypothesis::kStanding)] = 0.75;
+    now.status.probability[static_cast<std::size_t>(fusion::Hypothesis::kTurning)] = 0.25;
+    now.status.probability[static_cast<std::size_t>(fusion::Hypothesis::kGyro1Stepped)] = 0.04;
+    now.status.probability[static_cast<std::size_t>(fusion::Hypothesis::kWarmingUp)] = 0.5;
+    now.status.stops = 2;
+    now.status.stops_refused = 5;
+    now.status.stops_open = 1;
+    now.status.estimate_restarts = 3;
+    now.status.rates_too_far_apart = true;
     gateway::GyroStatus& left = now.status.gyros[0];
     left.heard = true;
     left.frames = 1000;
@@ -50,6 +60,8 @@ struct Sample {
     right.faults[static_cast<std::size_t>(gateway::Fault::kStuck)].times = 2;
     right.bias_dps = right.temperature_c = std::nan("");
     now.bias_sigma_dps = {0.0002, std::nan("")};
+    now.slope_dps_s = {1e-6, std::nan("")};
+    now.slope_sigma_dps_s = {2e-7, std::nan("")};
     now.traffic.transmitted.sent = 12'345;
     now.traffic.transmitted.dropped_stale = 7;
     now.log_lines_lost = 41;

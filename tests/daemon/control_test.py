@@ -131,7 +131,9 @@ class OnTheBus(Bench):
         expected = {".Recalibrate": ["method", "-"], ".SaveState": ["method", "-"], ".Counters": ["property", "a{st}"],
                     ".Gyros": ["property", "aa{sv}"], ".Buses": ["property", "aa{sv}"]}
         expected |= {f".{name}": ["property", "s"] for name in ("Version", "Method", "State", "Quality", "Restored")}
-        expected |= {f".{name}": ["property", "b"] for name in ("Valid", "Disagree", "ConfigRefused")}
+        expected |= {f".{name}": ["property", "b"] for name in ("Valid", "Disagree", "Ambiguous", "RatesTooFarApart",
+                                                                "ConfigRefused")}
+        expected |= {".Hypotheses": ["property", "a{sd}"]}
         expected |= {f".{name}": ["property", "d"] for name in ("RateDps", "SigmaDps", "BiasSigmaDps", "CalibratedS",
                                                                 "RestS", "UptimeS")}
         self.assertEqual(members, expected)
@@ -155,6 +157,17 @@ class OnTheBus(Bench):
         counters = self.get("Counters")
         self.assertEqual(counters["pairs"], 1 << 40)
         self.assertEqual((counters["log_lines_lost"], counters["service_messages_lost"]), (41, 3))
+
+    def test_properties_hold_what_the_corrector_thinks(self):
+        self.assertIs(self.get("Ambiguous"), True)
+        self.assertIs(self.get("RatesTooFarApart"), True)
+        self.assertEqual(self.get("Hypotheses"), {"standing": 0.75, "turning": 0.25, "warming_up": 0.5})
+        counters = self.get("Counters")
+        self.assertEqual([counters[name] for name in ("stops", "stops_refused", "stops_open", "estimate_restarts")],
+                         [2, 5, 1, 3])
+        left, right = self.get("Gyros")
+        self.assertEqual((left["slope_dps_s"]["data"], left["slope_sigma_dps_s"]["data"]), (1e-6, 2e-7))
+        self.assertNotIsInstance(right["slope_dps_s"]["data"], (int, bool))
 
     def test_changes_are_told_once_a_second(self):
         with subprocess.Popen(["busctl", f"--address={self.address}", "--json=short", "monitor", NAME],
@@ -213,6 +226,9 @@ class OnTheBus(Bench):
         self.assertIsNone(status["gyros"][1]["bias_dps"])
         self.assertEqual(status["counters"]["frames_sent"], 12345)
         self.assertEqual(status["buses"][0]["errors"]["bus_off"], 3)
+        self.assertEqual(status["hypotheses"], {"standing": 0.75, "turning": 0.25, "warming_up": 0.5})
+        self.assertIs(status["ambiguous"], True)
+        self.assertEqual([g["slope_dps_s"] for g in status["gyros"]], [1e-6, None])
 
     def test_status_as_a_table(self):
         done = self.vgyro("status")
@@ -231,6 +247,18 @@ class OnTheBus(Bench):
         at = next(i for i, line in enumerate(lines) if line.startswith("gyro "))
         column = lines[at].index("bus")
         self.assertEqual({lines[at + 1][column:column + 4], lines[at + 2][column:column + 4]}, {"can0", "can1"})
+
+    def test_status_says_what_the_corrector_thinks_in_plain_words(self):
+        said = self.vgyro("status").stdout.splitlines()
+        for line in ("what the gyros show can be read in two ways, and σ spans both: standing 75 %, turning steadily 25 %",
+                     "the drifts: warming up 50 %, random walk 50 %",
+                     f"the biases move by {GYRO} +13.0 ± 2.6 deg/h an hour",
+                     "7 steady stretches: 2 stops learned, 5 refused: turning together; "
+                     "1 of these left open: standing or turning could not be told apart"):
+            self.assertIn(line, said)
+        for beginning in ("most of them taught little: ", "one gyro speaks so much more often than the other",
+                          "the estimate was not finite and began anew 3 times: a fault of vgyro itself"):
+            self.assertEqual(sum(line.startswith(beginning) for line in said), 1, said)
 
     def test_watch_writes_lines_into_a_pipe(self):
         with subprocess.Popen([VGYRO, "status", "--watch", "--interval", "0.2"], stdout=subprocess.PIPE,
@@ -377,6 +405,14 @@ class Metrics(Bench):
         rate = samples["vgyro_gyro_bias_degrees_per_second", (("gyro", "right"),)]
         self.assertNotEqual(rate, rate, "not NaN")
         self.assertEqual(samples["vgyro_pairs_total", ()], float(1 << 40))
+        self.assertEqual(samples["vgyro_ambiguous", ()], 1)
+        self.assertEqual(samples["vgyro_rates_too_far_apart", ()], 1)
+        self.assertEqual(samples["vgyro_hypothesis_probability", (("hypothesis", "standing"),)], 0.75)
+        self.assertEqual(sum(name == "vgyro_hypothesis_probability" for name, _ in samples), 9)
+        self.assertEqual([samples[f"vgyro_{name}_total", ()] for name in ("stops", "stops_refused", "stops_open",
+                                                                         "estimate_restarts")], [2, 5, 1, 3])
+        self.assertEqual(samples["vgyro_gyro_bias_slope_degrees_per_second_squared", (("gyro", GYRO),)], 1e-6)
+        self.assertEqual(samples["vgyro_gyro_bias_slope_sigma_degrees_per_second_squared", (("gyro", GYRO),)], 2e-7)
         self.assertEqual(samples["vgyro_dropped_frames_total", (("cause", "stale"),)], 7)
         self.assertEqual(samples["vgyro_log_lines_lost_total", ()], 41)
         self.assertEqual(samples["vgyro_service_messages_lost_total", ()], 3)

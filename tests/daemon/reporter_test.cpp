@@ -102,6 +102,104 @@ TEST_F(ReporterTest, TellsEachChangeOfHealthOnceWithItsCause) {
   EXPECT_EQ(count_of("the gyros disagree", said), 1U) << said;
 }
 
+double& probability(gateway::Status& status, fusion::Hypothesis hypothesis) {
+  return status.probability[static_cast<std::size_t>(hypothesis)];
+}
+
+TEST_F(ReporterTest, TellsOnceThatTheDataCanBeReadInTwoWaysAndOnceThatTheyNoLongerCan) {
+  status.ambiguous = true;
+  probability(status, fusion::Hypothesis::kStanding) = 0.6;
+  probability(status, fusion::Hypothesis::kTurning) = 0.4;
+  const auto look = [&] {
+    reporter.check_state(status);
+    reporter.check_state(status);
+  };
+  std::string said = said_during(look);
+  EXPECT_EQ(count_of("\n", said), 1U) << said;
+  EXPECT_EQ(
+      count_of("can be read in two ways, and σ spans both: standing 60 %, turning steadily 40 %",
+               said),
+      1U)
+      << said;
+  status.state = State::kRunning;
+  second();
+  EXPECT_NE(last_line.find(", ambiguous: standing 60 %, turning steadily 40 %;"), std::string::npos)
+      << last_line;
+  status.ambiguous = false;
+  probability(status, fusion::Hypothesis::kStanding) = 0.99;
+  probability(status, fusion::Hypothesis::kTurning) = 0.01;
+  status.state = State::kWaiting;
+  said = said_during(look);
+  EXPECT_EQ(count_of("\n", said), 1U) << said;
+  EXPECT_EQ(count_of("what the gyros show is clear again: standing 99 %\n", said), 1U) << said;
+  second();
+  EXPECT_EQ(last_line.find("ambiguous"), std::string::npos) << last_line;
+}
+
+TEST_F(ReporterTest, HoldsAFlickeringAmbiguityBackAndSaysSo) {
+  const std::string said = said_during([&] {
+    for (int i = 0; i < 100; ++i) {
+      status.ambiguous = i % 2 == 0;
+      reporter.check_state(status);
+    }
+  });
+  EXPECT_EQ(count_of("\n", said), 10U) << said;
+  std::string later;
+  for (int i = 0; i < 60; ++i)
+    later += second();
+  EXPECT_EQ(count_of("90 more changes of health", later), 1U) << later;
+}
+
+TEST_F(ReporterTest, SaysWhatToLookAtWhereAGyroIsBlind) {
+  status.gyros[1].fault = gateway::Fault::kBlind;
+  const std::string said = said_during([&] { reporter.check_state(status); });
+  EXPECT_EQ(count_of("gyro right does not feel the rotation that the other one feels", said), 1U)
+      << said;
+  EXPECT_EQ(count_of("is its axis parallel", said), 1U) << said;
+}
+
+TEST_F(ReporterTest, TellsOnceThatMostStopsAreRefusedAndWhatToLookAt) {
+  status.stops = 1;
+  status.stops_refused = 2;
+  EXPECT_EQ(second(), "") << "two are no habit";
+  ++status.stops_refused;
+  const std::string said = second();
+  EXPECT_EQ(count_of("4 steady stretches: 1 stop learned, 3 refused: turning together", said), 1U)
+      << said;
+  EXPECT_EQ(count_of("latitude_deg", said), 1U) << said;
+  for (int i = 0; i < 200; ++i) {
+    ++status.stops_refused;
+    EXPECT_EQ(second(), "");
+  }
+}
+
+TEST_F(ReporterTest, TellsThatTheEstimateWasLostAndThatItIsOurOwnFault) {
+  status.estimate_restarts = 1;
+  const std::string said = second();
+  EXPECT_EQ(count_of("began anew once: a fault of vgyro itself, please report it", said), 1U)
+      << said;
+  EXPECT_EQ(second(), "");
+}
+
+TEST_F(ReporterTest, TellsOnceThatTheGyrosRatesAreTooFarApart) {
+  status.rates_too_far_apart = true;
+  EXPECT_EQ(count_of("so much more often than the other that no pairs", second()), 1U);
+  EXPECT_EQ(second(), "");
+}
+
+TEST_F(ReporterTest, SumsUpTheSteadyStretchesAtTheEnd) {
+  std::string said = said_during([&] { reporter.summarize(status, traffic); });
+  EXPECT_EQ(count_of("steady stretch", said), 0U) << said;
+  status.stops = 7;
+  status.stops_refused = 1;
+  said = said_during([&] { reporter.summarize(status, traffic); });
+  EXPECT_EQ(count_of("retries); 8 steady stretches: 7 stops learned, 1 refused: turning together; "
+                     "bias left unknown",
+                     said),
+            1U)
+      << said;
+}
+
 TEST_F(ReporterTest, HoldsAFlickeringHealthBackAndSaysSo) {
   const std::string said = said_during([&] {
     for (int i = 0; i < 100; ++i) {

@@ -107,9 +107,11 @@ def models():
 
 
 def saved_states():
-    text = (ROOT / "tests/fuzz/state.toml").read_bytes()
-    yield text
-    yield text.rpartition(b"\n[checksum]\n")[0]
+    """As the gateway writes it, and as it did before slopes, kinds and temperatures were learned."""
+    for name in ("state.toml", "older_state.toml"):
+        text = (ROOT / "tests/fuzz" / name).read_bytes()
+        yield text
+        yield text.rpartition(b"\n[checksum]\n")[0]
 
 
 def frames(lines):

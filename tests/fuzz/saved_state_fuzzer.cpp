@@ -34,6 +34,14 @@ void check(const SavedState& state) {
   for (const double bias_dps : drift.bias_dps)
     assert(std::isfinite(bias_dps));
   assert(drift.bias_covariance[0] > 0.0 && drift.bias_covariance[2] > 0.0);
+  for (std::size_t gyro = 0; gyro < 2; ++gyro) {
+    assert(std::isfinite(drift.slope_dps_s[gyro]) && drift.slope_sigma_dps_s[gyro] >= 0.0);
+    assert(std::isfinite(drift.coefficient_dps_k[gyro]));
+    assert(drift.coefficient_sigma_dps_k[gyro] >= 0.0);
+    assert(std::isfinite(drift.temperature_c[gyro]));
+  }
+  for (const double weight : drift.kind_weight)
+    assert(weight >= 0.0);
   const std::string text = to_text(state);
   const auto again = saved_state_from(text, "again");
   assert(again && to_text(*again) == text);

@@ -274,6 +274,30 @@ TEST(PipelineRates, OfGyrosThatAreKnownToBeLateAreRightAndComplete) {
   }
 }
 
+struct Opinions final : RateObserver {
+  void on_rate(TimePoint t, const std::array<double, 2>& /*raw_dps*/, double rate_dps) override {
+    if (std::isfinite(rate_dps)) rates.push_back(t);
+  }
+  void on_condition(TimePoint t, const fusion::Condition& condition) override {
+    told.push_back(t);
+    last = condition;
+  }
+  std::vector<TimePoint> rates, told;
+  fusion::Condition last;
+};
+
+// Whoever draws sees what the corrector thinks at each instant of a rate that it made.
+TEST(PipelineRates, ComeWithWhatTheCorrectorThinksToWhoeverObserves) {
+  Bench run;
+  Opinions opinions;
+  run.pipeline.observe(&opinions);
+  run.play(both(ms(6000)));
+  EXPECT_GT(opinions.rates.size(), 400U);
+  EXPECT_EQ(opinions.told, opinions.rates);
+  EXPECT_EQ(opinions.last.stops, run.pipeline.status().stops);
+  EXPECT_EQ(opinions.last.probability, run.pipeline.status().probability);
+}
+
 // `mean` needs no calibration and has no biases, but it too needs both gyros to begin with.
 TEST(PipelineRates, OfTheMeanAreValidFromTheFirstPairOn) {
   Plan plan = rig::two_gyros();

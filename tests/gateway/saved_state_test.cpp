@@ -7,9 +7,12 @@
 #include <cmath>
 #include <cstdint>
 #include <cstring>
+#include <fstream>
+#include <iterator>
 #include <random>
 #include <string>
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include "rig.h"
@@ -51,6 +54,13 @@ SavedState plain_state() {
   state.drift.scale_difference_sigma = 0.01;
   state.drift.skew_s = 1e-3;
   state.drift.skew_sigma_s = 1e-2;
+  state.drift.kind_weight = {0.5, 0.0, 0.25, 0.125, 0.125};
+  state.drift.slope_dps_s = {1.5e-6, -2e-7};
+  state.drift.slope_sigma_dps_s = {3e-7, 4e-7};
+  state.drift.coefficient_dps_k = {0.0, -3e-4};
+  state.drift.coefficient_sigma_dps_k = {0.0, 2e-4};
+  state.drift.temperature_c = {0.0, 31.5};
+  state.drift.has_temperature = {false, true};
   state.rate_stamp = time_from_ns(1'700'000'000'123'456'000);
   state.temperature_c = {25.25, std::nullopt};
   state.devices = {"a: can0 0x101 GYRO S", "b \"x\\: can1"};
@@ -78,6 +88,13 @@ void expect_same(const SavedState& a, const SavedState& b) {
                   a.drift.skew_sigma_s, a.rest_rate_dps},
                  {b.drift.scale_difference, b.drift.scale_difference_sigma, b.drift.skew_s,
                   b.drift.skew_sigma_s, b.rest_rate_dps});
+  expect_same(a.drift.kind_weight, b.drift.kind_weight);
+  expect_same(a.drift.slope_dps_s, b.drift.slope_dps_s);
+  expect_same(a.drift.slope_sigma_dps_s, b.drift.slope_sigma_dps_s);
+  expect_same(a.drift.coefficient_dps_k, b.drift.coefficient_dps_k);
+  expect_same(a.drift.coefficient_sigma_dps_k, b.drift.coefficient_sigma_dps_k);
+  expect_same(a.drift.temperature_c, b.drift.temperature_c);
+  EXPECT_EQ(a.drift.has_temperature, b.drift.has_temperature);
   EXPECT_EQ(a.rate_stamp, b.rate_stamp);
   EXPECT_EQ(a.devices, b.devices);
   for (std::size_t gyro = 0; gyro < 2; ++gyro) {
@@ -119,6 +136,14 @@ TEST(SavedState, AnyNumbersComeBackBitForBit) {
       sum += weight = any(1.0);
     for (double& weight : state.drift.walk_weight)
       weight /= sum;
+    for (double& weight : state.drift.kind_weight)
+      weight = any(1.0);
+    state.drift.slope_dps_s = {signed_any(1e5), signed_any(1e5)};
+    state.drift.slope_sigma_dps_s = {any(1e5), 1e-9};
+    state.drift.coefficient_dps_k = {signed_any(1e5), signed_any(1e5)};
+    state.drift.coefficient_sigma_dps_k = {any(1e5), any(1e5)};
+    state.drift.has_temperature = {true, round % 2 == 0};
+    state.drift.temperature_c = {signed_any(100.0), round % 2 == 0 ? any(100.0) : 0.0};
     state.temperature_c = {signed_any(100.0), any(100.0)};
     state.rate_stamp = time_from_ns(static_cast<std::int64_t>(rng() >> 1U));
     const auto back = saved_state_from(to_text(state), kWhere);
@@ -203,6 +228,26 @@ TEST(SavedState, WhatCannotBeIsRefusedBehindARightChecksum) {
       {"skew_s = 0.001", "skew_s = 11.0", "skew_s"},
       {"skew_sigma_s = 0.01", "skew_sigma_s = -1.0", "skew_sigma_s"},
       {"skew_sigma_s = 0.01", "skew_sigma_s = 0.01\nmore = 1", "more"},
+      {"kind_weight = [0.5", "kind_weight = [nan", "kind_weight holds nan"},
+      {"kind_weight = [0.5", "kind_weight = [-0.5", "kind_weight holds -0.5"},
+      {"kind_weight = [0.5", "kind_weight = [1.5", "kind_weight holds 1.5"},
+      {"kind_weight = [0.5, ", "kind_weight = [", "kind_weight is no list of "},
+      {"kind_weight = [0.5, 0.0, 0.25, 0.125, 0.125]", "kind_weight = [0.0, 0.0, 0.0, 0.0, 0.0]",
+       "kind_weight adds up to nothing"},
+      {"kind_weight = [0.5, 0.0, 0.25, 0.125, 0.125]", "kind_weight = 1.0", "kind_weight"},
+      {"slope_dps_s = [1.5e-06", "slope_dps_s = [inf", "slope_dps_s holds inf"},
+      {"slope_dps_s = [1.5e-06", "slope_dps_s = [1e9", "slope_dps_s"},
+      {"slope_dps_s = [1.5e-06, -2e-07]\n", "", "slope_dps_s is no list of 2"},
+      {"slope_sigma_dps_s = [3e-07", "slope_sigma_dps_s = [-3e-07", "slope_sigma_dps_s"},
+      {"slope_sigma_dps_s = [3e-07", "slope_sigma_dps_s = [nan", "slope_sigma_dps_s"},
+      {"slope_sigma_dps_s = [3e-07, 4e-07]\n", "", "slope_sigma_dps_s is no list of 2"},
+      {"temperature_2_c = 31.5", "temperature_2_c = nan", "temperature_2_c"},
+      {"temperature_2_c = 31.5", "temperature_2_c = -300.0", "temperature_2_c"},
+      {"temperature_2_c = 31.5\n", "", "coefficient_dps_k stands without a temperature"},
+      {"coefficient_dps_k = [0.0", "coefficient_dps_k = [nan", "coefficient_dps_k holds nan"},
+      {"coefficient_dps_k = [0.0, -0.0003]\n", "", "coefficient_dps_k is no list of 2"},
+      {"coefficient_sigma_dps_k = [0.0", "coefficient_sigma_dps_k = [-0.1",
+       "coefficient_sigma_dps_k holds -0.1"},
       {"rate_stamp_ns = 1", "rate_stamp_ns = -1", "rate_stamp_ns"},
       {"rate_stamp_ns = 1", "rate_stamp_ns = 1.", "rate_stamp_ns"},
       {"rate_stamp_ns = 1", "rate_stamp_ns = 99", ""},
@@ -225,6 +270,68 @@ TEST(SavedState, WhatCannotBeIsRefusedBehindARightChecksum) {
     EXPECT_EQ(message.find(kWhere), 0U) << message;
     EXPECT_FALSE(state.error().remedy.empty());
   }
+}
+
+std::string file_text(const std::string& name) {
+  std::ifstream file(std::string(VGYRO_STATES_DIR "/") + name, std::ios::binary);
+  EXPECT_TRUE(file) << name;
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+// Of the release before slopes, kinds of drift and temperatures were learned.
+TEST(SavedState, OfAnOlderReleaseIsReadAndWhatItDoesNotHoldIsNotKnown) {
+  const std::string older = file_text("older_state.toml");
+  const auto state = saved_state_from(older, kWhere);
+  ASSERT_TRUE(state) << state.error().message();
+  EXPECT_EQ(state->drift.bias_dps[0], 0.033002766051852594);
+  const fusion::DriftMemory nothing;
+  expect_same(state->drift.kind_weight, nothing.kind_weight);
+  expect_same(state->drift.slope_sigma_dps_s, nothing.slope_sigma_dps_s);
+  expect_same(state->drift.coefficient_sigma_dps_k, nothing.coefficient_sigma_dps_k);
+  EXPECT_EQ(state->drift.has_temperature, nothing.has_temperature);
+  EXPECT_EQ(to_text(*state), older) << "and written as that release did";
+}
+
+TEST(SavedState, OfThisReleaseIsReadWithWhatItHasLearned) {
+  const auto state = saved_state_from(file_text("state.toml"), kWhere);
+  ASSERT_TRUE(state) << state.error().message();
+  expect_same(state->drift.kind_weight, {0.41, 0.17, 0.12, 0.24, 0.06});
+  expect_same(state->drift.slope_dps_s, {1.3e-7, -4.2e-7});
+  EXPECT_TRUE(state->drift.has_temperature[0]);
+  EXPECT_FALSE(state->drift.has_temperature[1]);
+  EXPECT_EQ(state->drift.temperature_c[0], 31.25);
+  EXPECT_EQ(to_text(*state), file_text("state.toml"));
+}
+
+// Sums of probabilities, as the estimator makes them.
+TEST(SavedState, WeightsOfARoundingMoreThanOneAreRead) {
+  SavedState state = plain_state();
+  const double more_than_one = std::nextafter(1.0, 2.0);
+  state.drift.walk_weight.fill(0.0);
+  state.drift.walk_weight[40] = more_than_one;
+  state.drift.kind_weight = {0.0, 0.0, more_than_one, 0.0, 0.0};
+  const auto back = saved_state_from(to_text(state), kWhere);
+  ASSERT_TRUE(back) << back.error().message();
+  expect_same(state, *back);
+}
+
+// The longest numbers that there are, in every place, are far below what is looked at.
+TEST(SavedState, WithTheLongestNumbersStaysWithinItsBound) {
+  SavedState state = plain_state();
+  const double longest = -1.2345678901234567e-300;
+  ASSERT_EQ(fmt::format("{}", longest).size(), 24U);
+  state.drift.walk_weight.fill(-longest);
+  state.drift.walk_weight[0] = 1.0;
+  state.drift.kind_weight.fill(-longest);
+  state.drift.slope_dps_s.fill(longest);
+  state.drift.slope_sigma_dps_s.fill(-longest);
+  state.drift.coefficient_dps_k.fill(longest);
+  state.drift.coefficient_sigma_dps_k.fill(-longest);
+  state.drift.temperature_c.fill(longest);
+  state.drift.has_temperature.fill(true);
+  const std::string text = to_text(state);
+  EXPECT_LT(text.size(), kSavedStateBytesMax / 2);
+  EXPECT_TRUE(saved_state_from(text, kWhere));
 }
 
 TEST(SavedState, AnyNameOfAGyroComesBack) {

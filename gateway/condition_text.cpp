@@ -1,0 +1,147 @@
+#include "gateway/condition_text.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string_view>
+
+#include <fmt/format.h>
+
+namespace vgyro::gateway {
+
+namespace {
+
+using fusion::Hypothesis;
+
+constexpr std::uint64_t kFruitlessMin = 3;  // fewer are no habit
+constexpr double kSecondsPerHour = 3600.0;
+constexpr double kDegPerHourAnHour = kSecondsPerHour * kSecondsPerHour;  // of 1 deg/s a second
+
+double of(const Probabilities& probability, Hypothesis hypothesis) {
+  return probability[static_cast<std::size_t>(hypothesis)];
+}
+
+void add(std::string& text, const char* separator, const std::string& part) {
+  if (!text.empty()) text += separator;
+  text += part;
+}
+
+void add_likely(std::string& text, const char* separator, const std::string& words, double p) {
+  if (p > kWorthTelling) add(text, separator, fmt::format("{} {:.0f} %", words, 100.0 * p));
+}
+
+// To the second digit of its doubt, and without an exponent.
+std::string with_doubt(double value, double sigma) {
+  const int decimals = std::clamp(1 - static_cast<int>(std::floor(std::log10(sigma))), 0, 6);
+  const double step = std::pow(10.0, -decimals);
+  const double rounded = std::round(value / step) * step + 0.0;  // no "-0"
+  return fmt::format("{:+.{}f} ± {:.{}f}", rounded, decimals, sigma, decimals);
+}
+
+}  // namespace
+
+SteadyStretches steady_stretches(const Status& status) {
+  return {status.stops, status.stops_refused, status.stops_open};
+}
+
+std::string stretches_text(const SteadyStretches& stretches) {
+  const std::uint64_t all = stretches.learned + stretches.refused;
+  if (all == 0) return {};
+  std::string text = fmt::format("{} steady stretch{}: ", all, all == 1 ? "" : "es");
+  std::string parts;
+  if (stretches.learned > 0) {
+    parts =
+        fmt::format("{} {} learned", stretches.learned, stretches.learned == 1 ? "stop" : "stops");
+  }
+  if (stretches.refused > 0)
+    add(parts, ", ", fmt::format("{} refused: turning together", stretches.refused));
+  text += parts;
+  if (stretches.open > 0) {
+    text += fmt::format("; {} of these left open: standing or turning could not be told apart",
+                        stretches.open);
+  }
+  return text;
+}
+
+std::string stretches_advice(const SteadyStretches& stretches) {
+  const std::uint64_t all = stretches.learned + stretches.refused;
+  const std::uint64_t fruitless = stretches.refused + stretches.open;
+  if (fruitless < kFruitlessMin || 2 * fruitless <= all) return {};
+  return "most of them taught little: if the platform stood still in them, check the true "
+         "rate at rest (rate_dps or latitude_deg in [calibration]) and max_bias_dps of both gyros; "
+         "wheel speeds ([speed]) tell stops from turns";
+}
+
+std::string hypotheses_text(const Probabilities& probability, const GyroNames& names) {
+  std::string text;
+  add_likely(text, ", ", "standing", of(probability, Hypothesis::kStanding));
+  add_likely(text, ", ", "turning steadily", of(probability, Hypothesis::kTurning));
+  for (const std::size_t gyro : {0U, 1U}) {
+    const auto stepped = gyro == 0 ? Hypothesis::kGyro1Stepped : Hypothesis::kGyro2Stepped;
+    add_likely(text, "; ", fmt::format("gyro {} has stepped", names[gyro]),
+               of(probability, stepped));
+  }
+  for (const std::size_t gyro : {0U, 1U}) {
+    const auto blind = gyro == 0 ? Hypothesis::kGyro1Blind : Hypothesis::kGyro2Blind;
+    add_likely(text, "; ", fmt::format("gyro {} feels no rotation", names[gyro]),
+               of(probability, blind));
+  }
+  return text;
+}
+
+// Where no kind has a probability the method knows of none, and the walk is no finding either.
+std::string drift_kind_text(const Probabilities& probability) {
+  const double warming = of(probability, Hypothesis::kWarmingUp);
+  const double own = of(probability, Hypothesis::kOwnSlopes);
+  const double alike = of(probability, Hypothesis::kAlikeSlopes);
+  std::string text;
+  add_likely(text, ", ", "warming up", warming);
+  add_likely(text, ", ", "slopes of their own", own);
+  add_likely(text, ", ", "slopes alike", alike);
+  if (text.empty()) return {};
+  add_likely(text, ", ", "random walk", 1.0 - warming - own - alike);
+  return text;
+}
+
+std::string ambiguity_text(const Probabilities& probability, const GyroNames& names) {
+  const std::string readings = hypotheses_text(probability, names);
+  return "what the gyros show can be read in two ways, and σ spans both" +
+         (readings.empty() ? "" : ": " + readings);
+}
+
+std::string slopes_text(const std::array<double, 2>& slope_dps_s,
+                        const std::array<double, 2>& sigma_dps_s, const GyroNames& names) {
+  std::string text;
+  for (std::size_t gyro = 0; gyro < 2; ++gyro) {
+    if (!std::isfinite(slope_dps_s[gyro]) || !(sigma_dps_s[gyro] > 0.0)) continue;
+    add(text, ", ",
+        names[gyro] + ' ' +
+            with_doubt(slope_dps_s[gyro] * kDegPerHourAnHour,
+                       sigma_dps_s[gyro] * kDegPerHourAnHour));
+  }
+  return text.empty() ? text : text + " deg/h an hour";
+}
+
+std::string blind_text() {
+  return "does not feel the rotation that the other one feels, and is left out";
+}
+
+std::string blind_advice() {
+  return "is its axis parallel to the other one's, is it switched on and past its self-test, is "
+         "its "
+         "frame the right one?";
+}
+
+std::string rates_too_far_apart_text() {
+  return "one gyro speaks so much more often than the other that no pairs can be made of them; up "
+         "to "
+         "2000 times as often is possible";
+}
+
+std::string restarts_text(std::uint64_t restarts) {
+  return fmt::format(
+      "the estimate was not finite and began anew {}: a fault of vgyro itself, please "
+      "report it with the recording",
+      restarts == 1 ? std::string("once") : fmt::format("{} times", restarts));
+}
+
+}  // namespace vgyro::gateway

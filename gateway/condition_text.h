@@ -1,0 +1,53 @@
+#pragma once
+
+// What the corrector thinks of its data, in words for people: the same ones in `vgyro status`, in
+// the journal and in the summary of a replay. Plain values in, sentences out; an empty text where
+// there is nothing to tell. Colours, lines and limits on how often are the caller's.
+
+#include <array>
+#include <cstdint>
+#include <string>
+
+#include "gateway/status.h"
+
+namespace vgyro::gateway {
+
+using GyroNames = std::array<std::string, 2>;
+using Probabilities = std::array<double, fusion::kHypotheses>;
+
+/// What is less likely is not told.
+inline constexpr double kWorthTelling = 0.05;
+
+/// Stretches in which both gyros were steady. Every one of them was learned from or refused; `open`
+/// ones are among these.
+struct SteadyStretches {
+  std::uint64_t learned = 0;
+  std::uint64_t refused = 0;
+  std::uint64_t open = 0;
+};
+SteadyStretches steady_stretches(const Status& status);
+
+/// "8 steady stretches: 7 stops learned, 1 refused: turning together".
+std::string stretches_text(const SteadyStretches& stretches);
+/// Three or more, and more than half of all, taught little: what to look at then.
+std::string stretches_advice(const SteadyStretches& stretches);
+
+/// "standing 93 %, turning steadily 7 %; gyro fog has stepped 60 %".
+std::string hypotheses_text(const Probabilities& probability, const GyroNames& names);
+/// "warming up 80 %, random walk 20 %".
+std::string drift_kind_text(const Probabilities& probability);
+/// Two readings are likely: what they are, and what becomes of σ.
+std::string ambiguity_text(const Probabilities& probability, const GyroNames& names);
+
+/// "left +3.12 ± 0.41, right -1.00 ± 0.65 deg/h an hour"; NaN is not known.
+std::string slopes_text(const std::array<double, 2>& slope_dps_s,
+                        const std::array<double, 2>& sigma_dps_s, const GyroNames& names);
+
+/// What is wrong with a blind gyro, as the rest of a sentence about it, and what to look at.
+std::string blind_text();
+std::string blind_advice();
+std::string rates_too_far_apart_text();
+/// Of the estimate: a fault of our own.
+std::string restarts_text(std::uint64_t restarts);
+
+}  // namespace vgyro::gateway
