@@ -201,6 +201,93 @@ TEST(OptimalMemory, AgesWithTheDrift) {
   }
 }
 
+OptimalSettings learning_temperature() {
+  OptimalSettings settings;
+  settings.gyros[0].learns_temperature = settings.gyros[1].learns_temperature = true;
+  return settings;
+}
+/// Of a pair that drifts at a slope, of which nothing is told, after some stops.
+DriftMemory learned_memory(std::uint64_t seed, double ramp_dps_s, Drift& was, double& now_s) {
+  Gyros gyros = kGyros;
+  gyros[0].ramp_dps_s = ramp_dps_s;
+  OptimalRun run(gyros, kRate_hz, seed, learning_temperature());
+  run.corrector->set_temperature({20.0, 25.0});
+  run.calibrate(120.0);
+  for (int stop = 0; stop < 3; ++stop) {
+    run.corrector->set_temperature({21.0 + stop, 25.0 - stop});
+    drive(run, 60.0, swaying);
+    drive(run, 30.2, at_rest);
+  }
+  drive(run, 5.2, swaying);
+  now_s = run.world.now_s();
+  was = run.corrector->drift(now_s);
+  return *run.corrector->memory(now_s);
+}
+
+// Whatever has been learned, of slopes and of temperatures as well, is there again.
+TEST(OptimalMemory, KeepsSlopesAndTemperatureCoefficients) {
+  for (const double ramp_dps_s : {0.0, 5e-5, 3e-4}) {
+    for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+      SCOPED_TRACE(::testing::Message() << ramp_dps_s << " deg/s², seed " << seed);
+      Drift was;
+      double now_s = 0.0;
+      const DriftMemory memory = learned_memory(seed, ramp_dps_s, was, now_s);
+      const auto resumed = make_optimal_corrector(learning_temperature());
+      resumed->set_temperature(memory.temperature_c);
+      ASSERT_TRUE(resumed->resume(memory, 0.0, now_s));
+      const DriftMemory again = *resumed->memory(now_s);
+      for (std::size_t k = 0; k < 2; ++k) {
+        EXPECT_NEAR(again.bias_dps[k], memory.bias_dps[k], 1e-9) << k;
+        EXPECT_NEAR(std::sqrt(again.bias_covariance[2 * k] / memory.bias_covariance[2 * k]), 1.0,
+                    0.05)
+            << k;
+        EXPECT_NEAR(again.slope_dps_s[k], memory.slope_dps_s[k], 0.1 * memory.slope_sigma_dps_s[k])
+            << k;
+        EXPECT_NEAR(again.slope_sigma_dps_s[k] / memory.slope_sigma_dps_s[k], 1.0, 0.1) << k;
+        EXPECT_NEAR(again.coefficient_dps_k[k], memory.coefficient_dps_k[k],
+                    1e-9 + 0.05 * memory.coefficient_sigma_dps_k[k])
+            << k;
+        EXPECT_NEAR(again.coefficient_sigma_dps_k[k] / memory.coefficient_sigma_dps_k[k], 1.0, 0.05)
+            << k;
+        EXPECT_NEAR(again.temperature_c[k], memory.temperature_c[k], 1e-9) << k;
+      }
+      for (std::size_t kind = 0; kind < kDriftKinds; ++kind)
+        EXPECT_NEAR(again.kind_weight[kind], memory.kind_weight[kind], 1e-6) << kind;
+      EXPECT_NEAR(resumed->drift(now_s).bias_sigma_dps / was.bias_sigma_dps, 1.0, 0.05);
+    }
+  }
+}
+
+// A memory that an older program has left says nothing of slopes and temperatures: it is taken for
+// what it says.
+TEST(OptimalMemory, ReadsWhatOlderProgramsHaveKept) {
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    SCOPED_TRACE(seed);
+    Drift was;
+    double now_s = 0.0;
+    DriftMemory memory = learned_memory(seed, 0.0, was, now_s);
+    const DriftMemory none;
+    memory.kind_weight = none.kind_weight;
+    memory.slope_dps_s = none.slope_dps_s;
+    memory.slope_sigma_dps_s = none.slope_sigma_dps_s;
+    memory.coefficient_dps_k = none.coefficient_dps_k;
+    memory.coefficient_sigma_dps_k = none.coefficient_sigma_dps_k;
+    memory.temperature_c = none.temperature_c;
+    memory.has_temperature = none.has_temperature;
+    const auto resumed = make_optimal_corrector(learning_temperature());
+    ASSERT_TRUE(resumed->resume(memory, 0.0, now_s));
+    const DriftMemory again = *resumed->memory(now_s);
+    for (std::size_t k = 0; k < 2; ++k) {
+      EXPECT_NEAR(again.bias_dps[k], memory.bias_dps[k], 1e-9) << k;
+      EXPECT_NEAR(std::sqrt(again.bias_covariance[2 * k] / memory.bias_covariance[2 * k]), 1.0,
+                  1e-6)
+          << k;
+    }
+    const VirtualRate rate = resumed->update({now_s + 0.05, {0.3, 0.1}});
+    EXPECT_TRUE(std::isfinite(rate.rate_dps) && rate.sigma_dps > 0.0);
+  }
+}
+
 TEST(OptimalMemory, RefusesWhatCannotBe) {
   OptimalRun run(kGyros, kRate_hz, 63, {});
   run.calibrate();
@@ -230,6 +317,14 @@ TEST(OptimalMemory, RefusesWhatCannotBe) {
       {"skew sigma NaN", [](DriftMemory& m) { m.skew_sigma_s = kNan; }},
       {"weight NaN", [](DriftMemory& m) { m.walk_weight[5] = kNan; }},
       {"weight negative", [](DriftMemory& m) { m.walk_weight[5] = -1.0; }},
+      {"kind NaN", [](DriftMemory& m) { m.kind_weight[1] = kNan; }},
+      {"kind negative", [](DriftMemory& m) { m.kind_weight[1] = -0.5; }},
+      {"slope NaN", [](DriftMemory& m) { m.slope_dps_s[0] = kNan; }},
+      {"slope sigma infinite", [](DriftMemory& m) { m.slope_sigma_dps_s[1] = kInfinity; }},
+      {"slope sigma negative", [](DriftMemory& m) { m.slope_sigma_dps_s[1] = -1e-6; }},
+      {"coefficient NaN", [](DriftMemory& m) { m.coefficient_dps_k[0] = kNan; }},
+      {"coefficient sigma negative", [](DriftMemory& m) { m.coefficient_sigma_dps_k[0] = -1e-3; }},
+      {"temperature infinite", [](DriftMemory& m) { m.temperature_c[0] = kInfinity; }},
   };
   for (const auto& [name, spoil] : spoils) {
     DriftMemory memory = *good;
