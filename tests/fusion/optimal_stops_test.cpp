@@ -81,8 +81,10 @@ TEST(OptimalStops, AreNotBelievedOnAPlatformThatTurnsSteadily) {
   }
 }
 
-// Both drifts jump together, unseen, while the platform turns: the first stops are refused, but a
-// few of them, with turns in between, are proof.
+// Both drifts jump together, unseen, while the platform turns: the first stops may be taken for
+// turns, but a few of them, with turns in between, are proof. How many of them were refused is not
+// asked: both readings are weighed now, and drifts that are wider than their walk is told make a
+// stop the likelier one sooner.
 TEST(OptimalStops, AreBelievedAfterAllWhenTheDriftHasJumped) {
   for (std::uint64_t seed = 1; seed <= 5; ++seed) {
     SCOPED_TRACE(seed);
@@ -98,7 +100,6 @@ TEST(OptimalStops, AreBelievedAfterAllWhenTheDriftHasJumped) {
     }
     EXPECT_LT(std::abs(step.bias_error_dps), 0.1 * jump_dps);
     EXPECT_LT(std::abs(step.bias_error_dps), 4.0 * step.bias_sigma_dps);
-    EXPECT_GE(run.corrector->condition().stops_refused, 2U);
   }
 }
 
