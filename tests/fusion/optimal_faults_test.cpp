@@ -130,6 +130,51 @@ TEST(OptimalFaults, BridgeADropOutOfEitherGyro) {
   }
 }
 
+// --- a blind gyro --------------------------------------------------------------------------------
+
+// One gyro feels no rotation any more: it is named, the other one carries the rate, and what its
+// drift is known to is said of that one. Where it is the only one that is left, nothing is usable.
+TEST(OptimalFaults, NameABlindGyroAndDoWithoutIt) {
+  for (std::size_t bad = 0; bad < 2; ++bad) {
+    for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+      SCOPED_TRACE(::testing::Message() << "gyro " << bad + 1 << ", seed " << seed);
+      OptimalRun run(kGyros, 50.0, seed, {});
+      run.calibrate();
+      drive(run, 120.0, winding);
+      EXPECT_FALSE(run.corrector->condition().blind[0] || run.corrector->condition().blind[1]);
+      run.world.gyros_[bad].blind = true;
+      drive(run, 15.0, winding);
+      EXPECT_TRUE(run.corrector->condition().blind[bad]);
+      EXPECT_FALSE(run.corrector->condition().blind[1 - bad]);
+      EXPECT_TRUE(run.corrector->condition().disagree);
+      const Stretch after = drive(run, 60.0, winding);
+      EXPECT_LT(after.rate_square, 1.3);
+      // A gyro alone at 50 Hz, and a share of 0.05 % of the blind one's at up to 25 deg/s.
+      EXPECT_LT(after.rate_rms_dps,
+                1.2 * std::hypot(kGyros[1 - bad].white * std::sqrt(50.0), 0.0125));
+      const Use only = bad == 0 ? Use::kGyro1 : Use::kGyro2;
+      EXPECT_FALSE(run.step(winding, false, only).virtual_rate.usable);
+      const Use other = bad == 0 ? Use::kGyro2 : Use::kGyro1;
+      EXPECT_TRUE(run.step(winding, false, other).virtual_rate.usable);
+    }
+  }
+}
+
+// What goes off the virtual rate is the drift of the gyro that it rests on, and so is σ of the
+// drift: with the noisier and faster drifting one left, it is that one's.
+TEST(OptimalFaults, SayTheDriftsSigmaOfTheGyroThatTheRateRestsOn) {
+  constexpr std::uint64_t kSeed = 4;
+  const Gyros gyros{world::Gyro{1e-3, 1e-5, 0.05}, world::Gyro{2e-3, 3e-4, -0.1}};
+  OptimalRun run(gyros, 50.0, kSeed, told(gyros));
+  run.calibrate();
+  drive(run, 120.0, winding);
+  run.world.gyros_[0].blind = true;
+  const Step step = drive(run, 60.0, winding).last;
+  ASSERT_TRUE(run.corrector->condition().blind[0]);
+  // Within the minute that gyro 2 has been alone its walk has brought at least half of this.
+  EXPECT_GT(step.bias_sigma_dps, 0.5 * gyros[1].walk * std::sqrt(60.0)) << "seed " << kSeed;
+}
+
 // --- noise ---------------------------------------------------------------------------------------
 
 // Ten times the noise of the better gyro: it is named, and the other one carries the rate.
