@@ -9,7 +9,9 @@
 
 #include "fusion/alignment.h"
 #include "fusion/calibration.h"
+#include "fusion/coherence.h"
 #include "fusion/corrector.h"
+#include "fusion/readings.h"
 #include "fusion/stamp_guard.h"
 #include "tests/fusion/random.h"
 
@@ -197,8 +199,8 @@ TEST(Allocation, IsNotDoneByCalibratorAndCorrector) {
   }
 }
 
-// 121 filters are made in start(), in memory that the construction set aside; then windows, stops,
-// one gyro alone, gaps and a jump.
+// The filters of all banks are made in start(), in memory that the construction set aside; then
+// windows, stops, one gyro alone, gaps and a jump.
 TEST(Allocation, IsNotDoneByTheOptimalCorrector) {
   Calibrator calibrator(0, 20.0);
   const auto corrector = make_optimal_corrector({});
@@ -229,6 +231,76 @@ TEST(Allocation, IsNotDoneByTheOptimalCorrector) {
   EXPECT_GE(corrector->windows().completed, 30U);
   EXPECT_GE(corrector->condition().stops, 2U);
   EXPECT_GE(corrector->condition().disagreements, 1U);
+}
+
+// Readings are split, joined, swapped and given up: their banks' memory goes with them.
+TEST(Allocation, IsNotDoneByTheReadings) {
+  Readings readings({});
+  const DriftMemory none;
+  Random random(2);
+  double stepped = 0.0;
+  DriftMemory memory = none;
+  EXPECT_EQ(allocations_of([&] {
+              readings.begin({1e-3, 2e-3}, {0.1, -0.1}, {1e-6, 0.0, 4e-6});
+              for (int i = 0; i < 300; ++i) {
+                DriftMeasurement one(1);
+                one.rows(0, kBias1) = 1.0;
+                one.rows(0, kBias2) = -1.0;
+                one.values(0) = 0.2 + random.normal(1e-3);
+                one.noise(0, 0) = 1e-6;
+                DriftMeasurement both(2);
+                both.rows(0, kBias1) = both.rows(1, kBias2) = 1.0;
+                both.noise *= 1e-6;
+                both.values << 0.1 + random.normal(1e-3), -0.1 + random.normal(1e-3);
+                SteadyWindow window;
+                window.standing = both;
+                window.turning = one;
+                window.weight = {0.8, 0.2};
+                window.level_dps = 0.8 * both.values(0) + 0.2 * both.values(1);
+                window.level_variance = 1e-6;
+                window.length_s = 2.0;
+                window.log_turning = -0.5;
+                switch (i % 10) {
+                  case 0:
+                    readings.split_step(random.normal(0.05), 1e-5, 0.4);
+                    break;
+                  case 1:
+                    readings.learn_maybe_step(10.0, one, one, random.normal(0.05), 1e-5, 0.4);
+                    break;
+                  case 2:
+                    readings.suspect(random.below(2));
+                    break;
+                  case 3:
+                  case 4:
+                  case 5:
+                    readings.learn_steady(window);
+                    break;
+                  case 6:
+                    readings.end_steady();
+                    break;
+                  case 7:
+                    readings.widen(1e-9, 0.0, 1e-9);
+                    readings.set_temperature({20.0 + 0.1 * i, 20.0});
+                    break;
+                  case 8:
+                    readings.predict(5.0);
+                    readings.observe_at({20.0, 20.0});
+                    readings.save(memory);
+                    memory.white_density = {1e-6, 0.0, 4e-6};
+                    memory.bias_covariance = {1e-6, 0.0, 4e-6};
+                    memory.scale_difference_sigma = memory.skew_sigma_s = 0.01;
+                    if (i == 288) readings.resume(memory, 10.0);
+                    break;
+                  default:
+                    readings.learn(10.0, one);
+                }
+                stepped = std::max(stepped, readings.stepped(0));
+                static_cast<void>(readings.estimate());
+                static_cast<void>(readings.ambiguous());
+              }
+            }),
+            0U);
+  EXPECT_GT(stepped, 0.1) << "else nothing was split";
 }
 
 }  // namespace

@@ -62,15 +62,30 @@ struct Sensors {
   std::array<double, 2> white;
   std::array<double, 2> walk;
   std::vector<std::pair<std::size_t, GaussMarkov>> terms;
+  SlopeModel slopes = {};
+  std::array<double, 2> temperature_dps_k = {};
 };
 
 DriftModel model_of(const Sensors& sensors) {
   DriftModel model;
   model.walk_dps_rts = sensors.walk;
+  model.slopes = sensors.slopes;
+  model.temperature_dps_k = sensors.temperature_dps_k;
   for (const auto& [gyro, term] : sensors.terms)
     model.gauss_markov[gyro][model.gauss_markov_count[gyro]++] = term;
   return model;
 }
+
+constexpr SlopeModel kWarm{.begin_dps_s = {1e-3, 2e-3},
+                           .steady_dps_s = {2e-5, 4e-5},
+                           .tau_s = 100.0,
+                           .correlation = 0.0,
+                           .relative = 0.3};
+constexpr SlopeModel kAlike{.begin_dps_s = {0.0, 0.0},
+                            .steady_dps_s = {1e-4, 1e-4},
+                            .tau_s = 300.0,
+                            .correlation = 0.98,
+                            .relative = 0.0};
 
 // A hundred hours of everything that can come: the covariance never loses what makes it one.
 TEST(DriftFilter, KeepsASoundCovarianceForAHundredHours) {
@@ -84,6 +99,18 @@ TEST(DriftFilter, KeepsASoundCovarianceForAHundredHours) {
        {1e-3, 2e-3},
        {1e-6, 0.0},
        {{0, {3e-3, 100.0}}, {0, {1e-3, 1e4}}, {1, {5e-3, 30.0}}, {1, {1e-2, 1e6}}}},
+      {"slopes", {3e-3, 4e-3}, {2e-5, 3e-5}, {}, kWarm},
+      {"slopes alike", {1e-6, 1e-1}, {1e-10, 1e-3}, {}, kAlike},
+      {"slopes of no drift", {1e-3, 1e-3}, {0.0, 0.0}, {}, kWarm},
+      {"temperatures", {3e-3, 4e-3}, {2e-5, 3e-5}, {}, {}, {5e-3, 1e-2}},
+      {"the temperature of one", {1e-6, 1e-1}, {1e-10, 1e-3}, {}, {}, {0.0, 0.1}},
+      {"slopes and temperatures", {3e-3, 4e-3}, {2e-5, 3e-5}, {}, kAlike, {5e-3, 1e-2}},
+      {"all of it",
+       {1e-3, 2e-3},
+       {1e-6, 0.0},
+       {{0, {3e-3, 100.0}}, {1, {5e-3, 30.0}}},
+       kWarm,
+       {5e-3, 1e-2}},
   };
   for (const Sensors& sensors : all) {
     constexpr std::uint64_t kSeed = 11;
@@ -107,6 +134,8 @@ TEST(DriftFilter, KeepsASoundCovarianceForAHundredHours) {
           break;
         case 3:
           if (random.below(50) == 0) filter.widen(1e-2, 1e-2, 1e-2);
+          if (random.below(50) == 0) filter.shift(random.below(2), random.normal(0.1), 1e-3);
+          filter.set_temperature({random.uniform(-40.0, 60.0), random.uniform(-40.0, 60.0)});
           break;
         default: {
           const int rows = 1 + static_cast<int>(random.below(3));
@@ -281,6 +310,201 @@ TEST(DriftFilter, TreatsTheMeanOverAWindowExactly) {
         ASSERT_NEAR(p(gyro, other), plain.covariance(gyro, other), 1e-5 * scale) << "window " << i;
       }
     }
+  }
+}
+
+/// Drifts with slopes and temperature coefficients as a differential equation, integrated the same
+/// way. The temperature stands still within a window.
+class PlainSlopes {
+ public:
+  static constexpr int kStates = 8;  // walks, slopes, coefficients, ∫B₁, ∫B₂
+  using Matrix = Eigen::Matrix<double, kStates, kStates>;
+  using Vector = Eigen::Matrix<double, kStates, 1>;
+
+  PlainSlopes(const DriftModel& model, double bias_sigma) {
+    const SlopeModel& slopes = model.slopes;
+    for (int k = 0; k < 2; ++k) {
+      const auto gyro = static_cast<std::size_t>(k);
+      flow_(k, 2 + k) = 1.0;
+      flow_(2 + k, 2 + k) = -1.0 / slopes.tau_s;
+      flow_(6 + k, k) = 1.0;
+      drive_(k, k) = std::pow(model.walk_dps_rts[gyro], 2.0);
+      p_(k, k) = bias_sigma * bias_sigma;
+      p_(2 + k, 2 + k) = std::pow(slopes.begin_dps_s[gyro], 2.0);
+      p_(4 + k, 4 + k) = std::pow(model.temperature_dps_k[gyro], 2.0);
+      for (int j = 0; j < 2; ++j) {
+        drive_(2 + k, 2 + j) = 2.0 / slopes.tau_s * slopes.steady_dps_s[gyro] *
+                               slopes.steady_dps_s[static_cast<std::size_t>(j)] *
+                               (k == j ? 1.0 : slopes.correlation);
+      }
+    }
+  }
+  void set_temperature(const std::array<double, 2>& away_k) {
+    for (int k = 0; k < 2; ++k)
+      flow_(6 + k, 4 + k) = away_k_[static_cast<std::size_t>(k)] =
+          away_k[static_cast<std::size_t>(k)];
+  }
+  void pass(double length_s) {
+    p_.bottomRows<2>().setZero();
+    p_.rightCols<2>().setZero();
+    x_.tail<2>().setZero();
+    constexpr int kSteps = 200;
+    const double h = length_s / kSteps;
+    const auto slope = [this](const Matrix& p) -> Matrix {
+      return flow_ * p + p * flow_.transpose() + drive_;
+    };
+    for (int i = 0; i < kSteps; ++i) {
+      const Matrix a = slope(p_);
+      const Matrix b = slope(p_ + 0.5 * h * a);
+      const Matrix c = slope(p_ + 0.5 * h * b);
+      const Matrix d = slope(p_ + h * c);
+      p_ += h / 6.0 * (a + 2.0 * b + 2.0 * c + d);
+      const Vector e = flow_ * x_;
+      const Vector f = flow_ * (x_ + 0.5 * h * e);
+      const Vector g = flow_ * (x_ + 0.5 * h * f);
+      const Vector j = flow_ * (x_ + h * g);
+      x_ += h / 6.0 * (e + 2.0 * f + 2.0 * g + j);
+    }
+  }
+  void learn(double length_s, double h1, double h2, double value, double noise) {
+    Vector h = Vector::Zero();
+    h(6) = h1 / length_s;
+    h(7) = h2 / length_s;
+    const Vector cross = p_ * h;
+    const double square = h.dot(cross) + noise;
+    x_ += cross * ((value - h.dot(x_)) / square);
+    p_ -= cross * cross.transpose() / square;
+  }
+  /// Row k: the whole drift of gyro k; 2 + k: its slope; 4 + k: its coefficient.
+  [[nodiscard]] double mean(int i) const { return row(i).dot(x_); }
+  [[nodiscard]] double covariance(int i, int j) const { return row(i).dot(p_ * row(j)); }
+
+ private:
+  [[nodiscard]] Vector row(int i) const {
+    Vector made = Vector::Zero();
+    made(i) = 1.0;
+    if (i < 2) made(4 + i) = away_k_[static_cast<std::size_t>(i)];
+    return made;
+  }
+
+  Matrix flow_ = Matrix::Zero();
+  Matrix drive_ = Matrix::Zero();
+  Matrix p_ = Matrix::Zero();
+  Vector x_ = Vector::Zero();
+  std::array<double, 2> away_k_{};
+};
+
+/// Drift, slope and coefficient of a filter, as PlainSlopes numbers them.
+void expect_same(const DriftFilter& filter, const PlainSlopes& plain, double tolerance,
+                 int window) {
+  const DriftFilter::Slopes slopes = filter.slopes();
+  const Covariance p = filter.covariance();
+  for (int k = 0; k < 2; ++k) {
+    const double sigma = std::sqrt(plain.covariance(k, k));
+    const double slope_sigma = std::sqrt(plain.covariance(2 + k, 2 + k));
+    ASSERT_NEAR(filter.mean()(k), plain.mean(k), tolerance * sigma) << "window " << window;
+    ASSERT_NEAR(slopes.mean(k), plain.mean(2 + k), tolerance * slope_sigma) << "window " << window;
+    const auto [mean, variance] = filter.coefficient(static_cast<std::size_t>(k));
+    ASSERT_NEAR(mean, plain.mean(4 + k), tolerance * std::sqrt(variance)) << "window " << window;
+    ASSERT_NEAR(variance, plain.covariance(4 + k, 4 + k), tolerance * variance)
+        << "window " << window;
+    for (int j = 0; j < 2; ++j) {
+      const double other = std::sqrt(plain.covariance(j, j));
+      const double other_slope = std::sqrt(plain.covariance(2 + j, 2 + j));
+      ASSERT_NEAR(p(k, j), plain.covariance(k, j), tolerance * sigma * other)
+          << "window " << window;
+      ASSERT_NEAR(slopes.covariance(k, j), plain.covariance(2 + k, 2 + j),
+                  tolerance * slope_sigma * other_slope)
+          << "window " << window;
+      ASSERT_NEAR(slopes.with_drift(k, j), plain.covariance(k, 2 + j),
+                  tolerance * sigma * other_slope)
+          << "window " << window;
+    }
+  }
+}
+
+// Slopes that begin uncertain and those that come and go, apart and alike, windows short and long
+// against their time, temperatures that change in between. Slopes that are what they were are
+// treated exactly. What a slope's own walk adds to its drift within a window is taken for half of
+// that at the window's end: hence a share of the variance, which is less the shorter the windows.
+TEST(DriftFilter, TreatsSlopesAndTemperaturesExactlyButForTheSlopesOwnWalk) {
+  struct Case {
+    const char* name;
+    SlopeModel slopes;
+    double longest_s;
+    double tolerance;
+  };
+  SlopeModel dying = kWarm;
+  dying.relative = 0.0;  // that a slope's own walk grows with it is no linear equation
+  const SlopeModel warm = dying;
+  dying.steady_dps_s = {};
+  constexpr double kWindow_s = 10.0;
+  const std::array<Case, 4> cases{{{"dying away", dying, 200.0, 1e-5},
+                                   {"warming up", warm, 200.0, 0.1},
+                                   {"alike", kAlike, 200.0, 0.1},
+                                   {"alike, in windows as they are", kAlike, kWindow_s, 0.03}}};
+  constexpr double kBiasSigma = 0.05;
+  for (const Case& which : cases) {
+    constexpr std::uint64_t kSeed = 9;
+    SCOPED_TRACE(::testing::Message() << which.name << ", seed " << kSeed);
+    Random random(kSeed);
+    DriftModel model;
+    model.walk_dps_rts = {2e-4, 5e-5};
+    model.slopes = which.slopes;
+    model.temperature_dps_k = {5e-3, 1e-2};
+    DriftFilter filter(model, Observables::Zero(), prior(kBiasSigma));
+    PlainSlopes plain(model, kBiasSigma);
+    constexpr std::array<double, 2> kWhite{1e-3, 2e-3};
+    for (int i = 0; i < 120; ++i) {
+      const double length =
+          i % 10 == 0 ? which.longest_s : random.uniform(0.05, std::min(which.longest_s, 20.0));
+      if (i % 4 == 1) {
+        const std::array<double, 2> away_k{random.uniform(-20.0, 40.0),
+                                           random.uniform(-20.0, 40.0)};
+        filter.set_temperature(away_k);
+        plain.set_temperature(away_k);
+      }
+      plain.pass(length);
+      if (i % 5 == 0) {
+        filter.predict(length);
+      } else if (i % 3 == 0) {
+        const DriftMeasurement measurement = stop(kWhite, length, random);
+        filter.update(length, measurement);
+        plain.learn(length, 1.0, 0.0, measurement.values(0), measurement.noise(0, 0));
+        plain.learn(length, 0.0, 1.0, measurement.values(1), measurement.noise(1, 1));
+      } else {
+        const DriftMeasurement measurement = difference(1, kWhite, length, random);
+        filter.update(length, measurement);
+        plain.learn(length, 1.0, -1.0, measurement.values(0), measurement.noise(0, 0));
+      }
+      expect_same(filter, plain, which.tolerance, i);
+      if (::testing::Test::HasFatalFailure()) return;
+    }
+  }
+}
+
+// A prediction in two halves is one of the whole, whatever a slope does.
+TEST(DriftFilter, PredictsTheSameInPieces) {
+  for (SlopeModel slopes : {kWarm, kAlike}) {
+    slopes.relative = 0.0;
+    DriftModel model;
+    model.walk_dps_rts = {2e-4, 5e-5};
+    model.slopes = slopes;
+    DriftFilter whole(model, Observables::Zero(), prior(0.05));
+    whole.set_slopes({1e-3, -2e-3}, Eigen::Matrix2d::Identity() * 1e-7);
+    DriftFilter pieces = whole;
+    whole.predict(1000.0);
+    for (int i = 0; i < 4000; ++i)
+      pieces.predict(0.25);
+    for (int k = 0; k < 2; ++k) {
+      EXPECT_NEAR(pieces.mean()(k) / whole.mean()(k), 1.0, 1e-9);
+      EXPECT_NEAR(pieces.covariance()(k, k) / whole.covariance()(k, k), 1.0, 1e-6);
+      EXPECT_NEAR(pieces.slopes().with_drift(k, k) / whole.slopes().with_drift(k, k), 1.0, 1e-6);
+    }
+    // ∫ r·exp(−t/τ): a slope that dies away moves its drift by r·τ in all.
+    const double all = slopes.tau_s * -std::expm1(-1000.0 / slopes.tau_s);
+    EXPECT_NEAR(whole.mean()(0), 1e-3 * all, 1e-12);
+    EXPECT_NEAR(whole.mean()(1), -2e-3 * all, 1e-12);
   }
 }
 

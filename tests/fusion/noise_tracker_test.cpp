@@ -25,6 +25,8 @@ class Pair {
   std::function<double(double)> rate = [](double /*t_s*/) { return 0.0; };
   std::array<double, 2> white;
   double shared_white = 0.0;  ///< noise that both have
+  std::array<double, 2> scale{1.0, 1.0};
+  double step_dps = 0.0;  ///< to which both values are rounded
   std::array<double, 2> noise_gain{1.0, 1.0};
 
   template <class Use>
@@ -33,7 +35,8 @@ class Pair {
       const double shared = random_.normal(shared_white * std::sqrt(rate_hz_));
       std::array<double, 2> y{};
       for (std::size_t k = 0; k < 2; ++k)
-        y[k] = rate(t_s_) + shared + random_.normal(white[k] * std::sqrt(rate_hz_ * noise_gain[k]));
+        y[k] = rounded(scale[k] * rate(t_s_) + shared +
+                       random_.normal(white[k] * std::sqrt(rate_hz_ * noise_gain[k])));
       if (cells_.add(t_s_, y, noise_gain, Present::kBoth)) use(cells_.last());
     }
   }
@@ -46,6 +49,10 @@ class Pair {
   }
 
  private:
+  [[nodiscard]] double rounded(double value) const {
+    return step_dps > 0.0 ? step_dps * std::round(value / step_dps) : value;
+  }
+
   double rate_hz_;
   Random random_;
   CellBuilder cells_;
@@ -178,6 +185,127 @@ TEST(NoiseTracker, FindsNoRiseWhereThePlatformOnlyTurns) {
     EXPECT_FALSE(tracker.noisy(0) || tracker.noisy(1)) << block.from_s << " s, seed " << kSeed;
     EXPECT_LT(tracker.density()[0], 4.0 * usual) << block.from_s << " s, seed " << kSeed;
   });
+}
+
+// --- coarse values -------------------------------------------------------------------------------
+
+/// Mean square by which the mean of round(x + noise) is off, in units of the step: 40 places of x
+/// between two steps, drawn.
+double rounding_by_chance(double noise, Random& random) {
+  constexpr int kPlaces = 40;
+  constexpr int kDraws = 20'000;
+  double square = 0.0;
+  for (int place = 0; place < kPlaces; ++place) {
+    const double x = (place + 0.5) / kPlaces;
+    double mean = 0.0;
+    double squares = 0.0;
+    for (int i = 0; i < kDraws; ++i) {
+      const double away = std::round(x + random.normal(noise)) - x;
+      mean += away / kDraws;
+      squares += away * away / kDraws;
+    }
+    // The draws' own variance falls out.
+    square += (mean * mean - (squares - mean * mean) / (kDraws - 1)) / kPlaces;
+  }
+  return square;
+}
+
+// Never less than it is, and no more than twice as much where it matters at all: one term of a
+// series stands for all of it.
+TEST(NoiseTracker, KnowsHowFarRoundingPutsAMeanOff) {
+  constexpr double kStep_dps = 0.1;
+  constexpr std::uint64_t kSeed = 21;
+  Random random(kSeed);
+  NoiseTracker tracker({});
+  for (const double noise : {0.0, 0.05, 0.1, 0.2, 0.3, 0.4}) {
+    const double truth = squared(kStep_dps) * rounding_by_chance(noise, random);
+    for (std::size_t gyro = 0; gyro < 2; ++gyro)
+      tracker.set_resolution(gyro, kStep_dps);
+    const double sample = squared(kStep_dps) * (squared(noise) + 1.0 / 12.0);
+    tracker.resume({sample / kRate_hz, 0.0, sample / kRate_hz}, {sample, sample});
+    // What the draws leave: the square of a mean's standard error.
+    const double chance = squared(kStep_dps) * 4.0 * 0.35 / 20'000;
+    for (std::size_t gyro = 0; gyro < 2; ++gyro) {
+      EXPECT_GT(tracker.rounding_variance(gyro), 0.97 * truth - chance)
+          << noise << " steps of noise, seed " << kSeed;
+      EXPECT_LT(tracker.rounding_variance(gyro), 2.0 * truth + chance)
+          << noise << " steps of noise, seed " << kSeed;
+    }
+  }
+  NoiseTracker fine({});
+  fine.resume({1e-6, 0.0, 1e-6}, {5e-5, 5e-5});
+  EXPECT_EQ(fine.rounding_variance(0), 0.0) << "no step is known";
+}
+
+// Both step at the same instants, by as much: what is left to each is nothing, or a rounding error
+// below it. No number of it may become a NaN, or a noise of nothing.
+TEST(NoiseTracker, StaysFiniteWhereBothStepAlike) {
+  for (const double step_dps : {1e-3, 0.1, 1.0 / 3.0}) {
+    constexpr std::uint64_t kSeed = 22;
+    SCOPED_TRACE(::testing::Message() << step_dps << ", seed " << kSeed);
+    Pair pair({0.0, 0.0}, kSeed);
+    pair.step_dps = step_dps;
+    pair.rate = [](double t_s) { return 3.0 * std::sin(0.7 * t_s) + 1e4; };
+    NoiseTracker tracker({});
+    pair.measure(tracker, 60.0, true);
+    for (int i = 0; i < 2; ++i) {
+      pair.run(300.0, [&](const Block& block) {
+        tracker.watch(block);
+        for (std::size_t k = 0; k < 3; ++k) {
+          ASSERT_TRUE(std::isfinite(tracker.density()[k])) << block.from_s;
+          ASSERT_TRUE(std::isfinite(tracker.sample_variance()[k])) << block.from_s;
+        }
+        ASSERT_GT(tracker.density()[0], 0.0);
+        ASSERT_GT(tracker.density()[2], 0.0);
+        ASSERT_GT(tracker.sample_variance()[0], 0.0);
+        ASSERT_GT(tracker.sample_variance()[2], 0.0);
+      });
+      for (std::size_t gyro = 0; gyro < 2; ++gyro)
+        tracker.set_resolution(gyro, step_dps);
+      pair.measure(tracker, 60.0, true);
+    }
+  }
+}
+
+// Scale factors differ, and the platform sways: what the louder one has in common with the other is
+// more than all of the other's own. Neither is left without noise.
+TEST(NoiseTracker, LeavesNoGyroWithoutNoiseWhereScalesDifferAndThePlatformSways) {
+  for (const double scale : {0.9, 0.98, 1.02, 1.1}) {
+    for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+      SCOPED_TRACE(::testing::Message() << scale << ", seed " << seed);
+      Pair pair({1e-3, 3e-3}, seed);
+      pair.scale = {1.0, scale};
+      pair.rate = [](double t_s) { return 0.5 * std::sin(8.0 * t_s) + 0.3 * std::sin(3.0 * t_s); };
+      for (const bool told : {false, true}) {
+        NoiseTracker tracker({});
+        pair.measure(tracker, 120.0, told);
+        // A twentieth of what both differ by is the least that is left to each.
+        EXPECT_GT(tracker.density()[0], 0.04 * (1e-6 + 9e-6)) << told;
+        EXPECT_GT(tracker.density()[2], 0.04 * (1e-6 + 9e-6)) << told;
+        EXPECT_GT(tracker.sample_variance()[0], 0.04 * (1e-6 + 9e-6) * kRate_hz) << told;
+        EXPECT_GT(tracker.sample_variance()[2], 0.04 * (1e-6 + 9e-6) * kRate_hz) << told;
+      }
+    }
+  }
+}
+
+// A block of a rest like any other is usual, but for one in ten thousand; people who get in are
+// not.
+TEST(NoiseTracker, KnowsAnUnusualBlock) {
+  constexpr std::uint64_t kSeed = 23;
+  Pair pair({1e-3, 3e-3}, kSeed);
+  NoiseTracker tracker({});
+  pair.measure(tracker, 300.0);
+  int unusual = 0;
+  int blocks = 0;
+  pair.run(3600.0, [&](const Block& block) {
+    unusual += tracker.usual(block) ? 0 : 1;
+    ++blocks;
+  });
+  EXPECT_LT(unusual, blocks / 100) << "seed " << kSeed;
+  pair.rate = [](double t_s) { return 0.1 * std::sin(40.0 * t_s); };
+  pair.run(1.0, [](const Block& /*of both*/) {});
+  pair.run(60.0, [&](const Block& block) { EXPECT_FALSE(tracker.usual(block)) << block.from_s; });
 }
 
 }  // namespace

@@ -131,6 +131,51 @@ TEST(OptimalFaults, BridgeADropOutOfEitherGyro) {
   }
 }
 
+// --- a blind gyro --------------------------------------------------------------------------------
+
+// One gyro feels no rotation any more: it is named, the other one carries the rate, and what its
+// drift is known to is said of that one. Where it is the only one that is left, nothing is usable.
+TEST(OptimalFaults, NameABlindGyroAndDoWithoutIt) {
+  for (std::size_t bad = 0; bad < 2; ++bad) {
+    for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+      SCOPED_TRACE(::testing::Message() << "gyro " << bad + 1 << ", seed " << seed);
+      OptimalRun run(kGyros, 50.0, seed, {});
+      run.calibrate();
+      drive(run, 120.0, winding);
+      EXPECT_FALSE(run.corrector->condition().blind[0] || run.corrector->condition().blind[1]);
+      run.world.gyros_[bad].blind = true;
+      drive(run, 15.0, winding);
+      EXPECT_TRUE(run.corrector->condition().blind[bad]);
+      EXPECT_FALSE(run.corrector->condition().blind[1 - bad]);
+      EXPECT_TRUE(run.corrector->condition().disagree);
+      const Stretch after = drive(run, 60.0, winding);
+      EXPECT_LT(after.rate_square, 1.3);
+      // A gyro alone at 50 Hz, and a share of 0.05 % of the blind one's at up to 25 deg/s.
+      EXPECT_LT(after.rate_rms_dps,
+                1.2 * std::hypot(kGyros[1 - bad].white * std::sqrt(50.0), 0.0125));
+      const Use only = bad == 0 ? Use::kGyro1 : Use::kGyro2;
+      EXPECT_FALSE(run.step(winding, false, only).virtual_rate.usable);
+      const Use other = bad == 0 ? Use::kGyro2 : Use::kGyro1;
+      EXPECT_TRUE(run.step(winding, false, other).virtual_rate.usable);
+    }
+  }
+}
+
+// What goes off the virtual rate is the drift of the gyro that it rests on, and so is σ of the
+// drift: with the noisier and faster drifting one left, it is that one's.
+TEST(OptimalFaults, SayTheDriftsSigmaOfTheGyroThatTheRateRestsOn) {
+  constexpr std::uint64_t kSeed = 4;
+  const Gyros gyros{world::Gyro{1e-3, 1e-5, 0.05}, world::Gyro{2e-3, 3e-4, -0.1}};
+  OptimalRun run(gyros, 50.0, kSeed, told(gyros));
+  run.calibrate();
+  drive(run, 120.0, winding);
+  run.world.gyros_[0].blind = true;
+  const Step step = drive(run, 60.0, winding).last;
+  ASSERT_TRUE(run.corrector->condition().blind[0]);
+  // Within the minute that gyro 2 has been alone its walk has brought at least half of this.
+  EXPECT_GT(step.bias_sigma_dps, 0.5 * gyros[1].walk * std::sqrt(60.0)) << "seed " << kSeed;
+}
+
 // --- noise ---------------------------------------------------------------------------------------
 
 // Ten times the noise of the better gyro: it is named, and the other one carries the rate.
@@ -179,26 +224,118 @@ TEST(OptimalMemory, GoesOnWhereItEnded) {
   EXPECT_NEAR(is.bias_sigma_dps / was.bias_sigma_dps, 1.0, 0.02) << "seed " << kSeed;
 }
 
-// σ² grows by K² a second, and by what a sensor takes on when it is switched off and on.
+// σ² grows by K² a second, and by what a sensor takes on when it is switched off and on. That holds
+// for a memory that is sure of a walk; one that thinks slopes possible grows faster, never slower.
 TEST(OptimalMemory, AgesWithTheDrift) {
   OptimalRun run(kGyros, kRate_hz, 62, told(kGyros));
   run.calibrate();
   const auto memory = run.corrector->memory(run.world.now_s());
   ASSERT_TRUE(memory);
-  const auto variances = [&](double age_s) -> std::array<double, 3> {
+  const auto variances = [&](double age_s, bool only_walks) -> std::array<double, 3> {
+    DriftMemory kept = *memory;
+    if (only_walks) kept.kind_weight = {1.0, 0.0, 0.0, 0.0, 0.0};
     const auto resumed = make_optimal_corrector(told(kGyros));
-    EXPECT_TRUE(resumed->resume(*memory, age_s, 0.0));
+    EXPECT_TRUE(resumed->resume(kept, age_s, 0.0));
     return resumed->memory(0.0)->bias_covariance;
   };
-  const auto fresh = variances(0.0);
-  const auto hour = variances(3600.0);
-  const auto day = variances(86'400.0);
+  const auto fresh = variances(0.0, true);
+  const auto hour = variances(3600.0, true);
+  const auto day = variances(86'400.0, true);
+  const auto day_of_any = variances(86'400.0, false);
   for (std::size_t k = 0; k < 2; ++k) {
     const double walk = kGyros[k].walk * kGyros[k].walk;
-    EXPECT_NEAR(fresh[2 * k], memory->bias_covariance[2 * k], 1e-12 * fresh[2 * k]);
+    EXPECT_NEAR(fresh[2 * k], memory->bias_covariance[2 * k], 1e-9 * fresh[2 * k]);
     EXPECT_NEAR((day[2 * k] - hour[2 * k]) / (walk * 82'800.0), 1.0, 1e-6);
+    EXPECT_GT(day_of_any[2 * k], day[2 * k]);
     const double run_to_run = hour[2 * k] - fresh[2 * k] - walk * 3600.0;
     EXPECT_GT(run_to_run, kGyros[k].white * kGyros[k].white) << "off is more than waiting";
+  }
+}
+
+OptimalSettings learning_temperature() {
+  OptimalSettings settings;
+  settings.gyros[0].learns_temperature = settings.gyros[1].learns_temperature = true;
+  return settings;
+}
+/// Of a pair that drifts at a slope, of which nothing is told, after some stops.
+DriftMemory learned_memory(std::uint64_t seed, double ramp_dps_s, Drift& was, double& now_s) {
+  Gyros gyros = kGyros;
+  gyros[0].ramp_dps_s = ramp_dps_s;
+  OptimalRun run(gyros, kRate_hz, seed, learning_temperature());
+  run.corrector->set_temperature({20.0, 25.0});
+  run.calibrate(120.0);
+  for (int stop = 0; stop < 3; ++stop) {
+    run.corrector->set_temperature({21.0 + stop, 25.0 - stop});
+    drive(run, 60.0, swaying);
+    drive(run, 30.2, at_rest);
+  }
+  drive(run, 5.2, swaying);
+  now_s = run.world.now_s();
+  was = run.corrector->drift(now_s);
+  return *run.corrector->memory(now_s);
+}
+
+// Whatever has been learned, of slopes and of temperatures as well, is there again.
+TEST(OptimalMemory, KeepsSlopesAndTemperatureCoefficients) {
+  for (const double ramp_dps_s : {0.0, 5e-5, 3e-4}) {
+    for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+      SCOPED_TRACE(::testing::Message() << ramp_dps_s << " deg/s², seed " << seed);
+      Drift was;
+      double now_s = 0.0;
+      const DriftMemory memory = learned_memory(seed, ramp_dps_s, was, now_s);
+      const auto resumed = make_optimal_corrector(learning_temperature());
+      resumed->set_temperature(memory.temperature_c);
+      ASSERT_TRUE(resumed->resume(memory, 0.0, now_s));
+      const DriftMemory again = *resumed->memory(now_s);
+      for (std::size_t k = 0; k < 2; ++k) {
+        EXPECT_NEAR(again.bias_dps[k], memory.bias_dps[k], 1e-9) << k;
+        EXPECT_NEAR(std::sqrt(again.bias_covariance[2 * k] / memory.bias_covariance[2 * k]), 1.0,
+                    0.05)
+            << k;
+        EXPECT_NEAR(again.slope_dps_s[k], memory.slope_dps_s[k], 0.1 * memory.slope_sigma_dps_s[k])
+            << k;
+        EXPECT_NEAR(again.slope_sigma_dps_s[k] / memory.slope_sigma_dps_s[k], 1.0, 0.1) << k;
+        EXPECT_NEAR(again.coefficient_dps_k[k], memory.coefficient_dps_k[k],
+                    1e-9 + 0.05 * memory.coefficient_sigma_dps_k[k])
+            << k;
+        EXPECT_NEAR(again.coefficient_sigma_dps_k[k] / memory.coefficient_sigma_dps_k[k], 1.0, 0.05)
+            << k;
+        EXPECT_NEAR(again.temperature_c[k], memory.temperature_c[k], 1e-9) << k;
+      }
+      for (std::size_t kind = 0; kind < kDriftKinds; ++kind)
+        EXPECT_NEAR(again.kind_weight[kind], memory.kind_weight[kind], 1e-6) << kind;
+      EXPECT_NEAR(resumed->drift(now_s).bias_sigma_dps / was.bias_sigma_dps, 1.0, 0.05);
+    }
+  }
+}
+
+// A memory that an older program has left says nothing of slopes and temperatures: it is taken for
+// what it says.
+TEST(OptimalMemory, ReadsWhatOlderProgramsHaveKept) {
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    SCOPED_TRACE(seed);
+    Drift was;
+    double now_s = 0.0;
+    DriftMemory memory = learned_memory(seed, 0.0, was, now_s);
+    const DriftMemory none;
+    memory.kind_weight = none.kind_weight;
+    memory.slope_dps_s = none.slope_dps_s;
+    memory.slope_sigma_dps_s = none.slope_sigma_dps_s;
+    memory.coefficient_dps_k = none.coefficient_dps_k;
+    memory.coefficient_sigma_dps_k = none.coefficient_sigma_dps_k;
+    memory.temperature_c = none.temperature_c;
+    memory.has_temperature = none.has_temperature;
+    const auto resumed = make_optimal_corrector(learning_temperature());
+    ASSERT_TRUE(resumed->resume(memory, 0.0, now_s));
+    const DriftMemory again = *resumed->memory(now_s);
+    for (std::size_t k = 0; k < 2; ++k) {
+      EXPECT_NEAR(again.bias_dps[k], memory.bias_dps[k], 1e-9) << k;
+      EXPECT_NEAR(std::sqrt(again.bias_covariance[2 * k] / memory.bias_covariance[2 * k]), 1.0,
+                  1e-6)
+          << k;
+    }
+    const VirtualRate rate = resumed->update({now_s + 0.05, {0.3, 0.1}});
+    EXPECT_TRUE(std::isfinite(rate.rate_dps) && rate.sigma_dps > 0.0);
   }
 }
 
@@ -231,6 +368,14 @@ TEST(OptimalMemory, RefusesWhatCannotBe) {
       {"skew sigma NaN", [](DriftMemory& m) { m.skew_sigma_s = kNan; }},
       {"weight NaN", [](DriftMemory& m) { m.walk_weight[5] = kNan; }},
       {"weight negative", [](DriftMemory& m) { m.walk_weight[5] = -1.0; }},
+      {"kind NaN", [](DriftMemory& m) { m.kind_weight[1] = kNan; }},
+      {"kind negative", [](DriftMemory& m) { m.kind_weight[1] = -0.5; }},
+      {"slope NaN", [](DriftMemory& m) { m.slope_dps_s[0] = kNan; }},
+      {"slope sigma infinite", [](DriftMemory& m) { m.slope_sigma_dps_s[1] = kInfinity; }},
+      {"slope sigma negative", [](DriftMemory& m) { m.slope_sigma_dps_s[1] = -1e-6; }},
+      {"coefficient NaN", [](DriftMemory& m) { m.coefficient_dps_k[0] = kNan; }},
+      {"coefficient sigma negative", [](DriftMemory& m) { m.coefficient_sigma_dps_k[0] = -1e-3; }},
+      {"temperature infinite", [](DriftMemory& m) { m.temperature_c[0] = kInfinity; }},
   };
   for (const auto& [name, spoil] : spoils) {
     DriftMemory memory = *good;

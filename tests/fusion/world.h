@@ -20,6 +20,11 @@ struct Gyro {
   double bias = 0.0;   ///< deg/s
   double scale = 0.0;
   double delay_s = 0.0;
+  double ramp_dps_s = 0.0;  ///< slope of the bias, from the beginning on
+  double warm_dps = 0.0;    ///< of the bias at the beginning, dying away …
+  double warm_tau_s = 1.0;  ///< … with this time
+  double step_dps = 0.0;    ///< its values are multiples of this
+  bool blind = false;       ///< it feels no rotation
 };
 
 struct Instant {
@@ -45,9 +50,13 @@ class World {
     for (std::size_t k = 0; k < 2; ++k) {
       const Gyro& gyro = gyros_[k];
       bias_[k] += gyro.walk * std::sqrt(step_s_) * normal_(random_);
-      now.bias_dps[k] = bias_[k];
-      now.reading_dps[k] = rate(now.t_s - gyro.delay_s) * (1.0 + gyro.scale) + bias_[k] +
-                           gyro.white / std::sqrt(step_s_) * normal_(random_);
+      now.bias_dps[k] = bias_[k] + gyro.ramp_dps_s * now.t_s +
+                        gyro.warm_dps * std::exp(-now.t_s / gyro.warm_tau_s);
+      const double felt = gyro.blind ? 0.0 : rate(now.t_s - gyro.delay_s) * (1.0 + gyro.scale);
+      const double value =
+          felt + now.bias_dps[k] + gyro.white / std::sqrt(step_s_) * normal_(random_);
+      now.reading_dps[k] =
+          gyro.step_dps > 0.0 ? gyro.step_dps * std::round(value / gyro.step_dps) : value;
     }
     return now;
   }
