@@ -72,31 +72,34 @@ class CalibrationBlocks {
 };
 
 inline double CalibrationBlocks::sway_variance(const Symmetric& density) const {
-  if (count_ < 6) return 0.0;
   // The level of the quieter gyro counts most; noise alone scatters it by N_v²/length.
   const double sum = density[0] + density[2] - 2.0 * density[1];
   const double first = sum > 0.0 ? (density[2] - density[1]) / sum : 0.5;
   const std::array<double, 2> weight{first, 1.0 - first};
-  double squares = 0.0;
-  double noise = 0.0;
-  // Second differences: a level and a slope fall out. Of blocks two apart, so that what sways slowly
-  // is seen as well.
-  constexpr std::size_t kApart = 2;
   const auto level = [&](std::size_t i) {
     return weight[0] * means_[i].excess_dps[0] + weight[1] * means_[i].excess_dps[1];
   };
-  double terms = 0.0;
-  for (std::size_t i = 2 * kApart; i < count_; ++i, terms += 1.0) {
-    squares += squared(level(i) - 2.0 * level(i - kApart) + level(i - 2 * kApart)) / 6.0;
-    noise += weighted(weight, density) / means_[i].length_s;
-  }
-  const double scatter = squares / terms;
-  const double expected = noise / terms;
+  // Second differences: a level and a slope fall out. Of blocks at several distances, for sway of
+  // one period does not show at each.
+  constexpr std::array<std::size_t, 6> kApart{1, 2, 3, 5, 8, 13};
   // A scatter that chance gives in one calibration of a thousand is still noise.
-  const double chance = 1.0 + 3.0 * std::sqrt(6.0 / terms);
-  if (scatter <= expected * chance) return 0.0;
+  constexpr double kChance = 4.0;
   constexpr double kAlikeBlocks = 4.0;
-  return (scatter - expected) * kAlikeBlocks;
+  double most = 0.0;
+  for (const std::size_t apart : kApart) {
+    double squares = 0.0;
+    double noise = 0.0;
+    double terms = 0.0;
+    for (std::size_t i = 2 * apart; i < count_; ++i, terms += 1.0) {
+      squares += squared(level(i) - 2.0 * level(i - apart) + level(i - 2 * apart)) / 6.0;
+      noise += weighted(weight, density) / means_[i].length_s;
+    }
+    if (terms < 4.0) break;
+    const double own_terms = std::max(terms / static_cast<double>(apart), 2.0);
+    if (squares <= noise * (1.0 + kChance * std::sqrt(6.0 / own_terms))) continue;
+    most = std::max(most, (squares - noise) / terms);
+  }
+  return kAlikeBlocks * most;
 }
 
 }  // namespace vgyro::fusion

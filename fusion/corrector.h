@@ -47,23 +47,23 @@ enum class Wheels : std::uint8_t { kUnknown, kStanding, kRolling };
 
 /// What may be the case, each with its probability.
 enum class Hypothesis : std::uint8_t {
-  kStanding,       ///< in a steady stretch: the platform stands
-  kTurning,        ///< in a steady stretch: it turns at a constant rate
-  kGyro1Stepped,   ///< its bias has jumped, and nothing has settled it yet
+  kStanding,      ///< in a steady stretch: the platform stands
+  kTurning,       ///< in a steady stretch: it turns at a constant rate
+  kGyro1Stepped,  ///< its bias has jumped, and nothing has settled it yet
   kGyro2Stepped,
-  kGyro1Blind,     ///< it feels no rotation
+  kGyro1Blind,  ///< it feels no rotation
   kGyro2Blind,
-  kWarmingUp,      ///< the biases have slopes that die away
-  kOwnSlopes,      ///< the biases have slopes that come and go, each its own
-  kAlikeSlopes     ///< the same, both alike
+  kWarmingUp,   ///< the biases have slopes that die away
+  kOwnSlopes,   ///< the biases have slopes that come and go, each its own
+  kAlikeSlopes  ///< the same, both alike
 };
 inline constexpr std::size_t kHypotheses = 9;
 
 /// What the method does at present, for people and for VG_Bias.
 struct Condition {
-  bool stopped = false;             ///< standing still: the common drift is being learned
-  bool ambiguous = false;           ///< two readings of the data are likely, and far apart
-  std::array<bool, 2> blind{};      ///< this gyro feels no rotation, as it seems
+  bool stopped = false;         ///< standing still: the common drift is being learned
+  bool ambiguous = false;       ///< two readings of the data are likely, and far apart
+  std::array<bool, 2> blind{};  ///< this gyro feels no rotation, as it seems
   std::array<double, kHypotheses> probability{};
   bool disagree = false;            ///< the gyros contradict each other; which is wrong is open
   std::array<bool, 2> noisy{};      ///< the noise of this gyro is far above what it was

@@ -463,16 +463,33 @@ void DriftBank::save(DriftMemory& memory) const {
   if (!walks_are_known) memory.walk_weight.fill(0.0);
   memory.kind_weight.fill(0.0);
   std::array<double, 2> coefficient_square{};
+  std::array<double, 2> slope_square{};
+  double sloping = 0.0;
   for (const Hypothesis& one : hypotheses_) {
     const double weight = std::exp(one.log_weight);
     memory.kind_weight[one.kind] += weight;
     if (!walks_are_known) memory.walk_weight[one.place] += weight;
+    // Slopes as they are if there are any; how likely that is, kind_weight says.
+    if (one.filter.has_slopes()) {
+      const DriftFilter::Slopes slopes = one.filter.slopes();
+      sloping += weight;
+      for (int gyro = 0; gyro < 2; ++gyro) {
+        const auto k = static_cast<std::size_t>(gyro);
+        memory.slope_dps_s[k] += weight * slopes.mean(gyro);
+        slope_square[k] += weight * (slopes.covariance(gyro, gyro) + squared(slopes.mean(gyro)));
+      }
+    }
     for (std::size_t gyro = 0; gyro < 2; ++gyro) {
       if (!has_reference_[gyro]) continue;
       const auto [mean, variance] = one.filter.coefficient(gyro);
       memory.coefficient_dps_k[gyro] += weight * mean;
       coefficient_square[gyro] += weight * (variance + mean * mean);
     }
+  }
+  for (std::size_t gyro = 0; gyro < 2 && sloping > kWeightMin; ++gyro) {
+    memory.slope_dps_s[gyro] /= sloping;
+    memory.slope_sigma_dps_s[gyro] =
+        std::sqrt(std::max(slope_square[gyro] / sloping - squared(memory.slope_dps_s[gyro]), 0.0));
   }
   for (std::size_t gyro = 0; gyro < 2; ++gyro) {
     if (!has_reference_[gyro]) continue;

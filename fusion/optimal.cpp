@@ -231,7 +231,7 @@ class OptimalCorrector final : public Corrector {
   // Blocks.
   void close_block(const Block& block);
   void judge_coherence(const Block& block);
-  [[nodiscard]] Present trusted(const Block& block) const;
+  [[nodiscard]] Present trusted(Present present) const;
   void learn_from(const Block& block, bool steady);
   bool has_jumped(const Block& block);
   bool is_step(double away_dps, double variance);
@@ -246,7 +246,7 @@ class OptimalCorrector final : public Corrector {
   void add_steady(const Block& block, Present present);
   void close_window();
   void learn_difference(double length_s);
-  void learn_steady(double length_s);
+  void learn_steady();
   [[nodiscard]] DriftMeasurement standing_measurement() const;
   [[nodiscard]] DriftMeasurement turning_measurement() const;
   [[nodiscard]] SteadyWindow steady_window();
@@ -452,9 +452,6 @@ std::optional<DriftMemory> OptimalCorrector::memory(double t_s) const {
   memory.scale_difference_sigma = std::sqrt(estimate_.covariance(kScale, kScale));
   memory.skew_s = estimate_.mean(kSkew);
   memory.skew_sigma_s = std::sqrt(estimate_.covariance(kSkew, kSkew));
-  memory.slope_dps_s = slope_;
-  memory.slope_sigma_dps_s = {std::sqrt(std::max(estimate_.slope_covariance(0, 0), 0.0)),
-                              std::sqrt(std::max(estimate_.slope_covariance(1, 1), 0.0))};
   memory.white_density = noise_.usual_density();
   memory.sample_variance = {noise_.usual_sample_variance()[0], noise_.usual_sample_variance()[2]};
   return memory;
@@ -466,6 +463,9 @@ void OptimalCorrector::run(double t_s) {
   held_count_ = 0;
   stop_length_s_ = kFirstStopWindow_s;
   window_.kind = Kind::kNothing;
+  run_ = Run::kMoving;
+  run_open_ = false;
+  has_before_ = false;
   detector_.reset();
   coherence_.clear();
   difference_.break_off();
@@ -479,7 +479,8 @@ void OptimalCorrector::run(double t_s) {
 VirtualRate OptimalCorrector::update(const RatePair& pair) {
   if (cells_.add(pair.t_s, pair.rate_dps, pair.noise_gain, Present::kBoth))
     close_block(cells_.last());
-  if (weights_for_ != Present::kBoth) set_weights(Present::kBoth);
+  const Present trusted_now = trusted(Present::kBoth);
+  if (weights_for_ != trusted_now) set_weights(trusted_now);
 
   const double first = (pair.rate_dps[0] - bias(0, pair.t_s)) * gain_[0];
   const double second = (pair.rate_dps[1] - bias(1, pair.t_s)) * gain_[1];
@@ -605,8 +606,8 @@ BlockLevel OptimalCorrector::level_of(const Block& block) const {
 }
 
 /// A gyro that is blind has no say.
-Present OptimalCorrector::trusted(const Block& block) const {
-  if (block.present != Present::kBoth) return block.present;
+Present OptimalCorrector::trusted(Present present) const {
+  if (present != Present::kBoth) return present;
   if (blind_[0] >= kBlind) return Present::kGyro2;
   return blind_[1] >= kBlind ? Present::kGyro1 : Present::kBoth;
 }
@@ -634,7 +635,7 @@ void OptimalCorrector::judge_coherence(const Block& block) {
 // A block is used when the next one has been judged: motion begins before it is seen.
 void OptimalCorrector::close_block(const Block& block) {
   judge_coherence(block);
-  const Present present = trusted(block);
+  const Present present = trusted(block.present);
   if (block.present == Present::kBoth && present != Present::kBoth && !blind_before_)
     forget_blind_time();
   blind_before_ = block.present == Present::kBoth && present != Present::kBoth;
@@ -665,7 +666,7 @@ void OptimalCorrector::close_block(const Block& block) {
 }
 
 void OptimalCorrector::learn_from(const Block& block, bool steady) {
-  const Present present = trusted(block);
+  const Present present = trusted(block.present);
   if (present == Present::kBoth && (coherence_.suspects() || has_jumped(block))) return;
   if (steady) {
     if (readings_.standing() > kDecided && detector_.sway_variance() == 0.0 &&
@@ -854,7 +855,7 @@ void OptimalCorrector::close_window() {
   window_.kind = Kind::kNothing;
   readings_.observe_at(mean_c);
   if (kind == Kind::kSteady) {
-    learn_steady(length);
+    learn_steady();
   } else {
     learn_difference(length);
   }
@@ -948,8 +949,7 @@ SteadyWindow OptimalCorrector::steady_window() {
   return steady;
 }
 
-void OptimalCorrector::learn_steady(double length_s) {
-  static_cast<void>(length_s);
+void OptimalCorrector::learn_steady() {
   const SteadyWindow window = steady_window();
   const bool contradicted = has_before_ && learned_until_s_ - contradicted_s_ <= kCalm_s;
   if (run_ == Run::kMoving && contradicted && window_.present == Present::kBoth)
@@ -1050,6 +1050,9 @@ void OptimalCorrector::begin_anew() {
   const double second = std::max(kRestartDoubt * estimate_.covariance(kBias2, kBias2), density[2]);
   readings_.begin({std::sqrt(density[0]), std::sqrt(density[2])}, bias_, {first, 0.0, second});
   run_ = Run::kMoving;
+  run_open_ = false;
+  has_before_ = false;
+  window_.kind = Kind::kNothing;
   estimate_ = readings_.estimate();
   slope_ = {0.0, 0.0};
   gain_ = {1.0, 1.0};

@@ -252,11 +252,13 @@ void Readings::begin_turn(Reading& reading, const SteadyWindow& window) {
 }
 
 // Log density of the next level, if the platform turns on.
-double Readings::follow_turn(Reading& reading, const SteadyWindow& window, double turn_dps) {
+double Readings::follow_turn(Reading& reading, const SteadyWindow& window, double turn_dps,
+                             double drift_growth) {
   std::array<double, kTurnKinds> log_density{};
   for (std::size_t i = 0; i < kTurnKinds; ++i) {
     SteadyTurn& turn = reading.turn[i];
-    const double walk = squared(kTurnWalk_dps_rts[i]) + squared(kTurnWalkShare_rts[i] * turn_dps);
+    const double walk =
+        squared(kTurnWalk_dps_rts[i]) + squared(kTurnWalkShare_rts[i] * turn_dps) + drift_growth;
     turn.variance += walk * window.length_s;
     const double away = window.level_dps - turn.level_dps;
     const double expected = turn.variance + window.level_variance;
@@ -285,7 +287,10 @@ void Readings::go_on_steady(const SteadyWindow& window) {
       one.log_weight += one.bank.learn(window.length_s, window.standing);
       continue;
     }
-    one.log_weight += window.log_turning + follow_turn(one, window, turn_dps);
+    // What both read drifts on while the platform turns.
+    const auto growth = one.bank.estimate().growth;
+    const double drift = weighted(window.weight, {growth[0], 0.0, growth[1]});
+    one.log_weight += window.log_turning + follow_turn(one, window, turn_dps, drift);
     if (window.turning.values.size() == 0) {
       one.bank.predict(window.length_s);
     } else {

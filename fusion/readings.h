@@ -122,7 +122,8 @@ class Readings {
   void stand(Reading& reading, const SteadyWindow& window);
   static bool surprise(Reading& reading, const SteadyWindow& window, const DriftEstimate& known);
   static void begin_turn(Reading& reading, const SteadyWindow& window);
-  static double follow_turn(Reading& reading, const SteadyWindow& window, double turn_dps);
+  static double follow_turn(Reading& reading, const SteadyWindow& window, double turn_dps,
+                            double drift_growth);
   void begin_steady(const SteadyWindow& window);
   void go_on_steady(const SteadyWindow& window);
   [[nodiscard]] double beyond_limits(const DriftEstimate& estimate) const;

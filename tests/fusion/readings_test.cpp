@@ -162,7 +162,8 @@ TEST(Readings, HaveProbabilitiesThatSumToOne) {
     world.move(100.0);
   }
   world.readings.split_step(0.05, 1e-6, 0.3);
-  EXPECT_NEAR(world.readings.stepped(0), 0.3, 1e-9);
+  // Of many readings the least likely are given up.
+  EXPECT_NEAR(world.readings.stepped(0), 0.3, 1e-3);
   EXPECT_NEAR(world.readings.stepped(0) + world.readings.stepped(1), 1.0, 1e-12);
 }
 
