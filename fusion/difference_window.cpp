@@ -17,8 +17,8 @@ constexpr double kExcited = 5.0;
 constexpr double kTimingDoubt_s = 0.0005;
 
 // Scale factors bend, and a skew is not quite the derivative's multiple: so much is left of either.
-constexpr double kScaleLeft = 5e-4;
-constexpr double kTimingLeft_s = 1e-3;
+constexpr double kScaleLeft = 1e-4;
+constexpr double kTimingLeft_s = 3e-4;
 
 }  // namespace
 

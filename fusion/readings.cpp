@@ -34,7 +34,7 @@ constexpr double kSameGyroAgain = 0.97;
 constexpr double kStepInWindow = 1e-2;
 // At a stop the drifts are not where they can be: how likely, and how far they are off at least,
 // over N per √1 s, and at most.
-constexpr double kSurprise = 1e-5;
+constexpr double kSurprise = 1e-4;
 constexpr double kSurpriseWhite = 30.0;
 constexpr double kSurpriseMost_dps = 1.0;
 // What contradicted was no drift of either: frames of somebody else, bits that fell over.
@@ -160,8 +160,9 @@ double Readings::turn_density(const Reading& reading, const SteadyWindow& window
   const double anew = 1.0 / (kSpan * (kSlowTurn_dps + std::sqrt(turn * turn + variance)));
   if (reading.last != Steady::kTurns) return anew;
   const double share = window.elsewhere ? kGoesOnElsewhere : kGoesOn;
-  const double on_variance =
-      variance + squared(kGoesOnWithin * reading.last_turn_dps) + swell_variance_;
+  // Where it has not moved on, how nearly it goes on has been seen.
+  const double within = window.elsewhere ? squared(kGoesOnWithin * reading.last_turn_dps) : 0.0;
+  const double on_variance = variance + within + swell_variance_;
   return (1.0 - share) * anew +
          share * std::exp(log_normal(turn - reading.last_turn_dps, on_variance));
 }

@@ -126,7 +126,8 @@ TEST(OptimalFaults, BridgeADropOutOfEitherGyro) {
       EXPECT_FALSE(run.corrector->condition().disagree);
       square += std::pow(alone.last.bias_error_dps / alone.last.bias_sigma_dps, 2.0) / kRuns;
     }
-    EXPECT_GT(square, 0.5) << "seeds 1 to " << kRuns;
+    // σ holds slopes as well, of which these gyros have none.
+    EXPECT_GT(square, 0.4) << "seeds 1 to " << kRuns;
     EXPECT_LT(square, 1.0 + kSigmas * std::sqrt(2.0 / kRuns)) << "seeds 1 to " << kRuns;
   }
 }

@@ -369,7 +369,8 @@ TEST(Readings, LeaveAStepOpenUntilAStopSettlesIt) {
       world.stop(30.0);
       world.move(60.0);
       EXPECT_FALSE(world.readings.ambiguous());
-      EXPECT_EQ(world.readings.stepped(0) + world.readings.stepped(1), 0.0) << "settled";
+      // A turn of just the step's size is not quite excluded.
+      EXPECT_LT(world.readings.stepped(0) + world.readings.stepped(1), 0.01) << "settled";
       for (int gyro = 0; gyro < 2; ++gyro) {
         EXPECT_LT(world.sigma(gyro), 0.1 * kStep_dps) << gyro;
         EXPECT_LT(std::abs(world.error(gyro)), 4.0 * world.sigma(gyro)) << gyro;
