@@ -155,6 +155,10 @@ std::uint32_t hex_number(std::string_view digits) {
   return value;
 }
 
+// asc2log of can-utils up to 2020.11 carries microseconds above a million into the seconds, but not
+// exactly a million, which it prints as it is. No writer of more than six digits writes seven.
+constexpr std::string_view kMissedCarry = "1000000";
+
 const char* parse_stamp(Cursor& at, LogRecord& record) {
   const std::string_view whole = at.digits();
   if (whole.empty() || whole.size() > 10) return "stamp: the seconds are no number";
@@ -163,7 +167,11 @@ const char* parse_stamp(Cursor& at, LogRecord& record) {
     seconds = seconds * 10 + (c - '0');
   if (seconds > kSecondsMax) return "stamp: beyond the year 2255";
   if (!at.skip('.')) return "stamp: no decimal point";
-  const std::string_view fraction = at.digits();
+  std::string_view fraction = at.digits();
+  if (fraction == kMissedCarry) {
+    ++seconds;
+    fraction = "000000";
+  }
   if (fraction.empty() || fraction.size() > 9) return "stamp: the fraction needs 1 to 9 digits";
   std::int64_t ns = 0;
   for (std::size_t i = 0; i < 9; ++i)

@@ -12,11 +12,17 @@ constexpr int kForwardIntervals = 3;
 constexpr int kIntervalShare = 8;
 // Even spacing: to a quarter.
 constexpr int kSpacingShare = 4;
+// Nobody records for longer, but computers without a battery begin in 1970 and are set later.
+constexpr Duration kClockWasSet = std::chrono::hours(24) * 365 * 10;
+// The end of the monotone axis, in 2261: no stamp of a log is later than 2255, and a stamp less
+// another one stays a number.
+constexpr TimePoint kEndOfTime = time_from_ns(9'200'000'000'000'000'000);
 
 }  // namespace
 
 StampGuard::Verdict StampGuard::check(std::size_t stream_index, TimePoint raw, TimePoint& time) {
   Stream& stream = streams_[stream_index];
+  if (!can_be_time(raw)) return Verdict::kUnconfirmed;
   time = raw + offset_;
   const Duration step = time - stream.last;
   if (stream.seen && step == Duration::zero()) return Verdict::kRepeated;
@@ -24,6 +30,10 @@ StampGuard::Verdict StampGuard::check(std::size_t stream_index, TimePoint raw, T
   if (!usual) return consider(stream_index, time);
   follow(stream, time);
   return Verdict::kAccepted;
+}
+
+bool StampGuard::can_be_time(TimePoint raw) const {
+  return raw >= TimePoint{} && raw <= kEndOfTime - std::max(offset_, Duration::zero());
 }
 
 Duration StampGuard::forward_most(const Stream& stream) {
@@ -50,7 +60,7 @@ bool StampGuard::confirm(Stream& stream, TimePoint time) {
   const bool first_spacing = stream.confirmations == 1;
   const bool even =
       since > Duration::zero() && since <= kSlowest &&
-      (first_spacing || std::chrono::abs(since - stream.spacing) * kSpacingShare <= stream.spacing);
+      (first_spacing || std::chrono::abs(since - stream.spacing) <= stream.spacing / kSpacingShare);
   if (stream.confirmations > 0 && (close_by || even)) {
     ++stream.confirmations;
     stream.close_by = stream.close_by && close_by;
@@ -74,12 +84,12 @@ StampGuard::Verdict StampGuard::consider(std::size_t stream_index, TimePoint& ti
   if (!confirm(stream, time)) return Verdict::kUnconfirmed;
   if (!stream.close_by) stream.interval = stream.spacing;
   stream.confirmations = 0;
-  if (time > stream.last) {
+  if (time > stream.last && time - stream.last < kClockWasSet) {
     stream.last = time;
     return Verdict::kAccepted;
   }
-  if (stream_index < kLeaders) return step_back(stream_index, time);
-  // It was ahead of the gyros, and has come back to them.
+  if (stream_index < kLeaders) return step_clock(stream_index, time);
+  // It was away from the gyros, and has come back to them.
   if (!near_a_leader(time)) return Verdict::kUnconfirmed;
   stream.last = time;
   return Verdict::kAccepted;
@@ -91,7 +101,7 @@ bool StampGuard::near_a_leader(TimePoint time) const {
   });
 }
 
-StampGuard::Verdict StampGuard::step_back(std::size_t stream_index, TimePoint& time) {
+StampGuard::Verdict StampGuard::step_clock(std::size_t stream_index, TimePoint& time) {
   Stream& stream = streams_[stream_index];
   TimePoint newest = stream.last;
   for (std::size_t leader = 0; leader < kLeaders; ++leader) {

@@ -3,8 +3,8 @@
 // Raw stamps in, monotone time out. Stamps come from a clock that may be set, and from frames that
 // may be garbage: one stamp far off its neighbours is refused; three in a row that agree with each
 // other are believed, or four of a slow stream at its own pace. Set back by more than the reorder
-// limit, the common offset takes it up, so that time as the estimation sees it never runs
-// backwards. One guard serves all streams of a host.
+// limit, or ahead by more than ten years, the common offset takes it up, so that time as the
+// estimation sees it never runs backwards. One guard serves all streams of a host.
 
 #include <array>
 #include <cstdint>
@@ -33,6 +33,8 @@ class StampGuard {
   /// kClockStep: accepted, and all streams' earlier samples are of the time before the step.
   Verdict check(std::size_t stream, TimePoint raw, TimePoint& time);
 
+  /// Neither before the epoch nor beyond what the monotone axis can hold.
+  [[nodiscard]] bool can_be_time(TimePoint raw) const;
   /// monotone = raw + offset
   [[nodiscard]] Duration offset() const { return offset_; }
   /// Between the stream's stamps of late; 0 before there were two.
@@ -52,7 +54,7 @@ class StampGuard {
   static void follow(Stream& stream, TimePoint time);
   static bool confirm(Stream& stream, TimePoint time);
   Verdict consider(std::size_t stream_index, TimePoint& time);
-  Verdict step_back(std::size_t stream_index, TimePoint& time);
+  Verdict step_clock(std::size_t stream_index, TimePoint& time);
   [[nodiscard]] bool near_a_leader(TimePoint time) const;
 
   std::array<Stream, kStreams> streams_;

@@ -40,10 +40,6 @@ constexpr int kTimeOutIntervalsMin = 3;
 constexpr Duration kBiasPeriod = std::chrono::milliseconds(100);
 constexpr Duration kBiasGrace = std::chrono::milliseconds(50);
 
-// A log's stamps end here; with the offset of clocks that were set back they must still fit 64
-// bits.
-constexpr TimePoint kTimeMax = time_from_ns(9'000'000'000'000'000'000);
-
 // A frame that comes so long after something was due follows a silence of the whole bus, or carries
 // a stamp of garbage.
 constexpr Duration kOverdueMax = std::chrono::seconds(30);
@@ -107,7 +103,6 @@ struct Pipeline::Impl {
 
   void let_time_pass(TimePoint stamp, FrameSink& sink);
   void do_what_is_due(TimePoint t, TimePoint stamp, FrameSink& sink);
-  [[nodiscard]] bool can_be_time(TimePoint stamp) const;
   void enter_state(TimePoint stamp, FrameSink& sink);
   [[nodiscard]] State present_state() const;
   [[nodiscard]] Duration usual_interval(std::size_t gyro) const;
@@ -197,7 +192,7 @@ void Pipeline::Impl::receive(can::BusIndex bus, const can::Frame& frame, TimePoi
     let_time_pass(stamp, sink);
     return;
   }
-  if (can_be_time(stamp)) surroundings.begin(whole_microseconds(stamp) + guard.offset());
+  if (guard.can_be_time(stamp)) surroundings.begin(whole_microseconds(stamp) + guard.offset());
   if ((roles & (kAccelerometer | kSpeed)) != 0) {
     receive_surroundings(roles, frame, stamp);
     let_time_pass(stamp, sink);
@@ -219,7 +214,7 @@ void Pipeline::Impl::receive_gyro(std::size_t gyro, const can::Frame& frame, Tim
     let_time_pass(stamp, sink);
     return;
   }
-  if (!can_be_time(stamp)) {
+  if (!guard.can_be_time(stamp)) {
     count(input.reject.value_or(Reject::kStampJump));
     return;
   }
@@ -274,7 +269,7 @@ double Pipeline::Impl::take_back(std::size_t gyro, TimePoint t, double reading_d
 
 void Pipeline::Impl::receive_surroundings(std::uint8_t roles, const can::Frame& frame,
                                           TimePoint stamp) {
-  const bool timely = can_be_time(stamp);
+  const bool timely = guard.can_be_time(stamp);
   const TimePoint raw = whole_microseconds(stamp);
   if ((roles & kAccelerometer) != 0) {
     ++status.accelerometer_frames;
@@ -318,7 +313,7 @@ void Pipeline::Impl::receive_reference(const can::Frame& frame, TimePoint stamp,
   ++status.reference_frames;
   double rate_dps = 0.0;
   TimePoint t;
-  const bool usable = can_be_time(stamp) && !reference_check.judge(frame) &&
+  const bool usable = guard.can_be_time(stamp) && !reference_check.judge(frame) &&
                       !decode_quantity(plan.reference->rate, frame, rate_dps);
   const auto verdict = usable ? guard.check(kReferenceStream, whole_microseconds(stamp), t)
                               : fusion::StampGuard::Verdict::kUnconfirmed;
@@ -574,14 +569,10 @@ bool Pipeline::Impl::single_is_wanted(std::size_t gyro, TimePoint t) const {
   return status.pairs > 0 || t - first_heard > kTimeOutMax;
 }
 
-bool Pipeline::Impl::can_be_time(TimePoint stamp) const {
-  return stamp >= TimePoint{} && stamp <= kTimeMax - guard.offset();
-}
-
 // Nobody has judged the stamp of a frame that is not a sample. Garbage far ahead would stop
 // time-outs and VG_Bias until then, so the next such frame must agree with it.
 void Pipeline::Impl::let_time_pass(TimePoint stamp, FrameSink& sink) {
-  if (!can_be_time(stamp)) return;
+  if (!guard.can_be_time(stamp)) return;
   const TimePoint t = whole_microseconds(stamp) + guard.offset();
   if (t < deadline) return;
   const bool far_ahead = reached != TimePoint{} && t - reached > kOverdueMax;
@@ -614,7 +605,7 @@ void Pipeline::Impl::do_what_is_due(TimePoint t, TimePoint stamp, FrameSink& sin
 }
 
 void Pipeline::Impl::advance(TimePoint now, FrameSink& sink) {
-  if (!can_be_time(now)) return;
+  if (!guard.can_be_time(now)) return;
   const TimePoint t = whole_microseconds(now) + guard.offset();
   if (t >= deadline) do_what_is_due(t, now, sink);
 }

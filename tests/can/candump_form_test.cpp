@@ -226,6 +226,15 @@ TEST(CandumpForm, TellsWhatIsWrongWithAStamp) {
   EXPECT_EQ(why_malformed("(1.5e3) can0 123#"), "stamp: no closing parenthesis");
 }
 
+// asc2log of can-utils 2020.11, which Debian 12 has, prints a whole million of microseconds where
+// two stamps add up to exactly that: taken for a fraction, the line would be 0.9 s too early.
+TEST(CandumpForm, CarriesAMillionMicrosecondsIntoTheNextSecond) {
+  EXPECT_EQ(parse("(1795884748.1000000) can0 123#01 R").record.stamp,
+            parse("(1795884749.000000) can0 123#01 R").record.stamp);
+  EXPECT_EQ(parse("(1795884748.1000000) can0 123#01 R").record.fraction_digits, 6);
+  EXPECT_EQ(parse("(1.1000001) can0 123#01").record.stamp, time_from_ns(1'100'000'100));
+}
+
 // A line that lost its interface shifts everything; the frame must not become the name.
 TEST(CandumpForm, TellsWhatIsWrongWithAnInterface) {
   EXPECT_EQ(why_malformed("(1.5)"), "no interface name");

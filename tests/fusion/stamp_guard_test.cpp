@@ -108,6 +108,43 @@ TEST(StampGuard, RefusesOutliersThatLieFarApart) {
   EXPECT_EQ(check(guard, 0, 1010ms).since_start, 1010ms);
 }
 
+// Centuries lie between the stamps that a damaged log may hold, and nothing overflows between them
+// (the sanitizers would say so); good stamps are taken again behind any of it.
+TEST(StampGuard, SurvivesEveryStampThatALogMayHold) {
+  constexpr TimePoint kEarliest = time_from_ns(0);
+  constexpr TimePoint kLatest = time_from_ns(9'000'000'000'000'000'000);
+  StampGuard guard = running_until(1s);
+  TimePoint t;
+  for (int turn = 0; turn < 5; ++turn) {
+    for (const TimePoint base : {kLatest, kEarliest}) {
+      for (int i = 0; i < 4; ++i)
+        guard.check(static_cast<std::size_t>(turn % 2), base + i * 10ms, t);
+    }
+    guard.check(0, kLatest, t);
+    guard.check(0, kEarliest, t);
+  }
+  for (int i = 1; i <= 200; ++i)
+    guard.check(0, kStart + i * 10ms, t);
+  EXPECT_EQ(guard.check(0, kStart + 2010ms, t), Verdict::kAccepted);
+}
+
+// A computer without a battery begins in 1970; once its clock is right, half a century has not
+// passed, and what is known of the biases still holds.
+TEST(StampGuard, TakesDecadesForAClockThatWasSet) {
+  StampGuard guard;
+  TimePoint t;
+  for (int i = 0; i <= 100; ++i) {
+    guard.check(0, time_from_ns(0) + i * 10ms, t);
+    guard.check(1, time_from_ns(0) + i * 10ms, t);
+  }
+  for (int i = 0; i < 2; ++i)
+    EXPECT_EQ(guard.check(0, kStart + i * 10ms, t), Verdict::kUnconfirmed);
+  EXPECT_EQ(guard.check(0, kStart + 20ms, t), Verdict::kClockStep);
+  EXPECT_EQ(t, time_from_ns(0) + 1s + 1us);
+  EXPECT_EQ(guard.check(1, kStart + 30ms, t), Verdict::kAccepted);
+  EXPECT_EQ(t, time_from_ns(0) + 1s + 10ms + 1us);
+}
+
 // A silent bus comes back after minutes: the third stamp is believed, and time goes on as it says.
 TEST(StampGuard, BelievesThreeAgreeingStampsBehindALongGap) {
   StampGuard guard = running_until(1s);
