@@ -27,6 +27,13 @@ constexpr TimePoint time_from_ns(std::int64_t ns) {
 constexpr std::int64_t to_ns(TimePoint t) {
   return t.time_since_epoch().count();
 }
+/// `later` less `earlier`, at the ends of 64 bits instead of beyond them: a clock that was set, or
+/// a damaged stamp, may lie centuries off.
+constexpr Duration span(TimePoint earlier, TimePoint later) {
+  std::int64_t ns = 0;
+  if (!__builtin_sub_overflow(to_ns(later), to_ns(earlier), &ns)) return Duration{ns};
+  return later < earlier ? -Duration::max() : Duration::max();
+}
 constexpr double to_seconds(Duration d) {
   return static_cast<double>(d.count()) * 1e-9;
 }

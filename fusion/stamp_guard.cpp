@@ -24,7 +24,7 @@ StampGuard::Verdict StampGuard::check(std::size_t stream_index, TimePoint raw, T
   Stream& stream = streams_[stream_index];
   if (!can_be_time(raw)) return Verdict::kUnconfirmed;
   time = raw + offset_;
-  const Duration step = time - stream.last;
+  const Duration step = span(stream.last, time);
   if (stream.seen && step == Duration::zero()) return Verdict::kRepeated;
   const bool usual = !stream.seen || (step > -kReorderMax && step <= forward_most(stream));
   if (!usual) return consider(stream_index, time);
@@ -41,7 +41,7 @@ Duration StampGuard::forward_most(const Stream& stream) {
 }
 
 void StampGuard::follow(Stream& stream, TimePoint time) {
-  const Duration step = time - stream.last;
+  const Duration step = span(stream.last, time);
   if (stream.seen && step > Duration::zero()) {
     stream.interval =
         stream.interval == Duration::zero()
@@ -55,7 +55,7 @@ void StampGuard::follow(Stream& stream, TimePoint time) {
 
 // One more stamp that is far from the last one: do they agree by now?
 bool StampGuard::confirm(Stream& stream, TimePoint time) {
-  const Duration since = time - stream.candidate;
+  const Duration since = span(stream.candidate, time);
   const bool close_by = since > Duration::zero() && since <= kConfirmWithin;
   const bool first_spacing = stream.confirmations == 1;
   const bool even =
@@ -69,7 +69,7 @@ bool StampGuard::confirm(Stream& stream, TimePoint time) {
     stream.close_by = true;
   }
   stream.candidate = time;
-  stream.spacing = since;
+  stream.spacing = std::clamp<Duration>(since, -kSlowest, 2 * kSlowest);  // beyond, even to none
   return stream.confirmations >= (stream.close_by ? kConfirmations : kSlowConfirmations);
 }
 
@@ -78,13 +78,13 @@ StampGuard::Verdict StampGuard::consider(std::size_t stream_index, TimePoint& ti
   if (stream.confirmations > 0) {
     // The same frame again, or one that was overtaken, neither confirms nor contradicts.
     if (time == stream.candidate) return Verdict::kRepeated;
-    const bool overtaken = time < stream.candidate && stream.candidate - time < kReorderMax;
+    const bool overtaken = time < stream.candidate && span(time, stream.candidate) < kReorderMax;
     if (overtaken) return Verdict::kUnconfirmed;
   }
   if (!confirm(stream, time)) return Verdict::kUnconfirmed;
   if (!stream.close_by) stream.interval = stream.spacing;
   stream.confirmations = 0;
-  if (time > stream.last && time - stream.last < kClockWasSet) {
+  if (time > stream.last && span(stream.last, time) < kClockWasSet) {
     stream.last = time;
     return Verdict::kAccepted;
   }
@@ -97,7 +97,7 @@ StampGuard::Verdict StampGuard::consider(std::size_t stream_index, TimePoint& ti
 
 bool StampGuard::near_a_leader(TimePoint time) const {
   return std::any_of(streams_.begin(), streams_.begin() + kLeaders, [&](const Stream& leader) {
-    return leader.seen && std::chrono::abs(time - leader.last) <= forward_most(leader);
+    return leader.seen && std::chrono::abs(span(leader.last, time)) <= forward_most(leader);
   });
 }
 
@@ -108,9 +108,10 @@ StampGuard::Verdict StampGuard::step_clock(std::size_t stream_index, TimePoint& 
     if (streams_[leader].seen) newest = std::max(newest, streams_[leader].last);
   }
   // Nobody knows how long the step took; one microsecond keeps the order.
-  const Duration shift = newest + std::chrono::microseconds(1) - time;
-  offset_ += shift;
-  time += shift;
+  const TimePoint next = newest + std::chrono::microseconds(1);
+  const TimePoint raw = time - offset_;
+  offset_ = next - raw;
+  time = next;
   for (Stream& other : streams_) {
     other.confirmations = 0;
     if (other.seen) other.last = newest;

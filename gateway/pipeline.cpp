@@ -575,8 +575,8 @@ void Pipeline::Impl::let_time_pass(TimePoint stamp, FrameSink& sink) {
   if (!guard.can_be_time(stamp)) return;
   const TimePoint t = whole_microseconds(stamp) + guard.offset();
   if (t < deadline) return;
-  const bool far_ahead = reached != TimePoint{} && t - reached > kOverdueMax;
-  const bool confirmed = t >= suspect && t - suspect <= kOverdueMax;
+  const bool far_ahead = reached != TimePoint{} && span(reached, t) > kOverdueMax;
+  const bool confirmed = t >= suspect && span(suspect, t) <= kOverdueMax;
   suspect = far_ahead ? t : TimePoint{};
   if (!far_ahead || confirmed) do_what_is_due(t, stamp, sink);
 }

@@ -47,7 +47,7 @@ void Surroundings::reach(TimePoint t) {
     set_zero(t);
     return;
   }
-  const Duration step = t - newest_;
+  const Duration step = span(newest_, t);
   if (step <= Duration::zero()) return;
   newest_ = t;
   if (step <= kLeap) return;
