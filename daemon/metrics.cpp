@@ -104,14 +104,13 @@ void add_counters(Text& text, const Snapshot& now) {
   text.family("vgyro_rates_total", "counter", "VG_Rate frames made, by whether they were valid.");
   text.sample({{"valid", "yes"}}, status.rates_out_valid);
   text.sample({{"valid", "no"}}, status.rates_out - status.rates_out_valid);
-  text.family("vgyro_stops_total", "counter", "Stops that the drifts were learned from.");
-  text.sample({}, status.stops);
-  text.family("vgyro_stops_refused_total", "counter",
-              "Steady stretches that were taken for a turn of both gyros together.");
-  text.sample({}, status.stops_refused);
-  text.family("vgyro_stops_open_total", "counter",
-              "Steady stretches that ended before a stop could be told from a turn.");
-  text.sample({}, status.stops_open);
+  // No counters: a stretch that turns out to be the other thing goes from one to the other.
+  text.family("vgyro_stops", "gauge",
+              "Steady stretches so far, by whether they were taken for stops and learned from, for "
+              "turns of both gyros together, or ended open.");
+  text.sample({{"verdict", "learned"}}, status.stops);
+  text.sample({{"verdict", "refused"}}, status.stops_refused);
+  text.sample({{"verdict", "open"}}, status.stops_open);
   text.family("vgyro_estimate_restarts_total", "counter",
               "Times that the estimate was not finite and began anew: a fault of vgyro.");
   text.sample({}, status.estimate_restarts);

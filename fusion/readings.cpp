@@ -361,11 +361,6 @@ void Readings::suspect(std::size_t gyro) {
   settle();
 }
 
-void Readings::widen(double variance_1, double covariance_12, double variance_2) {
-  for (std::size_t i = 0; i < count_; ++i)
-    slots_[i].bank.widen(variance_1, covariance_12, variance_2);
-}
-
 void Readings::set_temperature(const std::array<double, 2>& temperature_c) {
   for (std::size_t i = 0; i < count_; ++i)
     slots_[i].bank.set_temperature(temperature_c);

@@ -75,7 +75,6 @@ class Readings {
                         double first_share);
   /// This gyro has fallen out: what contradicted the other one was likely its own.
   void suspect(std::size_t gyro);
-  void widen(double variance_1, double covariance_12, double variance_2);
   void set_temperature(const std::array<double, 2>& temperature_c);
   void observe_at(const std::array<double, 2>& temperature_c);
 
