@@ -279,7 +279,6 @@ TEST(Allocation, IsNotDoneByTheReadings) {
                     readings.end_steady();
                     break;
                   case 7:
-                    readings.widen(1e-9, 0.0, 1e-9);
                     readings.set_temperature({20.0 + 0.1 * i, 20.0});
                     break;
                   case 8:
