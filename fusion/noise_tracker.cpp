@@ -29,6 +29,14 @@ constexpr double kDensityMin = 1e-14;
 constexpr double kUsualSigmas = 4.0;
 constexpr double kGainMin = 1e-3;
 
+// A cell's difference scatters by so many standard deviations of noise: no Gaussian's does, and a
+// value that is off by less than a dozen or two of them does little harm.
+constexpr double kSpikeSigma = 4.0;
+// … of so many values at least: one of a few is not told from motion.
+constexpr double kSpikeSamples = 4.0;
+// … and beyond this share of what the gyros have in common, which skews and scales do not leave.
+constexpr double kMotionShare = 0.01;
+
 // What motion shares between the gyros never explains all of one's noise: scale factors differ, and
 // the difference of the two is noise that neither can be without.
 constexpr double kOwnShareMin = 0.05;
@@ -98,6 +106,29 @@ bool NoiseTracker::usual(const Block& block) const {
   }
   const double most = freedom + kUsualSigmas * std::sqrt(2.0 * freedom);
   return squares[0] <= most * present_sample_[0] && squares[2] <= most * present_sample_[2];
+}
+
+bool NoiseTracker::spiked(const Block& block, double more) const {
+  if (block.present != Present::kBoth) return false;
+  const double besides = more + squared(step_dps(0)) + squared(step_dps(1));
+  const auto difference = [&](std::size_t i) {
+    return block.cells[i].mean_dps[0] - block.cells[i].mean_dps[1];
+  };
+  for (std::size_t i = 0; i < block.count; ++i) {
+    const Cell& cell = block.cells[i];
+    if (cell.count < kSpikeSamples) continue;
+    const double noise =
+        present_sample_[0] * cell.noise_gain[0] + present_sample_[2] * cell.noise_gain[1] + besides;
+    const double motion = std::max(cell.scatter[1], 0.0);
+    const double scatter = of_difference(cell.scatter) - kMotionShare * motion;
+    if (scatter <= squared(kSpikeSigma) * cell.count * noise) continue;
+    // What one gyro feels and the other one does not goes on from cell to cell.
+    double moved = 0.0;
+    for (std::size_t other = 0; other < block.count; ++other)
+      moved = std::max(moved, std::abs(difference(other) - difference(i)));
+    if (squared(moved) * cell.count < scatter) return true;
+  }
+  return false;
 }
 
 void NoiseTracker::settle(double interval_s) {

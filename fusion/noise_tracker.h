@@ -28,6 +28,10 @@ class NoiseTracker {
   /// Does the block scatter as its gyros usually do? People who get in and engines that run are no
   /// noise, even where a stop is a stop.
   [[nodiscard]] bool usual(const Block& block) const;
+  /// Has one of the gyros sent a value or two that are no measurement? Somewhere in the block the
+  /// difference scatters within a cell as neither noise nor motion lets it. `more` is variance of a
+  /// sample's difference besides, (deg/s)².
+  [[nodiscard]] bool spiked(const Block& block, double more) const;
   /// A block of which nothing is known.
   void watch(const Block& block);
   /// The present rise was none, or is of no use any more.

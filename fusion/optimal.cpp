@@ -47,8 +47,12 @@ constexpr double kShareOfTau = 0.1;
 
 // The difference of the gyros, averaged over some samples, is watched on every sample …
 constexpr double kFastGain = 0.125;
+// The same of one sample, against all of its noise.
+constexpr double kSuddenSigma = 6.0;
 constexpr double kFastNoise = kFastGain / (2.0 - kFastGain);
 constexpr double kFastSigma = 5.0;
+// Blocks in a row that values which are no measurements may spoil.
+constexpr int kSpikedBlocks = 2;
 // … and block by block: beyond this it has jumped.
 constexpr double kJumpSigma = 6.0;
 // … it is a step where it stays within this share of itself, or a drift after so many blocks.
@@ -230,6 +234,7 @@ class OptimalCorrector final : public Corrector {
 
   // Blocks.
   void close_block(const Block& block);
+  bool is_spiked(const Block& block);
   void judge_coherence(const Block& block);
   [[nodiscard]] Present trusted(Present present) const;
   void learn_from(const Block& block, bool steady);
@@ -316,6 +321,7 @@ class OptimalCorrector final : public Corrector {
   bool has_before_ = false;
   double before_s_ = 0.0;
   double contradicted_s_ = 0.0;  ///< they did so last
+  int spiked_blocks_ = 0;        ///< in a row
   int jump_blocks_ = 0;          ///< in a row that contradict what is foretold
   double suspected_jump_dps_ = 0.0;
   Run run_ = Run::kMoving;
@@ -501,7 +507,10 @@ VirtualRate OptimalCorrector::update(const RatePair& pair) {
   const double allowed =
       squared(kFastSigma) *
       (fast_noise_ + kFastNoise * (rate_density(0, rate) + rate_density(1, rate)) / interval);
-  if (contradiction > allowed) variance += blame_ * (contradiction - allowed);
+  // A single value may be no measurement at all.
+  const double sudden = squared(first - second) -
+                        squared(kSuddenSigma) * (noise_1 - 2.0 * noise_12 + noise_2 + fast_noise_);
+  variance += blame_ * std::max({contradiction - allowed, sudden, 0.0});
   const VirtualRate out{rate, std::sqrt(variance), {first, second}};
   if (blind_[0] + blind_[1] < kBlindMin) return out;
   return with_blindness(out, {noise_1, noise_2});
@@ -632,8 +641,22 @@ void OptimalCorrector::judge_coherence(const Block& block) {
   blind_ = {coherence_.blind(0), coherence_.blind(1)};
 }
 
+// Values that are no measurements teach nothing, and neither end a stop nor begin one. A gyro that
+// goes on like that has grown noisy, which is to be learned.
+bool OptimalCorrector::is_spiked(const Block& block) {
+  const double rate = cell_rate(block.cells[0], block.to_s, weights_for_);
+  const double more =
+      (rate_density(0, rate) + rate_density(1, rate)) / std::max(cells_.interval_s(), 1e-6);
+  if (!noise_.spiked(block, more)) {
+    spiked_blocks_ = 0;
+    return false;
+  }
+  return ++spiked_blocks_ <= kSpikedBlocks;
+}
+
 // A block is used when the next one has been judged: motion begins before it is seen.
 void OptimalCorrector::close_block(const Block& block) {
+  if (is_spiked(block)) return;
   judge_coherence(block);
   const Present present = trusted(block.present);
   if (block.present == Present::kBoth && present != Present::kBoth && !blind_before_)

@@ -14,6 +14,7 @@ RATE_INVALID, SIGMA_UNKNOWN, AGE_OR_MORE = -(1 << 23), 0xFFF, 15
 OLDEST_US = 40_000  # that an age of "7.5 ms or more" may mean
 LATER_SAMPLES = 4  # as many of one gyro as may be meant
 INSTANT_BLOCK_S = 10.0
+WORST_SHARE = 0.01  # of a block, with no say in which instant is meant: a gyro's spike is larger than all the rest
 
 RUN_ENDS_S = 0.2
 SMOOTH_S = 1.0
@@ -73,6 +74,16 @@ def candidate_instants_us(rates, samples_us):
             yield np.where(open_age, old, near)
 
 
+def misfit(error, block):
+    """Per block the sum of squares but for the worst errors."""
+    square = error * error
+    order = np.lexsort((square, block))
+    counts = np.bincount(block)
+    rank = np.arange(len(order)) - np.repeat(np.cumsum(counts) - counts, counts)
+    usual = order[rank < np.repeat(np.ceil(counts * (1 - WORST_SHARE)), counts)]
+    return np.bincount(block[usual], square[usual], minlength=len(counts))
+
+
 def errors(rates, recording):
     """Errors and instants of the valid rates, each with the candidate that fits best over ten seconds. One choice for so
     many frames has no noise to profit from."""
@@ -83,7 +94,7 @@ def errors(rates, recording):
     all_errors = [rate - recording.truth(c) for c in choices]
     if not len(rate):
         return rate, rate
-    sums = np.array([np.bincount(block, e * e) for e in all_errors])
+    sums = np.array([misfit(e, block) for e in all_errors])
     best = np.argmin(sums, axis=0)[block]
     pick = np.arange(len(rate))
     return np.array(all_errors)[best, pick], np.array(choices)[best, pick]

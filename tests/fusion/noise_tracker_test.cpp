@@ -23,6 +23,8 @@ class Pair {
 
   /// The true rate at a time, deg/s.
   std::function<double(double)> rate = [](double /*t_s*/) { return 0.0; };
+  /// What gyro 1 shows besides, deg/s.
+  std::function<double(double)> spike = [](double /*t_s*/) { return 0.0; };
   std::array<double, 2> white;
   double shared_white = 0.0;  ///< noise that both have
   std::array<double, 2> scale{1.0, 1.0};
@@ -34,8 +36,9 @@ class Pair {
     for (const double until = t_s_ + seconds; t_s_ < until; t_s_ = ++count_ / rate_hz_) {
       const double shared = random_.normal(shared_white * std::sqrt(rate_hz_));
       std::array<double, 2> y{};
+      const std::array<double, 2> besides{spike(t_s_), 0.0};
       for (std::size_t k = 0; k < 2; ++k)
-        y[k] = rounded(scale[k] * rate(t_s_) + shared +
+        y[k] = rounded(besides[k] + scale[k] * rate(t_s_) + shared +
                        random_.normal(white[k] * std::sqrt(rate_hz_ * noise_gain[k])));
       if (cells_.add(t_s_, y, noise_gain, Present::kBoth)) use(cells_.last());
     }
@@ -306,6 +309,45 @@ TEST(NoiseTracker, KnowsAnUnusualBlock) {
   pair.rate = [](double t_s) { return 0.1 * std::sin(40.0 * t_s); };
   pair.run(1.0, [](const Block& /*of both*/) {});
   pair.run(60.0, [&](const Block& block) { EXPECT_FALSE(tracker.usual(block)) << block.from_s; });
+}
+
+// A value that is no measurement stands in one block, and spoils no other. Noise and motion, of
+// both gyros or of one that alone feels it, look like none. The smallest is twenty times the noise.
+TEST(NoiseTracker, KnowsABlockWithASpike) {
+  constexpr std::uint64_t kSeed = 24;
+  SCOPED_TRACE(::testing::Message() << "seed " << kSeed);
+  const std::array<std::function<double(double)>, 3> motions{
+      [](double /*t_s*/) { return 0.0; },
+      [](double t_s) { return 20.0 * std::sin(0.8 * t_s); },
+      [](double t_s) { return 5.0 * std::sin(6.0 * t_s); },
+  };
+  for (const auto& motion : motions) {
+    for (const double other_feels : {1.0, 1.01, 0.0}) {
+      Pair pair({1e-3, 3e-3}, kSeed);
+      NoiseTracker tracker({});
+      pair.measure(tracker, 300.0);
+      pair.rate = motion;
+      pair.scale[1] = other_feels;
+      pair.run(1.0, [](const Block& /*in which it begins*/) {});
+      pair.run(300.0, [&](const Block& block) { EXPECT_FALSE(tracker.spiked(block, 0.0)); });
+    }
+    for (const double spike_dps : {0.5, -1.0, 50.0}) {
+      Pair pair({1e-3, 3e-3}, kSeed);
+      NoiseTracker tracker({});
+      pair.measure(tracker, 300.0);
+      double at_s = 330.0;
+      pair.rate = motion;
+      pair.spike = [&](double t_s) { return std::abs(t_s - at_s) < 1e-6 ? spike_dps : 0.0; };
+      int spiked = 0;
+      pair.run(300.0, [&](const Block& block) {
+        const bool holds_it = block.from_s - 1e-6 < at_s && at_s < block.to_s - 1e-6;
+        EXPECT_EQ(tracker.spiked(block, 0.0), holds_it) << spike_dps << " at " << at_s;
+        if (holds_it) at_s += 3.14;
+        spiked += holds_it ? 1 : 0;
+      });
+      EXPECT_GT(spiked, 50);
+    }
+  }
 }
 
 }  // namespace

@@ -60,6 +60,7 @@ struct Scenario {
 struct Sureness {
   double rate = 0.0;
   double bias = 0.0;
+  std::uint64_t disagreements = 0;  ///< of all runs
 };
 
 Sureness sureness(const Scenario& scenario, std::uint64_t runs = kRuns) {
@@ -88,8 +89,9 @@ Sureness sureness(const Scenario& scenario, std::uint64_t runs = kRuns) {
       sum.bias += std::pow(step.bias_error_dps / step.bias_sigma_dps, 2.0);
       count += 1.0;
     }
+    sum.disagreements += run.corrector->condition().disagreements;
   }
-  return {sum.rate / count, sum.bias / count};
+  return {sum.rate / count, sum.bias / count, sum.disagreements};
 }
 
 struct Limits {
@@ -168,6 +170,27 @@ TEST(OptimalSureness, IsTrueOfABlindGyro) {
       run.world.gyros_[bad].blind = true;
     };
     expect_honest(sureness(scenario), {.least_of_rate = kLeast});
+  }
+}
+
+// A gyro whose frames hold a value in five to a hundred seconds that is no measurement. Much finer
+// gyros than such a value: it would be the greatest contradiction of all.
+TEST(OptimalSureness, IsTrueAmongSpikes) {
+  for (std::size_t bad = 0; bad < 2; ++bad) {
+    SCOPED_TRACE(::testing::Message() << "gyro " << bad + 1);
+    Scenario scenario;
+    scenario.prepare = [](Gyros& gyros, Random& /*random*/) {
+      for (world::Gyro& gyro : gyros) {
+        gyro.white *= 0.1;
+        gyro.walk *= 0.1;
+      }
+    };
+    scenario.event = [bad](OptimalRun& run, Random& random) {
+      run.world.gyros_[bad].spikes_hz = log_uniform(random, 0.01, 0.2);
+    };
+    const Sureness found = sureness(scenario);
+    expect_honest(found);
+    EXPECT_EQ(found.disagreements, 0U);
   }
 }
 

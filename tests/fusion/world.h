@@ -25,6 +25,7 @@ struct Gyro {
   double warm_tau_s = 1.0;  ///< … with this time
   double step_dps = 0.0;    ///< its values are multiples of this
   bool blind = false;       ///< it feels no rotation
+  double spikes_hz = 0.0;   ///< so often a value is no measurement, but 1 to 50 deg/s off
 };
 
 struct Instant {
@@ -54,7 +55,7 @@ class World {
                         gyro.warm_dps * std::exp(-now.t_s / gyro.warm_tau_s);
       const double felt = gyro.blind ? 0.0 : rate(now.t_s - gyro.delay_s) * (1.0 + gyro.scale);
       const double value =
-          felt + now.bias_dps[k] + gyro.white / std::sqrt(step_s_) * normal_(random_);
+          felt + now.bias_dps[k] + gyro.white / std::sqrt(step_s_) * normal_(random_) + spike(gyro);
       now.reading_dps[k] =
           gyro.step_dps > 0.0 ? gyro.step_dps * std::round(value / gyro.step_dps) : value;
     }
@@ -63,6 +64,15 @@ class World {
   [[nodiscard]] double step_s() const { return step_s_; }
   [[nodiscard]] double now_s() const { return step_s_ * static_cast<double>(count_); }
   void jump(std::size_t gyro, double by_dps) { bias_[gyro] += by_dps; }
+
+ private:
+  double spike(const Gyro& gyro) {
+    if (gyro.spikes_hz <= 0.0) return 0.0;
+    std::uniform_real_distribution<double> uniform;
+    if (uniform(random_) >= gyro.spikes_hz * step_s_) return 0.0;
+    const double size_dps = std::pow(50.0, uniform(random_));
+    return uniform(random_) < 0.5 ? -size_dps : size_dps;
+  }
 
  public:
   std::array<Gyro, 2> gyros_;

@@ -114,6 +114,17 @@ class Judge(unittest.TestCase):
         self.assertLess(found["beyond_6_s"], 0.2)
         self.assertNotIn("beyond 6 sigma", failed)
 
+    def test_a_spike_without_sigma_does_not_choose_the_instant_that_is_meant(self):
+        t, _ = self.recording.samples[0]
+        slope = np.gradient(self.recording.truth(t), t)
+        for sign in (-1, 1):
+            made = rates(self.recording, lambda t: 0.02 * white(t), 0.02 * SIGMA_DPS, age=judge.AGE_OR_MORE)
+            for begin_s in range(60, int(self.recording.world.duration_s), 10):
+                steepest = np.argmax(np.where((t >= begin_s) & (t < begin_s + 10), np.abs(slope), -1))
+                made.rate[steepest] += sign * 40 * np.sign(slope[steepest])
+                made.sigma[steepest] = np.nan
+            self.assertLess(abs(judge.figures(made, self.recording)["ratio_late"] - 1), 0.05)
+
     def test_a_rate_that_is_not_valid_for_a_tenth_of_the_time_is_told(self):
         made = rates(self.recording, white)
         made.valid[made.stamps_us % 10_000_000 < 1_000_000] = False
