@@ -1095,7 +1095,9 @@ void OptimalCorrector::set_weights(Present present) {
     const double both = doubt[1] + density[1] / window_s_;
     const double second = doubt[2] + density[2] / window_s_;
     const double sum = first + second - 2.0 * both;
-    weight_[0] = sum > 0.0 ? (second - both) / sum : 0.5;
+    // Where both biases may be off together the difference seems to tell how far; to use that the
+    // rate would have to leave the two gyros, and their noise would be many times what it is.
+    weight_[0] = sum > 0.0 ? std::clamp((second - both) / sum, 0.0, 1.0) : 0.5;
     weight_[1] = 1.0 - weight_[0];
   } else {
     weight_ = {present == Present::kGyro1 ? 1.0 : 0.0, present == Present::kGyro2 ? 1.0 : 0.0};

@@ -72,6 +72,7 @@ class Twin:
     fd: bool = False
     still_s: float = STILL_S
     run_s: float = RUN_S
+    turn_dps: float = TURN_DPS
     silent_s: tuple = ()  # from, to: gyro B sends nothing
 
     def prepare(self, folder):
@@ -82,7 +83,7 @@ class Twin:
         (folder / "vgyro.toml").write_text(CONFIG.format(
             bus_a=self.bus_a, bus_b=self.bus_b, bus_out=self.bus_out, fd=str(self.fd).lower(),
             rest_s=REST_S, rate_dps=make_twin.EARTH_DPS), encoding="utf-8")
-        options = make_twin.Options(scenario="turn", rest_s=self.still_s, run_s=self.run_s, turn_dps=TURN_DPS)
+        options = make_twin.Options(scenario="turn", rest_s=self.still_s, run_s=self.run_s, turn_dps=self.turn_dps)
         twin = make_twin.simulate(options)
         lines = []
         for stream, bus, fd in zip(twin.streams, (self.bus_a, self.bus_b), (self.fd, False)):
@@ -588,6 +589,8 @@ class UnreadLogCase:
 
     name = "unread_log"
     says = "stderr is a full pipe that nobody reads: rates, watchdog and SIGTERM as ever"
+    filled_bytes = 60000  # of 65536
+    refusals = 50  # each is told in ten lines or more
 
     def prepare(self, folder):
         twin = Twin(run_s=0.0)
@@ -595,13 +598,13 @@ class UnreadLogCase:
         config = folder / "vgyro.toml"
         text = config.read_text(encoding="utf-8")
         (folder / "good.toml").write_text(text, encoding="utf-8")
-        wrong = "".join(f"no_such_key_{i} = {i}\n" for i in range(3000))
+        wrong = "".join(f"no_such_key_{i} = {i}\n" for i in range(10))
         (folder / "bad.toml").write_text(wrong + text, encoding="utf-8")
         def take(name):
             return ["run", ["cp", str(folder / name), str(config)]]
         script = (f"mkfifo {{memory}}/unread; exec 3<>{{memory}}/unread; rm {{memory}}/unread; "
-                  f"exec {BIN / 'vgyrod'} --config {config} --metrics {{memory}}/state.toml.prom 2>&3")
-        steps = [take("bad.toml"), ["reload", None], take("good.toml"), ["play", str(folder / "played.log")],
+                  f"head -c {self.filled_bytes} /dev/zero >&3; exec {BIN / 'vgyrod'} --config {config} --metrics {{memory}}/state.toml.prom 2>&3")
+        steps = [take("bad.toml"), *[["reload", None]] * self.refusals, take("good.toml"), ["play", str(folder / "played.log")],
                  ["wait", 2.0]]
         return {"links": twin.links(), "steps": steps, "command": ["/bin/sh", "-c", script]}
 
@@ -703,7 +706,7 @@ class InheritedCase:
     new_rate_dps = make_twin.EARTH_DPS + 0.001
 
     def prepare(self, folder):
-        twin = Twin()
+        twin = Twin(turn_dps=2.0)  # a faster one is no bias of two gyros, and is not calibrated with
         twin.prepare(folder)
         config = folder / "vgyro.toml"
         text = config.read_text(encoding="utf-8")
