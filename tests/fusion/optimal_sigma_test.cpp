@@ -63,6 +63,14 @@ struct Sureness {
   std::uint64_t disagreements = 0;  ///< of all runs
 };
 
+// Whatever is thought of the biases: a rate outside would be noise of both, many times over.
+void expect_between_the_gyros(const VirtualRate& rate) {
+  constexpr double kRounding_dps = 1e-9;
+  const auto [low, high] = std::minmax(rate.corrected_dps[0], rate.corrected_dps[1]);
+  EXPECT_GE(rate.rate_dps, low - kRounding_dps);
+  EXPECT_LE(rate.rate_dps, high + kRounding_dps);
+}
+
 Sureness sureness(const Scenario& scenario, std::uint64_t runs = kRuns) {
   Sureness sum;
   double count = 0.0;
@@ -84,6 +92,7 @@ Sureness sureness(const Scenario& scenario, std::uint64_t runs = kRuns) {
         happened = true;
       }
       const Step step = run.step(scenario.rate);
+      expect_between_the_gyros(step.virtual_rate);
       if (step.now.t_s < scenario.judged_from_s) continue;
       sum.rate += std::pow(step.rate_error_dps / step.virtual_rate.sigma_dps, 2.0);
       sum.bias += std::pow(step.bias_error_dps / step.bias_sigma_dps, 2.0);
