@@ -8,8 +8,7 @@
 #include "cli/role_frames.h"
 #include "fusion/alignment.h"
 #include "fusion/stamp_guard.h"
-#include "gateway/gyro_input.h"
-#include "gateway/status.h"
+#include "gateway/intake.h"
 
 namespace vgyro::cli {
 
@@ -20,7 +19,8 @@ class Gatherer {
   explicit Gatherer(const gateway::Plan& plan)
       : plan_(plan),
         frames_(plan),
-        inputs_{gateway::GyroInput(plan.gyros[0]), gateway::GyroInput(plan.gyros[1])} {}
+        inputs_{gateway::GyroIntake(0, gateway::GyroInput(plan.gyros[0])),
+                gateway::GyroIntake(1, gateway::GyroInput(plan.gyros[1]))} {}
 
   Expected<void> read(const std::string& log) {
     return frames_.read(log, "allan", [this](std::uint8_t roles, const can::LogRecord& record) {
@@ -56,23 +56,15 @@ class Gatherer {
 
  private:
   void take_gyro(std::size_t gyro, const can::LogRecord& record) {
-    const gateway::GyroInput::Result input = inputs_[gyro].decode(record.frame);
-    if (input.reject) return;
-    TimePoint t;
-    switch (guard_.check(gyro, record.stamp, t)) {
-      case fusion::StampGuard::Verdict::kRepeated:
-      case fusion::StampGuard::Verdict::kUnconfirmed:
-        return;
-      case fusion::StampGuard::Verdict::kClockStep:
-        aligner_.clear();
-        break;
-      case fusion::StampGuard::Verdict::kAccepted:
-        break;
-    }
-    if (!aligner_.push(gyro, t, input.rate_dps)) return;
+    const gateway::GyroIntake::Result taken =
+        inputs_[gyro].take(record.frame, record.stamp, guard_);
+    if (taken.reject) return;
+    if (taken.stamp.clock_step) aligner_.clear();
+    const TimePoint t = taken.stamp.t;
+    if (!aligner_.push(gyro, t, taken.rate_dps)) return;
     if (samples_[0] + samples_[1] == 0) origin_ = t;
     ++samples_[gyro];
-    own_[gyro].add(to_seconds(t - origin_), {input.rate_dps, 0.0});
+    own_[gyro].add(to_seconds(t - origin_), {taken.rate_dps, 0.0});
     fusion::AlignedPair pair;
     while (aligner_.pop(pair)) {
       ++pairs_;
@@ -83,7 +75,7 @@ class Gatherer {
 
   const gateway::Plan& plan_;
   RoleFrames frames_;
-  std::array<gateway::GyroInput, 2> inputs_;
+  std::array<gateway::GyroIntake, 2> inputs_;
   fusion::StampGuard guard_;
   fusion::Aligner aligner_;
   std::array<analysis::SeriesBuilder, 2> own_;

@@ -7,15 +7,12 @@
 
 #include "cli/role_frames.h"
 #include "fusion/stamp_guard.h"
-#include "gateway/e2e_check.h"
-#include "gateway/gyro_input.h"
+#include "gateway/intake.h"
 #include "gateway/surroundings.h"
 
 namespace vgyro::cli {
 
 namespace {
-
-constexpr std::size_t kReferenceStream = 2;
 
 // A limit beyond this is none of a gyro: a floating-point number has no other than what is
 // plausible.
@@ -32,7 +29,9 @@ double limit_of(const gateway::Quantity& rate) {
 class Recorder {
  public:
   explicit Recorder(const gateway::Plan& plan)
-      : plan_(plan), inputs_{gateway::GyroInput(plan.gyros[0]), gateway::GyroInput(plan.gyros[1])} {
+      : plan_(plan),
+        inputs_{gateway::GyroIntake(0, gateway::GyroInput(plan.gyros[0])),
+                gateway::GyroIntake(1, gateway::GyroInput(plan.gyros[1]))} {
     for (std::size_t i = 0; i < 2; ++i) {
       const gateway::GyroPlan& gyro = plan.gyros[i];
       gap::GyroSeries& series = recording_.gyros[i];
@@ -41,8 +40,9 @@ class Recorder {
       series.step_dps = gyro.rate.step;
       series.limit_dps = limit_of(gyro.rate);
     }
-    if (plan.reference) reference_check_ = gateway::E2eCheck(plan.reference->e2e);
-    if (plan.accelerometer) accelerometer_check_ = gateway::E2eCheck(plan.accelerometer->e2e);
+    if (plan.reference) reference_.emplace(gateway::reference_intake(*plan.reference));
+    if (plan.accelerometer)
+      accelerometer_.emplace(gateway::accelerometer_intake(*plan.accelerometer));
     recording_.has_reference = plan.reference.has_value();
     recording_.has_acceleration = plan.accelerometer.has_value();
     if (!plan.calibration.from_reference) recording_.rest_s = plan.calibration.rest_s;
@@ -54,9 +54,7 @@ class Recorder {
     if ((roles & gateway::kGyro2) != 0) take_gyro(1, record);
     if ((roles & gateway::kReference) != 0) take_reference(record);
     if ((roles & gateway::kAccelerometer) != 0) take_acceleration(record);
-    if ((roles & gateway::kSpeed) != 0) {
-      accepted(gateway::Surroundings::kSpeedStream, record.stamp);
-    }
+    if ((roles & gateway::kSpeed) != 0) take_speed(record);
   }
 
   [[nodiscard]] std::array<std::uint64_t, 2> used() const {
@@ -75,13 +73,8 @@ class Recorder {
   }
 
  private:
-  // Seconds since the first frame; nothing for a stamp that is refused.
-  std::optional<double> accepted(std::size_t stream, TimePoint stamp, bool repeats = false) {
-    using Verdict = fusion::StampGuard::Verdict;
-    TimePoint t;
-    const Verdict verdict = guard_.check(stream, stamp, t);
-    if (verdict == Verdict::kUnconfirmed) return std::nullopt;
-    if (verdict == Verdict::kRepeated && !repeats) return std::nullopt;
+  // Seconds since the first frame.
+  double reach(TimePoint t) {
     if (!begun_) zero_ = newest_ = t;
     begun_ = true;
     // A clock that was set by more than a day: the recording goes on where it was.
@@ -94,42 +87,39 @@ class Recorder {
   }
 
   void take_gyro(std::size_t i, const can::LogRecord& record) {
-    const gateway::GyroInput::Result input = inputs_[i].decode(record.frame);
-    if (input.reject) return;
+    const gateway::GyroIntake::Result taken = inputs_[i].take(record.frame, record.stamp, guard_);
     // A frame whose counter moved is a new one, whatever its stamp.
     const auto& counter = plan_.gyros[i].e2e.counter;
-    const auto t_s = accepted(i, record.stamp, counter.has_value());
-    if (!t_s) return;
+    const bool new_at_old_stamp = counter && taken.reject == gateway::Reject::kStampRepeated;
+    if (taken.reject && !new_at_old_stamp) return;
+    const double t_s = reach(taken.stamp.t);
     gap::GyroSeries& series = recording_.gyros[i];
-    series.t_s.push_back(series.t_s.empty() ? *t_s : std::max(series.t_s.back(), *t_s));
-    series.rate_dps.push_back(input.rate_dps);
-    if (counter) series.counter.push_back(inputs_[i].counter());
-    if (plan_.gyros[i].temperature) series.temperature_c.push_back(inputs_[i].temperature_c());
+    series.t_s.push_back(series.t_s.empty() ? t_s : std::max(series.t_s.back(), t_s));
+    series.rate_dps.push_back(taken.rate_dps);
+    if (counter) series.counter.push_back(inputs_[i].input().counter());
+    if (plan_.gyros[i].temperature)
+      series.temperature_c.push_back(inputs_[i].input().temperature_c());
   }
 
   void take_reference(const can::LogRecord& record) {
-    double rate_dps = 0.0;
-    if (reference_check_.judge(record.frame)) return;
-    if (gateway::decode_quantity(plan_.reference->rate, record.frame, rate_dps)) return;
-    if (const auto t_s = accepted(kReferenceStream, record.stamp)) {
-      recording_.reference_dps.t_s.push_back(*t_s);
-      recording_.reference_dps.value.push_back(rate_dps);
-    }
+    const auto taken = reference_->take(record.frame, record.stamp, guard_);
+    if (taken.reject) return;
+    recording_.reference_dps.t_s.push_back(reach(taken.stamp.t));
+    recording_.reference_dps.value.push_back(taken.value[0]);
   }
 
   void take_acceleration(const can::LogRecord& record) {
-    if (accelerometer_check_.judge(record.frame)) return;
-    std::array<double, 3> axes_g{};
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      if (gateway::decode_quantity(plan_.accelerometer->axes[axis], record.frame, axes_g[axis])) {
-        return;
-      }
-    }
-    const auto t_s = accepted(gateway::Surroundings::kAccelerometerStream, record.stamp);
-    if (!t_s) return;
-    recording_.acceleration.t_s.push_back(*t_s);
+    const auto taken = accelerometer_->take(record.frame, record.stamp, guard_);
+    if (taken.reject) return;
+    recording_.acceleration.t_s.push_back(reach(taken.stamp.t));
     for (std::size_t axis = 0; axis < 3; ++axis)
-      recording_.acceleration.g[axis].push_back(axes_g[axis]);
+      recording_.acceleration.g[axis].push_back(taken.value[axis]);
+  }
+
+  // Nothing asks for the speed; its frames lengthen the recording.
+  void take_speed(const can::LogRecord& record) {
+    const auto stamp = gateway::judge_stamp(gateway::kSpeedStream, record.stamp, guard_);
+    if (stamp.believed()) reach(stamp.t);
   }
 
   // Zero is the earliest frame: on the slower of two buses it may come second.
@@ -153,9 +143,9 @@ class Recorder {
   }
 
   const gateway::Plan& plan_;
-  std::array<gateway::GyroInput, 2> inputs_;
-  gateway::E2eCheck reference_check_;
-  gateway::E2eCheck accelerometer_check_;
+  std::array<gateway::GyroIntake, 2> inputs_;
+  std::optional<gateway::ScalarIntake> reference_;
+  std::optional<gateway::AxesIntake> accelerometer_;
   fusion::StampGuard guard_;
   gap::Recording recording_;
   bool begun_ = false;

@@ -29,7 +29,7 @@ class StampGuard {
 
   enum class Verdict : std::uint8_t { kAccepted, kRepeated, kUnconfirmed, kClockStep };
 
-  /// The stamp on the monotone axis goes to `time` unless the verdict is kUnconfirmed or kRepeated.
+  /// The stamp on the monotone axis goes to `time` unless the verdict is kUnconfirmed.
   /// kClockStep: accepted, and all streams' earlier samples are of the time before the step.
   Verdict check(std::size_t stream, TimePoint raw, TimePoint& time);
 

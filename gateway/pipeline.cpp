@@ -11,9 +11,8 @@
 #include "fusion/compensation.h"
 #include "fusion/corrector.h"
 #include "fusion/stamp_guard.h"
-#include "gateway/e2e_check.h"
 #include "gateway/gyro_health.h"
-#include "gateway/gyro_input.h"
+#include "gateway/intake.h"
 #include "gateway/model_plan.h"
 #include "gateway/output_frames.h"
 #include "gateway/reference_calibration.h"
@@ -25,7 +24,6 @@ namespace vgyro::gateway {
 namespace {
 
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
-constexpr std::size_t kReferenceStream = 2;
 constexpr std::size_t kNobody = 2;
 
 // A gyro that is silent for this many of its usual intervals is missing, within these limits.
@@ -89,6 +87,9 @@ struct Pipeline::Impl {
   void take_pair(const fusion::AlignedPair& pair, TimePoint stamp, FrameSink& sink);
   void take_single(std::size_t gyro, TimePoint t, double rate_dps, Duration age, TimePoint stamp,
                    FrameSink& sink);
+  void step_clock();
+  void pass_over(std::size_t gyro, const GyroIntake::Result& taken, TimePoint stamp,
+                 FrameSink& sink);
   void refuse(std::size_t gyro, Reject cause, TimePoint t, TimePoint stamp, FrameSink& sink);
   void set_aside(std::size_t gyro, TimePoint t, TimePoint stamp, FrameSink& sink);
   void note_condition(TimePoint t);
@@ -124,7 +125,7 @@ struct Pipeline::Impl {
 
   Plan plan;
   Router router;
-  std::array<GyroInput, 2> inputs;
+  std::array<GyroIntake, 2> inputs;
   std::array<GyroHealth, 2> health_of;
   Surroundings surroundings;
   std::array<fusion::Compensation, 2> compensations;
@@ -132,7 +133,7 @@ struct Pipeline::Impl {
   fusion::StampGuard guard;
   fusion::Aligner aligner;
   fusion::Calibrator calibrator;
-  E2eCheck reference_check;
+  std::optional<ScalarIntake> reference_input;
   ReferenceCalibration reference;
   std::unique_ptr<fusion::Corrector> corrector;
   OutputEncoder encoder;
@@ -159,7 +160,8 @@ struct Pipeline::Impl {
 Pipeline::Impl::Impl(const Plan& the_plan, std::unique_ptr<fusion::Corrector> the_corrector)
     : plan(the_plan),
       router(plan),
-      inputs{GyroInput(plan.gyros[0]), GyroInput(plan.gyros[1])},
+      inputs{GyroIntake(0, GyroInput(plan.gyros[0]), Timed::kSickToo),
+             GyroIntake(1, GyroInput(plan.gyros[1]), Timed::kSickToo)},
       health_of{GyroHealth(plan.gyros[0]), GyroHealth(plan.gyros[1])},
       surroundings(plan),
       compensations{make_compensation(plan, 0), make_compensation(plan, 1)},
@@ -167,7 +169,7 @@ Pipeline::Impl::Impl(const Plan& the_plan, std::unique_ptr<fusion::Corrector> th
       calibrator(plan.corrector.order, plan.calibration.rest_s, plan.calibration.when_moving),
       corrector(std::move(the_corrector)),
       encoder(plan.output) {
-  if (plan.reference) reference_check = E2eCheck(plan.reference->e2e);
+  if (plan.reference) reference_input.emplace(reference_intake(*plan.reference));
   calibrated = !corrector->needs_calibration();
   status.rate_dps = kNone;
   status.sigma_dps = kNone;
@@ -206,54 +208,50 @@ void Pipeline::Impl::receive_gyro(std::size_t gyro, const can::Frame& frame, Tim
                                   FrameSink& sink) {
   GyroStatus& own = status.gyros[gyro];
   ++own.frames;
-  const auto count = [&](Reject why) { ++own.rejected[static_cast<std::size_t>(why)]; };
-  const GyroInput::Result input = inputs[gyro].decode(frame);
-  own.missing += input.missing;
-  if (input.reject && !GyroHealth::tells_of_sensor(*input.reject)) {
-    count(*input.reject);
-    let_time_pass(stamp, sink);
+  const GyroIntake::Result taken = inputs[gyro].take(frame, whole_microseconds(stamp), guard);
+  own.missing += taken.missing;
+  if (taken.stamp.clock_step) step_clock();
+  if (taken.reject) {
+    pass_over(gyro, taken, stamp, sink);
     return;
   }
-  if (!guard.can_be_time(stamp)) {
-    count(input.reject.value_or(Reject::kStampJump));
-    return;
-  }
-  TimePoint t;
-  switch (guard.check(gyro, whole_microseconds(stamp), t)) {
-    case fusion::StampGuard::Verdict::kRepeated:
-      count(input.reject.value_or(Reject::kStampRepeated));
-      return;
-    case fusion::StampGuard::Verdict::kUnconfirmed:
-      count(input.reject.value_or(Reject::kStampJump));
-      if (input.reject) let_time_pass(stamp, sink);
-      return;
-    case fusion::StampGuard::Verdict::kClockStep:
-      ++status.clock_steps;
-      aligner.clear();
-      break;
-    case fusion::StampGuard::Verdict::kAccepted:
-      break;
-  }
+  const TimePoint t = taken.stamp.t;
   GyroHealth& health = health_of[gyro];
-  if (input.reject) {
-    health.refuse(t, *input.reject);
-    refuse(gyro, *input.reject, t, stamp, sink);
-    return;
-  }
   const GyroHealth* other = heard[1 - gyro] ? &health_of[1 - gyro] : nullptr;
   const bool can_spare = other != nullptr && calibrated && status.pairs > 0;
-  if (const auto cause = health.judge(t, input.rate_dps, other, can_spare)) {
+  if (const auto cause = health.judge(t, taken.rate_dps, other, can_spare)) {
     refuse(gyro, *cause, t, stamp, sink);
     return;
   }
-  const double rate_dps = take_back(gyro, t, input.rate_dps);
+  const double rate_dps = take_back(gyro, t, taken.rate_dps);
   if (!aligner.push(gyro, t, rate_dps)) {
-    count(Reject::kLate);
+    ++own.rejected[static_cast<std::size_t>(Reject::kLate)];
     return;
   }
   ++own.samples;
-  own.last_rate_dps = input.rate_dps;
+  own.last_rate_dps = taken.rate_dps;
   take_sample(gyro, t, rate_dps, stamp, sink);
+}
+
+// A frame without a sample. One that is sick tells of its gyro where its stamp can be believed;
+// what else is refused moves time at most, and a stamp that says nothing new does not.
+void Pipeline::Impl::pass_over(std::size_t gyro, const GyroIntake::Result& taken, TimePoint stamp,
+                               FrameSink& sink) {
+  if (taken.stamp.believed()) {
+    health_of[gyro].refuse(taken.stamp.t, *taken.reject);
+    refuse(gyro, *taken.reject, taken.stamp.t, stamp, sink);
+    return;
+  }
+  ++status.gyros[gyro].rejected[static_cast<std::size_t>(*taken.reject)];
+  const bool stamp_alone = taken.reject == Reject::kStampJump;
+  const bool repeated = taken.stamp.reject == Reject::kStampRepeated;
+  if (!stamp_alone && !repeated) let_time_pass(stamp, sink);
+}
+
+// What waits for a partner is of the time before the step.
+void Pipeline::Impl::step_clock() {
+  ++status.clock_steps;
+  aligner.clear();
 }
 
 // The reading less what the model knows of it.
@@ -261,7 +259,7 @@ double Pipeline::Impl::take_back(std::size_t gyro, TimePoint t, double reading_d
   surroundings.reach(t);
   if ((needs[gyro] & model::kNeedsTemperature) != 0 ||
       plan.corrector.gyros[gyro].learns_temperature) {
-    surroundings.add_temperature(gyro, t, inputs[gyro].temperature_c());
+    surroundings.add_temperature(gyro, t, inputs[gyro].input().temperature_c());
   }
   if (!compensations[gyro].takes_any()) return reading_dps;
   return compensations[gyro].correct(reading_dps, surroundings.at(gyro, t));
@@ -311,22 +309,18 @@ void Pipeline::Impl::set_aside(std::size_t gyro, TimePoint t, TimePoint stamp, F
 
 void Pipeline::Impl::receive_reference(const can::Frame& frame, TimePoint stamp, FrameSink& sink) {
   ++status.reference_frames;
-  double rate_dps = 0.0;
-  TimePoint t;
-  const bool usable = guard.can_be_time(stamp) && !reference_check.judge(frame) &&
-                      !decode_quantity(plan.reference->rate, frame, rate_dps);
-  const auto verdict = usable ? guard.check(kReferenceStream, whole_microseconds(stamp), t)
-                              : fusion::StampGuard::Verdict::kUnconfirmed;
-  if (verdict == fusion::StampGuard::Verdict::kUnconfirmed ||
-      verdict == fusion::StampGuard::Verdict::kRepeated) {
+  std::optional<ScalarIntake::Result> taken;
+  if (guard.can_be_time(stamp)) {
+    taken = reference_input->take(frame, whole_microseconds(stamp), guard);
+  }
+  if (!taken || taken->reject) {
     ++status.reference_rejected;
     let_time_pass(stamp, sink);
     return;
   }
-  if (verdict == fusion::StampGuard::Verdict::kClockStep) {
-    ++status.clock_steps;
-    aligner.clear();
-  }
+  if (taken->stamp.clock_step) step_clock();
+  const TimePoint t = taken->stamp.t;
+  const double rate_dps = taken->value[0];
   reference.add_reference(t, rate_dps);
   if (!calibrated && plan.calibration.from_reference) surroundings.add_rate(t, rate_dps);
   while (!calibrated && plan.calibration.from_reference) {
@@ -522,7 +516,7 @@ std::optional<SavedState> Pipeline::Impl::memory() const {
   state.rate_stamp = newest - guard.offset();
   for (std::size_t gyro = 0; gyro < 2; ++gyro) {
     state.devices[gyro] = device_of(plan.gyros[gyro]);
-    const double temperature_c = inputs[gyro].temperature_c();
+    const double temperature_c = inputs[gyro].input().temperature_c();
     if (std::isfinite(temperature_c)) state.temperature_c[gyro] = temperature_c;
   }
   state.rest_rate_dps = plan.calibration.rate_dps;
@@ -697,7 +691,7 @@ const Status& Pipeline::Impl::refreshed_status() {
     status.gyros[gyro].faults = health_of[gyro].records();
     for (FaultRecord& record : status.gyros[gyro].faults)
       record.last -= guard.offset();
-    status.gyros[gyro].temperature_c = inputs[gyro].temperature_c();
+    status.gyros[gyro].temperature_c = inputs[gyro].input().temperature_c();
     status.gyros[gyro].waits_for = surroundings.missing(gyro, needs[gyro]);
     status.gyros[gyro].unpaired = aligner.counts().unpaired[gyro];
   }

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <numbers>
 
-#include "gateway/gyro_input.h"
 #include "model/catalogue.h"
 
 namespace vgyro::gateway {
@@ -18,11 +17,6 @@ fusion::TemperatureFilter filter_of(const GyroPlan& gyro) {
   return fusion::TemperatureFilter(gyro.temperature ? gyro.temperature->step : 0.0);
 }
 
-// A stamp that the guard has accepted for one of the streams that do not lead.
-bool accept(fusion::StampGuard& guard, std::size_t stream, TimePoint raw, TimePoint& t) {
-  return guard.check(stream, raw, t) == fusion::StampGuard::Verdict::kAccepted;
-}
-
 }  // namespace
 
 Surroundings::Surroundings(const Plan& plan)
@@ -30,8 +24,8 @@ Surroundings::Surroundings(const Plan& plan)
       temperatures_{filter_of(plan.gyros[0]), filter_of(plan.gyros[1])},
       rate_dps_(plan.calibration.rate_dps) {
   acceleration_g_.fill(model::Surroundings::kUnknown);
-  if (plan.accelerometer) accelerometer_check_ = E2eCheck(plan.accelerometer->e2e);
-  if (plan.speed) speed_check_ = E2eCheck(plan.speed->e2e);
+  if (plan.accelerometer) accelerometer_.emplace(accelerometer_intake(*plan.accelerometer));
+  if (plan.speed) speed_.emplace(speed_intake(*plan.speed));
 }
 
 void Surroundings::set_zero(TimePoint t) {
@@ -61,29 +55,22 @@ void Surroundings::add_temperature(std::size_t gyro, TimePoint t, double tempera
 
 bool Surroundings::receive_acceleration(const can::Frame& frame, TimePoint raw,
                                         fusion::StampGuard& guard) {
-  if (accelerometer_check_.judge(frame)) return false;
-  std::array<double, 3> acceleration_g{};
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    if (decode_quantity(plan_.accelerometer->axes[axis], frame, acceleration_g[axis])) return false;
-  }
-  TimePoint t;
-  if (!accept(guard, kAccelerometerStream, raw, t)) return false;
-  acceleration_g_ = acceleration_g;
-  vibration_.add(t, std::hypot(acceleration_g[0], acceleration_g[1], acceleration_g[2]));
+  const AxesIntake::Result taken = accelerometer_->take(frame, raw, guard);
+  if (taken.reject) return false;
+  acceleration_g_ = taken.value;
+  vibration_.add(taken.stamp.t, std::hypot(taken.value[0], taken.value[1], taken.value[2]));
   return true;
 }
 
 bool Surroundings::receive_speed(const can::Frame& frame, TimePoint raw,
                                  fusion::StampGuard& guard) {
-  if (speed_check_.judge(frame)) return false;
-  double speed_m_s = 0.0;
-  const auto reject = decode_quantity(plan_.speed->speed, frame, speed_m_s);
+  const ScalarIntake::Result taken = speed_->take(frame, raw, guard);
   // The sensor says that it does not know: what it said before is worth no more.
-  if (reject == Reject::kOutOfRange || reject == Reject::kNotFinite) speed_at_ = std::nullopt;
-  TimePoint t;
-  if (reject || !accept(guard, kSpeedStream, raw, t)) return false;
-  speed_at_ = t;
-  speed_m_s_ = speed_m_s;
+  const bool unknown = taken.reject == Reject::kOutOfRange || taken.reject == Reject::kNotFinite;
+  if (unknown) speed_at_ = std::nullopt;
+  if (taken.reject) return false;
+  speed_at_ = taken.stamp.t;
+  speed_m_s_ = taken.value[0];
   return true;
 }
 

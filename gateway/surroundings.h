@@ -14,7 +14,7 @@
 #include "fusion/moving_variance.h"
 #include "fusion/stamp_guard.h"
 #include "fusion/temperature_filter.h"
-#include "gateway/e2e_check.h"
+#include "gateway/intake.h"
 #include "gateway/plan.h"
 #include "model/effect.h"
 
@@ -29,8 +29,6 @@ class Surroundings {
   static constexpr Duration kAngleAhead = std::chrono::seconds(1);
   /// A longer leap of time is a clock that was set, not a gyro that went on warming up.
   static constexpr Duration kLeap = std::chrono::hours(24);
-  static constexpr std::size_t kAccelerometerStream = 3;
-  static constexpr std::size_t kSpeedStream = 4;
 
   explicit Surroundings(const Plan& plan);
 
@@ -74,8 +72,8 @@ class Surroundings {
   TimePoint angle_at_;
   double angle_rad_ = 0.0;
   double rate_dps_;
-  E2eCheck accelerometer_check_;
-  E2eCheck speed_check_;
+  std::optional<AxesIntake> accelerometer_;
+  std::optional<ScalarIntake> speed_;
   std::optional<TimePoint> speed_at_;
   double speed_m_s_ = 0.0;
 };

@@ -1,0 +1,108 @@
+#pragma once
+
+// Frames of one stream in, accepted values with their time out, or the cause why a frame cannot be
+// used. Owns the order of the questions: is the frame whole and new (E2E), does it hold a value,
+// can its stamp be believed. The live pipeline and the readers of recordings ask here, so that both
+// refuse the same. Counts nothing and knows no state; the guard is the host's and is only lent.
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <utility>
+
+#include "base/time.h"
+#include "can/frame.h"
+#include "fusion/stamp_guard.h"
+#include "gateway/e2e_check.h"
+#include "gateway/gyro_input.h"
+#include "gateway/plan.h"
+#include "gateway/status.h"
+
+namespace vgyro::gateway {
+
+/// The streams of a fusion::StampGuard. The gyros, 0 and 1, come first: they lead.
+inline constexpr std::size_t kReferenceStream = 2;
+inline constexpr std::size_t kAccelerometerStream = 3;
+inline constexpr std::size_t kSpeedStream = 4;
+
+/// What the guard says of one stamp.
+struct StampResult {
+  bool judged = false;           ///< false: the frame was not worth asking for
+  std::optional<Reject> reject;  ///< kStampRepeated or kStampJump
+  bool clock_step = false;       ///< believed, and what came before is of the time before the step
+  TimePoint t;  ///< monotone; of a stamp that is believed, and of one that is repeated
+
+  [[nodiscard]] bool believed() const { return judged && !reject; }
+};
+StampResult judge_stamp(std::size_t stream, TimePoint stamp, fusion::StampGuard& guard);
+
+/// Whose stamps are judged besides those of values: nobody's, or those of frames that are their
+/// sender's own and say that the sensor is sick (GyroHealth wants their time).
+enum class Timed : std::uint8_t { kValues, kSickToo };
+[[nodiscard]] bool is_timed(const std::optional<Reject>& reject, Timed timed);
+
+/// N quantities of one message, all or none, with the message's E2E check.
+template <std::size_t N>
+class QuantityInput {
+ public:
+  /// The plan's parts must live as long.
+  QuantityInput(const std::array<const Quantity*, N>& quantities, const E2ePlan& e2e)
+      : quantities_(quantities), e2e_(e2e) {}
+
+  struct Result {
+    std::optional<Reject> reject;   ///< set: the frame is not used
+    std::array<double, N> value{};  ///< in the product's units
+  };
+  Result decode(const can::Frame& frame) {
+    Result result;
+    result.reject = e2e_.judge(frame);
+    for (std::size_t i = 0; i < N && !result.reject; ++i)
+      result.reject = decode_quantity(*quantities_[i], frame, result.value[i]);
+    return result;
+  }
+
+ private:
+  std::array<const Quantity*, N> quantities_;
+  E2eCheck e2e_;
+};
+
+/// `Input` turns a frame into its Result, which holds a `reject`.
+template <class Input>
+class Intake {
+ public:
+  Intake(std::size_t stream, Input input, Timed timed = Timed::kValues)
+      : stream_(stream), input_(std::move(input)), timed_(timed) {}
+
+  /// The value, used when nothing is in `reject`. What the frame itself says comes before what its
+  /// stamp says.
+  struct Result : Input::Result {
+    StampResult stamp;
+  };
+  Result take(const can::Frame& frame, TimePoint stamp, fusion::StampGuard& guard) {
+    Result result{input_.decode(frame), {}};
+    if (!is_timed(result.reject, timed_)) return result;
+    result.stamp = judge_stamp(stream_, stamp, guard);
+    if (!result.reject) result.reject = result.stamp.reject;
+    return result;
+  }
+
+  [[nodiscard]] const Input& input() const { return input_; }
+  /// What an alive counter tells begins anew.
+  void fall_silent() { input_.fall_silent(); }
+
+ private:
+  std::size_t stream_;
+  Input input_;
+  Timed timed_;
+};
+
+using GyroIntake = Intake<GyroInput>;
+using ScalarIntake = Intake<QuantityInput<1>>;
+using AxesIntake = Intake<QuantityInput<3>>;
+
+ScalarIntake reference_intake(const ReferencePlan& plan);
+ScalarIntake speed_intake(const SpeedPlan& plan);
+AxesIntake accelerometer_intake(const AccelerometerPlan& plan);
+
+}  // namespace vgyro::gateway
