@@ -248,14 +248,14 @@ Prediction::Prediction(std::span<const model::Effect> effects, const Signals& si
 double Prediction::at(double t_s) const {
   const double true_s = t_s / (1.0 + skew_);
   const double lagged_s = true_s - lag_s_;
-  double reading = low_passed_.empty() ? signals_.motion.rate(lagged_s).value
-                                       : low_passed_.back().at(lagged_s).value;
-  if (added_.empty()) return reading;
-  const double rate_dps = signals_.motion.rate(true_s).value;
+  const double late_dps = low_passed_.empty() ? signals_.motion.rate(lagged_s).value
+                                              : low_passed_.back().at(lagged_s).value;
+  if (added_.empty()) return late_dps;
   const model::Surroundings s = signals_.at(true_s);
+  double reading_dps = late_dps;
   for (const model::Effect& effect : added_)
-    reading += model::added_dps(effect, rate_dps, s);
-  return reading;
+    reading_dps += model::added_dps(effect, late_dps, s);
+  return reading_dps;
 }
 
 }  // namespace vgyro::gap

@@ -46,7 +46,8 @@ struct Signals {
 void smooth_temperature(const GyroSeries& gyro, Signals& signals);
 void set_acceleration(const AccelerationSeries& acceleration, Signals& signals);
 
-/// What one gyro's effects say it reads at `t_s`, deterministic kinds only, before clipping.
+/// What one gyro's effects say it reads at `t_s`, deterministic kinds only, before clipping, in
+/// deg/s. Responses are to the rate behind delay and low-passes; offsets are of the instant itself.
 class Prediction {
  public:
   /// `effects` of this gyro. The signals must live as long.

@@ -635,10 +635,38 @@ void Study::cache(Problem& problem) {
   }
 }
 
+Eigen::VectorXd Study::lateness_dps(const Problem& problem, std::size_t gyro,
+                                    const std::vector<Effect>& moving) const {
+  const auto same = [&](const Remembered& one) {
+    return one.problem == &problem && one.effect.kind == moving[0].kind &&
+           one.effect.gyro == moving[0].gyro && one.effect.parameters == moving[0].parameters;
+  };
+  if (moving.size() == 1) {
+    const auto found = std::find_if(remembered_.begin(), remembered_.end(), same);
+    if (found != remembered_.end()) return found->values;
+  }
+  Eigen::VectorXd lateness = Eigen::VectorXd::Zero(problem.size());
+  if (moving.empty()) return lateness;
+  const Prediction prediction(moving, signals_[gyro]);
+  for (Eigen::Index i = 0; i < problem.size(); ++i) {
+    const auto place = static_cast<std::size_t>(i);
+    if (share_of(problem.channel[place], gyro) == 0.0) continue;
+    lateness[i] = prediction.at(problem.t_s[place]) - problem.rate[gyro][place].value;
+  }
+  if (moving.size() > 1) return lateness;
+  const Remembered one{&problem, moving[0], lateness};
+  if (remembered_.size() < kRemembered) {
+    remembered_.push_back(one);
+  } else {
+    remembered_[forget_next_++ % kRemembered] = one;
+  }
+  return lateness;
+}
+
+// The rate comes late first, and every response is to what has come.
 Eigen::VectorXd Study::contribution(const Problem& problem, std::size_t gyro,
                                     const std::vector<Effect>& effects) const {
-  Eigen::VectorXd sum = Eigen::VectorXd::Zero(problem.size());
-  if (!problem.holds[gyro]) return sum;
+  if (!problem.holds[gyro]) return Eigen::VectorXd::Zero(problem.size());
   std::vector<Effect> moving;
   std::vector<Effect> added;
   for (const Effect& effect : effects) {
@@ -648,41 +676,16 @@ Eigen::VectorXd Study::contribution(const Problem& problem, std::size_t gyro,
     if (nature == model::Nature::kOffset || nature == model::Nature::kResponse)
       added.push_back(effect);
   }
-  if (moving.size() == 1) {
-    const auto same = [&](const Remembered& one) {
-      return one.problem == &problem && one.effect.kind == moving[0].kind &&
-             one.effect.gyro == moving[0].gyro && one.effect.parameters == moving[0].parameters;
-    };
-    const auto found = std::find_if(remembered_.begin(), remembered_.end(), same);
-    if (found != remembered_.end()) {
-      sum += found->values;
-      moving.clear();
-    }
-  }
-  if (!moving.empty()) {
-    const Prediction prediction(moving, signals_[gyro]);
-    for (Eigen::Index i = 0; i < problem.size(); ++i) {
-      const auto place = static_cast<std::size_t>(i);
-      const double share = share_of(problem.channel[place], gyro);
-      if (share == 0.0) continue;
-      sum[i] += share * (prediction.at(problem.t_s[place]) - problem.rate[gyro][place].value);
-    }
-    if (moving.size() == 1) {
-      const Remembered one{&problem, moving[0], sum};
-      if (remembered_.size() < kRemembered) {
-        remembered_.push_back(one);
-      } else {
-        remembered_[forget_next_++ % kRemembered] = one;
-      }
-    }
-  }
-  for (const Effect& effect : added) {
-    for (Eigen::Index i = 0; i < problem.size(); ++i) {
-      const auto place = static_cast<std::size_t>(i);
-      const double share = share_of(problem.channel[place], gyro);
-      if (share == 0.0) continue;
-      sum[i] += share * model::added_dps(effect, problem.rate[gyro][place].value,
-                                         problem.surroundings[gyro][place]);
+  Eigen::VectorXd sum = Eigen::VectorXd::Zero(problem.size());
+  const Eigen::VectorXd lateness = lateness_dps(problem, gyro, moving);
+  for (Eigen::Index i = 0; i < problem.size(); ++i) {
+    const auto place = static_cast<std::size_t>(i);
+    const double share = share_of(problem.channel[place], gyro);
+    if (share == 0.0) continue;
+    const double late_dps = problem.rate[gyro][place].value + lateness[i];
+    sum[i] = share * lateness[i];
+    for (const Effect& effect : added) {
+      sum[i] += share * model::added_dps(effect, late_dps, problem.surroundings[gyro][place]);
     }
   }
   return sum;

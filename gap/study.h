@@ -76,6 +76,10 @@ class Study {
                                              const std::vector<model::Effect>& effects) const;
 
  private:
+  /// What a gyro feels less the true rate, in deg/s, at each sample that holds the gyro: what
+  /// delay, low-passes and clock skew make of the motion.
+  [[nodiscard]] Eigen::VectorXd lateness_dps(const Problem& problem, std::size_t gyro,
+                                             const std::vector<model::Effect>& moving) const;
   explicit Study(const Recording& recording) : recording_(recording) {}
   Expected<void> check() const;
   Expected<void> check_spans() const;
@@ -88,7 +92,7 @@ class Study {
   Problem build_against_reference(std::size_t gyro);
   Problem build_pair();
 
-  /// The last contributions of timing effects: dear, and asked for again and again.
+  /// The last answers of lateness_dps: dear, and asked for again and again.
   struct Remembered {
     const Problem* problem = nullptr;
     model::Effect effect;

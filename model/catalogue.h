@@ -4,8 +4,8 @@
 // the deterministic ones, its equation. The simulator adds what the live path takes back, so both
 // ask here; a new kind is a new row.
 //
-// A gyro reads  clip(Ω(t − lag) + responses + offsets + noise): responses depend on the rate,
-// offsets do not.
+// A gyro reads  clip(Ω' + responses(Ω') + offsets + noise), where Ω' is the rate behind delay and
+// low-passes: every response is to the late rate, and offsets depend on no rate.
 
 #include <cstdint>
 #include <optional>
@@ -67,8 +67,8 @@ const KindInfo& info(Kind kind);
 const KindInfo* find_kind(std::string_view name);
 std::vector<std::string> kind_names();
 
-/// What an offset or a response adds to the reading, deg/s; 0 where it depends on something that is
-/// not known.
+/// What an offset or a response adds to the reading, deg/s; `rate_dps` is the late rate. 0 where it
+/// depends on something that is not known.
 double added_dps(const Effect& effect, double rate_dps, const Surroundings& surroundings);
 
 /// Of responses: d added_dps / d rate_dps.

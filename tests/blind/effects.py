@@ -93,10 +93,11 @@ def companions(kind, world, rng, plain):
     return {}
 
 
-def shape(kind, p, gyro, t, world):
-    """What one unit of the effect adds to a reading at the instants t."""
+def shape(kind, p, gyro, t, world, late_rate=None):
+    """What one unit of the effect adds to a reading at the instants t; a response to the late rate, which
+    is the true one where nothing delays it."""
     if kind in RESPONSES:
-        rate = world.motion.rate(t)
+        rate = world.motion.rate(t) if late_rate is None else late_rate
         if kind == "scale_factor_temperature":
             return rate * (world.temperatures[gyro - 1].value(t) - p["reference_c"])
         power = {"scale_factor": rate, "scale_factor_asymmetry": np.abs(rate)}

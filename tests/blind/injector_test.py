@@ -99,6 +99,23 @@ class Strength(unittest.TestCase):
                 added, -lag_s * world.motion.acceleration(t), atol=0.01 * np.abs(added).max()
             )
 
+    def test_responses_are_to_the_rate_that_comes_late(self):
+        """One scale error makes every reading larger by it, late or not."""
+        world = small_world(SEED, 100.0)
+        lags = [
+            {"kind": "delay", "gyro": 1, "parameters": {"seconds": 0.02}},
+            {"kind": "bandwidth", "gyro": 1, "parameters": {"cutoff_hz": 10.0}},
+        ]
+        scale = {"kind": "scale_factor", "gyro": 1, "parameters": {"error": 2e-3}}
+        for late in (lags[:1], lags[1:], lags):
+            with_it, without = (
+                truth.reading(world, 1, es, [], np.random.default_rng(1))[3] for es in ([scale, *late], late)
+            )
+            # The rate that is late, by the definition of each lag.
+            t = world.times(1) - (0.02 if late[0]["kind"] == "delay" else 0.0)
+            rate = world.motion.low_passed(t, 10.0) if late[-1]["kind"] == "bandwidth" else world.motion.rate(t)
+            np.testing.assert_allclose(with_it - without, 2e-3 * rate, atol=1e-12)
+
     def test_noise_stands_out_by_the_wanted_t_in_the_likelihood(self):
         """Twice the mean log-likelihood ratio of true to false noise is t²."""
         for kind in ("white_noise", "rate_noise", "rate_random_walk"):

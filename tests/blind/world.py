@@ -65,7 +65,17 @@ def correlated(count, interval_s, sigma, tau_s, rng):
     return np.array(out)
 
 
-def _noise(world, gyro, t, effects, rng):
+def late_rate(world, t, effects):
+    """What a gyro feels at the instants t, in deg/s: the rate behind its delays and its low-pass."""
+    delay_s = sum(p["seconds"] for p in _of(effects, "delay"))
+    cutoffs = _of(effects, "bandwidth")
+    assert len(cutoffs) <= 1
+    if cutoffs:
+        return world.motion.low_passed(t - delay_s, cutoffs[0]["cutoff_hz"])
+    return world.motion.rate(t - delay_s)
+
+
+def _noise(world, gyro, t, rate, effects, rng):
     g, rate_hz = world.gyros[gyro - 1], world.rates_hz[gyro - 1]
     total = np.zeros(len(t))
     for density in [g.density, *(e["density_dps_rthz"] for e in _of(effects, "white_noise"))]:
@@ -78,9 +88,7 @@ def _noise(world, gyro, t, effects, rng):
     for sigma, tau_s in markov:
         total += correlated(len(t), 1.0 / rate_hz, sigma, tau_s, rng)
     for e in _of(effects, "rate_noise"):
-        total += (
-            rng.standard_normal(len(t)) * e["ratio_rthz"] * np.abs(world.motion.rate(t)) * np.sqrt(rate_hz)
-        )
+        total += rng.standard_normal(len(t)) * e["ratio_rthz"] * np.abs(rate) * np.sqrt(rate_hz)
     return total
 
 
@@ -93,20 +101,15 @@ def reading(world, gyro, effects, strangers, rng):
     (world, gyro, t, rng) → deg/s outside the catalogue."""
     effects = [e for e in effects if e["gyro"] == gyro]
     t = world.times(gyro)
-    delay_s = sum(p["seconds"] for p in _of(effects, "delay"))
-    cutoffs = _of(effects, "bandwidth")
-    assert len(cutoffs) <= 1
-    y = (
-        world.motion.low_passed(t - delay_s, cutoffs[0]["cutoff_hz"])
-        if cutoffs
-        else world.motion.rate(t - delay_s)
-    )
+    # It comes late first; what the sensor makes of a rate, it makes of that.
+    rate = late_rate(world, t, effects)
+    y = rate.copy()
     y += world.gyros[gyro - 1].bias
     for e in effects:
         if e["kind"] in kinds.OFFSETS + kinds.RESPONSES:
             p = e["parameters"]
-            y += p[kinds.SIZE[e["kind"]][0]] * kinds.shape(e["kind"], p, gyro, t, world)
-    y += _noise(world, gyro, t, effects, rng)
+            y += p[kinds.SIZE[e["kind"]][0]] * kinds.shape(e["kind"], p, gyro, t, world, rate)
+    y += _noise(world, gyro, t, rate, effects, rng)
     for stranger in strangers:
         y += stranger(world, gyro, t, rng)
     manner = {e["kind"]: e.get("manner") for e in effects}

@@ -63,6 +63,24 @@ TEST(Prediction, AddsAScaleFactorToTheRate) {
     EXPECT_NEAR(prediction.at(t), 40.4 * std::sin(2.0 * kPi * t) + 0.5, 1e-5);
 }
 
+// The sensor's response is to the rate that it reads, which is the late one: at 250 deg/s² the
+// order of the two is worth 1e-2 deg/s.
+TEST(Prediction, ResponsesSeeTheRateBehindDelayAndLowPass) {
+  const Signals signals = turning_at(1.0, 40.0);
+  const model::Effect delay{0, model::Kind::kDelay, {0.02}, 0};
+  const model::Effect bandwidth{0, model::Kind::kBandwidth, {20.0}, 0};
+  const model::Effect scale{0, model::Kind::kScaleFactor, {2e-3}, 0};
+  const model::Effect cubic{0, model::Kind::kScaleFactorCubic, {1e-6}, 0};
+  const std::array lags{delay, bandwidth};
+  const std::array all{scale, delay, cubic, bandwidth};
+  const Prediction lagged(lags, signals);
+  const Prediction read(all, signals);
+  for (double t = 1.0; t < 19.0; t += 0.0371) {
+    const double late_dps = lagged.at(t);
+    EXPECT_NEAR(read.at(t), late_dps * (1.0 + 2e-3 + 1e-6 * late_dps * late_dps), 1e-12);
+  }
+}
+
 TEST(Motion, AngleIsTheIntegralOfTheRate) {
   const double frequency_hz = 0.8;
   const Signals signals = turning_at(frequency_hz, 90.0);

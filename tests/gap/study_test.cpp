@@ -1,5 +1,7 @@
 #include "gap/study.h"
 
+#include <cmath>
+
 #include <gtest/gtest.h>
 
 #include "gap/views.h"
@@ -57,6 +59,34 @@ TEST(Study, BearsPauses) {
     recording.reference_dps.t_s[i] += 1800.0;
   recording.seconds += 1800.0;
   EXPECT_EQ(refusal(recording), "");
+}
+
+// What a model says of a scale factor behind a delay leaves nothing but noise of readings that the
+// same equation made; with the response before the delay it would leave 2e-3 deg/s.
+TEST(Study, ResponsesSeeTheLateRate) {
+  constexpr double kDelay_s = 0.02;
+  constexpr double kScale = 2e-3;
+  constexpr double kNoise_dps = 1e-5;
+  Making making;
+  making.white_dps_rthz.fill(kNoise_dps * std::sqrt(making.interval_s));
+  making.walk_dps_rts.fill(0.0);
+  making.error = [&](std::size_t, double t_s, double rate_dps) {
+    return (1.0 + kScale) * true_rate_dps(making, t_s - kDelay_s) - rate_dps;
+  };
+  const Recording recording = make_recording(making);
+  std::vector<model::Effect> effects;
+  for (std::size_t gyro = 0; gyro < 2; ++gyro) {
+    effects.push_back({gyro, model::Kind::kScaleFactor, {kScale}, 0});
+    effects.push_back({gyro, model::Kind::kDelay, {kDelay_s}, 0});
+  }
+  const auto study = Study::begin(recording, effects);
+  ASSERT_TRUE(study) << study.error().message();
+  ASSERT_EQ((*study)->problems().size(), 2U);
+  for (const Problem& problem : (*study)->problems()) {
+    // Asked twice, because what a delay does is remembered.
+    for (int time = 0; time < 2; ++time)
+      EXPECT_LT((*study)->residual(problem, effects).cwiseAbs().maxCoeff(), 10.0 * kNoise_dps);
+  }
 }
 
 // An hour without a sample is one place for a step, not a thousand.
