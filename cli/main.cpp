@@ -6,8 +6,10 @@
 
 #include "base/nearest.h"
 #include "cli/commands.h"
+#include "cli/exit_code.h"
 #include "cli/number_option.h"
-#include "cli/terminal.h"
+#include "cli/output/errors.h"
+#include "cli/output/terminal.h"
 #include "gateway/config.h"
 
 namespace {
