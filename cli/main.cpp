@@ -4,7 +4,7 @@
 
 #include <CLI/CLI.hpp>
 
-#include "base/nearest.h"
+#include "base/spelling.h"
 #include "cli/commands.h"
 #include "cli/exit_code.h"
 #include "cli/number_option.h"

@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/file.h"
-#include "base/nearest.h"
+#include "base/spelling.h"
 #include "can/candump.h"
 #include "cli/commands.h"
 #include "cli/exit_code.h"
