@@ -2,7 +2,7 @@
 
 // Every kind of effect: its name and parameters in the model file, what it does to a gyro, and, of
 // the deterministic ones, its equation. The simulator adds what the live path takes back, so both
-// ask here; a new kind is a new row.
+// ask here. A new offset or response is a new row; HACKING.md says what else another kind touches.
 //
 // A gyro reads  clip(Ω(t − lag) + responses + offsets + noise): responses depend on the rate,
 // offsets do not.

@@ -30,7 +30,7 @@ SYSTEM_HEADERS = (
     # The other one speaks to the service manager.
     (r"sys/socket\.h|sys/un\.h", r"can/socket\.(h|cpp)|daemon/service\.cpp"),
     (r"systemd/.*", r"daemon/.*|cli/status/gateway_client\.cpp"),
-    (r"Eigen/.*|unsupported/Eigen/.*", r"(fusion|gateway|model|analysis|gap)/.*"),
+    (r"Eigen/.*|unsupported/Eigen/.*", r"(fusion|analysis|gap)/.*"),
     (r"iostream|istream|ostream|fstream|sstream|iomanip", r"(base|daemon|cli)/.*"),
 )
 
@@ -106,6 +106,8 @@ PLANTED = (  # file, text, is it a breach?
     ("can/c.cpp", "#include <net/if.h>", True),
     ("cli/b.cpp", "#include <systemd/sd-event.h>", True),
     ("dbc/b.cpp", "#include <Eigen/Dense>", True),
+    ("gateway/i.cpp", "#include <Eigen/Dense>", True),
+    ("model/b.h", "#include <Eigen/Core>", True),
     ("gateway/d.cpp", "#include <iostream>", True),
     ("gateway/e.cpp", '#include "plan.h"', True),
     ("fusion/c.cpp", "auto t = std::chrono::steady_clock::now();", True),
