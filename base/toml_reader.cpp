@@ -5,7 +5,7 @@
 
 #include <fmt/core.h>
 
-#include "base/nearest.h"
+#include "base/spelling.h"
 #include "base/toml_bounds.h"
 
 namespace vgyro {

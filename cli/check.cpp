@@ -2,7 +2,9 @@
 
 #include "base/printable.h"
 #include "cli/commands.h"
-#include "cli/terminal.h"
+#include "cli/exit_code.h"
+#include "cli/output/errors.h"
+#include "cli/output/terminal.h"
 #include "gateway/config.h"
 #include "gateway/model_plan.h"
 

@@ -1,21 +1,16 @@
 #pragma once
 
-// The subcommands of `vgyro`, each in a file of its own. They return the exit code: 0 done, 1 bad
-// input (told on stderr). Wrong usage, 2, is main()'s business.
+// The subcommands of `vgyro`, each in a file of its own. They return the exit code (exit_code.h);
+// wrong usage is main()'s business.
 
 #include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "base/error.h"
 #include "gateway/plan.h"
 
 namespace vgyro::cli {
-
-inline constexpr int kDone = 0;
-inline constexpr int kBadInput = 1;
-inline constexpr int kWrongUsage = 2;
 
 struct CheckOptions {
   std::string config;
@@ -98,10 +93,5 @@ struct StatusOptions {
 };
 int run_status(const StatusOptions& options);
 int run_recalibrate();
-
-/// "error: where: what; remedy" on stderr; returns kBadInput.
-int report(const Error& error);
-int report(const std::vector<Error>& errors);
-void warn(const Error& warning);
 
 }  // namespace vgyro::cli

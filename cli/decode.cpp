@@ -9,8 +9,10 @@
 #include "base/printable.h"
 #include "can/candump.h"
 #include "cli/commands.h"
-#include "cli/output_file.h"
-#include "cli/terminal.h"
+#include "cli/exit_code.h"
+#include "cli/output/errors.h"
+#include "cli/output/output_file.h"
+#include "cli/output/terminal.h"
 #include "dbc/multiplex.h"
 #include "dbc/parser.h"
 

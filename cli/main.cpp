@@ -4,10 +4,12 @@
 
 #include <CLI/CLI.hpp>
 
-#include "base/nearest.h"
+#include "base/spelling.h"
 #include "cli/commands.h"
+#include "cli/exit_code.h"
 #include "cli/number_option.h"
-#include "cli/terminal.h"
+#include "cli/output/errors.h"
+#include "cli/output/terminal.h"
 #include "gateway/config.h"
 
 namespace {

@@ -1,7 +1,8 @@
 #include <fmt/core.h>
 
 #include "cli/commands.h"
-#include "cli/terminal.h"
+#include "cli/exit_code.h"
+#include "cli/output/terminal.h"
 #include "model/catalogue.h"
 #include "model/evidence.h"
 

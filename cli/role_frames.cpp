@@ -5,7 +5,7 @@
 #include <fmt/core.h>
 
 #include "can/log_source.h"
-#include "cli/progress.h"
+#include "cli/output/progress.h"
 
 namespace vgyro::cli {
 

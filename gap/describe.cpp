@@ -1,3 +1,5 @@
+#include "gap/describe.h"
+
 #include <algorithm>
 #include <cmath>
 #include <complex>
@@ -5,7 +7,6 @@
 
 #include <fmt/core.h>
 
-#include "gap/figures.h"
 #include "gap/views.h"
 #include "model/catalogue.h"
 

@@ -1,3 +1,5 @@
+#include "gap/differences.h"
+
 #include <algorithm>
 #include <cmath>
 #include <complex>
@@ -9,7 +11,6 @@
 #include <unsupported/Eigen/FFT>
 
 #include "gap/candidates.h"
-#include "gap/figures.h"
 #include "gap/median.h"
 #include "gap/views.h"
 #include "model/catalogue.h"

@@ -5,6 +5,8 @@
 
 #include <fmt/core.h>
 
+#include "gap/describe.h"
+#include "gap/differences.h"
 #include "gap/figures.h"
 #include "gap/leftover.h"
 #include "gap/score.h"

@@ -8,8 +8,8 @@
 #include <fmt/core.h>
 
 #include "base/bounded_file.h"
-#include "base/nearest.h"
 #include "base/printable.h"
+#include "base/spelling.h"
 #include "base/toml_reader.h"
 #include "fusion/polynomial.h"
 #include "gateway/e2e_config.h"

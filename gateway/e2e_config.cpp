@@ -5,7 +5,7 @@
 
 #include <fmt/core.h>
 
-#include "base/nearest.h"
+#include "base/spelling.h"
 #include "dbc/e2e.h"
 
 namespace vgyro::gateway {

@@ -7,8 +7,8 @@
 
 #include <fmt/core.h>
 
-#include "base/nearest.h"
 #include "base/printable.h"
+#include "base/spelling.h"
 #include "dbc/parser.h"
 
 namespace vgyro::gateway {

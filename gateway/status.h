@@ -15,7 +15,7 @@ namespace vgyro::gateway {
 
 /// VG_State on the wire; the transition table is in ARCHITECTURE.md.
 enum class State : std::uint8_t {
-  kWaiting = 0,      ///< at least one gyro has not been heard since the start
+  kWaiting = 0,      ///< no pair yet; or not calibrated, and a gyro is not in use
   kCalibrating = 1,  ///< both heard, initial calibration not complete
   kRunning = 2,      ///< both gyros in use
   kDegraded = 3,     ///< one gyro in use, the other timed out or was set aside

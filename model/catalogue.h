@@ -2,7 +2,7 @@
 
 // Every kind of effect: its name and parameters in the model file, what it does to a gyro, and, of
 // the deterministic ones, its equation. The simulator adds what the live path takes back, so both
-// ask here; a new kind is a new row.
+// ask here. A new offset or response is a new row; HACKING.md says what else another kind touches.
 //
 // A gyro reads  clip(Ω' + responses(Ω') + offsets + noise), where Ω' is the rate behind delay and
 // low-passes: every response is to the late rate, and offsets depend on no rate.

@@ -7,7 +7,7 @@
 #include <fmt/core.h>
 
 #include "base/bounded_file.h"
-#include "base/nearest.h"
+#include "base/spelling.h"
 #include "base/toml_reader.h"
 #include "model/catalogue.h"
 

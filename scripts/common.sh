@@ -8,6 +8,9 @@ RUN_PACKAGES=(gnuplot-nox fonts-dejavu-core can-utils iproute2 util-linux xz-uti
 TEST_PACKAGES=(libgtest-dev libbenchmark-dev clang-format git python3 python3-numpy python3-can
   python3-canmatrix user-mode-linux kmod dbus lintian man-db systemd mmdebstrap uidmap genext2fs e2fsprogs)
 FUZZ_PACKAGES=(clang libclang-rt-14-dev)
+TIDY_PACKAGES=(clang-tidy)
+
+LAYERS=(base can dbc model simulation fusion analysis gap gateway daemon cli)
 
 say() { printf '\n== %s\n' "$*"; }
 die() { printf 'error: %s\n' "$*" >&2; exit 1; }

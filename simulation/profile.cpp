@@ -8,7 +8,7 @@
 #include <fmt/core.h>
 
 #include "base/file.h"
-#include "base/nearest.h"
+#include "base/spelling.h"
 
 namespace vgyro::simulation {
 

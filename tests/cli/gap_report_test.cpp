@@ -1,8 +1,7 @@
-#include "cli/gap_report.h"
-
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "cli/gap/report.h"
 #include "made_up_result.h"
 #include "model/catalogue.h"
 

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "cli/gap_report.h"
+#include "cli/gap/report.h"
 #include "gap/result.h"
 
 namespace vgyro::cli {

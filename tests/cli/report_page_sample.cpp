@@ -2,7 +2,7 @@
 
 #include <cstdio>
 
-#include "cli/report_page.h"
+#include "cli/gap/report_page.h"
 #include "made_up_result.h"
 
 int main() {

@@ -1,4 +1,4 @@
-#include "cli/result_folder.h"
+#include "cli/output/result_folder.h"
 
 #include <cstdlib>
 #include <filesystem>

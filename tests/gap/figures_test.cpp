@@ -5,6 +5,8 @@
 
 #include <gtest/gtest.h>
 
+#include "gap/describe.h"
+#include "gap/differences.h"
 #include "gap/study.h"
 #include "made_recording.h"
 

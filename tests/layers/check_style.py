@@ -1,6 +1,7 @@
 #!/usr/bin/python3
 """Fails when a tracked file holds what does not belong into a repository (a path of somebody's machine,
-a registry's host, a note to oneself, megabytes), or when ARCHITECTURE.md names a test that does not exist."""
+a registry's host, a note to oneself, megabytes), when a function is longer than it may be, or when ARCHITECTURE.md
+names a test that does not exist."""
 
 import argparse
 import os
@@ -9,6 +10,8 @@ import subprocess
 import sys
 import tempfile
 from pathlib import Path
+
+from function_lengths import UnbalancedBraces, function_lengths
 
 BYTES_MAX = 2_000_000
 # Split, so that this file does not hold what it looks for.
@@ -22,6 +25,31 @@ FORBIDDEN = (
 MACHINE_FILES = re.compile(r"\.ci/.*")
 # Third-party spellings that only look like a note.
 NOT_NOTES = re.compile(r"Vector__" + "XX" + "X")
+
+SOURCES = re.compile(r"(?:base|can|dbc|model|simulation|fusion|analysis|gap|gateway|daemon|cli)/.*\.(?:h|cpp)")
+LINES_MAX = 60
+# (file, function) → its lines: longer than LINES_MAX already when that limit was set. They may only shrink;
+# the longest stands for overloads.
+LONG_FUNCTIONS = {
+    ("cli/replay/summary.cpp", "to_text"): 82,
+    ("fusion/drift_filter.cpp", "DriftFilter::update_sized"): 83,
+    ("gap/describe.cpp", "evidence_of"): 92,
+    ("gap/differences.cpp", "choose"): 68,
+    ("gap/differences.cpp", "clock"): 68,
+    ("gap/leftover.cpp", "judge"): 89,
+    ("gap/leftover.cpp", "leftovers"): 92,
+    ("gap/noise.cpp", "whiten_means"): 66,
+    ("gap/noise.cpp", "fit_pair_noise"): 67,
+    ("gap/search.cpp", "Search::score"): 68,
+    ("gap/search.cpp", "Search::score_lines"): 78,
+    ("gap/search.cpp", "Search::noise_rounds"): 113,
+    ("gap/study.cpp", "Study::find_spikes"): 100,
+    ("gap/transport.cpp", "find_lateness"): 87,
+    ("gap/transport.cpp", "find_lattice"): 64,
+    ("gap/transport.cpp", "find_stuck"): 64,
+    ("gap/views.cpp", "binned"): 68,
+    ("gap/workflow.cpp", "find_gap"): 84,
+}
 
 INVARIANT = re.compile(r"^\s*(\d+)\.\s")
 TEST_NAMES = re.compile(r"(?:\*tests?:\*|\(tests?:)\s*(.+)")
@@ -116,11 +144,50 @@ def invariant_complaints(root):
     return found
 
 
-def complaints(root):
-    return [c for n in tracked(root) for c in text_complaints(root, n)] + invariant_complaints(root)
+def longest_functions(root, names):
+    """{(file, function): lines} of those beyond LINES_MAX, and what could not be read."""
+    longest, unread = {}, []
+    for name in names:
+        try:
+            for function, _, lines in function_lengths((root / name).read_text(encoding="utf-8")):
+                if lines > LINES_MAX:
+                    longest[name, function] = max(lines, longest.get((name, function), 0))
+        except UnbalancedBraces as error:
+            unread.append(f"{name}: {error}")
+    return longest, unread
 
 
+def length_complaints(root, names, exceptions):
+    longest, found = longest_functions(root, names)
+    for (name, function), lines in longest.items():
+        limit = exceptions.get((name, function), LINES_MAX)
+        if lines > limit:
+            found.append(f"{name}: {function}() has {lines} lines, more than {limit}")
+    for (name, function), limit in exceptions.items():
+        lines = longest.get((name, function))
+        if lines is None:
+            found.append(f"{name}: {function}() is no longer too long, or gone: strike it from LONG_FUNCTIONS")
+        elif lines < limit:
+            found.append(f"{name}: {function}() has shrunk to {lines} lines: LONG_FUNCTIONS says {limit}")
+    return found
+
+
+def complaints(root, long_functions):
+    names = tracked(root)
+    sources = [n for n in names if SOURCES.fullmatch(n)]
+    return ([c for n in names for c in text_complaints(root, n)] + length_complaints(root, sources, long_functions)
+            + invariant_complaints(root))
+
+
+def function_of(lines, name="f"):
+    return f"int {name}(int a) {{\n" + "  a += '{';\n" * (lines - 2) + "}\n"
+
+
+# What GOOD holds beyond LINES_MAX.
+GOOD_LONG = {("gap/long.cpp", "known"): LINES_MAX + 2}
 GOOD = {
+    "gap/long.cpp": "namespace {\nconst int kList[] = {{1}, {2}};\n" + function_of(LINES_MAX + 2, "known") + function_of(LINES_MAX) + "}\n",
+    "gap/class.h": "class A {\n public:\n  A() : a_{1} {}\n" + "  int a_ = 0;\n" * LINES_MAX + "};\n",
     "ARCHITECTURE.md": "# Invariants\n\n1. Holds. — *test:* `Suite.Name`, `tests/a.cpp`\n2. Is\n   long. — *test:* `Oracle.test_x`\n",
     "tests/a.cpp": "TEST(Suite, Name) {}\nTEST_F(Other,\n       Long) {}\n",
     "tests/b.py": "class Oracle(Base):\n    def test_x(self):\n        pass\n",
@@ -134,6 +201,12 @@ PLANTED = (  # a file on top of GOOD that must be complained of
     ("run", "pull registry" + ".example.org/image\n"),
     ("README.md", "data from .." + "/shared/data\n"),
     ("data.bin", "x" * (BYTES_MAX + 1)),
+    ("gap/a.cpp", function_of(LINES_MAX + 1)),
+    ("gap/b.cpp", "struct A {\n  A(int a)\n      : a_{a}, b_{a} {\n" + "    ++a_;\n" * LINES_MAX + "  }\n};\n"),
+    ("gap/c.cpp", "int f() {\n"),
+    ("gap/long.cpp", function_of(LINES_MAX + 3, "known")),
+    ("gap/long.cpp", function_of(LINES_MAX + 1, "known")),
+    ("gap/long.cpp", function_of(LINES_MAX, "known")),
     ("ARCHITECTURE.md", "# Invariants\n\n1. Holds.\n"),
     ("ARCHITECTURE.md", "# Invariants\n\n1. Holds. — *test:* `Suite.Gone`\n"),
     ("ARCHITECTURE.md", "# Invariants\n\n1. Holds. — *test:* `tests/gone.py`\n"),
@@ -147,7 +220,7 @@ def found_in(files):
             path = Path(folder) / name
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_text(text, encoding="utf-8")
-        return complaints(Path(folder))
+        return complaints(Path(folder), GOOD_LONG)
 
 
 def self_test():
@@ -164,7 +237,7 @@ def main():
     default = os.environ.get("VGYRO_SOURCE", Path(__file__).resolve().parents[2])
     parser.add_argument("root", nargs="?", type=Path, default=Path(default))
     root = parser.parse_args().root
-    problems = [f"self-test: {f}" for f in self_test()] + complaints(root)
+    problems = [f"self-test: {f}" for f in self_test()] + complaints(root, LONG_FUNCTIONS)
     print("\n".join(problems) if problems else f"{len(tracked(root))} files, {len(PLANTED)} planted cases: nothing amiss")
     return 1 if problems else 0
 

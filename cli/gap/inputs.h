@@ -9,7 +9,7 @@
 #include <tl/expected.hpp>
 
 #include "base/error.h"
-#include "cli/gap_report.h"
+#include "cli/gap/report.h"
 #include "gap/recording.h"
 #include "gap/workflow.h"
 #include "model/file.h"

@@ -1,4 +1,4 @@
-#include "cli/replay_summary.h"
+#include "cli/replay/summary.h"
 
 #include <algorithm>
 #include <cmath>

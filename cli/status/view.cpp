@@ -1,4 +1,4 @@
-#include "cli/status_view.h"
+#include "cli/status/view.h"
 
 #include <algorithm>
 #include <array>

@@ -1,4 +1,4 @@
-#include "cli/result_folder.h"
+#include "cli/output/result_folder.h"
 
 #include <algorithm>
 #include <cstdlib>
@@ -8,7 +8,7 @@
 
 #include <fmt/format.h>
 
-#include "cli/output_file.h"
+#include "cli/output/output_file.h"
 
 namespace vgyro::cli {
 

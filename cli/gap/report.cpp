@@ -1,4 +1,4 @@
-#include "cli/gap_report.h"
+#include "cli/gap/report.h"
 
 #include <algorithm>
 #include <cmath>

@@ -5,14 +5,16 @@
 
 #include "analysis/pair_noise.h"
 #include "analysis/recommendation.h"
-#include "cli/allan_plot.h"
-#include "cli/allan_report.h"
+#include "cli/allan/plot.h"
+#include "cli/allan/report.h"
 #include "cli/commands.h"
-#include "cli/gnuplot.h"
-#include "cli/output_file.h"
-#include "cli/overwrite.h"
+#include "cli/exit_code.h"
+#include "cli/output/errors.h"
+#include "cli/output/gnuplot.h"
+#include "cli/output/output_file.h"
+#include "cli/output/overwrite.h"
+#include "cli/output/terminal.h"
 #include "cli/pair_recording.h"
-#include "cli/terminal.h"
 #include "gateway/config.h"
 
 namespace vgyro::cli {

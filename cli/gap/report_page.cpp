@@ -1,4 +1,4 @@
-#include "cli/report_page.h"
+#include "cli/gap/report_page.h"
 
 #include <cmath>
 #include <map>

@@ -14,9 +14,11 @@
 #include <fmt/core.h>
 
 #include "cli/commands.h"
-#include "cli/gateway_client.h"
-#include "cli/status_view.h"
-#include "cli/terminal.h"
+#include "cli/exit_code.h"
+#include "cli/output/errors.h"
+#include "cli/output/terminal.h"
+#include "cli/status/gateway_client.h"
+#include "cli/status/view.h"
 
 namespace vgyro::cli {
 namespace {

@@ -1,4 +1,4 @@
-#include "cli/progress.h"
+#include "cli/output/progress.h"
 
 #include <cstdio>
 #include <unistd.h>
@@ -6,7 +6,7 @@
 #include <fmt/core.h>
 
 #include "base/printable.h"
-#include "cli/terminal.h"
+#include "cli/output/terminal.h"
 
 namespace vgyro::cli {
 

@@ -1,4 +1,4 @@
-#include "cli/gateway_client.h"
+#include "cli/status/gateway_client.h"
 
 #include <cctype>
 #include <cmath>

@@ -1,7 +1,7 @@
-#include "cli/gap_inputs.h"
+#include "cli/gap/inputs.h"
 
-#include "cli/commands.h"
-#include "cli/overwrite.h"
+#include "cli/output/errors.h"
+#include "cli/output/overwrite.h"
 #include "cli/recording.h"
 #include "gateway/config.h"
 

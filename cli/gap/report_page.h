@@ -5,7 +5,7 @@
 
 #include <string>
 
-#include "cli/gap_report.h"
+#include "cli/gap/report.h"
 #include "gap/result.h"
 
 namespace vgyro::cli {

@@ -1,4 +1,4 @@
-#include "cli/allan_plot.h"
+#include "cli/allan/plot.h"
 
 #include <algorithm>
 #include <array>
@@ -9,7 +9,7 @@
 
 #include <fmt/format.h>
 
-#include "cli/gnuplot.h"
+#include "cli/output/gnuplot.h"
 
 namespace vgyro::cli {
 

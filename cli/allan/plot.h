@@ -6,7 +6,7 @@
 #include <string>
 
 #include "base/error.h"
-#include "cli/allan_report.h"
+#include "cli/allan/report.h"
 
 namespace vgyro::cli {
 

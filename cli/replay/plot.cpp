@@ -1,11 +1,11 @@
-#include "cli/plot.h"
+#include "cli/replay/plot.h"
 
 #include <algorithm>
 #include <cmath>
 
 #include <fmt/format.h>
 
-#include "cli/gnuplot.h"
+#include "cli/output/gnuplot.h"
 
 namespace vgyro::cli {
 

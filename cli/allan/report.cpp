@@ -1,4 +1,4 @@
-#include "cli/allan_report.h"
+#include "cli/allan/report.h"
 
 #include <algorithm>
 #include <cmath>

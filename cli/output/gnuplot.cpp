@@ -1,4 +1,4 @@
-#include "cli/gnuplot.h"
+#include "cli/output/gnuplot.h"
 
 #include <array>
 #include <cerrno>
@@ -14,7 +14,7 @@
 #include <fmt/format.h>
 
 #include "base/printable.h"
-#include "cli/output_file.h"
+#include "cli/output/output_file.h"
 
 namespace vgyro::cli {
 

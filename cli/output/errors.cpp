@@ -1,7 +1,9 @@
+#include "cli/output/errors.h"
+
 #include <algorithm>
 
-#include "cli/commands.h"
-#include "cli/terminal.h"
+#include "cli/exit_code.h"
+#include "cli/output/terminal.h"
 
 namespace vgyro::cli {
 

@@ -1,4 +1,4 @@
-#include "cli/overwrite.h"
+#include "cli/output/overwrite.h"
 
 #include <filesystem>
 #include <optional>

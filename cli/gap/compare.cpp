@@ -4,12 +4,14 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/commands.h"
-#include "cli/gap_inputs.h"
-#include "cli/gap_report.h"
-#include "cli/output_file.h"
-#include "cli/overwrite.h"
-#include "cli/progress.h"
-#include "cli/terminal.h"
+#include "cli/exit_code.h"
+#include "cli/gap/inputs.h"
+#include "cli/gap/report.h"
+#include "cli/output/errors.h"
+#include "cli/output/output_file.h"
+#include "cli/output/overwrite.h"
+#include "cli/output/progress.h"
+#include "cli/output/terminal.h"
 #include "gap/workflow.h"
 
 namespace vgyro::cli {

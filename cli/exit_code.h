@@ -1,0 +1,11 @@
+#pragma once
+
+// What `vgyro` says to the shell when it ends.
+
+namespace vgyro::cli {
+
+inline constexpr int kDone = 0;
+inline constexpr int kBadInput = 1;  ///< told on stderr
+inline constexpr int kWrongUsage = 2;
+
+}  // namespace vgyro::cli
