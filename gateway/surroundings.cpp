@@ -20,8 +20,7 @@ fusion::TemperatureFilter filter_of(const GyroPlan& gyro) {
 }  // namespace
 
 Surroundings::Surroundings(const Plan& plan)
-    : plan_(plan),
-      temperatures_{filter_of(plan.gyros[0]), filter_of(plan.gyros[1])},
+    : temperatures_{filter_of(plan.gyros[0]), filter_of(plan.gyros[1])},
       rate_dps_(plan.calibration.rate_dps) {
   acceleration_g_.fill(model::Surroundings::kUnknown);
   if (plan.accelerometer) accelerometer_.emplace(accelerometer_intake(*plan.accelerometer));

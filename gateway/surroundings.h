@@ -62,7 +62,6 @@ class Surroundings {
  private:
   void set_zero(TimePoint t);
 
-  const Plan& plan_;
   bool begun_ = false;
   TimePoint zero_;
   TimePoint newest_;
