@@ -26,7 +26,8 @@ StampGuard::Verdict StampGuard::check(std::size_t stream_index, TimePoint raw, T
   time = raw + offset_;
   const Duration step = span(stream.last, time);
   if (stream.seen && step == Duration::zero()) return Verdict::kRepeated;
-  const bool usual = !stream.seen || (step > -kReorderMax && step <= forward_most(stream));
+  const bool usual =
+      stream.seen ? step > -kReorderMax && step <= forward_most(stream) : time >= TimePoint{};
   if (!usual) return consider(stream_index, time);
   follow(stream, time);
   return Verdict::kAccepted;

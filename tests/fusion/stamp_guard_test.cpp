@@ -145,6 +145,23 @@ TEST(StampGuard, TakesDecadesForAClockThatWasSet) {
   EXPECT_EQ(t, time_from_ns(0) + 1s + 10ms + 1us);
 }
 
+// What still has the stamps of 1970 when the gyros' clock has been set lies before the axis begins:
+// heard for the first time or not, it is no time that the estimation could take.
+TEST(StampGuard, TakesNothingFromBeforeTheAxisBegins) {
+  StampGuard guard;
+  TimePoint t;
+  for (int i = 0; i <= 100; ++i)
+    guard.check(0, time_from_ns(0) + i * 10ms, t);
+  for (int i = 0; i <= 3; ++i)
+    guard.check(0, kStart + i * 10ms, t);
+  ASSERT_LT(guard.offset(), 0ns);
+  for (int i = 1; i <= 10; ++i) {
+    EXPECT_EQ(guard.check(kReference, time_from_ns(0) + i * 10ms, t), Verdict::kUnconfirmed) << i;
+  }
+  EXPECT_EQ(guard.check(kReference, kStart + 40ms, t), Verdict::kAccepted);
+  EXPECT_GE(t, TimePoint{});
+}
+
 // A silent bus comes back after minutes: the third stamp is believed, and time goes on as it says.
 TEST(StampGuard, BelievesThreeAgreeingStampsBehindALongGap) {
   StampGuard guard = running_until(1s);
