@@ -45,14 +45,18 @@ constexpr std::size_t kHeldMax = 8;
 // Windows are short against every Gauss–Markov term.
 constexpr double kShareOfTau = 0.1;
 
+// An interval that is not known yet, or is none, is no divisor.
+constexpr double kIntervalMin_s = 1e-6;
+
+// Blocks in a row that may be left out for values that are no measurements.
+constexpr int kSpikedBlocks = 2;
+
 // The difference of the gyros, averaged over some samples, is watched on every sample …
 constexpr double kFastGain = 0.125;
-// The same of one sample, against all of its noise.
-constexpr double kSuddenSigma = 6.0;
 constexpr double kFastNoise = kFastGain / (2.0 - kFastGain);
 constexpr double kFastSigma = 5.0;
-// Blocks in a row that values which are no measurements may spoil.
-constexpr int kSpikedBlocks = 2;
+// … and unaveraged, against all noise of the sample …
+constexpr double kSuddenSigma = 6.0;
 // … and block by block: beyond this it has jumped.
 constexpr double kJumpSigma = 6.0;
 // … it is a step where it stays within this share of itself, or a drift after so many blocks.
@@ -276,6 +280,11 @@ class OptimalCorrector final : public Corrector {
   [[nodiscard]] double rate_density(std::size_t gyro, double rate_dps) const {
     return squared(settings_.gyros[gyro].rate_noise_rthz * rate_dps);
   }
+  /// Of the gyros' difference.
+  [[nodiscard]] double rate_density(double rate_dps) const {
+    return rate_density(0, rate_dps) + rate_density(1, rate_dps);
+  }
+  [[nodiscard]] double interval_s() const { return std::max(cells_.interval_s(), kIntervalMin_s); }
   [[nodiscard]] double drift_variance(double t_s) const {
     const double late_s = std::max(t_s - learned_until_s_, 0.0);
     return doubt_ + (doubt_growth_ + 2.0 * doubt_with_slope_ + slope_variance_ * late_s) * late_s;
@@ -493,7 +502,7 @@ VirtualRate OptimalCorrector::update(const RatePair& pair) {
   const double rate = weight_[0] * first + weight_[1] * second;
 
   const Symmetric& sample = noise_.sample_variance();
-  const double interval = std::max(cells_.interval_s(), 1e-6);
+  const double interval = interval_s();
   const double noise_1 = (sample[0] + rate_density(0, rate) / interval) * pair.noise_gain[0];
   const double noise_2 = (sample[2] + rate_density(1, rate) / interval) * pair.noise_gain[1];
   const double noise_12 = sample[1] * std::sqrt(pair.noise_gain[0] * pair.noise_gain[1]);
@@ -505,8 +514,7 @@ VirtualRate OptimalCorrector::update(const RatePair& pair) {
   fast_difference_ += kFastGain * (first - second - fast_difference_);
   const double contradiction = fast_difference_ * fast_difference_;
   const double allowed =
-      squared(kFastSigma) *
-      (fast_noise_ + kFastNoise * (rate_density(0, rate) + rate_density(1, rate)) / interval);
+      squared(kFastSigma) * (fast_noise_ + kFastNoise * rate_density(rate) / interval);
   // A single value may be no measurement at all.
   const double sudden = squared(first - second) -
                         squared(kSuddenSigma) * (noise_1 - 2.0 * noise_12 + noise_2 + fast_noise_);
@@ -567,7 +575,7 @@ VirtualRate OptimalCorrector::update_alone(std::size_t gyro, const RatePair& pai
   VirtualRate out{
       (pair.rate_dps[gyro] - bias(gyro, pair.t_s)) * gain_[gyro], kNone, {kNone, kNone}};
   out.corrected_dps[gyro] = out.rate_dps;
-  const double interval = std::max(cells_.interval_s(), 1e-6);
+  const double interval = interval_s();
   const double noise =
       noise_.sample_variance()[2 * gyro] + rate_density(gyro, out.rate_dps) / interval;
   out.sigma_dps = std::sqrt(noise * pair.noise_gain[gyro] + drift_variance(pair.t_s) +
@@ -645,9 +653,7 @@ void OptimalCorrector::judge_coherence(const Block& block) {
 // goes on like that has grown noisy, which is to be learned.
 bool OptimalCorrector::is_spiked(const Block& block) {
   const double rate = cell_rate(block.cells[0], block.to_s, weights_for_);
-  const double more =
-      (rate_density(0, rate) + rate_density(1, rate)) / std::max(cells_.interval_s(), 1e-6);
-  if (!noise_.spiked(block, more)) {
+  if (!noise_.spiked(block, rate_density(rate) / interval_s())) {
     spiked_blocks_ = 0;
     return false;
   }
@@ -753,8 +759,7 @@ bool OptimalCorrector::has_jumped(const Block& block) {
                     (estimate_.growth[0] + estimate_.growth[1]) * late_s +
                     2.0 * late_s * apart.dot(estimate_.slope_with_bias * apart) +
                     late_s * late_s * apart.dot(estimate_.slope_covariance * apart) +
-                    of_difference(noise_.density()) / length +
-                    (rate_density(0, rate) + rate_density(1, rate)) / length +
+                    of_difference(noise_.density()) / length + rate_density(rate) / length +
                     noise_.rounding_variance(0) + noise_.rounding_variance(1);
   const double skew_s = std::abs(estimate_.mean(kSkew)) +
                         std::sqrt(estimate_.covariance(kSkew, kSkew)) + kSkewTolerance_s;
