@@ -11,7 +11,7 @@
 #include "cli/exit_code.h"
 #include "cli/output/errors.h"
 #include "cli/output/gnuplot.h"
-#include "cli/output/output_file.h"
+#include "cli/output/json_text.h"
 #include "cli/output/overwrite.h"
 #include "cli/output/terminal.h"
 #include "cli/pair_recording.h"
@@ -42,14 +42,6 @@ Expected<AllanReport> judge(const AllanOptions& options, const gateway::Plan& pl
   return report;
 }
 
-Expected<void> write_json(const std::string& path, const AllanReport& report) {
-  auto file = OutputFile::open(path);
-  if (!file) return tl::unexpected(file.error());
-  constexpr auto kReplace = nlohmann::ordered_json::error_handler_t::replace;
-  file->write(to_json(report).dump(2, ' ', false, kReplace) + "\n");
-  return file->close();
-}
-
 }  // namespace
 
 int run_allan(const AllanOptions& options) {
@@ -69,7 +61,8 @@ int run_allan(const AllanOptions& options) {
   // JSON on standard output stands there alone.
   put_text(options.json == "-" ? stderr : stdout, to_text(*judged));
   if (!options.json.empty()) {
-    if (const auto done = write_json(options.json, *judged); !done) return report(done.error());
+    if (const auto done = write_json(options.json, to_json(*judged)); !done)
+      return report(done.error());
   }
   if (!options.plot.empty()) {
     if (const auto done = draw_allan(options.plot, *judged); !done) return report(done.error());

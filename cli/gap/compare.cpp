@@ -8,7 +8,7 @@
 #include "cli/gap/inputs.h"
 #include "cli/gap/report.h"
 #include "cli/output/errors.h"
-#include "cli/output/output_file.h"
+#include "cli/output/json_text.h"
 #include "cli/output/overwrite.h"
 #include "cli/output/progress.h"
 #include "cli/output/terminal.h"
@@ -20,20 +20,10 @@ namespace {
 
 Expected<gap::Comparison> judge(const GapInputs& inputs, const CompareOptions& options) {
   Progress progress("compare");
-  gap::Settings settings;
-  settings.seed = options.seed;
-  settings.progress = [&](std::string_view what, double share) { progress.update(what, share); };
-  auto comparison = gap::compare(inputs.recording, inputs.model, settings);
+  auto comparison =
+      gap::compare(inputs.recording, inputs.model, settings_of(options.seed, progress));
   if (!comparison) return tl::unexpected(at_log(comparison.error(), inputs.subject.log));
   return comparison;
-}
-
-Expected<void> write_json(const std::string& path, const gap::Comparison& comparison) {
-  auto file = OutputFile::open(path);
-  if (!file) return tl::unexpected(file.error());
-  constexpr auto kReplace = nlohmann::ordered_json::error_handler_t::replace;
-  file->write(comparison_json(comparison).dump(2, ' ', false, kReplace) + "\n");
-  return file->close();
 }
 
 }  // namespace
@@ -45,7 +35,7 @@ int run_compare(const CompareOptions& options) {
   const auto comparison = judge(*inputs, options);
   if (!comparison) return report(comparison.error());
   if (!options.json.empty()) {
-    if (const auto done = write_json(options.json, *comparison); !done) {
+    if (const auto done = write_json(options.json, comparison_json(*comparison)); !done) {
       return report(done.error());
     }
   }

@@ -11,6 +11,7 @@
 #include "cli/gap/report.h"
 #include "cli/gap/report_page.h"
 #include "cli/output/errors.h"
+#include "cli/output/json_text.h"
 #include "cli/output/progress.h"
 #include "cli/output/result_folder.h"
 #include "cli/output/terminal.h"
@@ -21,8 +22,6 @@
 namespace vgyro::cli {
 
 namespace {
-
-constexpr auto kReplaceBadText = nlohmann::ordered_json::error_handler_t::replace;
 
 std::string comment_of(const GapSubject& subject, const gap::NamedEffect& named) {
   std::string text =
@@ -87,10 +86,7 @@ Expected<std::string> model_text(const model::Model& model) {
 
 Expected<gap::Result> work(const GapInputs& inputs, const GapOptions& options) {
   Progress progress("gap");
-  gap::Settings settings;
-  settings.seed = options.seed;
-  settings.progress = [&](std::string_view what, double share) { progress.update(what, share); };
-  auto result = gap::find_gap(inputs.recording, inputs.model, settings);
+  auto result = gap::find_gap(inputs.recording, inputs.model, settings_of(options.seed, progress));
   if (!result) return tl::unexpected(at_log(result.error(), inputs.subject.log));
   round_to_sigma(*result);
   return result;
@@ -100,11 +96,9 @@ Expected<void> write(const std::string& folder, const GapInputs& inputs,
                      const std::string& given_text, const gap::Result& result) {
   auto model = extended_model(inputs, given_text, result);
   if (!model) return tl::unexpected(model.error());
-  const nlohmann::ordered_json json = gap_json(result);
-  return write_result_folder(folder,
-                             {{"gap.json", json.dump(2, ' ', false, kReplaceBadText) + "\n"},
-                              {"model.toml", std::move(*model)},
-                              {"report.html", report_page(inputs.subject, result)}});
+  return write_result_folder(folder, {{"gap.json", json_text(gap_json(result))},
+                                      {"model.toml", std::move(*model)},
+                                      {"report.html", report_page(inputs.subject, result)}});
 }
 
 }  // namespace

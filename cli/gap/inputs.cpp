@@ -29,6 +29,15 @@ tl::expected<GapInputs, std::vector<Error>> load_gap_inputs(
   return inputs;
 }
 
+gap::Settings settings_of(std::uint64_t seed, Progress& progress) {
+  gap::Settings settings;
+  settings.seed = seed;
+  settings.progress = [&progress](std::string_view what, double share) {
+    progress.update(what, share);
+  };
+  return settings;
+}
+
 Error at_log(Error error, const std::string& log) {
   if (error.where.empty()) error.where = log;
   return error;

@@ -10,6 +10,7 @@
 
 #include "base/error.h"
 #include "cli/gap/report.h"
+#include "cli/output/progress.h"
 #include "gap/recording.h"
 #include "gap/workflow.h"
 #include "model/file.h"
@@ -27,6 +28,9 @@ struct GapInputs {
 tl::expected<GapInputs, std::vector<Error>> load_gap_inputs(
     const std::string& config, const std::optional<std::string>& model, const std::string& log,
     const std::string& doing, const std::vector<std::string>& outputs);
+
+/// Of the workflow; it tells `progress`, which must live as long, how far it is.
+gap::Settings settings_of(std::uint64_t seed, Progress& progress);
 
 /// An error of the workflow, which does not know the log's name.
 Error at_log(Error error, const std::string& log);

@@ -13,6 +13,7 @@
 #include "cli/exit_code.h"
 #include "cli/output/errors.h"
 #include "cli/output/gnuplot.h"
+#include "cli/output/json_text.h"
 #include "cli/output/output_file.h"
 #include "cli/output/overwrite.h"
 #include "cli/output/progress.h"
@@ -368,12 +369,9 @@ void warn_of_other_senders(const ReplaySummary& summary, const gateway::Plan& pl
 int write_results(const ReplayOptions& options, const gateway::Plan& plan,
                   const ReplaySummary& summary, const ReplayPlot& plot) {
   if (!options.json.empty()) {
-    auto json = OutputFile::open(options.json);
-    if (!json) return report(json.error());
     // A log's interface names may be any bytes.
-    constexpr auto kReplace = nlohmann::ordered_json::error_handler_t::replace;
-    json->write(to_json(summary, plan).dump(2, ' ', false, kReplace) + "\n");
-    if (const auto closed = json->close(); !closed) return report(closed.error());
+    const auto done = write_json(options.json, to_json(summary, plan));
+    if (!done) return report(done.error());
   }
   if (!options.quiet) put_text(stderr, to_text(summary, plan));
   if (!options.plot.empty()) {
