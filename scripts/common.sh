@@ -12,6 +12,12 @@ TIDY_PACKAGES=(clang-tidy)
 
 LAYERS=(base can dbc model simulation fusion analysis gap gateway daemon cli)
 
+# clang-tidy goes by the debug preset's commands: clang cannot read the precompiled headers of another compiler.
+configure_tidy() {
+  mkdir -p build
+  cmake --preset debug >build/debug.log 2>&1 || { cat build/debug.log; die "the configuration of debug failed"; }
+}
+
 say() { printf '\n== %s\n' "$*"; }
 die() { printf 'error: %s\n' "$*" >&2; exit 1; }
 

@@ -11,6 +11,7 @@ import sys
 import tempfile
 from pathlib import Path
 
+from check_layers import ARROWS
 from function_lengths import UnbalancedBraces, function_lengths
 
 BYTES_MAX = 2_000_000
@@ -26,7 +27,7 @@ MACHINE_FILES = re.compile(r"\.ci/.*")
 # Third-party spellings that only look like a note.
 NOT_NOTES = re.compile(r"Vector__" + "XX" + "X")
 
-SOURCES = re.compile(r"(?:base|can|dbc|model|simulation|fusion|analysis|gap|gateway|daemon|cli)/.*\.(?:h|cpp)")
+SOURCES = re.compile(rf"(?:{'|'.join(ARROWS)})/.*\.(?:h|cpp)")
 LINES_MAX = 60
 # (file, function) → its lines: longer than LINES_MAX already when that limit was set. They may only shrink;
 # the longest stands for overloads.
