@@ -108,6 +108,7 @@ int run_gap(const GapOptions& options) {
   const auto free = check_result_folder(options.out, names);
   if (!free) return report(free.error());
   std::vector<std::string> outputs;
+  outputs.reserve(names.size());
   for (const std::string& name : names)
     outputs.push_back(std::filesystem::path(options.out) / name);
   const auto inputs =
