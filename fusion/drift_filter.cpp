@@ -86,10 +86,10 @@ DriftFilter::DriftFilter(const DriftModel& model, const Observables& mean,
   }
 }
 
-DriftFilter::Motion DriftFilter::motion(double length_s) const {
+DriftFilter::Transition DriftFilter::transition(double length_s) const {
   const auto states = state_.size();
-  Motion all{State::Ones(states), State::Ones(states), State::Zero(states), State::Zero(states),
-             State::Zero(states)};
+  Transition all{State::Ones(states), State::Ones(states), State::Zero(states), State::Zero(states),
+                 State::Zero(states)};
   const auto put = [&all](int place, const Term& term) {
     all.carry(place) = term.carry;
     all.carry_mean(place) = term.carry_mean;
@@ -149,7 +149,7 @@ void DriftFilter::add_slope_noise(double length_s, Square& walked) const {
 
 void DriftFilter::predict(double length_s) {
   if (!(length_s > 0.0)) return;
-  const Motion m = motion(length_s);
+  const Transition m = transition(length_s);
   Square flow = m.carry.asDiagonal();
   Square walked = m.end_variance.asDiagonal();
   if (slopes_at_ >= 0) {
@@ -198,11 +198,11 @@ double DriftFilter::update_sized(double length_s, const DriftMeasurement& measur
   using RowSquare = Eigen::Matrix<double, Rows, Rows>;
   using RowVector = Eigen::Matrix<double, Rows, 1>;
 
-  const Motion motion_of_all = motion(length_s);
-  const StateVector carry = motion_of_all.carry;
-  const StateVector end_variance = motion_of_all.end_variance;
-  const StateVector lead = motion_of_all.lead;
-  const StateVector mean_variance = motion_of_all.mean_variance;
+  const Transition of_all = transition(length_s);
+  const StateVector carry = of_all.carry;
+  const StateVector end_variance = of_all.end_variance;
+  const StateVector lead = of_all.lead;
+  const StateVector mean_variance = of_all.mean_variance;
   const StateSquare before = covariance_;
   const StateVector state = state_;
 
@@ -212,20 +212,20 @@ double DriftFilter::update_sized(double length_s, const DriftMeasurement& measur
   } else {
     h = measurement.rows * observe_;
   }
-  Map h_mean = h * motion_of_all.carry_mean.asDiagonal();
+  Map h_mean = h * of_all.carry_mean.asDiagonal();
   const Map h_lead = h * lead.asDiagonal();
   StateVector end = carry.cwiseProduct(state);
   if (slopes_at_ >= 0) {
     for (int gyro = 0; gyro < 2; ++gyro) {
-      h_mean.col(slopes_at_ + gyro) += motion_of_all.slope_mean_s * h.col(kBias1 + gyro);
-      end(kBias1 + gyro) += motion_of_all.slope_end_s * state(slopes_at_ + gyro);
+      h_mean.col(slopes_at_ + gyro) += of_all.slope_mean_s * h.col(kBias1 + gyro);
+      end(kBias1 + gyro) += of_all.slope_end_s * state(slopes_at_ + gyro);
     }
   }
   // Only a slope's own walk is correlated with another state's.
   const bool slopes_walk = slopes_at_ >= 0;
   StateSquare walk_covariance;
   if (slopes_walk) {
-    Square all = motion_of_all.end_variance.asDiagonal();
+    Square all = of_all.end_variance.asDiagonal();
     add_slope_noise(length_s, all);
     walk_covariance = all;
   }
@@ -236,7 +236,7 @@ double DriftFilter::update_sized(double length_s, const DriftMeasurement& measur
   Gain cross = carry.asDiagonal() * spread + led;
   if (slopes_at_ >= 0) {
     for (int gyro = 0; gyro < 2; ++gyro)
-      cross.row(kBias1 + gyro) += motion_of_all.slope_end_s * spread.row(slopes_at_ + gyro);
+      cross.row(kBias1 + gyro) += of_all.slope_end_s * spread.row(slopes_at_ + gyro);
   }
   const Gain wandered = mean_variance.asDiagonal() * h.transpose();
   RowSquare noise = measurement.noise;
@@ -255,7 +255,7 @@ double DriftFilter::update_sized(double length_s, const DriftMeasurement& measur
   start.diagonal() += carry;
   if (slopes_at_ >= 0) {
     for (int gyro = 0; gyro < 2; ++gyro)
-      start(kBias1 + gyro, slopes_at_ + gyro) += motion_of_all.slope_end_s;
+      start(kBias1 + gyro, slopes_at_ + gyro) += of_all.slope_end_s;
   }
   StateSquare walked = -gain * h_lead;
   walked.diagonal().array() += 1.0;
