@@ -128,7 +128,7 @@ class DriftFilter {
   [[nodiscard]] Transition transition(double length_s) const;
   void add_slope_noise(double length_s, Square& walked) const;
   template <int States, int Rows>
-  double update_sized(double length_s, const DriftMeasurement& measurement);
+  class SizedUpdate;
   template <int States>
   double update_of(double length_s, const DriftMeasurement& measurement);
 
