@@ -1,6 +1,6 @@
 #pragma once
 
-// Whole small files (configs, DBC): read once at start-up.
+// Whole small files (configs, DBC): read at the start and when a reload asks for it.
 
 #include <string>
 

@@ -47,7 +47,7 @@ enum class ErrorCause : std::uint8_t {
   kBusOff,           ///< the controller left the bus
   kRestarted,        ///< and came back
   kErrorPassive,     ///< it may no longer disturb others: next to bus-off
-  kErrorWarning,     ///< a hundred errors more than successes
+  kErrorWarning,     ///< one of its error counters has reached 96
   kLostArbitration,  ///< told only by controllers that send once
   kNotAcknowledged,  ///< nobody else is on the bus
   kOverflow,         ///< of the controller's own buffers

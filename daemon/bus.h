@@ -75,7 +75,8 @@ class Bus final : public can::Transmitter {
   [[nodiscard]] BusStatus status() const;
 
  private:
-  // 1024 frames: more than a second of a busy bus, so the other buses do not starve.
+  // 1024 frames, a quarter of a second of a full bus at 500 kbit/s: after a delay that is caught up
+  // with, and the other buses do not starve.
   static constexpr int kReadsPerCycle = 16;
   static constexpr std::size_t kFewFrames = 4;
 

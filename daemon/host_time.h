@@ -75,8 +75,8 @@ class ForwardTime {
   Duration set_back_{};
 };
 
-/// How long a frame may wait for the bus: two periods of VG_Rate. What it has not taken by then is
-/// worth less than its successor.
+/// How long a frame may wait for the bus: two periods of VG_Rate, within limits. What it has not
+/// taken by then is worth less than its successor.
 class Patience {
  public:
   void rate_at(TimePoint stamp) {

@@ -15,8 +15,8 @@ namespace vgyro::daemon {
 
 class IdentifierWatch {
  public:
-  /// So long after the last such frame the bus counts as contested: VG_Bias comes ten times a
-  /// second.
+  /// So long after the last such frame the bus counts as contested: longer than the slowest gyros,
+  /// at whose rates another gateway sends, leave between two samples.
   static constexpr int kContestedSeconds = 10;
   /// A frame that was handed to a controller is sent, or given up, and looped back within this.
   static constexpr int kEchoSeconds = 2;

@@ -49,9 +49,9 @@ class Notifier {
 /// WATCHDOG_USEC of this process; 0 where nobody watches.
 std::uint64_t watchdog_usec();
 
-/// Decides whether the watchdog is fed. A loop that turns is not enough: the gateway sends VG_Bias
-/// ten times a second whatever its state, so one that has sent nothing for a second hangs.
-/// Clock-free.
+/// Decides whether the watchdog is fed. A loop that turns is not enough: whatever its state, the
+/// gateway sends VG_Bias ten times a second, or at every rate of slower gyros. One that is asked
+/// again after a second or more, and has sent nothing since, hangs. Clock-free.
 class LifeSign {
  public:
   static constexpr Duration kSilenceMost = std::chrono::seconds(1);

@@ -3,7 +3,8 @@
 // Frames of one stream in, accepted values with their time out, or the cause why a frame cannot be
 // used. Owns the order of the questions: is the frame whole and new (E2E), does it hold a value,
 // can its stamp be believed. The live pipeline and the readers of recordings ask here, so that both
-// refuse the same. Counts nothing and knows no state; the guard is the host's and is only lent.
+// refuse the same. Keeps no books and knows nothing of the pipeline's states; the guard is the
+// host's and is only lent.
 
 #include <array>
 #include <cstddef>

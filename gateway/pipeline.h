@@ -1,8 +1,9 @@
 #pragma once
 
 // The gateway itself: frames and time in, frames out. Decode → align → correct → encode.
-// One object behind the daemon, the replay and the tests; it opens nothing, reads no clock and,
-// once constructed, allocates nothing. The states and their transitions are in ARCHITECTURE.md.
+// One object behind the daemon, the replay and the tests; it opens nothing and reads no clock, and
+// once it is constructed neither a frame nor passing time makes it allocate. The states and their
+// transitions are in ARCHITECTURE.md.
 
 #include <array>
 #include <cstdint>
@@ -50,8 +51,8 @@ class Pipeline {
   /// resolution of a candump log, so that a replay of what candump saw repeats the run bit for bit.
   void receive(can::BusIndex bus, const can::Frame& frame, TimePoint stamp, FrameSink& out);
 
-  /// Time passed without a frame: time-outs and the heartbeat of VG_Bias. Cheap when nothing is
-  /// due.
+  /// Time passed without a frame: time-outs, and VG_Bias where no sample drives it. Cheap when
+  /// nothing is due.
   void advance(TimePoint now, FrameSink& out);
 
   /// When advance() has to be called next, at the latest.

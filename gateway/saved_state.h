@@ -17,7 +17,7 @@
 
 namespace vgyro::gateway {
 
-/// Longer texts are not looked at; a saved state takes about 4 kB.
+/// Longer texts are not looked at; a saved state takes about 3 kB.
 inline constexpr std::size_t kSavedStateBytesMax = 16U << 10U;
 
 struct SavedState {

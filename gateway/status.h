@@ -38,7 +38,7 @@ std::string_view to_string(Quality quality);
 
 /// Why a frame of a configured identifier was not used.
 enum class Reject : std::uint8_t {
-  kNotData,          ///< remote or error frame with the gyro's identifier
+  kNotData,          ///< remote frame with the gyro's identifier; error frames get no role
   kOtherPage,        ///< multiplexed message on a page without the rate
   kTruncated,        ///< payload shorter than the signal
   kFlaggedInvalid,   ///< the `valid` comparison is false
@@ -69,7 +69,7 @@ enum class Restored : std::uint8_t {
 std::string_view to_string(Restored restored);
 
 /// What can be wrong with a gyro. What is neither silence nor a dead band makes it "suspect" in
-/// VB_Health; a noisy gyro stays in use.
+/// VB_Health; a noisy or blind gyro stays in use.
 enum class Fault : std::uint8_t {
   kSilent,          ///< no frame within the time-out
   kFlaggedInvalid,  ///< it says so itself
@@ -119,7 +119,7 @@ struct Status {
   std::uint64_t speed_rejected = 0;
   std::uint64_t pairs = 0;
   bool rates_too_far_apart = false;  ///< of the gyros: no buffer reaches from sample to sample
-  std::uint64_t clock_steps = 0;     ///< times the stamps were set back
+  std::uint64_t clock_steps = 0;     ///< times the stamps were set back, or years ahead
   std::uint64_t rates_out = 0;
   std::uint64_t rates_out_valid = 0;
   std::uint64_t rates_out_of_range = 0;  ///< virtual rate beyond what VG_Rate can carry

@@ -2,7 +2,7 @@
 //   vgyro_faults sequences COUNT FIRST_SEED    random faults; a failed seed goes to stderr
 //   vgyro_faults shifted COUNT FIRST_SEED      the same at other times of day: the same rates
 //   vgyro_faults drive HOURS                   a drive with stops
-// Both print JSON. Truth and noise are made here, frames by hand, and what comes out is read from
+// All print JSON. Truth and noise are made here, frames by hand, and what comes out is read from
 // its bits.
 
 #include <algorithm>
