@@ -7,13 +7,11 @@
 
 #include <nlopt.hpp>
 
-#include "model/catalogue.h"
+#include "gap/kinds.h"
 
 namespace vgyro::gap {
 
 namespace {
-
-using model::Kind;
 
 // Below this a variance is rounding of the arithmetic, not noise: (1e-9 deg/s)².
 constexpr double kVarianceMin = 1e-18;
@@ -65,23 +63,23 @@ PairNoise noise_of(const std::vector<model::Effect>& effects) {
   for (const model::Effect& effect : effects) {
     NoiseTerms& terms = noise[effect.gyro];
     const double value = effect.parameters[0];
-    switch (effect.kind) {
-      case Kind::kWhiteNoise:
+    switch (row(effect.kind).random) {
+      case Random::kWhite:
         terms.white_dps_rthz = std::hypot(terms.white_dps_rthz, value);
         break;
-      case Kind::kRateNoise:
+      case Random::kRatio:
         terms.ratio_rthz = std::hypot(terms.ratio_rthz, value);
         break;
-      case Kind::kRateRandomWalk:
+      case Random::kWalk:
         terms.walk_dps_rts = std::hypot(terms.walk_dps_rts, value);
         break;
-      case Kind::kGaussMarkov:
+      case Random::kMarkov:
         terms.markov.push_back({value, effect.parameters[1]});
         break;
-      case Kind::kQuantization:
+      case Random::kRounding:
         terms.step_dps = std::hypot(terms.step_dps, value);
         break;
-      default:
+      case Random::kNone:
         break;
     }
   }

@@ -29,10 +29,10 @@ bool knows(const std::vector<Effect>& effects, std::size_t gyro, Kind kind) {
 Likelihood observed(const Study& study, const std::vector<Effect>& effects, Part part) {
   Likelihood sum;
   const PairNoise noise = noise_of(effects);
-  for (const Problem& problem : study.problems()) {
-    const Eigen::VectorXd residual = study.residual(problem, effects);
-    sum.nats -= log_likelihood(residual, problem.layout, noise, part);
-    for (const Block& block : problem.layout.blocks) {
+  for (const auto& data : study.observations()) {
+    const Eigen::VectorXd residual = data->residual(effects);
+    sum.nats -= log_likelihood(residual, data->layout, noise, part);
+    for (const Block& block : data->layout.blocks) {
       if (counts(block, part)) sum.samples += block.count;
     }
   }
@@ -86,11 +86,11 @@ Floor simulate_floor(const Study& study, const std::vector<Effect>& effects, Par
   const PairNoise noise = noise_of(effects);
   double nats = 0.0;
   double samples = 0.0;
-  for (const Problem& problem : study.problems()) {
+  for (const auto& data : study.observations()) {
     // Of a residual of zeros only the determinants are left.
-    const Eigen::VectorXd nothing = Eigen::VectorXd::Zero(problem.size());
-    nats -= log_likelihood(nothing, problem.layout, noise, part);
-    for (const Block& block : problem.layout.blocks) {
+    const Eigen::VectorXd nothing = Eigen::VectorXd::Zero(data->size());
+    nats -= log_likelihood(nothing, data->layout, noise, part);
+    for (const Block& block : data->layout.blocks) {
       if (counts(block, part)) samples += block.count;
     }
   }

@@ -34,22 +34,12 @@ LINES_MAX = 60
 LONG_FUNCTIONS = {
     ("cli/replay/summary.cpp", "to_text"): 82,
     ("fusion/drift_filter.cpp", "DriftFilter::update_sized"): 83,
-    ("gap/describe.cpp", "evidence_of"): 92,
-    ("gap/differences.cpp", "choose"): 68,
-    ("gap/differences.cpp", "clock"): 68,
-    ("gap/leftover.cpp", "judge"): 89,
-    ("gap/leftover.cpp", "leftovers"): 92,
     ("gap/noise.cpp", "whiten_means"): 66,
     ("gap/noise.cpp", "fit_pair_noise"): 67,
-    ("gap/search.cpp", "Search::score"): 68,
-    ("gap/search.cpp", "Search::score_lines"): 78,
-    ("gap/search.cpp", "Search::noise_rounds"): 113,
-    ("gap/study.cpp", "Study::find_spikes"): 100,
     ("gap/transport.cpp", "find_lateness"): 87,
     ("gap/transport.cpp", "find_lattice"): 64,
     ("gap/transport.cpp", "find_stuck"): 64,
     ("gap/views.cpp", "binned"): 68,
-    ("gap/workflow.cpp", "find_gap"): 84,
 }
 
 INVARIANT = re.compile(r"^\s*(\d+)\.\s")
