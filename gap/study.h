@@ -83,7 +83,6 @@ class Study {
   explicit Study(const Recording& recording) : recording_(recording) {}
   Expected<void> check() const;
   Expected<void> check_spans() const;
-  void find_spikes(const std::vector<model::Effect>& effects);
   void find_rest();
   [[nodiscard]] bool rests_at(double t_s) const;
   void build();

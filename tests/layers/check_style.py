@@ -44,7 +44,6 @@ LONG_FUNCTIONS = {
     ("gap/search.cpp", "Search::score"): 68,
     ("gap/search.cpp", "Search::score_lines"): 78,
     ("gap/search.cpp", "Search::noise_rounds"): 113,
-    ("gap/study.cpp", "Study::find_spikes"): 100,
     ("gap/transport.cpp", "find_lateness"): 87,
     ("gap/transport.cpp", "find_lattice"): 64,
     ("gap/transport.cpp", "find_stuck"): 64,
