@@ -6,7 +6,6 @@
 
 #include <fmt/core.h>
 
-#include "gap/median.h"
 #include "gap/spikes.h"
 #include "gap/wiener.h"
 #include "model/catalogue.h"
@@ -29,13 +28,10 @@ constexpr double kPauseMost_s = 3600.0;
 constexpr double kRestMin_s = 10.0;
 /// Share of samples that repeat the last one.
 constexpr double kCoarseRepeats = 0.2;
-constexpr double kRestNear_dps = 2.0;
 constexpr int kMotionRounds = 16;
 constexpr double kMotionSame_dps = 2e-6;
 constexpr double kHeldOutCell_s = 1.0;
 constexpr unsigned kHeldOutOneIn = 4;
-constexpr double kRestBelow_dps = 0.15;
-constexpr double kRestSteady = 3.0;
 
 // A quarter of the seconds, scattered without a pattern that motion could have.
 bool held_out(double t_s) {
@@ -280,8 +276,8 @@ Expected<std::unique_ptr<Study>> Study::begin(const Recording& recording,
       signals.motion = Motion(rate);
     study->build();
   } else {
-    study->find_rest();
-    if (study->rest_s_ < kRestMin_s) {
+    study->rest_ = find_rest(recording, study->transports_);
+    if (study->rest_.count() < kRestMin_s) {
       return fail("", "the recording holds no rest, and there is no reference",
                   "without either nothing tells which gyro is wrong: record a minute at rest, or "
                   "name a [reference]");
@@ -312,72 +308,6 @@ void Study::set_aside(Problem& problem) const {
 
 std::size_t Study::problem_of(std::size_t gyro) const {
   return problems_.size() == 2 ? gyro : 0;
-}
-
-// Seconds in which both gyros are as steady as in their steadiest seconds and read what they read
-// in the beginning.
-void Study::find_rest() {
-  const auto cells = static_cast<std::size_t>(recording_.seconds) + 1;
-  resting_.assign(cells, 1);
-  for (std::size_t gyro = 0; gyro < 2; ++gyro) {
-    // What is masked too: a dead band rests on 0.
-    const std::span<const double> t_s = transports_[gyro].t_s;
-    const std::span<const double> rate = recording_.gyros[gyro].rate_dps;
-    std::vector<double> sum(cells, 0.0), squares(cells, 0.0), count(cells, 0.0);
-    for (std::size_t i = 0; i < t_s.size(); ++i) {
-      const std::size_t cell = std::min(cells - 1, static_cast<std::size_t>(std::max(0.0, t_s[i])));
-      sum[cell] += rate[i], squares[cell] += rate[i] * rate[i], count[cell] += 1.0;
-    }
-    std::vector<double> first;
-    std::vector<double> deviation(cells, 1e300);
-    for (std::size_t cell = 0; cell < cells; ++cell) {
-      if (count[cell] < 5.0) continue;
-      const double mean = sum[cell] / count[cell];
-      deviation[cell] = std::sqrt(std::max(0.0, squares[cell] / count[cell] - mean * mean));
-      if (static_cast<double>(cell) < std::max(5.0, recording_.rest_s)) first.push_back(mean);
-    }
-    // A gyro at its limit is steadier than any at rest.
-    std::vector<double> deviations;
-    const double start = first.empty() ? 0.0 : median_of(first);
-    for (std::size_t cell = 0; cell < cells; ++cell) {
-      if (count[cell] >= 5.0 && std::abs(sum[cell] / count[cell] - start) < kRestNear_dps)
-        deviations.push_back(deviation[cell]);
-    }
-    if (deviations.size() < 10 || first.empty()) {
-      resting_.assign(cells, 0);
-      return;
-    }
-    std::sort(deviations.begin(), deviations.end());
-    const double quiet =
-        std::max(deviations[deviations.size() / 10], recording_.gyros[gyro].step_dps);
-    for (std::size_t cell = 0; cell < cells; ++cell) {
-      if (count[cell] < 5.0 || deviation[cell] > kRestSteady * quiet ||
-          std::abs(sum[cell] / count[cell] - start) > kRestBelow_dps + 3.0 * quiet) {
-        resting_[cell] = 0;
-      }
-    }
-  }
-  // Single seconds are turning points of a motion.
-  std::vector<std::uint8_t> kept(cells, 0);
-  for (std::size_t from = 0; from < cells;) {
-    std::size_t to = from;
-    while (to < cells && resting_[to] != 0)
-      ++to;
-    if (to - from >= 4) {
-      // Its first and last second may hold the end of a motion.
-      const std::size_t first = from == 0 ? 0 : from + 1;
-      const std::size_t last = to == cells ? to : to - 1;
-      for (std::size_t cell = first; cell < last; ++cell)
-        kept[cell] = 1, rest_s_ += 1.0;
-    }
-    from = std::max(to, from + 1);
-  }
-  resting_ = kept;
-}
-
-bool Study::rests_at(double t_s) const {
-  const auto cell = static_cast<std::size_t>(std::max(0.0, t_s));
-  return cell < resting_.size() && resting_[cell] != 0;
 }
 
 void Study::learn_motion(const std::vector<Effect>& effects) {
@@ -411,7 +341,7 @@ void Study::learn_motion(const std::vector<Effect>& effects) {
     }
     double change_dps = 0.0;
     for (std::size_t i = 0; i < t_s.size(); ++i) {
-      if (rests_at(t_s[i])) next[i] = recording_.rest_rate_dps;
+      if (rest_.at(t_s[i])) next[i] = recording_.rest_rate_dps;
       if (round > 0) change_dps = std::max(change_dps, std::abs(next[i] - rate[i]));
     }
     rate = std::move(next);
@@ -453,7 +383,7 @@ Problem Study::build_pair() {
   for (std::size_t gyro = 0; gyro < 2; ++gyro) {
     const std::span<const double> t_s = readings_[gyro].times_s();
     for (std::size_t i = 0; i < t_s.size(); ++i) {
-      if (!rests_at(t_s[i])) continue;
+      if (!rest_.at(t_s[i])) continue;
       samples.push_back({t_s[i], gyro == 0 ? Channel::kGyro1 : Channel::kGyro2,
                          readings_[gyro].values()[i] - recording_.rest_rate_dps,
                          recording_.rest_rate_dps});
@@ -462,7 +392,7 @@ Problem Study::build_pair() {
   const std::span<const double> t_s = readings_[0].times_s();
   const double reach_s = 1.5 * readings_[1].interval_s();
   for (std::size_t i = 0; i < t_s.size(); ++i) {
-    if (rests_at(t_s[i]) || readings_[1].hole_at(t_s[i], reach_s)) continue;
+    if (rest_.at(t_s[i]) || readings_[1].hole_at(t_s[i], reach_s)) continue;
     samples.push_back({t_s[i], Channel::kDifference,
                        readings_[0].values()[i] - readings_[1].at(t_s[i]).value,
                        motion.rate(t_s[i]).value});

@@ -15,6 +15,7 @@
 #include "base/error.h"
 #include "gap/noise.h"
 #include "gap/recording.h"
+#include "gap/rest.h"
 #include "gap/signals.h"
 #include "gap/transport.h"
 #include "model/effect.h"
@@ -83,8 +84,6 @@ class Study {
   explicit Study(const Recording& recording) : recording_(recording) {}
   Expected<void> check() const;
   Expected<void> check_spans() const;
-  void find_rest();
-  [[nodiscard]] bool rests_at(double t_s) const;
   void build();
   void cache(Problem& problem);
   void set_aside(Problem& problem) const;
@@ -105,8 +104,7 @@ class Study {
   std::array<Signals, 2> signals_;
   std::array<Excitation, 2> excitations_;
   std::array<SampledCurve, 2> readings_;  ///< unmasked samples
-  std::vector<std::uint8_t> resting_;     ///< by whole seconds
-  double rest_s_ = 0.0;
+  RestingSeconds rest_;                   ///< without a reference only
   std::vector<std::array<double, 2>> for_fit_s_;
   std::vector<Problem> problems_;
   std::vector<Finding> findings_;
