@@ -19,7 +19,7 @@ struct Study::Facts {
   const Recording& recording;
   std::array<Transport, 2> transports;
   std::array<SampledCurve, 2> readings;  ///< samples that are not masked
-  Rest rest;
+  RestingSeconds rest;
   std::vector<Finding> findings;
   std::vector<std::string> notes;
 };
@@ -233,7 +233,7 @@ Expected<std::shared_ptr<const Study>> Study::begin(const Recording& recording,
                 "record with a sensor that moves");
   }
   if (!recording.has_reference) facts->rest = find_rest(recording, facts->transports);
-  if (!recording.has_reference && facts->rest.seconds < kRestMin_s) {
+  if (!recording.has_reference && facts->rest.count() < kRestMin_s) {
     return fail("", "the recording holds no rest, and there is no reference",
                 "without either nothing tells which gyro is wrong: record a minute at rest, or "
                 "name a [reference]");
