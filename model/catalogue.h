@@ -1,11 +1,11 @@
 #pragma once
 
 // Every kind of effect: its name and parameters in the model file, what it does to a gyro, and, of
-// the deterministic ones, its equation. The simulator adds what the live path takes back, so both
-// ask here. A new offset or response is a new row; HACKING.md says what else another kind touches.
+// the deterministic ones, its equation. A new offset or response is a new row; HACKING.md says what
+// else another kind touches.
 //
-// A gyro reads  clip(Ω' + responses(Ω') + offsets + noise), where Ω' is the rate behind delay and
-// low-passes: every response is to the late rate, and offsets depend on no rate.
+// How the effects of one gyro act together is said in model/equation.h: every response is to the
+// rate behind delay and low-passes, and offsets depend on no rate.
 
 #include <cstdint>
 #include <optional>

@@ -9,6 +9,7 @@
 
 #include "base/error.h"
 #include "model/effect.h"
+#include "model/equation.h"
 
 namespace vgyro::simulation {
 
@@ -25,11 +26,7 @@ Expected<std::vector<double>> readings(std::span<const model::Effect> effects,
                                        std::span<const Instant> instants, double interval_s,
                                        std::uint64_t seed);
 
-/// Sum of the delays, and the cutoffs, among the effects of one gyro.
-struct Lags {
-  double delay_s = 0.0;
-  std::vector<double> cutoffs_hz;
-};
-Expected<Lags> lags_of(std::span<const model::Effect> effects);
+/// An error when the equation has more low-passes than are simulated.
+Expected<void> check_low_passes(const model::Equation& equation);
 
 }  // namespace vgyro::simulation

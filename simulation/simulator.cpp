@@ -8,6 +8,7 @@
 #include <fmt/core.h>
 
 #include "model/catalogue.h"
+#include "model/equation.h"
 #include "simulation/gyro_chain.h"
 #include "simulation/low_pass.h"
 #include "simulation/noise_source.h"
@@ -43,9 +44,9 @@ double sample_time_s(const Timing& timing, std::size_t n) {
 class Stamps {
  public:
   Stamps(std::span<const Effect> effects, const Settings& settings, std::uint32_t stream)
-      : jitters_{{settings.jitter_s, NoiseSource(settings.seed, stream, kJitterOfAll, 0)}} {
+      : equation_(effects),
+        jitters_{{settings.jitter_s, NoiseSource(settings.seed, stream, kJitterOfAll, 0)}} {
     for (const Effect& effect : effects) {
-      if (effect.kind == Kind::kClockSkew) pace_ += effect.parameters[0] * 1e-6;
       if (effect.kind != Kind::kTimestampJitter) continue;
       const auto ordinal = static_cast<std::uint32_t>(jitters_.size());
       const auto kind = static_cast<std::uint32_t>(effect.kind);
@@ -54,7 +55,7 @@ class Stamps {
   }
 
   double next(double t_s) {
-    double stamp_s = t_s * pace_;
+    double stamp_s = equation_.stamp_s(t_s);
     for (Jitter& jitter : jitters_)
       stamp_s += std::abs(jitter.sigma_s * jitter.source.normal());
     last_s_ = std::max(stamp_s, last_s_ + kStampStep_s);
@@ -66,8 +67,8 @@ class Stamps {
     double sigma_s;
     NoiseSource source;
   };
+  model::Equation equation_;
   std::vector<Jitter> jitters_;
-  double pace_ = 1.0;
   double last_s_ = -1.0;
 };
 
@@ -134,8 +135,8 @@ Expected<void> check_columns(const model::Model& model, const Profile& profile) 
 Expected<Simulator> Simulator::make(model::Model model, Profile profile, const Settings& settings) {
   if (const auto good = check_columns(model, profile); !good) return tl::unexpected(good.error());
   for (std::size_t gyro = 0; gyro < 2; ++gyro) {
-    const auto lags = lags_of(effects_of(model, gyro));
-    if (!lags) return fail(model.file, lags.error().what, lags.error().remedy);
+    const auto good = check_low_passes(model::Equation(effects_of(model, gyro)));
+    if (!good) return fail(model.file, good.error().what, good.error().remedy);
   }
   for (const Timing& timing :
        {settings.gyros[0], settings.gyros[1], settings.reference, settings.accelerometer}) {
@@ -213,18 +214,19 @@ model::Surroundings Simulator::surroundings(double t_s) const {
 std::vector<GyroSample> Simulator::gyro(std::size_t index) const {
   const std::vector<Effect> effects = effects_of(model_, index);
   const Timing& timing = settings_.gyros[index];
-  const Lags lags = lags_of(effects).value();
-  LowPass low_pass(profile_.rate_dps, lags.cutoffs_hz);
+  const model::Equation equation(effects);
+  LowPass low_pass(profile_.rate_dps, equation.cutoffs_hz());
+  const auto low_passed = [&](double t_s) { return low_pass.at(t_s); };
   GyroChain chain(effects, 1.0 / timing.rate_hz, settings_.seed);
   Stamps stamps(effects, settings_, static_cast<std::uint32_t>(index));
   Losses losses(effects, settings_.seed);
   std::vector<GyroSample> samples(sample_count(timing, profile_.length_s));
   for (std::size_t n = 0; n < samples.size(); ++n) {
     const double t_s = sample_time_s(timing, n);
-    const double sensed_dps = low_pass.at(t_s - lags.delay_s);
+    const double late_dps = equation.late_rate_dps(low_passed, t_s);
     samples[n] = {.t_s = t_s,
                   .stamp_s = stamps.next(t_s),
-                  .reading_dps = chain.next(sensed_dps, surroundings(t_s)),
+                  .reading_dps = chain.next(late_dps, surroundings(t_s)),
                   .lost = losses.next()};
   }
   return samples;
