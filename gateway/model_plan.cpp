@@ -5,6 +5,8 @@
 
 #include <fmt/core.h>
 
+#include "base/fnv1a.h"
+
 namespace vgyro::gateway {
 
 namespace {
@@ -50,9 +52,9 @@ void add_limit(const model::Effect& effect, GyroPlan& gyro) {
   }
 }
 
-// FNV-1a: the same effects give the same eight digits on every machine.
+// The same effects give the same eight digits on every machine.
 std::string digest_of(const std::vector<model::Effect>& effects) {
-  std::uint32_t hash = 2166136261U;
+  std::uint32_t hash = kFnv1aBegin;
   bool any = false;
   for (const model::Effect& effect : effects) {
     if (treatment(effect.kind) != kTakesBack) continue;
@@ -60,8 +62,7 @@ std::string digest_of(const std::vector<model::Effect>& effects) {
     std::string text(model::info(effect.kind).name);
     for (const double parameter : effect.parameters)
       text += fmt::format(" {}", parameter);
-    for (const char c : text)
-      hash = (hash ^ static_cast<unsigned char>(c)) * 16777619U;
+    hash = fnv1a(text, hash);
   }
   return any ? fmt::format("{:08x}", hash) : std::string();
 }

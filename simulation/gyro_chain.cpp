@@ -29,11 +29,10 @@ GyroChain::GyroChain(std::span<const Effect> effects, double interval_s, std::ui
     const auto ordinal = std::count_if(randoms_.begin(), randoms_.end(), [&](const Random& other) {
       return other.effect.kind == effect.kind;
     });
-    randoms_.push_back(
-        {effect,
-         NoiseSource(seed, static_cast<std::uint32_t>(effect.gyro),
-                     static_cast<std::uint32_t>(effect.kind), static_cast<std::uint32_t>(ordinal)),
-         0.0});
+    randoms_.push_back({effect,
+                        NoiseSource(seed, kGyroSenders[effect.gyro], model::info(effect.kind).name,
+                                    static_cast<std::uint32_t>(ordinal)),
+                        0.0});
   }
 }
 

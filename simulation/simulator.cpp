@@ -25,10 +25,10 @@ constexpr double kRadPerDeg = std::numbers::pi / 180.0;
 constexpr double kVibrationWindow_s = 1.0;
 // A bus keeps the order of a sender's frames; a log tells them apart by a microsecond.
 constexpr double kStampStep_s = 1e-6;
-// Streams of random numbers beside those of the kinds.
-constexpr auto kJitterOfAll = static_cast<std::uint32_t>(model::kKindCount);
-constexpr std::uint32_t kReferenceStream = 2;
-constexpr std::uint32_t kAccelerometerStream = 3;
+// Names of streams of random numbers, beside the gyros and the kinds; docs/simulate.md has them.
+constexpr std::string_view kJitterOfAll = "jitter";
+constexpr std::string_view kReferenceSender = "reference";
+constexpr std::string_view kAccelerometerSender = "accelerometer";
 
 // A sample at the very end of the motion still belongs to it.
 std::size_t sample_count(const Timing& timing, double length_s) {
@@ -43,14 +43,15 @@ double sample_time_s(const Timing& timing, std::size_t n) {
 // When the log says that a frame came: the sender's clock, then what held it up.
 class Stamps {
  public:
-  Stamps(std::span<const Effect> effects, const Settings& settings, std::uint32_t stream)
+  Stamps(std::span<const Effect> effects, const Settings& settings, std::string_view sender)
       : equation_(effects),
-        jitters_{{settings.jitter_s, NoiseSource(settings.seed, stream, kJitterOfAll, 0)}} {
+        jitters_{{settings.jitter_s, NoiseSource(settings.seed, sender, kJitterOfAll, 0)}} {
+    std::uint32_t ordinal = 0;
     for (const Effect& effect : effects) {
       if (effect.kind != Kind::kTimestampJitter) continue;
-      const auto ordinal = static_cast<std::uint32_t>(jitters_.size());
-      const auto kind = static_cast<std::uint32_t>(effect.kind);
-      jitters_.push_back({effect.parameters[0], NoiseSource(settings.seed, stream, kind, ordinal)});
+      const std::string_view purpose = model::info(effect.kind).name;
+      jitters_.push_back(
+          {effect.parameters[0], NoiseSource(settings.seed, sender, purpose, ordinal++)});
     }
   }
 
@@ -78,10 +79,9 @@ class Losses {
   Losses(std::span<const Effect> effects, std::uint64_t seed) {
     for (const Effect& effect : effects) {
       if (effect.kind != Kind::kDroppedFrames) continue;
-      losses_.push_back(
-          {effect.parameters[0], NoiseSource(seed, static_cast<std::uint32_t>(effect.gyro),
-                                             static_cast<std::uint32_t>(effect.kind),
-                                             static_cast<std::uint32_t>(losses_.size()))});
+      losses_.push_back({effect.parameters[0],
+                         NoiseSource(seed, kGyroSenders[effect.gyro], model::info(effect.kind).name,
+                                     static_cast<std::uint32_t>(losses_.size()))});
     }
   }
 
@@ -218,7 +218,7 @@ std::vector<GyroSample> Simulator::gyro(std::size_t index) const {
   LowPass low_pass(profile_.rate_dps, equation.cutoffs_hz());
   const auto low_passed = [&](double t_s) { return low_pass.at(t_s); };
   GyroChain chain(effects, 1.0 / timing.rate_hz, settings_.seed);
-  Stamps stamps(effects, settings_, static_cast<std::uint32_t>(index));
+  Stamps stamps(effects, settings_, kGyroSenders[index]);
   Losses losses(effects, settings_.seed);
   std::vector<GyroSample> samples(sample_count(timing, profile_.length_s));
   for (std::size_t n = 0; n < samples.size(); ++n) {
@@ -233,7 +233,7 @@ std::vector<GyroSample> Simulator::gyro(std::size_t index) const {
 }
 
 std::vector<RateSample> Simulator::reference() const {
-  Stamps stamps({}, settings_, kReferenceStream);
+  Stamps stamps({}, settings_, kReferenceSender);
   std::vector<RateSample> samples(sample_count(settings_.reference, profile_.length_s));
   for (std::size_t n = 0; n < samples.size(); ++n) {
     const double t_s = sample_time_s(settings_.reference, n);
@@ -243,7 +243,7 @@ std::vector<RateSample> Simulator::reference() const {
 }
 
 std::vector<AccelerationSample> Simulator::acceleration() const {
-  Stamps stamps({}, settings_, kAccelerometerStream);
+  Stamps stamps({}, settings_, kAccelerometerSender);
   std::vector<AccelerationSample> samples(sample_count(settings_.accelerometer, profile_.length_s));
   for (std::size_t n = 0; n < samples.size(); ++n) {
     const double t_s = sample_time_s(settings_.accelerometer, n);
