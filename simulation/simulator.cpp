@@ -12,7 +12,6 @@
 #include "simulation/gyro_chain.h"
 #include "simulation/low_pass.h"
 #include "simulation/noise_source.h"
-#include "simulation/readings.h"
 
 namespace vgyro::simulation {
 
@@ -135,8 +134,10 @@ Expected<void> check_columns(const model::Model& model, const Profile& profile) 
 Expected<Simulator> Simulator::make(model::Model model, Profile profile, const Settings& settings) {
   if (const auto good = check_columns(model, profile); !good) return tl::unexpected(good.error());
   for (std::size_t gyro = 0; gyro < 2; ++gyro) {
-    const auto good = check_low_passes(model::Equation(effects_of(model, gyro)));
-    if (!good) return fail(model.file, good.error().what, good.error().remedy);
+    const std::size_t count = model::Equation(effects_of(model, gyro)).cutoffs_hz().size();
+    if (count <= LowPass::kStagesMax) continue;
+    return fail(model.file, fmt::format("a gyro has {} effects of kind bandwidth", count),
+                fmt::format("at most {}", LowPass::kStagesMax));
   }
   for (const Timing& timing :
        {settings.gyros[0], settings.gyros[1], settings.reference, settings.accelerometer}) {
