@@ -4,6 +4,7 @@
 #include <cassert>
 #include <cmath>
 #include <numbers>
+#include <span>
 
 #include <fmt/core.h>
 
@@ -106,15 +107,37 @@ std::vector<Effect> effects_of(const model::Model& model, std::size_t gyro) {
   return effects;
 }
 
-// Nothing where it is there.
+std::string missing_temperature(const Effect& /*effect*/, const Profile& profile) {
+  return profile.temperature_c ? "" : "temperature_c";
+}
+
+// Of the axis of a kind that has one, or of any.
+std::string missing_acceleration(const Effect& effect, const Profile& profile) {
+  const std::span<const model::Parameter> parameters = model::info(effect.kind).parameters;
+  for (std::size_t i = 0; i < parameters.size(); ++i) {
+    if (parameters[i].form != model::Parameter::Form::kAxis) continue;
+    const auto axis = static_cast<std::size_t>(effect.parameters[i]);
+    return profile.acceleration_g[axis] ? "" : fmt::format("acc_{}_g", "xyz"[axis]);
+  }
+  return profile.has_acceleration() ? "" : "acc_x_g, acc_y_g, acc_z_g";
+}
+
+struct InputColumn {
+  model::Need need;
+  /// Nothing where it is there.
+  std::string (*missing)(const Effect& effect, const Profile& profile);
+};
+constexpr InputColumn kInputColumns[] = {{model::kNeedsTemperature, missing_temperature},
+                                         {model::kNeedsAcceleration, missing_acceleration}};
+static_assert(model::answers_each_need(kInputColumns));
+
 std::string missing_column(const Effect& effect, const Profile& profile) {
-  const std::uint8_t needs = model::info(effect.kind).needs;
-  if ((needs & model::kNeedsTemperature) != 0 && !profile.temperature_c) return "temperature_c";
-  if ((needs & model::kNeedsAcceleration) == 0) return {};
-  if (effect.kind != Kind::kGSensitivity)
-    return profile.has_acceleration() ? "" : "acc_x_g, acc_y_g, acc_z_g";
-  const auto axis = static_cast<std::size_t>(effect.parameters[0]);
-  return profile.acceleration_g[axis] ? "" : fmt::format("acc_{}_g", "xyz"[axis]);
+  for (const InputColumn& input : kInputColumns) {
+    if ((model::info(effect.kind).needs & input.need) == 0) continue;
+    std::string missing = input.missing(effect, profile);
+    if (!missing.empty()) return missing;
+  }
+  return {};
 }
 
 Expected<void> check_columns(const model::Model& model, const Profile& profile) {
