@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
+#include <iterator>
 
 #include <fmt/core.h>
 
@@ -241,16 +241,17 @@ Expected<std::unique_ptr<Study>> Study::begin(const Recording& recording,
   if (auto good = study->check(); !good) return tl::unexpected(good.error());
   for (std::size_t gyro = 0; gyro < 2; ++gyro) {
     const GyroSeries& series = recording.gyros[gyro];
-    Transport transport = check_transport(series, gyro, of_gyro(effects, gyro));
-    study->findings_.insert(study->findings_.end(), transport.findings.begin(),
-                            transport.findings.end());
-    study->notes_.insert(study->notes_.end(), transport.notes.begin(), transport.notes.end());
-    study->transports_[gyro] = std::move(transport);
+    study->transports_[gyro] = check_transport(series, gyro, of_gyro(effects, gyro));
     smooth_temperature(series, study->signals_[gyro]);
     set_acceleration(recording.acceleration, study->signals_[gyro]);
   }
-  for (Finding& spikes : find_spikes(recording, study->transports_, effects))
-    study->findings_.push_back(std::move(spikes));
+  std::vector<Finding> spikes = find_spikes(recording, study->transports_, effects);
+  for (const Transport& transport : study->transports_) {
+    study->findings_.insert(study->findings_.end(), transport.findings.begin(),
+                            transport.findings.end());
+    study->notes_.insert(study->notes_.end(), transport.notes.begin(), transport.notes.end());
+  }
+  std::move(spikes.begin(), spikes.end(), std::back_inserter(study->findings_));
   for (std::size_t gyro = 0; gyro < 2; ++gyro) {
     const GyroSeries& series = recording.gyros[gyro];
     const Transport& transport = study->transports_[gyro];
