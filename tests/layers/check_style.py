@@ -39,8 +39,6 @@ LONG_FUNCTIONS = {
     ("gap/differences.cpp", "clock"): 68,
     ("gap/leftover.cpp", "judge"): 89,
     ("gap/leftover.cpp", "leftovers"): 92,
-    ("gap/noise.cpp", "whiten_means"): 66,
-    ("gap/noise.cpp", "fit_pair_noise"): 67,
     ("gap/search.cpp", "Search::score"): 68,
     ("gap/search.cpp", "Search::score_lines"): 78,
     ("gap/search.cpp", "Search::noise_rounds"): 113,
