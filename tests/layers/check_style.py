@@ -42,7 +42,6 @@ LONG_FUNCTIONS = {
     ("gap/search.cpp", "Search::score"): 68,
     ("gap/search.cpp", "Search::score_lines"): 78,
     ("gap/search.cpp", "Search::noise_rounds"): 113,
-    ("gap/views.cpp", "binned"): 68,
     ("gap/workflow.cpp", "find_gap"): 84,
 }
 
