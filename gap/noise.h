@@ -13,7 +13,6 @@
 #include <Eigen/Core>
 
 #include "model/effect.h"
-#include "model/file.h"
 
 namespace vgyro::gap {
 

@@ -36,8 +36,6 @@ constexpr std::size_t kJudgedMin = 10;
 constexpr double kSigmaPerMedian = 1.4826;
 // Standard error of a median over that of a mean: √(π/2).
 constexpr double kMedianError = 1.25;
-// What so many samples beyond kSpikeSigmas leave to chance is less; the report says no less.
-constexpr double kPValue = 1e-6;
 
 // How each sample of one gyro stands to its neighbours.
 struct Standing {
@@ -178,7 +176,8 @@ Finding finding_of(const Recording& recording, const Transport& transport, const
   finding.effect = Effect{gyro, Kind::kSpikes, {count / recording.seconds, typical}, 0};
   finding.sigma = {std::sqrt(count) / recording.seconds, kMedianError * noise / std::sqrt(count)};
   finding.statistic = count * (typical / noise) * (typical / noise);
-  finding.p_value = kPValue;
+  finding.p_value = kFoundPValue;
+  finding.cost_nats = finding.effect.parameters[0] * recording.seconds * kImpossibleNats;
   finding.where = {marks.x.front(), marks.x.back(), 0.0, 0.5 / transport.interval_s};
   finding.evidence = fmt::format(
       "{:.0f} single samples of {} stand out by about {:.3g} deg/s, {:.0f} "
@@ -198,6 +197,7 @@ std::vector<Finding> find_spikes(const Recording& recording, std::array<Transpor
   std::vector<Finding> findings;
   for (std::size_t gyro = 0; gyro < 2; ++gyro) {
     const std::vector<std::size_t> spikes = mask_spikes(recording, transports, standings, gyro);
+    count_masked(transports[gyro]);
     const bool told = std::any_of(known.begin(), known.end(), [&](const Effect& effect) {
       return effect.gyro == gyro && effect.kind == Kind::kSpikes;
     });

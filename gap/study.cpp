@@ -207,11 +207,7 @@ Expected<std::shared_ptr<const Study>> Study::begin(const Recording& recording,
   const std::shared_ptr<Study> study(new Study);
   for (std::size_t gyro = 0; gyro < 2; ++gyro) {
     const GyroSeries& series = recording.gyros[gyro];
-    Transport transport = check_transport(series, gyro, of_gyro(effects, gyro));
-    facts->findings.insert(facts->findings.end(), transport.findings.begin(),
-                           transport.findings.end());
-    facts->notes.insert(facts->notes.end(), transport.notes.begin(), transport.notes.end());
-    facts->transports[gyro] = std::move(transport);
+    facts->transports[gyro] = check_transport(series, gyro, of_gyro(effects, gyro));
     auto signals = std::make_shared<Signals>();
     smooth_temperature(series, *signals);
     set_acceleration(recording.acceleration, *signals);
@@ -220,7 +216,13 @@ Expected<std::shared_ptr<const Study>> Study::begin(const Recording& recording,
           Motion(SampledCurve(recording.reference_dps.t_s, recording.reference_dps.value));
     study->signals_[gyro] = std::move(signals);
   }
+  // What a finding costs is known when the spikes are masked too.
   const std::vector<Finding> spikes = find_spikes(recording, facts->transports, effects);
+  for (const Transport& transport : facts->transports) {
+    facts->findings.insert(facts->findings.end(), transport.findings.begin(),
+                           transport.findings.end());
+    facts->notes.insert(facts->notes.end(), transport.notes.begin(), transport.notes.end());
+  }
   facts->findings.insert(facts->findings.end(), spikes.begin(), spikes.end());
   for (std::size_t gyro = 0; gyro < 2; ++gyro) {
     facts->readings[gyro] = unmasked(recording.gyros[gyro], facts->transports[gyro]);

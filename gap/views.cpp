@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
+#include <limits>
 #include <numbers>
 #include <numeric>
 #include <random>
@@ -20,6 +21,9 @@ constexpr std::size_t kSegmentMin = 64;
 constexpr double kPresentMin = 0.9;  ///< of a stretch that is transformed or averaged
 constexpr std::size_t kBins = 24;
 constexpr double kBinShareMin = 0.002;
+constexpr double kBinSamplesMin = 3.0;  ///< fewer have no scatter of their own
+/// Of the largest diagonal element, added to each: above the rounding of a sum over all samples.
+constexpr double kSilentShare = 1e-12;
 constexpr double kMostOfGain = 0.9;
 constexpr std::size_t kCellsMax = 600;
 
@@ -367,64 +371,107 @@ Where where_of(const Observations& data, std::size_t gyro, const PairNoise& nois
   return where;
 }
 
-Bins binned(const Observations& data, std::size_t gyro, const PairNoise& noise,
-            const std::vector<const Eigen::VectorXd*>& residuals,
-            const std::vector<double>& against, const std::vector<double>& unit) {
-  const std::size_t n = data.t_s.size();
-  double low = 1e300;
-  double high = -1e300;
-  double seen = 0.0;
-  const auto shows = [&](std::size_t i) {
-    return share_of(data.channel[i], gyro) != 0.0 && std::isfinite(against[i]);
-  };
-  for (std::size_t i = 0; i < n; ++i) {
-    if (!shows(i)) continue;
-    low = std::min(low, against[i]);
-    high = std::max(high, against[i]);
-    seen += 1.0;
+namespace {
+
+// Which samples of a gyro fall into which bin of what they are shown against.
+class Binning {
+ public:
+  Binning(const Observations& data, std::size_t gyro, const std::vector<double>& against)
+      : data_(data), gyro_(gyro), against_(against) {
+    for (std::size_t i = 0; i < against_.size(); ++i) {
+      if (!shows(i)) continue;
+      low_ = std::min(low_, against_[i]);
+      high_ = std::max(high_, against_[i]);
+      seen_ += 1.0;
+    }
   }
-  Bins bins;
-  bins.value.resize(residuals.size());
-  if (!(high > low)) return bins;
-  const auto bin_of = [&](std::size_t i) {
-    const double place = (against[i] - low) / (high - low) * static_cast<double>(kBins);
+
+  /// What it is shown against does not change, or nothing shows: there are no bins.
+  [[nodiscard]] bool empty() const { return !(high_ > low_); }
+
+  /// Where the bins large enough to show stand. Precondition: not empty.
+  std::vector<double> choose() {
+    std::array<double, kBins> count{};
+    std::array<double, kBins> sum{};
+    for (std::size_t i = 0; i < against_.size(); ++i) {
+      if (!shows(i)) continue;
+      count[bin_of(i)] += 1.0;
+      sum[bin_of(i)] += against_[i];
+    }
+    std::vector<double> at;
+    for (std::size_t bin = 0; bin < kBins; ++bin) {
+      column_[bin] = -1;
+      if (count[bin] < std::max(kBinSamplesMin, kBinShareMin * seen_)) continue;
+      column_[bin] = static_cast<Eigen::Index>(at.size());
+      at.push_back(sum[bin] / count[bin]);
+    }
+    return at;
+  }
+
+  /// Of the chosen bins; −1: of none. Precondition: chosen.
+  [[nodiscard]] Eigen::Index column_of(std::size_t i) const {
+    return shows(i) ? column_[bin_of(i)] : -1;
+  }
+
+ private:
+  [[nodiscard]] bool shows(std::size_t i) const {
+    return share_of(data_.channel[i], gyro_) != 0.0 && std::isfinite(against_[i]);
+  }
+  [[nodiscard]] std::size_t bin_of(std::size_t i) const {
+    const double place = (against_[i] - low_) / (high_ - low_) * static_cast<double>(kBins);
     return std::min(kBins - 1, static_cast<std::size_t>(place));
-  };
-  std::array<double, kBins> count{};
-  std::array<double, kBins> sum{};
-  for (std::size_t i = 0; i < n; ++i) {
-    if (!shows(i)) continue;
-    count[bin_of(i)] += 1.0;
-    sum[bin_of(i)] += against[i];
   }
-  std::array<Eigen::Index, kBins> column{};
-  Eigen::Index width = 0;
-  for (std::size_t bin = 0; bin < kBins; ++bin) {
-    column[bin] = -1;
-    if (count[bin] < std::max(3.0, kBinShareMin * seen)) continue;
-    column[bin] = width++;
-    bins.at.push_back(sum[bin] / count[bin]);
-  }
+
+  const Observations& data_;
+  std::size_t gyro_;
+  const std::vector<double>& against_;
+  double low_ = std::numeric_limits<double>::infinity();
+  double high_ = -std::numeric_limits<double>::infinity();
+  double seen_ = 0.0;
+  std::array<Eigen::Index, kBins> column_{};
+};
+
+// A column for each bin, then the residuals.
+Matrix bin_columns(const Observations& data, std::size_t gyro, const Binning& binning,
+                   Eigen::Index width, const std::vector<const Eigen::VectorXd*>& residuals,
+                   const std::vector<double>& unit) {
   const auto wanted = static_cast<Eigen::Index>(residuals.size());
   Matrix columns = Matrix::Zero(data.size(), width + wanted);
   for (Eigen::Index k = 0; k < wanted; ++k)
     columns.col(width + k) = *residuals[static_cast<std::size_t>(k)];
-  for (std::size_t i = 0; i < n; ++i) {
+  for (std::size_t i = 0; i < data.t_s.size(); ++i) {
     const auto row = static_cast<Eigen::Index>(i);
-    if (share_of(data.channel[i], gyro) == 0.0) continue;
-    const Eigen::Index place = shows(i) ? column[bin_of(i)] : -1;
+    const double share = share_of(data.channel[i], gyro);
+    if (share == 0.0) continue;
+    const Eigen::Index place = binning.column_of(i);
     // Samples of bins too small to show take no part.
     if (place < 0) columns.row(row).setZero();
     if (place < 0) continue;
-    columns(row, place) = share_of(data.channel[i], gyro) * (unit.empty() ? 1.0 : unit[i]);
+    columns(row, place) = share * (unit.empty() ? 1.0 : unit[i]);
   }
+  return columns;
+}
+
+}  // namespace
+
+Bins binned(const Observations& data, std::size_t gyro, const PairNoise& noise,
+            const std::vector<const Eigen::VectorXd*>& residuals,
+            const std::vector<double>& against, const std::vector<double>& unit) {
+  Bins bins;
+  bins.value.resize(residuals.size());
+  Binning binning(data, gyro, against);
+  if (binning.empty()) return bins;
+  bins.at = binning.choose();
+  const auto width = static_cast<Eigen::Index>(bins.at.size());
+  const auto wanted = static_cast<Eigen::Index>(residuals.size());
+  Matrix columns = bin_columns(data, gyro, binning, width, residuals, unit);
   Matrix means = block_means(columns, data.layout);
   whiten_within(columns, data.layout, noise, Part::kAll);
   whiten_means(means, data.layout, noise, Part::kAll);
   const Eigen::MatrixXd gram = columns.transpose() * columns + means.transpose() * means;
   Eigen::MatrixXd normal = gram.topLeftCorner(width, width);
   // What says nothing of a bin leaves it at zero with a large error instead of a division by zero.
-  normal.diagonal().array() += 1e-12 * normal.diagonal().maxCoeff();
+  normal.diagonal().array() += kSilentShare * normal.diagonal().maxCoeff();
   const Eigen::LDLT<Eigen::MatrixXd> solver(normal);
   const Eigen::MatrixXd covariance = solver.solve(Eigen::MatrixXd::Identity(width, width));
   const Eigen::MatrixXd value = solver.solve(gram.topRightCorner(width, wanted));

@@ -34,12 +34,6 @@ LINES_MAX = 60
 LONG_FUNCTIONS = {
     ("cli/replay/summary.cpp", "to_text"): 82,
     ("fusion/drift_filter.cpp", "DriftFilter::update_sized"): 83,
-    ("gap/noise.cpp", "whiten_means"): 66,
-    ("gap/noise.cpp", "fit_pair_noise"): 67,
-    ("gap/transport.cpp", "find_lateness"): 87,
-    ("gap/transport.cpp", "find_lattice"): 64,
-    ("gap/transport.cpp", "find_stuck"): 64,
-    ("gap/views.cpp", "binned"): 68,
 }
 
 INVARIANT = re.compile(r"^\s*(\d+)\.\s")
