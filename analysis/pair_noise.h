@@ -37,7 +37,7 @@ struct Correlation {
 };
 
 struct PairNoise {
-  Motion motion;
+  MotionSummary motion;
   std::array<SeriesNoise, 2> gyros;  ///< over motion.rest; without one over everything, no fit
   SeriesNoise difference;
   std::optional<Mismatch> removed;         ///< from the difference

@@ -21,7 +21,7 @@ constexpr double kWander = 6.0;
 constexpr double kWander_dps = 0.2;
 constexpr double kStep_dps = 0.02;
 
-struct Block {
+struct RestBlock {
   double begin_s = 0.0;
   double sum_dps = 0.0;  ///< mean of y₁ + y₂
   double difference_dps = 0.0;
@@ -30,13 +30,13 @@ struct Block {
   bool first = false;  ///< of its part
 };
 
-Block make_block(const double* first, const double* second, std::size_t count) {
+RestBlock make_block(const double* first, const double* second, std::size_t count) {
   const auto n = static_cast<Eigen::Index>(count);
   const Eigen::Map<const Eigen::ArrayXd> y1(first, n);
   const Eigen::Map<const Eigen::ArrayXd> y2(second, n);
   const Eigen::ArrayXd sum = y1 + y2;
   const Eigen::ArrayXd difference = y1 - y2;
-  Block block;
+  RestBlock block;
   block.sum_dps = sum.mean();
   block.difference_dps = difference.mean();
   block.sum_scatter_dps = std::sqrt((sum - block.sum_dps).square().mean());
@@ -44,14 +44,14 @@ Block make_block(const double* first, const double* second, std::size_t count) {
   return block;
 }
 
-std::vector<Block> blocks_of(const std::array<Series, 2>& paired) {
+std::vector<RestBlock> blocks_of(const std::array<Series, 2>& paired) {
   const double interval_s = paired[0].interval_s;
   const auto count = static_cast<std::size_t>(std::max(2.0, std::round(kBlock_s / interval_s)));
-  std::vector<Block> blocks;
+  std::vector<RestBlock> blocks;
   for (std::size_t p = 0; p < paired[0].parts.size(); ++p) {
     const Part& part = paired[0].parts[p];
     for (std::size_t i = 0; i + count <= part.rate_dps.size(); i += count) {
-      Block block = make_block(&part.rate_dps[i], &paired[1].parts[p].rate_dps[i], count);
+      RestBlock block = make_block(&part.rate_dps[i], &paired[1].parts[p].rate_dps[i], count);
       block.begin_s = part.begin_s + static_cast<double>(i) * interval_s;
       block.first = i == 0;
       blocks.push_back(block);
@@ -74,7 +74,7 @@ struct Usual {
   double scatter_dps = 0.0;
 };
 
-Usual usual_of(const std::vector<Block>& blocks) {
+Usual usual_of(const std::vector<RestBlock>& blocks) {
   std::vector<double> steps;
   std::vector<double> scatters;
   for (std::size_t i = 0; i < blocks.size(); ++i) {
@@ -91,20 +91,21 @@ Usual usual_of(const std::vector<Block>& blocks) {
   return {quarter(steps) / 0.319, quarter(scatters)};
 }
 
-bool turns(const Block& block, const Usual& usual) {
-  return std::abs(block.sum_dps) > 2.0 * Motion::kTurning_dps ||
+bool turns(const RestBlock& block, const Usual& usual) {
+  return std::abs(block.sum_dps) > 2.0 * MotionSummary::kTurning_dps ||
          block.sum_scatter_dps > kScatter * std::max(usual.scatter_dps, kStep_dps * 1e-3);
 }
 
-bool moves(const std::vector<Block>& blocks, std::size_t i, const Usual& usual) {
-  const Block& block = blocks[i];
+bool moves(const std::vector<RestBlock>& blocks, std::size_t i, const Usual& usual) {
+  const RestBlock& block = blocks[i];
   if (turns(block, usual)) return true;
   if (block.first) return false;
   return std::abs(block.sum_dps - blocks[i - 1].sum_dps) > kSteps * usual.step_dps + kStep_dps;
 }
 
 // Extends the rest that begins with block `begin`; one beyond its last block.
-std::size_t end_of_rest(const std::vector<Block>& blocks, std::size_t begin, const Usual& usual) {
+std::size_t end_of_rest(const std::vector<RestBlock>& blocks, std::size_t begin,
+                        const Usual& usual) {
   std::size_t end = begin;
   double wander_dps = 0.0;
   for (; end < blocks.size(); ++end) {
@@ -119,20 +120,20 @@ std::size_t end_of_rest(const std::vector<Block>& blocks, std::size_t begin, con
 
 }  // namespace
 
-Motion find_motion(const std::array<Series, 2>& paired) {
-  Motion motion;
-  const std::vector<Block> blocks = blocks_of(paired);
+MotionSummary find_motion(const std::array<Series, 2>& paired) {
+  MotionSummary motion;
+  const std::vector<RestBlock> blocks = blocks_of(paired);
   if (blocks.empty()) return motion;
   std::vector<double> sums;
   sums.reserve(blocks.size());
-  for (const Block& block : blocks)
+  for (const RestBlock& block : blocks)
     sums.push_back(block.sum_dps);
   const double usual_sum_dps = median(sums);
-  for (const Block& block : blocks) {
+  for (const RestBlock& block : blocks) {
     motion.turned_up_to_dps =
         std::max(motion.turned_up_to_dps, 0.5 * std::abs(block.sum_dps - usual_sum_dps));
   }
-  if (0.5 * std::abs(usual_sum_dps) > Motion::kTurning_dps) {
+  if (0.5 * std::abs(usual_sum_dps) > MotionSummary::kTurning_dps) {
     motion.turned_up_to_dps += 0.5 * std::abs(usual_sum_dps);
   }
   const Usual usual = usual_of(blocks);
@@ -146,7 +147,7 @@ Motion find_motion(const std::array<Series, 2>& paired) {
     }
     begin = std::max(end, begin + 1);
   }
-  if (motion.at_rest || longest.seconds() >= Motion::kRestMin_s) motion.rest = longest;
+  if (motion.at_rest || longest.seconds() >= MotionSummary::kRestMin_s) motion.rest = longest;
   return motion;
 }
 
@@ -194,7 +195,7 @@ std::optional<Mismatch> fit_mismatch(const std::array<Series, 2>& paired) {
 
 }  // namespace
 
-Difference difference(const std::array<Series, 2>& paired, const Motion& motion) {
+Difference difference(const std::array<Series, 2>& paired, const MotionSummary& motion) {
   Difference result{{paired[0].interval_s, {}, paired[0].filled_share}, {}};
   if (!motion.at_rest) result.removed = fit_mismatch(paired);
   const Mismatch mismatch = result.removed.value_or(Mismatch{});

@@ -17,7 +17,7 @@ struct Stretch {
   [[nodiscard]] double seconds() const { return to_s - from_s; }
 };
 
-struct Motion {
+struct MotionSummary {
   static constexpr double kTurning_dps = 2.0;
   static constexpr double kRestMin_s = 30.0;
 
@@ -27,7 +27,7 @@ struct Motion {
 };
 
 /// `paired`: both gyros' rates at common instants.
-Motion find_motion(const std::array<Series, 2>& paired);
+MotionSummary find_motion(const std::array<Series, 2>& paired);
 
 /// How much of the difference y₁ − y₂ follows the rotation.
 struct Mismatch {
@@ -40,6 +40,6 @@ struct Difference {
   std::optional<Mismatch> removed;  ///< by least squares, where the platform moved
 };
 
-Difference difference(const std::array<Series, 2>& paired, const Motion& motion);
+Difference difference(const std::array<Series, 2>& paired, const MotionSummary& motion);
 
 }  // namespace vgyro::analysis

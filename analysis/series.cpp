@@ -68,12 +68,12 @@ void SeriesBuilder::find_interval() {
     count += 1.0;
   }
   interval_s_ = sum / count;
-  for (const Sample& sample : first_)
+  for (const StampedValues& sample : first_)
     place(sample);
   first_.clear();
 }
 
-void SeriesBuilder::place(const Sample& sample) {
+void SeriesBuilder::place(const StampedValues& sample) {
   if (series_[0].parts.empty()) {
     begin_part(sample);
     return;
@@ -108,7 +108,7 @@ void SeriesBuilder::place(const Sample& sample) {
   if (holes_ > 0 && size >= hole_at_ + holes_ + kNeighbours) bridge();
 }
 
-void SeriesBuilder::begin_part(const Sample& sample) {
+void SeriesBuilder::begin_part(const StampedValues& sample) {
   for (Series& series : series_)
     series.parts.push_back({sample.t_s, {}});
   append(sample.values);

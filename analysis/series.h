@@ -42,20 +42,20 @@ class SeriesBuilder {
   std::array<Series, 2> finish();
 
  private:
-  struct Sample {
+  struct StampedValues {
     double t_s;
     std::array<double, 2> values;
   };
   static constexpr std::size_t kSamplesToJudge = 512;
 
   void find_interval();
-  void place(const Sample& sample);
-  void begin_part(const Sample& sample);
+  void place(const StampedValues& sample);
+  void begin_part(const StampedValues& sample);
   void append(const std::array<double, 2>& values);
   void close_part();
   void bridge();
 
-  std::vector<Sample> first_;  ///< until the interval is known
+  std::vector<StampedValues> first_;  ///< until the interval is known
   double interval_s_ = 0.0;
   double newest_s_ =
       0.0;          ///< where the grid has its newest place, as far as jitter lets it be seen

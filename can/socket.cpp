@@ -231,7 +231,7 @@ Socket::Socket(std::string interface, int fd)
     : interface_(std::move(interface)), fd_(fd), buffers_(std::make_unique<Buffers>()) {}
 
 Socket::Socket(Socket&& other) noexcept
-    : Sender(other),
+    : Transmitter(other),
       interface_(std::move(other.interface_)),
       fd_(std::exchange(other.fd_, -1)),
       fd_frames_(other.fd_frames_),

@@ -14,7 +14,7 @@
 #include "base/error.h"
 #include "base/time.h"
 #include "can/frame.h"
-#include "can/sender.h"
+#include "can/transmitter.h"
 
 namespace vgyro::can {
 
@@ -54,7 +54,7 @@ struct Batch {
   ReceiveStatus status = ReceiveStatus::kDrained;
 };
 
-class Socket final : public Sender {
+class Socket final : public Transmitter {
  public:
   static constexpr std::size_t kBatchFrames = 64;
 

@@ -8,9 +8,9 @@ TransmitQueue::TransmitQueue(const TransmitLimits& limits)
     : limits_(limits), ring_(std::max<std::size_t>(limits.capacity, 1)) {}
 
 // What the kernel refuses is tried once more by drain(), which keeps the books of refusals.
-bool TransmitQueue::send_at_once(const Frame& frame, Sender& sender) {
+bool TransmitQueue::send_at_once(const Frame& frame, Transmitter& transmitter) {
   if (size_ > 0 || awaits_writable_ || wait_ != Duration{}) return false;
-  if (sender.send(frame) != SendResult::kSent) return false;
+  if (transmitter.send(frame) != SendResult::kSent) return false;
   link_down_ = false;
   ++counts_.sent;
   return true;
@@ -30,10 +30,10 @@ void TransmitQueue::pop() {
   --size_;
 }
 
-void TransmitQueue::drain(TimePoint now, Sender& sender) {
+void TransmitQueue::drain(TimePoint now, Transmitter& transmitter) {
   drop_stale(now);
   if (!may_try(now)) return;
-  while (size_ > 0 && send_oldest(now, sender))
+  while (size_ > 0 && send_oldest(now, transmitter))
     drop_stale(now);
 }
 
@@ -50,9 +50,9 @@ bool TransmitQueue::may_try(TimePoint now) const {
   return wait_ == Duration{} || now >= retry_at_ || now < retry_at_ - wait_;
 }
 
-bool TransmitQueue::send_oldest(TimePoint now, Sender& sender) {
+bool TransmitQueue::send_oldest(TimePoint now, Transmitter& transmitter) {
   if (wait_ != Duration{}) ++counts_.retries;
-  const SendResult result = sender.send(ring_[head_].frame);
+  const SendResult result = transmitter.send(ring_[head_].frame);
   link_down_ = result == SendResult::kLinkDown;
   switch (result) {
     case SendResult::kWouldBlock:

@@ -10,7 +10,7 @@
 
 #include "base/time.h"
 #include "can/frame.h"
-#include "can/sender.h"
+#include "can/transmitter.h"
 
 namespace vgyro::can {
 
@@ -34,13 +34,13 @@ class TransmitQueue {
 
   /// Sends at once, where nothing waits and nothing holds back, which is nearly always; needs no
   /// time. False when it has not gone out: push() it.
-  bool send_at_once(const Frame& frame, Sender& sender);
+  bool send_at_once(const Frame& frame, Transmitter& transmitter);
 
   /// Last in the order of sending. Dropped when not sent by `send_by`.
   void push(const Frame& frame, TimePoint send_by);
 
   /// Sends what can be sent now, oldest first; the first refusal ends the attempt.
-  void drain(TimePoint now, Sender& sender);
+  void drain(TimePoint now, Transmitter& transmitter);
 
   /// Poll says that the socket takes frames again.
   void on_writable() { awaits_writable_ = false; }
@@ -65,7 +65,7 @@ class TransmitQueue {
   void pop();
   void drop_stale(TimePoint now);
   [[nodiscard]] bool may_try(TimePoint now) const;
-  bool send_oldest(TimePoint now, Sender& sender);
+  bool send_oldest(TimePoint now, Transmitter& transmitter);
   void back_off(TimePoint now);
 
   TransmitLimits limits_;

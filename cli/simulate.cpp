@@ -40,7 +40,7 @@ constexpr double kMicro = 1e6;
 enum Part : std::uint8_t { kGyroA = 0, kGyroB = 1, kReference = 2, kAccelerometer = 3 };
 
 /// One message: its parts, and the next of its samples to be sent.
-struct Sender {
+struct SimulatedMessage {
   const FrameMatch* match = nullptr;
   std::vector<Part> parts{};
   bool temperature_page = false;
@@ -52,21 +52,21 @@ bool same_message(const FrameMatch& a, const FrameMatch& b) {
   return a.bus == b.bus && a.id == b.id && a.extended == b.extended;
 }
 
-std::vector<Sender> senders_of(const Plan& plan, bool has_acceleration) {
-  std::vector<Sender> senders;
+std::vector<SimulatedMessage> messages_of(const Plan& plan, bool has_acceleration) {
+  std::vector<SimulatedMessage> messages;
   const auto add = [&](const FrameMatch& match, Part part) {
-    for (Sender& sender : senders) {
-      if (!same_message(*sender.match, match)) continue;
-      sender.parts.push_back(part);
+    for (SimulatedMessage& message : messages) {
+      if (!same_message(*message.match, match)) continue;
+      message.parts.push_back(part);
       return;
     }
-    senders.push_back({.match = &match, .parts = {part}});
+    messages.push_back({.match = &match, .parts = {part}});
   };
   add(plan.gyros[0].match, kGyroA);
   add(plan.gyros[1].match, kGyroB);
   if (plan.reference) add(plan.reference->match, kReference);
   if (plan.accelerometer && has_acceleration) add(plan.accelerometer->match, kAccelerometer);
-  return senders;
+  return messages;
 }
 
 simulation::Timing& timing_of(simulation::Settings& settings, Part part) {
@@ -76,7 +76,7 @@ simulation::Timing& timing_of(simulation::Settings& settings, Part part) {
 }
 
 simulation::Settings settings_of(const SimulateOptions& options,
-                                 const std::vector<Sender>& senders) {
+                                 const std::vector<SimulatedMessage>& messages) {
   simulation::Settings settings{.jitter_s = options.jitter_s, .seed = options.seed};
   for (std::size_t i = 0; i < 2; ++i) {
     const double rate_hz = i == 0 ? options.gyro_rates_hz.front() : options.gyro_rates_hz.back();
@@ -85,16 +85,17 @@ simulation::Settings settings_of(const SimulateOptions& options,
   settings.reference = {options.reference_rate_hz, kReferenceOffset / options.reference_rate_hz};
   settings.accelerometer = {options.accelerometer_rate_hz,
                             kAccelerometerOffset / options.accelerometer_rate_hz};
-  for (const Sender& sender : senders) {
-    for (const Part part : sender.parts)
-      timing_of(settings, part) = timing_of(settings, sender.parts.front());
+  for (const SimulatedMessage& message : messages) {
+    for (const Part part : message.parts)
+      timing_of(settings, part) = timing_of(settings, message.parts.front());
   }
   return settings;
 }
 
 class Recording {
  public:
-  Recording(const Plan& plan, const simulation::Simulator& simulator, std::vector<Sender> senders);
+  Recording(const Plan& plan, const simulation::Simulator& simulator,
+            std::vector<SimulatedMessage> messages);
 
   /// All frames in the order of their stamps.
   void write(OutputFile& output, double start_s);
@@ -104,16 +105,16 @@ class Recording {
  private:
   [[nodiscard]] std::size_t count(Part part) const;
   [[nodiscard]] double stamp_s(Part part, std::size_t n) const;
-  [[nodiscard]] bool lost(const Sender& sender) const;
-  [[nodiscard]] can::Frame frame(const Sender& sender);
+  [[nodiscard]] bool lost(const SimulatedMessage& message) const;
+  [[nodiscard]] can::Frame frame(const SimulatedMessage& message);
   void put(Part part, std::size_t n, can::Frame& frame);
   [[nodiscard]] const gateway::E2ePlan& e2e_of(Part part) const;
   void add_temperature_pages();
-  bool find_next(Sender& sender) const;
+  bool find_next(SimulatedMessage& message) const;
 
   const Plan& plan_;
   const simulation::Simulator& simulator_;
-  std::vector<Sender> senders_;
+  std::vector<SimulatedMessage> messages_;
   std::array<std::vector<simulation::GyroSample>, 2> gyros_;
   std::vector<simulation::RateSample> reference_;
   std::vector<simulation::AccelerationSample> acceleration_;
@@ -122,13 +123,13 @@ class Recording {
 };
 
 Recording::Recording(const Plan& plan, const simulation::Simulator& simulator,
-                     std::vector<Sender> senders)
+                     std::vector<SimulatedMessage> messages)
     : plan_(plan),
       simulator_(simulator),
-      senders_(std::move(senders)),
+      messages_(std::move(messages)),
       gyros_{simulator.gyro(0), simulator.gyro(1)} {
-  for (const Sender& sender : senders_) {
-    for (const Part part : sender.parts) {
+  for (const SimulatedMessage& message : messages_) {
+    for (const Part part : message.parts) {
       if (part == kReference) reference_ = simulator.reference();
       if (part == kAccelerometer) acceleration_ = simulator.acceleration();
     }
@@ -143,7 +144,7 @@ void Recording::add_temperature_pages() {
     can::Frame frame = gateway::empty_frame(gyro.match);
     gateway::put_gyro(gyro, 0.0, 0, frame);
     if (gateway::carries_temperature(gyro, frame)) continue;
-    senders_.push_back({.match = &gyro.match, .parts = {part}, .temperature_page = true});
+    messages_.push_back({.match = &gyro.match, .parts = {part}, .temperature_page = true});
   }
 }
 
@@ -159,19 +160,19 @@ double Recording::stamp_s(Part part, std::size_t n) const {
   return gyros_[part][n].stamp_s;
 }
 
-bool Recording::lost(const Sender& sender) const {
-  return std::any_of(sender.parts.begin(), sender.parts.end(),
-                     [&](Part part) { return part <= kGyroB && gyros_[part][sender.next].lost; });
+bool Recording::lost(const SimulatedMessage& message) const {
+  return std::any_of(message.parts.begin(), message.parts.end(),
+                     [&](Part part) { return part <= kGyroB && gyros_[part][message.next].lost; });
 }
 
-// From sender.next on; false where there is none.
-bool Recording::find_next(Sender& sender) const {
-  const Part leader = sender.parts.front();
-  const std::size_t step = sender.temperature_page ? kPageEvery : 1;
-  while (sender.next < count(leader) && lost(sender))
-    sender.next += step;
-  if (sender.next >= count(leader)) return false;
-  sender.stamp_s = stamp_s(leader, sender.next) + (sender.temperature_page ? kPageAfter_s : 0.0);
+// From message.next on; false where there is none.
+bool Recording::find_next(SimulatedMessage& message) const {
+  const Part leader = message.parts.front();
+  const std::size_t step = message.temperature_page ? kPageEvery : 1;
+  while (message.next < count(leader) && lost(message))
+    message.next += step;
+  if (message.next >= count(leader)) return false;
+  message.stamp_s = stamp_s(leader, message.next) + (message.temperature_page ? kPageAfter_s : 0.0);
   return true;
 }
 
@@ -203,17 +204,17 @@ const gateway::E2ePlan& Recording::e2e_of(Part part) const {
   return part == kAccelerometer ? plan_.accelerometer->e2e : plan_.gyros[part].e2e;
 }
 
-can::Frame Recording::frame(const Sender& sender) {
-  can::Frame frame = gateway::empty_frame(*sender.match);
-  if (sender.temperature_page) {
-    const Part part = sender.parts.front();
-    const double t_s = gyros_[part][sender.next].t_s;
+can::Frame Recording::frame(const SimulatedMessage& message) {
+  can::Frame frame = gateway::empty_frame(*message.match);
+  if (message.temperature_page) {
+    const Part part = message.parts.front();
+    const double t_s = gyros_[part][message.next].t_s;
     gateway::put_quantity(*plan_.gyros[part].temperature, simulator_.temperature_c(t_s), frame);
   } else {
-    for (const Part part : sender.parts)
-      put(part, sender.next, frame);
+    for (const Part part : message.parts)
+      put(part, message.next, frame);
   }
-  for (const Part part : sender.parts)
+  for (const Part part : message.parts)
     gateway::seal(e2e_of(part), frame);
   return frame;
 }
@@ -223,9 +224,9 @@ void Recording::write(OutputFile& output, double start_s) {
   formatters.reserve(plan_.buses.size());
   for (const std::string& bus : plan_.buses)
     formatters.emplace_back(bus);
-  std::vector<Sender*> alive;
-  for (Sender& sender : senders_) {
-    if (find_next(sender)) alive.push_back(&sender);
+  std::vector<SimulatedMessage*> alive;
+  for (SimulatedMessage& message : messages_) {
+    if (find_next(message)) alive.push_back(&message);
   }
   const auto start_ns = static_cast<std::int64_t>(std::llround(start_s * kMicro)) * 1000;
   Progress progress("simulate");
@@ -233,15 +234,15 @@ void Recording::write(OutputFile& output, double start_s) {
     const auto first =
         std::min_element(alive.begin(), alive.end(),
                          [](const auto* a, const auto* b) { return a->stamp_s < b->stamp_s; });
-    Sender& sender = **first;
+    SimulatedMessage& message = **first;
     // A log's last digit is the microsecond.
-    const auto since_ns = static_cast<std::int64_t>(std::llround(sender.stamp_s * kMicro)) * 1000;
-    output.commit(formatters[sender.match->bus].format(
-        output.room(can::kLineBytesMax), time_from_ns(start_ns + since_ns), frame(sender), 6));
-    progress.update(static_cast<std::uint64_t>(sender.stamp_s * 1e3),
+    const auto since_ns = static_cast<std::int64_t>(std::llround(message.stamp_s * kMicro)) * 1000;
+    output.commit(formatters[message.match->bus].format(
+        output.room(can::kLineBytesMax), time_from_ns(start_ns + since_ns), frame(message), 6));
+    progress.update(static_cast<std::uint64_t>(message.stamp_s * 1e3),
                     static_cast<std::uint64_t>(simulator_.profile().length_s * 1e3), ++frames_);
-    sender.next += sender.temperature_page ? kPageEvery : 1;
-    if (!find_next(sender)) alive.erase(first);
+    message.next += message.temperature_page ? kPageEvery : 1;
+    if (!find_next(message)) alive.erase(first);
   }
 }
 
@@ -301,8 +302,8 @@ int run_simulate(const SimulateOptions& options) {
   if (!model) return report(model.error());
   auto profile = simulation::load_profile(options.profile);
   if (!profile) return report(profile.error());
-  auto senders = senders_of(plan, profile->has_acceleration());
-  const simulation::Settings settings = settings_of(options, senders);
+  auto messages = messages_of(plan, profile->has_acceleration());
+  const simulation::Settings settings = settings_of(options, messages);
   const auto simulator =
       simulation::Simulator::make(*std::move(model), *std::move(profile), settings);
   if (!simulator) return report(simulator.error());
@@ -310,7 +311,7 @@ int run_simulate(const SimulateOptions& options) {
   auto output = OutputFile::open(options.output);
   if (!output) return report(output.error());
 
-  Recording recording(plan, *simulator, std::move(senders));
+  Recording recording(plan, *simulator, std::move(messages));
   recording.write(*output, options.start_s);
   if (const auto closed = output->close(); !closed) return report(closed.error());
   if (!options.quiet) recording.summarize(options);

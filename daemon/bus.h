@@ -11,9 +11,9 @@
 #include "base/error.h"
 #include "base/time.h"
 #include "can/error_frame.h"
-#include "can/sender.h"
 #include "can/socket.h"
 #include "can/stamp_clock.h"
+#include "can/transmitter.h"
 #include "daemon/bus_status.h"
 #include "daemon/host_time.h"
 #include "daemon/identifier_watch.h"
@@ -27,7 +27,7 @@ struct Arrival {
   TimePoint stamp;  ///< on the host's clock
 };
 
-class Bus final : public can::Sender {
+class Bus final : public can::Transmitter {
  public:
   /// Without filters the bus is only written to. `own` are the identifiers that the gateway sends
   /// here; they belong into the filters too. The clock stands in where the kernel gives no stamp.

@@ -24,7 +24,7 @@ bool alike(Duration a, Duration b) {
 
 }  // namespace
 
-void Aligner::Ring::insert(const Sample& sample) {
+void Aligner::Ring::insert(const RateSample& sample) {
   assert(size_ < kCapacity);
   std::size_t at = size_++;
   for (; at > 0 && (*this)[at - 1].t > sample.t; --at) {
@@ -220,14 +220,14 @@ bool Aligner::pop(AlignedPair& pair) {
 bool Aligner::interpolate(const Ring& other, AlignedPair& pair, std::size_t other_index) {
   if (other[0].t > pair.t) return false;
   // pop() has left the last sample at or before the pair in front.
-  const Sample& before = other[0];
+  const RateSample& before = other[0];
   if (before.t == pair.t) {
     pair.rate_dps[other_index] = before.rate_dps;
     pair.noise_gain[other_index] = 1.0;
     pair.complete = pair.t;
     return true;
   }
-  const Sample& after = other[1];
+  const RateSample& after = other[1];
   if (after.t - before.t > gap_[other_index]) return false;
   pair.rate_dps[other_index] = line_at(pair.t, before.t, before.rate_dps, after.t, after.rate_dps);
   const double share = to_seconds(pair.t - before.t) / to_seconds(after.t - before.t);
@@ -244,8 +244,8 @@ bool Aligner::average(const Ring& other, AlignedPair& pair, std::size_t other_in
   if (other[0].t > from) return false;
   double area = 0.0;
   for (std::size_t i = 0; i + 1 < other.size() && other[i].t < to; ++i) {
-    const Sample& a = other[i];
-    const Sample& b = other[i + 1];
+    const RateSample& a = other[i];
+    const RateSample& b = other[i + 1];
     if (b.t - a.t > gap_[other_index]) return false;
     const TimePoint left = std::max(a.t, from);
     const TimePoint right = std::min(b.t, to);

@@ -80,7 +80,7 @@ class Aligner {
   [[nodiscard]] bool too_far_apart() const { return too_far_apart_; }
 
  private:
-  struct Sample {
+  struct RateSample {
     TimePoint t;
     double rate_dps = 0.0;
   };
@@ -88,17 +88,17 @@ class Aligner {
    public:
     [[nodiscard]] std::size_t size() const { return size_; }
     [[nodiscard]] bool empty() const { return size_ == 0; }
-    [[nodiscard]] const Sample& operator[](std::size_t i) const {
+    [[nodiscard]] const RateSample& operator[](std::size_t i) const {
       return samples_[(head_ + i) & (kCapacity - 1)];
     }
-    [[nodiscard]] const Sample& back() const { return (*this)[size_ - 1]; }
+    [[nodiscard]] const RateSample& back() const { return (*this)[size_ - 1]; }
     void pop_front(std::size_t count = 1) {
       head_ = (head_ + count) & (kCapacity - 1);
       size_ -= count;
     }
     void clear() { size_ = 0; }
     /// Keeps the stamps ascending. Precondition: size() < kCapacity, no equal stamp inside.
-    void insert(const Sample& sample);
+    void insert(const RateSample& sample);
     [[nodiscard]] bool contains(TimePoint t) const;
     /// Of the samples at or before `until`: their usual interval, and one more than the last index.
     [[nodiscard]] Duration usual_interval(TimePoint until) const;
@@ -106,7 +106,7 @@ class Aligner {
 
    private:
     static_assert((kCapacity & (kCapacity - 1)) == 0);
-    std::array<Sample, kCapacity> samples_;
+    std::array<RateSample, kCapacity> samples_;
     std::size_t head_ = 0;
     std::size_t size_ = 0;
   };

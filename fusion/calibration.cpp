@@ -31,7 +31,7 @@ void Calibrator::begin(double t_s) {
   covered_s_ = 0.0;
   sums_ = empty_sums(t_s);
   calm_ = sums_;
-  block_ = Block{.from_s = t_s};
+  block_ = StillnessBlock{.from_s = t_s};
 }
 
 bool Calibrator::close_block() {
@@ -93,7 +93,7 @@ bool Calibrator::add(double t_s, const std::array<double, 2>& rate_dps, double t
     } else {
       calm_ = sums_;
       calm_until_s_ = t_s;
-      block_ = Block{.from_s = t_s};
+      block_ = StillnessBlock{.from_s = t_s};
     }
   }
   covered_s_ = t_s - from_s_;

@@ -75,8 +75,8 @@ class Calibrator {
     LeastSquares level;  ///< the sum as a constant
     LeastSquares difference;
   };
-  /// One second of pairs.
-  struct Block {
+  /// A second of pairs, or more of slow gyros: is it as still as those before?
+  struct StillnessBlock {
     double from_s = 0.0;
     std::uint64_t count = 0;
     double common = 0.0;              ///< Σ ½(y₁ + y₂) − Ω
@@ -101,7 +101,7 @@ class Calibrator {
   Sums sums_;
   Sums calm_;  ///< up to the last block that was judged still
   double calm_until_s_ = 0.0;
-  Block block_;
+  StillnessBlock block_;
   double level_dps_ = 0.0;  ///< common rate of the last blocks, smoothed
   bool level_known_ = false;
   Calibration result_;

@@ -30,7 +30,7 @@ class CalibrationBlocks {
     merge_ = 1;
     gathered_ = 0;
   }
-  void add(const Block& block) {
+  void add(const CellBlock& block) {
     const Mean mean{
         block.from_s, block.to_s, block.length_s(), {block.mean_dps(0), block.mean_dps(1)}};
     if (gathered_ == 0) {

@@ -26,7 +26,7 @@ struct Cell {
   std::array<double, 2> noise_gain{};
 };
 
-struct Block {
+struct CellBlock {
   static constexpr std::size_t kCellsMax = 12;
   Present present = Present::kBoth;
   double from_s = 0.0;
@@ -74,7 +74,7 @@ class CellBuilder {
         if (t_s - cell_from_s_ >= kCell_s) {
           close_cell(t_s);
           if ((t_s - block_.from_s >= kBlock_s && block_.count >= kBlockCellsMin) ||
-              block_.count == Block::kCellsMax) {
+              block_.count == CellBlock::kCellsMax) {
             closed = close_block();
             begin_block(t_s, present);
           }
@@ -99,7 +99,7 @@ class CellBuilder {
   }
 
   /// Precondition: add() has returned true.
-  [[nodiscard]] const Block& last() const { return last_; }
+  [[nodiscard]] const CellBlock& last() const { return last_; }
   [[nodiscard]] double interval_s() const { return interval_s_; }
   /// Forget all samples, keep the interval.
   void clear() {
@@ -145,8 +145,8 @@ class CellBuilder {
     return true;
   }
 
-  Block block_;
-  Block last_;
+  CellBlock block_;
+  CellBlock last_;
   double interval_s_ = 0.0;
   double intervals_ = 0.0;
   double newest_s_ = 0.0;

@@ -192,8 +192,8 @@ DriftEstimate EstimateMixer::result() const {
 }
 
 DriftBank::DriftBank(const std::array<GyroParameters, 2>& gyros) : gyros_(gyros) {
-  constexpr std::size_t kHypothesesMax = 25 + 4 * 9;
-  hypotheses_.reserve(kHypothesesMax);
+  constexpr std::size_t kFiltersMax = 25 + 4 * 9;
+  filters_.reserve(kFiltersMax);
 }
 
 // Who gives K has measured the drift, and would have seen more of it.
@@ -233,8 +233,8 @@ void DriftBank::make_kind(std::size_t kind, const std::array<double, 2>& white_d
       const double quality_2 = white_dps_rthz[1] * std::sqrt(growth[1]);
       const double scale_share =
           quality_1 + quality_2 > 0.0 ? quality_1 / (quality_1 + quality_2) : 0.5;
-      hypotheses_.push_back({std::move(filter), scale_share, log_weight, log_weight,
-                             first.place * kWalkRatios_per_s.size() + second.place, kind});
+      filters_.push_back({std::move(filter), scale_share, log_weight, log_weight,
+                          first.place * kWalkRatios_per_s.size() + second.place, kind});
     }
   }
 }
@@ -242,7 +242,7 @@ void DriftBank::make_kind(std::size_t kind, const std::array<double, 2>& white_d
 void DriftBank::make(const std::array<double, 2>& white_dps_rthz,
                      const DriftFilter::Observables& mean,
                      const DriftFilter::Covariance& covariance) {
-  hypotheses_.clear();
+  filters_.clear();
   white_dps_rthz_ = white_dps_rthz;
   for (std::size_t kind = 0; kind < kDriftKinds; ++kind)
     make_kind(kind, white_dps_rthz, mean, covariance);
@@ -270,7 +270,7 @@ void DriftBank::resume(const DriftMemory& memory, double age_s) {
   normalize();
   // Heat that comes and goes does not add up for days.
   const double sloping_s = std::min(age_s, kSlopesGoOn_s);
-  for (Hypothesis& one : hypotheses_) {
+  for (WeighedFilter& one : filters_) {
     one.filter.predict(one.filter.has_slopes() ? sloping_s : age_s);
     if (!one.filter.has_slopes()) continue;
     const auto growth = one.filter.growth_per_s();
@@ -292,7 +292,7 @@ void DriftBank::weigh_as(const DriftMemory& memory) {
   for (const double weight : memory.kind_weight)
     kinds += weight;
   const bool walks_are_known = !gyros_[0].walk_dps_rts && !gyros_[1].walk_dps_rts;
-  for (Hypothesis& one : hypotheses_) {
+  for (WeighedFilter& one : filters_) {
     const DriftKind& kind = kKinds[one.kind];
     double weight = kinds > 0.0 ? memory.kind_weight[one.kind] / kinds : prior_of(one.kind);
     if (walks_are_known) {
@@ -316,7 +316,7 @@ void DriftBank::take_slopes(const DriftMemory& memory) {
   Eigen::Matrix2d covariance = Eigen::Matrix2d::Zero();
   covariance(0, 0) = squared(memory.slope_sigma_dps_s[0]);
   covariance(1, 1) = squared(memory.slope_sigma_dps_s[1]);
-  for (Hypothesis& one : hypotheses_) {
+  for (WeighedFilter& one : filters_) {
     if (one.filter.has_slopes()) one.filter.set_slopes(mean, covariance);
   }
 }
@@ -329,7 +329,7 @@ void DriftBank::take_coefficients(const DriftMemory& memory) {
     has_reference_[gyro] = true;
     const double sigma = memory.coefficient_sigma_dps_k[gyro];
     if (!(sigma > 0.0)) continue;
-    for (Hypothesis& one : hypotheses_)
+    for (WeighedFilter& one : filters_)
       one.filter.set_coefficient(gyro, memory.coefficient_dps_k[gyro], squared(sigma));
   }
 }
@@ -352,27 +352,27 @@ double DriftBank::usual_scale_doubt(double difference, double variance) const {
 }
 
 void DriftBank::predict(double length_s) {
-  for (Hypothesis& one : hypotheses_)
+  for (WeighedFilter& one : filters_)
     one.filter.predict(length_s);
 }
 
 double DriftBank::learn(double length_s, const DriftMeasurement& measurement) {
   const double kept = std::exp(-length_s / kMemory_s);
-  for (Hypothesis& one : hypotheses_)
+  for (WeighedFilter& one : filters_)
     one.log_weight = one.log_prior + kept * (one.log_weight - one.log_prior);
   normalize();
-  for (Hypothesis& one : hypotheses_)
+  for (WeighedFilter& one : filters_)
     one.log_weight += one.filter.update(length_s, measurement);
   return normalize() - kHalfLogTwoPi * static_cast<double>(measurement.values.size());
 }
 
 void DriftBank::widen(double variance_1, double covariance_12, double variance_2) {
-  for (Hypothesis& one : hypotheses_)
+  for (WeighedFilter& one : filters_)
     one.filter.widen(variance_1, covariance_12, variance_2);
 }
 
 void DriftBank::shift(std::size_t gyro, double by_dps, double variance) {
-  for (Hypothesis& one : hypotheses_)
+  for (WeighedFilter& one : filters_)
     one.filter.shift(gyro, by_dps, variance);
 }
 
@@ -392,7 +392,7 @@ void DriftBank::set_temperature(const std::array<double, 2>& temperature_c) {
     away_k_[gyro] = away_k;
   }
   if (!changed) return;
-  for (Hypothesis& one : hypotheses_) {
+  for (WeighedFilter& one : filters_) {
     one.filter.set_temperature(away_k_);
     one.filter.widen(bend[0], 0.0, bend[1]);
   }
@@ -404,26 +404,26 @@ void DriftBank::observe_at(const std::array<double, 2>& temperature_c) {
     if (has_reference_[gyro] && std::isfinite(temperature_c[gyro]))
       away_k[gyro] = temperature_c[gyro] - reference_c_[gyro];
   }
-  for (Hypothesis& one : hypotheses_)
+  for (WeighedFilter& one : filters_)
     one.filter.set_temperature(away_k);
 }
 
 double DriftBank::normalize() {
-  double greatest = hypotheses_.front().log_weight;
-  for (const Hypothesis& one : hypotheses_)
+  double greatest = filters_.front().log_weight;
+  for (const WeighedFilter& one : filters_)
     greatest = std::max(greatest, one.log_weight);
   double sum = 0.0;
-  for (const Hypothesis& one : hypotheses_)
+  for (const WeighedFilter& one : filters_)
     sum += std::exp(one.log_weight - greatest);
   const double log_sum = greatest + std::log(sum);
-  for (Hypothesis& one : hypotheses_)
+  for (WeighedFilter& one : filters_)
     one.log_weight -= log_sum;
   return log_sum;
 }
 
 DriftEstimate DriftBank::estimate() const {
   EstimateMixer mixer;
-  for (const Hypothesis& one : hypotheses_) {
+  for (const WeighedFilter& one : filters_) {
     const double weight = std::exp(one.log_weight);
     if (weight < kWeightMin) continue;
     DriftEstimate part;
@@ -465,7 +465,7 @@ void DriftBank::save(DriftMemory& memory) const {
   std::array<double, 2> coefficient_square{};
   std::array<double, 2> slope_square{};
   double sloping = 0.0;
-  for (const Hypothesis& one : hypotheses_) {
+  for (const WeighedFilter& one : filters_) {
     const double weight = std::exp(one.log_weight);
     memory.kind_weight[one.kind] += weight;
     if (!walks_are_known) memory.walk_weight[one.place] += weight;

@@ -87,12 +87,12 @@ class DriftBank {
   [[nodiscard]] double white_density(std::size_t gyro) const {
     return squared(white_dps_rthz_[gyro]);
   }
-  [[nodiscard]] bool few() const { return hypotheses_.size() <= kDriftKinds; }
-  [[nodiscard]] bool empty() const { return hypotheses_.empty(); }
+  [[nodiscard]] bool few() const { return filters_.size() <= kDriftKinds; }
+  [[nodiscard]] bool empty() const { return filters_.empty(); }
   void save(DriftMemory& memory) const;
 
  private:
-  struct Hypothesis {
+  struct WeighedFilter {
     DriftFilter filter;
     double scale_share = 0.5;  ///< of gyro 1 in the scale-factor difference
     double log_prior = 0.0;
@@ -117,7 +117,7 @@ class DriftBank {
   std::array<double, 2> reference_c_{};  ///< temperature at which the coefficients begin
   std::array<bool, 2> has_reference_{};
   std::array<double, 2> away_k_{};
-  std::vector<Hypothesis> hypotheses_;
+  std::vector<WeighedFilter> filters_;
 };
 
 }  // namespace vgyro::fusion

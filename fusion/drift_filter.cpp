@@ -86,10 +86,10 @@ DriftFilter::DriftFilter(const DriftModel& model, const Observables& mean,
   }
 }
 
-DriftFilter::Motion DriftFilter::motion(double length_s) const {
+DriftFilter::Transition DriftFilter::transition(double length_s) const {
   const auto states = state_.size();
-  Motion all{State::Ones(states), State::Ones(states), State::Zero(states), State::Zero(states),
-             State::Zero(states)};
+  Transition all{State::Ones(states), State::Ones(states), State::Zero(states), State::Zero(states),
+                 State::Zero(states)};
   const auto put = [&all](int place, const Term& term) {
     all.carry(place) = term.carry;
     all.carry_mean(place) = term.carry_mean;
@@ -149,7 +149,7 @@ void DriftFilter::add_slope_noise(double length_s, Square& walked) const {
 
 void DriftFilter::predict(double length_s) {
   if (!(length_s > 0.0)) return;
-  const Motion m = motion(length_s);
+  const Transition m = transition(length_s);
   Square flow = m.carry.asDiagonal();
   Square walked = m.end_variance.asDiagonal();
   if (slopes_at_ >= 0) {
@@ -159,6 +159,122 @@ void DriftFilter::predict(double length_s) {
   }
   state_ = (flow * state_).eval();
   covariance_ = (flow * covariance_ * flow.transpose() + walked).eval();
+}
+
+// One window with its measurement, in sizes that the compiler knows: states and rows.
+template <int States, int Rows>
+class DriftFilter::SizedUpdate {
+ public:
+  SizedUpdate(const DriftFilter& filter, double length_s, const DriftMeasurement& measurement)
+      : slopes_at_(filter.slopes_at_),
+        window_(filter.transition(length_s)),
+        carry_(window_.carry),
+        end_variance_(window_.end_variance),
+        before_(filter.covariance_),
+        state_(filter.state_),
+        noise_(measurement.noise) {
+    see(filter, measurement);
+    if (slopes_at_ < 0) return;
+    Square walked = window_.end_variance.asDiagonal();
+    filter.add_slope_noise(length_s, walked);
+    walk_covariance_ = walked;
+  }
+
+  /// The states behind the window go to `state`; returns the log likelihood of `values`.
+  double correct(const DriftMeasurement::Values& values, State& state);
+  /// After correct(): their covariance goes to `covariance`.
+  void spread(Square& covariance) const;
+
+ private:
+  static constexpr int kMax = States == Eigen::Dynamic ? kStatesMax : States;
+  using StateVector = Eigen::Matrix<double, States, 1, 0, kMax, 1>;
+  using StateSquare = Eigen::Matrix<double, States, States, 0, kMax, kMax>;
+  using Map = Eigen::Matrix<double, Rows, States, (Rows == 1 ? Eigen::RowMajor : 0), Rows, kMax>;
+  using Gain = Eigen::Matrix<double, States, Rows, 0, kMax, Rows>;
+  using RowSquare = Eigen::Matrix<double, Rows, Rows>;
+  using RowVector = Eigen::Matrix<double, Rows, 1>;
+
+  void see(const DriftFilter& filter, const DriftMeasurement& measurement);
+
+  int slopes_at_;
+  Transition window_;
+  StateVector carry_;
+  StateVector end_variance_;
+  StateSquare walk_covariance_;  ///< where there are slopes: only theirs is no diagonal
+  StateSquare before_;
+  StateVector state_;
+  StateVector end_;  ///< the states behind the window, unmeasured
+  Map h_;            ///< what the measurement sees of r, of the start, and of w
+  Map h_mean_;
+  Map h_lead_;
+  RowSquare noise_;  ///< of the measurement, with r
+  Gain gain_;
+};
+
+template <int States, int Rows>
+void DriftFilter::SizedUpdate<States, Rows>::see(const DriftFilter& filter,
+                                                 const DriftMeasurement& measurement) {
+  if constexpr (States == kObservables) {
+    h_ = measurement.rows;
+  } else {
+    h_ = measurement.rows * filter.observe_;
+  }
+  const StateVector lead = window_.lead;
+  h_mean_ = h_ * window_.carry_mean.asDiagonal();
+  h_lead_ = h_ * lead.asDiagonal();
+  end_ = carry_.cwiseProduct(state_);
+  if (slopes_at_ < 0) return;
+  for (int gyro = 0; gyro < 2; ++gyro) {
+    h_mean_.col(slopes_at_ + gyro) += window_.slope_mean_s * h_.col(kBias1 + gyro);
+    end_(kBias1 + gyro) += window_.slope_end_s * state_(slopes_at_ + gyro);
+  }
+}
+
+template <int States, int Rows>
+double DriftFilter::SizedUpdate<States, Rows>::correct(const DriftMeasurement::Values& values,
+                                                       State& state) {
+  const Gain spread = before_ * h_mean_.transpose();
+  Gain led = end_variance_.asDiagonal() * h_lead_.transpose();
+  if (slopes_at_ >= 0) led = walk_covariance_ * h_lead_.transpose();
+  Gain cross = carry_.asDiagonal() * spread + led;
+  if (slopes_at_ >= 0) {
+    for (int gyro = 0; gyro < 2; ++gyro)
+      cross.row(kBias1 + gyro) += window_.slope_end_s * spread.row(slopes_at_ + gyro);
+  }
+  const StateVector mean_variance = window_.mean_variance;
+  const Gain wandered = mean_variance.asDiagonal() * h_.transpose();
+  noise_.noalias() += h_ * wandered;
+  RowSquare innovation_covariance = noise_;
+  innovation_covariance.noalias() += h_mean_ * spread;
+  innovation_covariance.noalias() += h_lead_ * led;
+
+  const Eigen::LLT<RowSquare> factor(innovation_covariance);
+  gain_ = factor.solve(cross.transpose()).transpose();
+  const RowVector innovation = values - h_mean_ * state_;
+  state = end_ + gain_ * innovation;
+  const RowVector white = factor.matrixL().solve(innovation);
+  return -0.5 * white.squaredNorm() - factor.matrixLLT().diagonal().array().log().sum();
+}
+
+// x₁ − x̂₁ = (F − G·H_mean)(x₀ − x̂₀) + (I − G·H_lead)·w − G·(H·r + n): independent parts.
+template <int States, int Rows>
+void DriftFilter::SizedUpdate<States, Rows>::spread(Square& covariance) const {
+  StateSquare start = -gain_ * h_mean_;
+  start.diagonal() += carry_;
+  if (slopes_at_ >= 0) {
+    for (int gyro = 0; gyro < 2; ++gyro)
+      start(kBias1 + gyro, slopes_at_ + gyro) += window_.slope_end_s;
+  }
+  StateSquare walked = -gain_ * h_lead_;
+  walked.diagonal().array() += 1.0;
+  const StateSquare started = start * before_;
+  StateSquare next = started * start.transpose();
+  StateSquare scaled = walked * end_variance_.asDiagonal();
+  if (slopes_at_ >= 0) scaled.noalias() = walked * walk_covariance_;
+  next.noalias() += scaled * walked.transpose();
+  const Gain noisy = gain_ * noise_;
+  next.noalias() += noisy * gain_.transpose();
+  covariance = 0.5 * (next + next.transpose());
 }
 
 // Without Gauss–Markov terms, as always where the parameters are estimated, all sizes are known to
@@ -178,98 +294,19 @@ double DriftFilter::update(double length_s, const DriftMeasurement& measurement)
 
 template <int States>
 double DriftFilter::update_of(double length_s, const DriftMeasurement& measurement) {
+  const auto with = [&](auto update) {
+    const double log_likelihood = update.correct(measurement.values, state_);
+    update.spread(covariance_);
+    return log_likelihood;
+  };
   switch (measurement.values.size()) {
     case 1:
-      return update_sized<States, 1>(length_s, measurement);
+      return with(SizedUpdate<States, 1>(*this, length_s, measurement));
     case 2:
-      return update_sized<States, 2>(length_s, measurement);
+      return with(SizedUpdate<States, 2>(*this, length_s, measurement));
     default:
-      return update_sized<States, 3>(length_s, measurement);
+      return with(SizedUpdate<States, 3>(*this, length_s, measurement));
   }
-}
-
-template <int States, int Rows>
-double DriftFilter::update_sized(double length_s, const DriftMeasurement& measurement) {
-  constexpr int kMax = States == Eigen::Dynamic ? kStatesMax : States;
-  using StateVector = Eigen::Matrix<double, States, 1, 0, kMax, 1>;
-  using StateSquare = Eigen::Matrix<double, States, States, 0, kMax, kMax>;
-  using Map = Eigen::Matrix<double, Rows, States, (Rows == 1 ? Eigen::RowMajor : 0), Rows, kMax>;
-  using Gain = Eigen::Matrix<double, States, Rows, 0, kMax, Rows>;
-  using RowSquare = Eigen::Matrix<double, Rows, Rows>;
-  using RowVector = Eigen::Matrix<double, Rows, 1>;
-
-  const Motion motion_of_all = motion(length_s);
-  const StateVector carry = motion_of_all.carry;
-  const StateVector end_variance = motion_of_all.end_variance;
-  const StateVector lead = motion_of_all.lead;
-  const StateVector mean_variance = motion_of_all.mean_variance;
-  const StateSquare before = covariance_;
-  const StateVector state = state_;
-
-  Map h;
-  if constexpr (States == kObservables) {
-    h = measurement.rows;
-  } else {
-    h = measurement.rows * observe_;
-  }
-  Map h_mean = h * motion_of_all.carry_mean.asDiagonal();
-  const Map h_lead = h * lead.asDiagonal();
-  StateVector end = carry.cwiseProduct(state);
-  if (slopes_at_ >= 0) {
-    for (int gyro = 0; gyro < 2; ++gyro) {
-      h_mean.col(slopes_at_ + gyro) += motion_of_all.slope_mean_s * h.col(kBias1 + gyro);
-      end(kBias1 + gyro) += motion_of_all.slope_end_s * state(slopes_at_ + gyro);
-    }
-  }
-  // Only a slope's own walk is correlated with another state's.
-  const bool slopes_walk = slopes_at_ >= 0;
-  StateSquare walk_covariance;
-  if (slopes_walk) {
-    Square all = motion_of_all.end_variance.asDiagonal();
-    add_slope_noise(length_s, all);
-    walk_covariance = all;
-  }
-
-  const Gain spread = before * h_mean.transpose();
-  Gain led = end_variance.asDiagonal() * h_lead.transpose();
-  if (slopes_walk) led = walk_covariance * h_lead.transpose();
-  Gain cross = carry.asDiagonal() * spread + led;
-  if (slopes_at_ >= 0) {
-    for (int gyro = 0; gyro < 2; ++gyro)
-      cross.row(kBias1 + gyro) += motion_of_all.slope_end_s * spread.row(slopes_at_ + gyro);
-  }
-  const Gain wandered = mean_variance.asDiagonal() * h.transpose();
-  RowSquare noise = measurement.noise;
-  noise.noalias() += h * wandered;
-  RowSquare innovation_covariance = noise;
-  innovation_covariance.noalias() += h_mean * spread;
-  innovation_covariance.noalias() += h_lead * led;
-
-  const Eigen::LLT<RowSquare> factor(innovation_covariance);
-  const Gain gain = factor.solve(cross.transpose()).transpose();
-  const RowVector innovation = measurement.values - h_mean * state;
-  state_ = end + gain * innovation;
-
-  // x₁ − x̂₁ = (F − G·H_mean)(x₀ − x̂₀) + (I − G·H_lead)·w − G·(H·r + n): independent parts.
-  StateSquare start = -gain * h_mean;
-  start.diagonal() += carry;
-  if (slopes_at_ >= 0) {
-    for (int gyro = 0; gyro < 2; ++gyro)
-      start(kBias1 + gyro, slopes_at_ + gyro) += motion_of_all.slope_end_s;
-  }
-  StateSquare walked = -gain * h_lead;
-  walked.diagonal().array() += 1.0;
-  const StateSquare started = start * before;
-  StateSquare next = started * start.transpose();
-  StateSquare scaled = walked * end_variance.asDiagonal();
-  if (slopes_walk) scaled.noalias() = walked * walk_covariance;
-  next.noalias() += scaled * walked.transpose();
-  const Gain noisy = gain * noise;
-  next.noalias() += noisy * gain.transpose();
-  covariance_ = 0.5 * (next + next.transpose());
-
-  const RowVector white = factor.matrixL().solve(innovation);
-  return -0.5 * white.squaredNorm() - factor.matrixLLT().diagonal().array().log().sum();
 }
 
 void DriftFilter::widen(double variance_1, double covariance_12, double variance_2) {

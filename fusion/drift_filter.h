@@ -117,7 +117,7 @@ class DriftFilter {
 
   /// The states over a window: end = F·start + w, mean = M·start + lead·w + r. F and M are diagonal
   /// (carry, carry_mean) but for what a slope adds to its drift.
-  struct Motion {
+  struct Transition {
     State carry;
     State carry_mean;
     State end_variance;  ///< of w, but for the slopes' part
@@ -126,10 +126,10 @@ class DriftFilter {
     double slope_end_s = 0.0;   ///< a slope's share in its drift's end
     double slope_mean_s = 0.0;  ///< in its drift's mean
   };
-  [[nodiscard]] Motion motion(double length_s) const;
+  [[nodiscard]] Transition transition(double length_s) const;
   void add_slope_noise(double length_s, Square& walked) const;
   template <int States, int Rows>
-  double update_sized(double length_s, const DriftMeasurement& measurement);
+  class SizedUpdate;
   template <int States>
   double update_of(double length_s, const DriftMeasurement& measurement);
 

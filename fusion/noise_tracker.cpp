@@ -64,7 +64,7 @@ double NoiseTracker::rounding_variance(std::size_t gyro) const {
   return square / 12.0 * std::exp(-kFourPiSquare * noise / square);
 }
 
-void NoiseTracker::measure(const Block& block, bool moving) {
+void NoiseTracker::measure(const CellBlock& block, bool moving) {
   shared_is_motion_ = shared_is_motion_ || moving;
   for (std::size_t i = 0; i < block.count; ++i) {
     const Cell& cell = block.cells[i];
@@ -95,7 +95,7 @@ void NoiseTracker::measure(const Block& block, bool moving) {
   gain_[1] *= 0.5;
 }
 
-bool NoiseTracker::usual(const Block& block) const {
+bool NoiseTracker::usual(const CellBlock& block) const {
   Symmetric squares{};
   double freedom = 0.0;
   for (std::size_t i = 0; i < block.count; ++i) {
@@ -108,7 +108,7 @@ bool NoiseTracker::usual(const Block& block) const {
   return squares[0] <= most * present_sample_[0] && squares[2] <= most * present_sample_[2];
 }
 
-bool NoiseTracker::spiked(const Block& block, double more) const {
+bool NoiseTracker::spiked(const CellBlock& block, double more) const {
   if (block.present != Present::kBoth) return false;
   const double besides = more + squared(step_dps(0)) + squared(step_dps(1));
   const auto difference = [&](std::size_t i) {
@@ -180,7 +180,7 @@ void NoiseTracker::resume(const Symmetric& density, const std::array<double, 2>&
   apply_rise();
 }
 
-void NoiseTracker::watch(const Block& block) {
+void NoiseTracker::watch(const CellBlock& block) {
   if (block.present != Present::kBoth) return;
   Symmetric squares{};
   double freedom = 0.0;

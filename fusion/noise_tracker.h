@@ -24,16 +24,16 @@ class NoiseTracker {
   void clear();
   /// A block whose true rate is constant: its cells differ by noise alone. With `moving` only what
   /// the gyros do not share counts as noise.
-  void measure(const Block& block, bool moving);
+  void measure(const CellBlock& block, bool moving);
   /// Does the block scatter as its gyros usually do? People who get in and engines that run are no
   /// noise, even where a stop is a stop.
-  [[nodiscard]] bool usual(const Block& block) const;
+  [[nodiscard]] bool usual(const CellBlock& block) const;
   /// Has one of the gyros sent a value or two that are no measurement? Somewhere in the block the
   /// difference scatters within a cell as neither noise nor motion lets it. `more` is variance of a
   /// sample's difference besides, (deg/s)².
-  [[nodiscard]] bool spiked(const Block& block, double more) const;
+  [[nodiscard]] bool spiked(const CellBlock& block, double more) const;
   /// A block of which nothing is known.
-  void watch(const Block& block);
+  void watch(const CellBlock& block);
   /// The present rise was none, or is of no use any more.
   void forget_rise();
   /// The smallest step that a gyro's values have shown.

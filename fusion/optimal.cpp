@@ -237,12 +237,12 @@ class OptimalCorrector final : public Corrector {
   void run(double t_s);
 
   // Blocks.
-  void close_block(const Block& block);
-  bool is_spiked(const Block& block);
-  void judge_coherence(const Block& block);
+  void close_block(const CellBlock& block);
+  bool is_spiked(const CellBlock& block);
+  void judge_coherence(const CellBlock& block);
   [[nodiscard]] Present trusted(Present present) const;
-  void learn_from(const Block& block, bool steady);
-  bool has_jumped(const Block& block);
+  void learn_from(const CellBlock& block, bool steady);
+  bool has_jumped(const CellBlock& block);
   bool is_step(double away_dps, double variance);
   void keep_before();
   void forget_blind_time();
@@ -250,9 +250,9 @@ class OptimalCorrector final : public Corrector {
   void note_run(Run run);
 
   // Windows.
-  void open_window(const Block& block, Kind kind, Present present);
-  void add_difference(const Block& block, Present present);
-  void add_steady(const Block& block, Present present);
+  void open_window(const CellBlock& block, Kind kind, Present present);
+  void add_difference(const CellBlock& block, Present present);
+  void add_steady(const CellBlock& block, Present present);
   void close_window();
   void learn_difference(double length_s);
   void learn_steady();
@@ -272,7 +272,7 @@ class OptimalCorrector final : public Corrector {
   void refresh();
   void begin_anew();
   void set_weights(Present present);
-  [[nodiscard]] BlockLevel level_of(const Block& block) const;
+  [[nodiscard]] BlockLevel level_of(const CellBlock& block) const;
   [[nodiscard]] double cell_rate(const Cell& cell, double t_s, Present present) const;
   [[nodiscard]] double bias(std::size_t gyro, double t_s) const {
     return bias_[gyro] + slope_[gyro] * std::max(t_s - learned_until_s_, 0.0);
@@ -318,9 +318,9 @@ class OptimalCorrector final : public Corrector {
   Window window_;
   double learned_until_s_ = 0.0;               ///< the filters stand here
   double stop_length_s_ = kFirstStopWindow_s;  ///< of the next window of this steady run
-  /// Blocks that wait for the verdict: the last one, and while a run is not sure all of its blocks
-  /// so far.
-  std::array<Block, kHeldMax> held_;
+  /// Blocks that wait for a verdict on the platform: the last one, and while a run is not sure all
+  /// of its blocks so far.
+  std::array<CellBlock, kHeldMax> held_;
   std::size_t held_count_ = 0;
   double recent_until_s_ = 0.0;
   bool held_steady_ = false;
@@ -594,7 +594,7 @@ double OptimalCorrector::cell_rate(const Cell& cell, double t_s, Present present
   return weight_[0] * first + weight_[1] * second;
 }
 
-BlockLevel OptimalCorrector::level_of(const Block& block) const {
+BlockLevel OptimalCorrector::level_of(const CellBlock& block) const {
   BlockLevel level;
   level.length_s = block.length_s();
   level.cells = static_cast<double>(block.count);
@@ -629,7 +629,7 @@ Present OptimalCorrector::trusted(Present present) const {
   return blind_[1] >= kBlind ? Present::kGyro1 : Present::kBoth;
 }
 
-void OptimalCorrector::judge_coherence(const Block& block) {
+void OptimalCorrector::judge_coherence(const CellBlock& block) {
   if (block.present != Present::kBoth) {
     coherence_.break_off();
     return;
@@ -651,7 +651,7 @@ void OptimalCorrector::judge_coherence(const Block& block) {
 
 // Values that are no measurements teach nothing, and neither end a stop nor begin one. A gyro that
 // goes on like that has grown noisy, which is to be learned.
-bool OptimalCorrector::is_spiked(const Block& block) {
+bool OptimalCorrector::is_spiked(const CellBlock& block) {
   const double rate = cell_rate(block.cells[0], block.to_s, weights_for_);
   if (!noise_.spiked(block, rate_density(rate) / interval_s())) {
     spiked_blocks_ = 0;
@@ -661,7 +661,7 @@ bool OptimalCorrector::is_spiked(const Block& block) {
 }
 
 // A block is used when the next one has been judged: motion begins before it is seen.
-void OptimalCorrector::close_block(const Block& block) {
+void OptimalCorrector::close_block(const CellBlock& block) {
   if (is_spiked(block)) return;
   judge_coherence(block);
   const Present present = trusted(block.present);
@@ -675,11 +675,11 @@ void OptimalCorrector::close_block(const Block& block) {
     noise_.forget_rise();
   }
   apply_temperature();
-  auto verdict = StopDetector::Verdict::kMoving;
-  if (settings_.stop_rate_dps) verdict = detector_.judge(level_of(block), wheels_);
-  const bool steady = verdict == StopDetector::Verdict::kSteady;
+  auto steadiness = StopDetector::Steadiness::kMoving;
+  if (settings_.stop_rate_dps) steadiness = detector_.judge(level_of(block), wheels_);
+  const bool steady = steadiness == StopDetector::Steadiness::kSteady;
   // All held blocks but the last belong to a run that has just become sure, or to none.
-  const bool waits = verdict == StopDetector::Verdict::kUnsure && held_count_ < kHeldMax;
+  const bool waits = steadiness == StopDetector::Steadiness::kUnsure && held_count_ < kHeldMax;
   if (!waits || detector_.run_begins()) {
     for (std::size_t i = 0; i < held_count_; ++i) {
       const bool still = steady && held_steady_ && held_[i].present == block.present;
@@ -691,10 +691,10 @@ void OptimalCorrector::close_block(const Block& block) {
   }
   if (!steady && run_ != Run::kMoving) end_steady();
   held_[held_count_++] = block;
-  held_steady_ = verdict != StopDetector::Verdict::kMoving;
+  held_steady_ = steadiness != StopDetector::Steadiness::kMoving;
 }
 
-void OptimalCorrector::learn_from(const Block& block, bool steady) {
+void OptimalCorrector::learn_from(const CellBlock& block, bool steady) {
   const Present present = trusted(block.present);
   if (present == Present::kBoth && (coherence_.suspects() || has_jumped(block))) return;
   if (steady) {
@@ -730,7 +730,7 @@ void OptimalCorrector::end_steady() {
   refresh();
 }
 
-bool OptimalCorrector::has_jumped(const Block& block) {
+bool OptimalCorrector::has_jumped(const CellBlock& block) {
   const double length = block.length_s();
   double difference = 0.0;
   double rate = 0.0;
@@ -815,7 +815,7 @@ void OptimalCorrector::forget_blind_time() {
 
 // --- windows -------------------------------------------------------------------------------------
 
-void OptimalCorrector::open_window(const Block& block, Kind kind, Present present) {
+void OptimalCorrector::open_window(const CellBlock& block, Kind kind, Present present) {
   const bool goes_on = window_.kind == kind && window_.present == present &&
                        block.from_s <= window_.to_s + kRounding_s;
   if (!goes_on) {
@@ -836,7 +836,7 @@ void OptimalCorrector::open_window(const Block& block, Kind kind, Present presen
   window_.temperature_s += block.length_s();
 }
 
-void OptimalCorrector::add_difference(const Block& block, Present present) {
+void OptimalCorrector::add_difference(const CellBlock& block, Present present) {
   stop_length_s_ = kFirstStopWindow_s;
   if (block.from_s > recent_until_s_ + kRounding_s || present != Present::kBoth)
     difference_.break_off();
@@ -858,7 +858,7 @@ void OptimalCorrector::add_difference(const Block& block, Present present) {
   if (tells || window_.to_s - window_.from_s >= window_s_) close_window();
 }
 
-void OptimalCorrector::add_steady(const Block& block, Present present) {
+void OptimalCorrector::add_steady(const CellBlock& block, Present present) {
   open_window(block, Kind::kSteady, present);
   const double length = block.length_s();
   for (std::size_t gyro = 0; gyro < 2; ++gyro) {

@@ -63,11 +63,11 @@ constexpr double kSigmas = 6.0;
 
 // --- movement ------------------------------------------------------------------------------------
 
-double Movement::Block::mean_sigma_dps() const {
+double Movement::MovementBlock::mean_sigma_dps() const {
   return std::sqrt(squares / (2.0 * (count - 1)) / count);
 }
 
-Movement::Level Movement::Block::level() const {
+Movement::Level Movement::MovementBlock::level() const {
   // The neighbours of the block may have moved as much as it did itself.
   return {mean_dps(), kSigmas * mean_sigma_dps() + 2.0 * std::abs(last_dps - first_dps)};
 }
@@ -92,7 +92,7 @@ void Movement::add(TimePoint t, double rate_dps) {
 double Movement::between(TimePoint from, TimePoint until) const {
   double lowest = std::numeric_limits<double>::infinity();
   double highest = -lowest;
-  for (const Block& block : done_) {
+  for (const MovementBlock& block : done_) {
     if (block.count == 0 || block.begin < from || block.begin + length_ > until) continue;
     const double doubt = kSigmas * block.mean_sigma_dps();
     lowest = std::min(lowest, block.mean_dps() + doubt);
@@ -104,7 +104,7 @@ double Movement::between(TimePoint from, TimePoint until) const {
 std::optional<Movement::Level> Movement::before(TimePoint t) const {
   constexpr int kOldMost = 5;  // blocks
   for (std::size_t i = 0; i < kBlocks; ++i) {
-    const Block& block = past(i);
+    const MovementBlock& block = past(i);
     if (block.count == 0 || block.begin + kOldMost * length_ < t) break;
     if (block.begin + length_ <= t) return block.level();
   }
@@ -112,13 +112,13 @@ std::optional<Movement::Level> Movement::before(TimePoint t) const {
 }
 
 std::optional<Movement::Level> Movement::behind(TimePoint t) const {
-  const Block& newest = past(0);
+  const MovementBlock& newest = past(0);
   if (newest.count == 0 || newest.begin < t) return std::nullopt;
   return newest.level();
 }
 
 bool Movement::is_leap(double step_dps) const {
-  const Block& newest = past(0);
+  const MovementBlock& newest = past(0);
   const double beyond_dps = std::abs(step_dps) - kMovement_dps;
   if (newest.count == 0 || beyond_dps <= 0.0) return false;
   return beyond_dps * beyond_dps > kSigmas * kSigmas * newest.squares / (newest.count - 1);

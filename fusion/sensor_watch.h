@@ -52,7 +52,7 @@ class Movement {
  private:
   static constexpr std::size_t kBlocks = 8;
   static constexpr int kSamplesMin = 3;
-  struct Block {
+  struct MovementBlock {
     TimePoint begin;
     int count = 0;
     double first_dps = 0.0;
@@ -64,15 +64,15 @@ class Movement {
     [[nodiscard]] Level level() const;
   };
   /// 0: the newest.
-  [[nodiscard]] const Block& past(std::size_t i) const {
+  [[nodiscard]] const MovementBlock& past(std::size_t i) const {
     return done_[(next_ + 2 * kBlocks - 1 - i) % kBlocks];
   }
 
   Duration length_;
-  std::array<Block, kBlocks> done_;
+  std::array<MovementBlock, kBlocks> done_;
   std::size_t next_ = 0;
   std::uint64_t closed_ = 0;
-  Block open_;
+  MovementBlock open_;
 };
 
 /// The sensor's resolution: how close two different values in a row have been of late. A message

@@ -20,17 +20,18 @@ constexpr TimePoint kEndOfTime = time_from_ns(9'200'000'000'000'000'000);
 
 }  // namespace
 
-StampGuard::Verdict StampGuard::check(std::size_t stream_index, TimePoint raw, TimePoint& time) {
+StampGuard::StampVerdict StampGuard::check(std::size_t stream_index, TimePoint raw,
+                                           TimePoint& time) {
   Stream& stream = streams_[stream_index];
-  if (!can_be_time(raw)) return Verdict::kUnconfirmed;
+  if (!can_be_time(raw)) return StampVerdict::kUnconfirmed;
   time = raw + offset_;
   const Duration step = span(stream.last, time);
-  if (stream.seen && step == Duration::zero()) return Verdict::kRepeated;
+  if (stream.seen && step == Duration::zero()) return StampVerdict::kRepeated;
   const bool usual =
       stream.seen ? step > -kReorderMax && step <= forward_most(stream) : time >= TimePoint{};
   if (!usual) return consider(stream_index, time);
   follow(stream, time);
-  return Verdict::kAccepted;
+  return StampVerdict::kAccepted;
 }
 
 bool StampGuard::can_be_time(TimePoint raw) const {
@@ -74,26 +75,26 @@ bool StampGuard::confirm(Stream& stream, TimePoint time) {
   return stream.confirmations >= (stream.close_by ? kConfirmations : kSlowConfirmations);
 }
 
-StampGuard::Verdict StampGuard::consider(std::size_t stream_index, TimePoint& time) {
+StampGuard::StampVerdict StampGuard::consider(std::size_t stream_index, TimePoint& time) {
   Stream& stream = streams_[stream_index];
   if (stream.confirmations > 0) {
     // The same frame again, or one that was overtaken, neither confirms nor contradicts.
-    if (time == stream.candidate) return Verdict::kRepeated;
+    if (time == stream.candidate) return StampVerdict::kRepeated;
     const bool overtaken = time < stream.candidate && span(time, stream.candidate) < kReorderMax;
-    if (overtaken) return Verdict::kUnconfirmed;
+    if (overtaken) return StampVerdict::kUnconfirmed;
   }
-  if (!confirm(stream, time)) return Verdict::kUnconfirmed;
+  if (!confirm(stream, time)) return StampVerdict::kUnconfirmed;
   if (!stream.close_by) stream.interval = stream.spacing;
   stream.confirmations = 0;
   if (time > stream.last && span(stream.last, time) < kClockWasSet) {
     stream.last = time;
-    return Verdict::kAccepted;
+    return StampVerdict::kAccepted;
   }
   if (stream_index < kLeaders) return step_clock(stream_index, time);
   // It was away from the gyros, and has come back to them.
-  if (!near_a_leader(time)) return Verdict::kUnconfirmed;
+  if (!near_a_leader(time)) return StampVerdict::kUnconfirmed;
   stream.last = time;
-  return Verdict::kAccepted;
+  return StampVerdict::kAccepted;
 }
 
 bool StampGuard::near_a_leader(TimePoint time) const {
@@ -102,7 +103,7 @@ bool StampGuard::near_a_leader(TimePoint time) const {
   });
 }
 
-StampGuard::Verdict StampGuard::step_clock(std::size_t stream_index, TimePoint& time) {
+StampGuard::StampVerdict StampGuard::step_clock(std::size_t stream_index, TimePoint& time) {
   Stream& stream = streams_[stream_index];
   TimePoint newest = stream.last;
   for (std::size_t leader = 0; leader < kLeaders; ++leader) {
@@ -118,7 +119,7 @@ StampGuard::Verdict StampGuard::step_clock(std::size_t stream_index, TimePoint& 
     if (other.seen) other.last = newest;
   }
   stream.last = time;
-  return Verdict::kClockStep;
+  return StampVerdict::kClockStep;
 }
 
 }  // namespace vgyro::fusion

@@ -27,11 +27,11 @@ class StampGuard {
   /// No stream that says less is worth listening to.
   static constexpr Duration kSlowest = std::chrono::seconds(5);
 
-  enum class Verdict : std::uint8_t { kAccepted, kRepeated, kUnconfirmed, kClockStep };
+  enum class StampVerdict : std::uint8_t { kAccepted, kRepeated, kUnconfirmed, kClockStep };
 
   /// The stamp on the monotone axis goes to `time` unless the verdict is kUnconfirmed.
   /// kClockStep: accepted, and all streams' earlier samples are of the time before the step.
-  Verdict check(std::size_t stream, TimePoint raw, TimePoint& time);
+  StampVerdict check(std::size_t stream, TimePoint raw, TimePoint& time);
 
   /// Neither before the epoch nor beyond what the monotone axis can hold.
   [[nodiscard]] bool can_be_time(TimePoint raw) const;
@@ -53,8 +53,8 @@ class StampGuard {
   [[nodiscard]] static Duration forward_most(const Stream& stream);
   static void follow(Stream& stream, TimePoint time);
   static bool confirm(Stream& stream, TimePoint time);
-  Verdict consider(std::size_t stream_index, TimePoint& time);
-  Verdict step_clock(std::size_t stream_index, TimePoint& time);
+  StampVerdict consider(std::size_t stream_index, TimePoint& time);
+  StampVerdict step_clock(std::size_t stream_index, TimePoint& time);
   [[nodiscard]] bool near_a_leader(TimePoint time) const;
 
   std::array<Stream, kStreams> streams_;

@@ -73,7 +73,7 @@ void StopDetector::note_motion(double level_dps, double length_s, bool rolls) {
   moved_on_ = moved_on_ || rolls || turned_deg_ > kTurned_deg || moving_s_ > kMovedOn_s;
 }
 
-StopDetector::Verdict StopDetector::judge(const BlockLevel& block, Wheels wheels) {
+StopDetector::Steadiness StopDetector::judge(const BlockLevel& block, Wheels wheels) {
   double level = 0.0;
   for (std::size_t gyro = 0; gyro < 2; ++gyro)
     level += block.weight[gyro] * (block.excess_dps[gyro] - block.bias_dps[gyro]);
@@ -88,14 +88,14 @@ StopDetector::Verdict StopDetector::judge(const BlockLevel& block, Wheels wheels
   if (moves) end_run();
   const bool rolls = moves && wheels == Wheels::kRolling;
   if (run_s_ < kRun_s) note_motion(level, block.length_s, rolls);
-  if (moves) return Verdict::kMoving;
+  if (moves) return Steadiness::kMoving;
   const double weight = block.length_s / (run_s_ + block.length_s);
   const double recent = std::max(kRecent, weight);
   for (std::size_t gyro = 0; gyro < 2; ++gyro)
     recent_[gyro] += recent * (block.excess_dps[gyro] - recent_[gyro]);
   run_s_ += block.length_s;
   run_blocks_ = std::min(run_blocks_ + 1, kRunBlocks);
-  return run_s_ < kRun_s || run_blocks_ < kRunBlocks ? Verdict::kUnsure : Verdict::kSteady;
+  return run_s_ < kRun_s || run_blocks_ < kRunBlocks ? Steadiness::kUnsure : Steadiness::kSteady;
 }
 
 double StopDetector::log_turning(Wheels wheels) const {

@@ -34,13 +34,13 @@ class StopDetector {
   /// Standing on its wheels a vehicle may sway by this much, rms.
   static constexpr double kSway_dps = 0.05;
 
-  enum class Verdict : std::uint8_t {
+  enum class Steadiness : std::uint8_t {
     kMoving,
     kUnsure,  ///< steady, but not for long enough
     kSteady
   };
 
-  Verdict judge(const BlockLevel& block, Wheels wheels);
+  Steadiness judge(const BlockLevel& block, Wheels wheels);
   void reset() { end_run(); }
 
   /// The last block began a run of steady ones.

@@ -120,8 +120,8 @@ void read_source_address(TomlReader& reader, const dbc::Message& message, FrameM
   match.mask |= 0xFFU;
 }
 
-std::optional<Condition> read_condition(TomlReader& reader, SignalResolver& resolver,
-                                        const dbc::Signal& rate) {
+std::optional<ValidCondition> read_condition(TomlReader& reader, SignalResolver& resolver,
+                                             const dbc::Signal& rate) {
   const auto text = reader.text("valid");
   if (!text) return std::nullopt;
   const auto parsed = parse_comparison(*text);
@@ -134,7 +134,7 @@ std::optional<Condition> read_condition(TomlReader& reader, SignalResolver& reso
   if (signal == nullptr || !resolver.shares_page("valid", *signal, rate)) return std::nullopt;
   const auto codec = resolver.codec(*signal);
   if (!codec) return std::nullopt;
-  return Condition{*codec, parsed->comparison, parsed->value, *text};
+  return ValidCondition{*codec, parsed->comparison, parsed->value, *text};
 }
 
 std::optional<GyroPlan> read_gyro(const toml::table& table, std::size_t index, Context& context) {

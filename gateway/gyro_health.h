@@ -2,7 +2,7 @@
 
 // May this gyro be used? Gathers what its frames and its values say of its health, sets it aside at
 // once when they say no, and takes it back when it has been well for a while: longer each time that
-// it relapses. Keeps the books of faults. Whether it speaks at all is the pipeline's to know.
+// it relapses. Keeps the books of faults. Whether it speaks at all is Attendance's to know.
 
 #include <array>
 #include <cstdint>

@@ -29,7 +29,7 @@ std::optional<Reject> convert(const Quantity& quantity, std::span<const std::uin
 
 }  // namespace
 
-bool holds(const Condition& condition, double value) {
+bool holds(const ValidCondition& condition, double value) {
   switch (condition.comparison) {
     case Comparison::kEqual:
       return value == condition.value;

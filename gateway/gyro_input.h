@@ -45,7 +45,7 @@ class GyroInput {
 };
 
 /// Is the comparison true of this value?
-bool holds(const Condition& condition, double value);
+bool holds(const ValidCondition& condition, double value);
 
 /// A quantity's value in the product's unit, or the cause why it is none.
 std::optional<Reject> decode_quantity(const Quantity& quantity, const can::Frame& frame,

@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "fusion/corrector.h"
-#include "gateway/pipeline.h"
+#include "gateway/estimator.h"
 
 namespace vgyro::gateway {
 namespace {
@@ -15,7 +15,7 @@ std::optional<fusion::DriftMemory> aged(const SavedState& before, const SavedSta
                                         const Plan& plan) {
   const bool age_is_known = now.rate_stamp >= before.rate_stamp;
   const double age_s =
-      age_is_known ? to_seconds(now.rate_stamp - before.rate_stamp) : Pipeline::kUnknownAge_s;
+      age_is_known ? to_seconds(now.rate_stamp - before.rate_stamp) : Estimator::kUnknownAge_s;
   const auto corrector =
       fusion::make_optimal_corrector({.window_s = plan.corrector.window_s,
                                       .stop_rate_dps = plan.calibration.stop_rate_dps,

@@ -22,7 +22,7 @@ double in_unit_of(const Quantity& quantity, double value) {
 
 // What the bits are already, where that will do; otherwise the value compared with, one of its
 // neighbours, or an end of the signal's range.
-bool put_valid(const Condition& condition, std::span<std::uint8_t> payload) {
+bool put_valid(const ValidCondition& condition, std::span<std::uint8_t> payload) {
   const dbc::SignalCodec& codec = condition.codec;
   const auto fulfilled = [&] { return holds(condition, codec.decode(payload).value); };
   for (const double value : {condition.value, condition.value + 1.0, condition.value - 1.0,

@@ -7,16 +7,16 @@ namespace vgyro::gateway {
 StampResult judge_stamp(std::size_t stream, TimePoint stamp, fusion::StampGuard& guard) {
   StampResult result{.judged = true, .reject = {}, .clock_step = false, .t = {}};
   switch (guard.check(stream, stamp, result.t)) {
-    case fusion::StampGuard::Verdict::kRepeated:
+    case fusion::StampGuard::StampVerdict::kRepeated:
       result.reject = Reject::kStampRepeated;
       break;
-    case fusion::StampGuard::Verdict::kUnconfirmed:
+    case fusion::StampGuard::StampVerdict::kUnconfirmed:
       result.reject = Reject::kStampJump;
       break;
-    case fusion::StampGuard::Verdict::kClockStep:
+    case fusion::StampGuard::StampVerdict::kClockStep:
       result.clock_step = true;
       break;
-    case fusion::StampGuard::Verdict::kAccepted:
+    case fusion::StampGuard::StampVerdict::kAccepted:
       break;
   }
   return result;

@@ -15,6 +15,7 @@
 #include "base/error.h"
 #include "base/time.h"
 #include "can/frame.h"
+#include "gateway/frame_sink.h"
 #include "gateway/plan.h"
 #include "gateway/saved_state.h"
 #include "gateway/status.h"
@@ -24,14 +25,6 @@ class Corrector;
 }
 
 namespace vgyro::gateway {
-
-/// Where the pipeline's frames go. The stamp is that of the input frame (or of the time-out) that
-/// caused the output.
-class FrameSink {
- public:
-  virtual ~FrameSink() = default;
-  virtual void put(const can::Frame& frame, TimePoint stamp) = 0;
-};
 
 /// For those who draw or add up: every virtual rate with what it was made of, before it becomes a
 /// frame, also where it is beyond what the frame can carry. NaN stands for a missing gyro, and for
@@ -46,9 +39,6 @@ class RateObserver {
 
 class Pipeline {
  public:
-  /// The age of saved biases when the clock cannot tell it: it stands before their stamp.
-  static constexpr double kUnknownAge_s = 30 * 86400.0;
-
   explicit Pipeline(const Plan& plan);
   /// With a corrector of the caller's instead of the plan's.
   Pipeline(const Plan& plan, std::unique_ptr<fusion::Corrector> corrector);

@@ -59,13 +59,13 @@ enum class Comparison : std::uint8_t {
 };
 
 /// `valid = "Status == 0"`
-struct Condition {
+struct ValidCondition {
   dbc::SignalCodec codec;
   Comparison comparison = Comparison::kEqual;
   double value = 0.0;
   std::string text;  ///< as configured
 
-  friend bool operator==(const Condition&, const Condition&) = default;
+  friend bool operator==(const ValidCondition&, const ValidCondition&) = default;
 };
 
 struct AliveCounter {
@@ -102,7 +102,7 @@ struct GyroPlan {
   std::optional<dbc::SignalCodec> sign;  ///< separate sign bit: 1 means negative
   std::optional<Quantity> temperature;
   E2ePlan e2e = {};
-  std::optional<Condition> valid;
+  std::optional<ValidCondition> valid;
   std::optional<double> saturation_dps = {};  ///< from the model file: it clips at ± this
   double dead_band_dps = 0.0;                 ///< likewise: it reads 0 below; 0: it has none
   std::optional<double> max_bias_dps = {};    ///< no bias of this gyro is larger

@@ -15,7 +15,7 @@ void ReferenceCalibration::add_reference(TimePoint t, double rate_dps) {
   const bool set_back = newest_ && newest_->t - t > kGapMax;
   if (newest_ && t <= newest_->t && !set_back) return;
   before_ = set_back ? std::nullopt : newest_;
-  newest_ = Sample{t, rate_dps};
+  newest_ = ReferenceSample{t, rate_dps};
 }
 
 std::optional<ReferenceCalibration::Ready> ReferenceCalibration::next() {

@@ -32,12 +32,12 @@ class ReferenceCalibration {
   std::array<fusion::AlignedPair, kPendingMax> pending_;
   std::size_t head_ = 0;
   std::size_t size_ = 0;
-  struct Sample {
+  struct ReferenceSample {
     TimePoint t;
     double rate_dps = 0.0;
   };
-  std::optional<Sample> before_;
-  std::optional<Sample> newest_;
+  std::optional<ReferenceSample> before_;
+  std::optional<ReferenceSample> newest_;
 };
 
 }  // namespace vgyro::gateway

@@ -102,7 +102,7 @@ std::string table(const AllanReport& report) {
 }
 
 std::string motion_text(const AllanReport& report) {
-  const analysis::Motion& motion = report.noise.motion;
+  const analysis::MotionSummary& motion = report.noise.motion;
   if (motion.at_rest) return "The platform rested throughout.\n";
   std::string text =
       fmt::format("The platform turned or shook: up to {:.3g} deg/s. ", motion.turned_up_to_dps);
@@ -115,7 +115,7 @@ std::string motion_text(const AllanReport& report) {
     text += fmt::format(
         "There is no rest of {:g} s in it: each gyro's own curve\nholds the motion, no noise is "
         "given for it; only the pair's difference is judged.\n",
-        analysis::Motion::kRestMin_s);
+        analysis::MotionSummary::kRestMin_s);
   }
   if (const auto& removed = report.noise.removed) {
     text += fmt::format(
@@ -326,7 +326,7 @@ std::string to_text(const AllanReport& report) {
 }
 
 nlohmann::ordered_json to_json(const AllanReport& report) {
-  const analysis::Motion& motion = report.noise.motion;
+  const analysis::MotionSummary& motion = report.noise.motion;
   nlohmann::ordered_json json;
   json["format"] = 1;
   json["log"] = report.log;

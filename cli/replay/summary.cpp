@@ -282,48 +282,50 @@ void put_opinion(fmt::memory_buffer& text, const ReplaySummary& summary,
   }
 }
 
-}  // namespace
-
-std::string to_text(const ReplaySummary& summary, const gateway::Plan& plan) {
-  const gateway::Status& status = summary.status;
-  fmt::memory_buffer text;
+void put_log(fmt::memory_buffer& text, const LogSummary& log) {
   auto to = std::back_inserter(text);
-  for (const LogSummary& log : summary.logs) {
-    fmt::format_to(to, "{}: {} frames", log.path, log.counts.frames);
-    if (log.counts.xl_frames > 0)
-      fmt::format_to(to, ", {} CAN XL frames passed over", log.counts.xl_frames);
-    if (log.counts.malformed_lines > 0)
-      fmt::format_to(to, ", {} lines not understood", log.counts.malformed_lines);
-    if (log.counts.cut_off_lines > 0) {
-      fmt::format_to(to, "; the log ends inside line {}, which was not used", log.counts.lines + 1);
-    }
-    fmt::format_to(to, "\n");
-    for (const can::MalformedLine& bad : log.counts.first_malformed) {
-      fmt::format_to(to, "  line {}: {}\n", bad.line, bad.why);
+  fmt::format_to(to, "{}: {} frames", log.path, log.counts.frames);
+  if (log.counts.xl_frames > 0)
+    fmt::format_to(to, ", {} CAN XL frames passed over", log.counts.xl_frames);
+  if (log.counts.malformed_lines > 0)
+    fmt::format_to(to, ", {} lines not understood", log.counts.malformed_lines);
+  if (log.counts.cut_off_lines > 0) {
+    fmt::format_to(to, "; the log ends inside line {}, which was not used", log.counts.lines + 1);
+  }
+  fmt::format_to(to, "\n");
+  for (const can::MalformedLine& bad : log.counts.first_malformed)
+    fmt::format_to(to, "  line {}: {}\n", bad.line, bad.why);
+}
+
+void put_gyro(fmt::memory_buffer& text, const ReplaySummary& summary, const gateway::Plan& plan,
+              std::size_t i) {
+  auto to = std::back_inserter(text);
+  const gateway::GyroStatus& gyro = summary.status.gyros[i];
+  fmt::format_to(to, "gyro {:<8} {} samples", plan.gyros[i].name, gyro.samples);
+  if (summary.raws[i] > 0) {
+    fmt::format_to(to, ", raw mean {:+.6f} deg/s",
+                   summary.raw_sum_dps[i] / static_cast<double>(summary.raws[i]));
+  }
+  if (std::isfinite(gyro.bias_dps)) {
+    fmt::format_to(to, ", drift now {:+.6f} deg/s = {:+.3f} deg/h", gyro.bias_dps,
+                   gyro.bias_dps * kSecondsPerHour);
+  }
+  if (gyro.missing > 0) fmt::format_to(to, ", {} missing by its counter", gyro.missing);
+  if (rejected_total(gyro) > 0) {
+    fmt::format_to(to, "\n  not used:");
+    for (std::size_t k = 0; k < gateway::kRejectCount; ++k) {
+      if (gyro.rejected[k] == 0) continue;
+      fmt::format_to(to, " {} {}", gyro.rejected[k], to_string(static_cast<gateway::Reject>(k)));
     }
   }
-  for (std::size_t i = 0; i < 2; ++i) {
-    const gateway::GyroStatus& gyro = status.gyros[i];
-    fmt::format_to(to, "gyro {:<8} {} samples", plan.gyros[i].name, gyro.samples);
-    if (summary.raws[i] > 0) {
-      fmt::format_to(to, ", raw mean {:+.6f} deg/s",
-                     summary.raw_sum_dps[i] / static_cast<double>(summary.raws[i]));
-    }
-    if (std::isfinite(gyro.bias_dps)) {
-      fmt::format_to(to, ", drift now {:+.6f} deg/s = {:+.3f} deg/h", gyro.bias_dps,
-                     gyro.bias_dps * kSecondsPerHour);
-    }
-    if (gyro.missing > 0) fmt::format_to(to, ", {} missing by its counter", gyro.missing);
-    if (rejected_total(gyro) > 0) {
-      fmt::format_to(to, "\n  not used:");
-      for (std::size_t k = 0; k < gateway::kRejectCount; ++k) {
-        if (gyro.rejected[k] == 0) continue;
-        fmt::format_to(to, " {} {}", gyro.rejected[k], to_string(static_cast<gateway::Reject>(k)));
-      }
-    }
-    put_faults(text, gyro, summary.first_s);
-    fmt::format_to(to, "\n");
-  }
+  put_faults(text, gyro, summary.first_s);
+  fmt::format_to(to, "\n");
+}
+
+// The reference, and what of the model file was taken back.
+void put_other_inputs(fmt::memory_buffer& text, const gateway::Status& status,
+                      const gateway::Plan& plan) {
+  auto to = std::back_inserter(text);
   if (status.reference_frames > 0) {
     fmt::format_to(to, "reference     {} frames, {} not used\n", status.reference_frames,
                    status.reference_rejected);
@@ -338,6 +340,11 @@ std::string to_text(const ReplaySummary& summary, const gateway::Plan& plan) {
                      plan.gyros[i].name, input);
     }
   }
+}
+
+void put_virtual_gyro(fmt::memory_buffer& text, const ReplaySummary& summary) {
+  auto to = std::back_inserter(text);
+  const gateway::Status& status = summary.status;
   fmt::format_to(to, "virtual gyro  {} pairs, {} valid rates", status.pairs,
                  status.rates_out_valid);
   if (summary.rates > 0) {
@@ -349,6 +356,11 @@ std::string to_text(const ReplaySummary& summary, const gateway::Plan& plan) {
                    status.rates_out_of_range);
   }
   put_plain_mean(text, summary);
+}
+
+void put_method(fmt::memory_buffer& text, const ReplaySummary& summary, const gateway::Plan& plan) {
+  auto to = std::back_inserter(text);
+  const gateway::Status& status = summary.status;
   fmt::format_to(to, "\nmethod        {}", gateway::to_string(plan.corrector.method));
   if (status.windows + status.windows_skipped > 0) {
     fmt::format_to(to, ", {} windows, {} skipped for want of pairs", status.windows,
@@ -363,7 +375,21 @@ std::string to_text(const ReplaySummary& summary, const gateway::Plan& plan) {
                    summary.longest_gaps.front().length_s);
   }
   put_opinion(text, summary, plan);
-  fmt::format_to(to, "\nended in state {}\n", to_string(status.state));
+}
+
+}  // namespace
+
+std::string to_text(const ReplaySummary& summary, const gateway::Plan& plan) {
+  fmt::memory_buffer text;
+  for (const LogSummary& log : summary.logs)
+    put_log(text, log);
+  for (std::size_t i = 0; i < 2; ++i)
+    put_gyro(text, summary, plan, i);
+  put_other_inputs(text, summary.status, plan);
+  put_virtual_gyro(text, summary);
+  put_method(text, summary, plan);
+  fmt::format_to(std::back_inserter(text), "\nended in state {}\n",
+                 to_string(summary.status.state));
   return fmt::to_string(text);
 }
 

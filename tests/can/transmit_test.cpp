@@ -21,7 +21,7 @@ Frame numbered(std::uint32_t id) {
 }
 
 /// Answers with the scripted results, then with kSent; keeps the ids that it took.
-class FakeSender final : public Sender {
+class FakeTransmitter final : public Transmitter {
  public:
   std::deque<SendResult> answers;
   SendResult afterwards = SendResult::kSent;
@@ -44,11 +44,11 @@ using Ids = std::vector<std::uint32_t>;
 
 TEST(TransmitQueue, SendsInTheOrderOfPushing) {
   TransmitQueue queue;
-  FakeSender sender;
+  FakeTransmitter transmitter;
   for (std::uint32_t id : {3U, 1U, 2U})
     queue.push(numbered(id), at(10ms));
-  queue.drain(at(0ms), sender);
-  EXPECT_EQ(sender.taken, (Ids{3, 1, 2}));
+  queue.drain(at(0ms), transmitter);
+  EXPECT_EQ(transmitter.taken, (Ids{3, 1, 2}));
   EXPECT_EQ(queue.counts().sent, 3U);
   EXPECT_EQ(queue.counts().retries, 0U);
   EXPECT_EQ(queue.next_deadline(), std::nullopt);
@@ -56,64 +56,64 @@ TEST(TransmitQueue, SendsInTheOrderOfPushing) {
 
 TEST(TransmitQueue, SendsAtOnceWhereNothingWaits) {
   TransmitQueue queue;
-  FakeSender sender;
-  EXPECT_TRUE(queue.send_at_once(numbered(1), sender));
-  EXPECT_EQ(sender.taken, (Ids{1}));
+  FakeTransmitter transmitter;
+  EXPECT_TRUE(queue.send_at_once(numbered(1), transmitter));
+  EXPECT_EQ(transmitter.taken, (Ids{1}));
   EXPECT_EQ(queue.counts().sent, 1U);
   EXPECT_EQ(queue.size(), 0U);
 }
 
 TEST(TransmitQueue, SendsNothingPastWhatWaits) {
   TransmitQueue queue;
-  FakeSender sender;
+  FakeTransmitter transmitter;
   queue.push(numbered(1), at(10ms));
-  EXPECT_FALSE(queue.send_at_once(numbered(2), sender));
-  EXPECT_EQ(sender.attempts, 0);
+  EXPECT_FALSE(queue.send_at_once(numbered(2), transmitter));
+  EXPECT_EQ(transmitter.attempts, 0);
 }
 
 // A refusal is met in one place, with its reason: the frame is kept and tried again in its time.
 TEST(TransmitQueue, WhatIsRefusedAtOnceIsPushed) {
   TransmitQueue queue;
-  FakeSender sender;
-  sender.answers = {SendResult::kNoBuffer, SendResult::kNoBuffer};
-  EXPECT_FALSE(queue.send_at_once(numbered(1), sender));
+  FakeTransmitter transmitter;
+  transmitter.answers = {SendResult::kNoBuffer, SendResult::kNoBuffer};
+  EXPECT_FALSE(queue.send_at_once(numbered(1), transmitter));
   EXPECT_EQ(queue.counts().sent, 0U);
   queue.push(numbered(1), at(50ms));
-  queue.drain(at(0ms), sender);
-  EXPECT_FALSE(queue.send_at_once(numbered(2), sender)) << "not past a back-off";
-  EXPECT_EQ(sender.attempts, 2);
+  queue.drain(at(0ms), transmitter);
+  EXPECT_FALSE(queue.send_at_once(numbered(2), transmitter)) << "not past a back-off";
+  EXPECT_EQ(transmitter.attempts, 2);
   queue.push(numbered(2), at(50ms));
-  queue.drain(at(1ms), sender);
-  EXPECT_EQ(sender.taken, (Ids{1, 2}));
+  queue.drain(at(1ms), transmitter);
+  EXPECT_EQ(transmitter.taken, (Ids{1, 2}));
   EXPECT_EQ(queue.counts().sent, 2U);
 }
 
 TEST(TransmitQueue, KeepsTheFrameAndBacksOffWhenTheDeviceQueueIsFull) {
   TransmitQueue queue({.capacity = 8, .first_retry = 1ms, .last_retry = 4ms});
-  FakeSender sender;
-  sender.answers = {SendResult::kNoBuffer};
+  FakeTransmitter transmitter;
+  transmitter.answers = {SendResult::kNoBuffer};
   queue.push(numbered(1), at(50ms));
-  queue.drain(at(0ms), sender);
-  EXPECT_TRUE(sender.taken.empty());
+  queue.drain(at(0ms), transmitter);
+  EXPECT_TRUE(transmitter.taken.empty());
   EXPECT_FALSE(queue.wants_writable()) << "poll says writable although the queue is full";
   EXPECT_EQ(queue.next_deadline(), at(1ms));
 
-  queue.drain(at(1ms) - 1ns, sender);
-  EXPECT_EQ(sender.attempts, 1) << "tried again before the time";
-  queue.drain(at(1ms), sender);
-  EXPECT_EQ(sender.taken, (Ids{1}));
+  queue.drain(at(1ms) - 1ns, transmitter);
+  EXPECT_EQ(transmitter.attempts, 1) << "tried again before the time";
+  queue.drain(at(1ms), transmitter);
+  EXPECT_EQ(transmitter.taken, (Ids{1}));
   EXPECT_EQ(queue.counts().retries, 1U);
 }
 
 TEST(TransmitQueue, DoublesTheWaitUpToTheLimit) {
   TransmitQueue queue({.capacity = 8, .first_retry = 1ms, .last_retry = 4ms});
-  FakeSender sender;
-  sender.afterwards = SendResult::kNoBuffer;
+  FakeTransmitter transmitter;
+  transmitter.afterwards = SendResult::kNoBuffer;
   queue.push(numbered(1), at(1s));
   TimePoint now = at(0ms);
   std::vector<Duration> waits;
   for (int i = 0; i < 5; ++i) {
-    queue.drain(now, sender);
+    queue.drain(now, transmitter);
     waits.push_back(*queue.next_deadline() - now);
     now = *queue.next_deadline();
   }
@@ -122,73 +122,73 @@ TEST(TransmitQueue, DoublesTheWaitUpToTheLimit) {
 
 TEST(TransmitQueue, StartsWithTheShortestWaitAgainAfterASuccess) {
   TransmitQueue queue({.capacity = 8, .first_retry = 1ms, .last_retry = 64ms});
-  FakeSender sender;
-  sender.answers = {SendResult::kNoBuffer, SendResult::kNoBuffer, SendResult::kSent,
-                    SendResult::kNoBuffer};
+  FakeTransmitter transmitter;
+  transmitter.answers = {SendResult::kNoBuffer, SendResult::kNoBuffer, SendResult::kSent,
+                         SendResult::kNoBuffer};
   queue.push(numbered(1), at(1s));
   queue.push(numbered(2), at(1s));
-  queue.drain(at(0ms), sender);
-  queue.drain(at(1ms), sender);
-  queue.drain(at(3ms), sender);
-  EXPECT_EQ(sender.taken, (Ids{1}));
+  queue.drain(at(0ms), transmitter);
+  queue.drain(at(1ms), transmitter);
+  queue.drain(at(3ms), transmitter);
+  EXPECT_EQ(transmitter.taken, (Ids{1}));
   EXPECT_EQ(queue.next_deadline(), at(4ms));
 }
 
 TEST(TransmitQueue, NeverSendsAStaleFrameWhenTheBusReturns) {
   TransmitQueue queue;
-  FakeSender sender;
-  sender.afterwards = SendResult::kNoBuffer;
+  FakeTransmitter transmitter;
+  transmitter.afterwards = SendResult::kNoBuffer;
   const auto push_and_drain = [&](std::uint32_t i) {
     queue.push(numbered(i), at(i * 2ms + 4ms));
-    queue.drain(at(i * 2ms), sender);
+    queue.drain(at(i * 2ms), transmitter);
   };
   for (std::uint32_t i = 0; i < 100; ++i)
     push_and_drain(i);
-  sender.afterwards = SendResult::kSent;
+  transmitter.afterwards = SendResult::kSent;
   for (std::uint32_t i = 100; i < 150; ++i)
     push_and_drain(i);
 
-  ASSERT_FALSE(sender.taken.empty());
-  EXPECT_GE(sender.taken.front(), 98U) << "a frame from before the bus returned";
-  EXPECT_LE(sender.taken.front(), 116U) << "waited longer than the longest back-off";
-  EXPECT_EQ(sender.taken.back(), 149U);
-  EXPECT_EQ(sender.taken.size() + queue.counts().dropped_stale, 150U);
+  ASSERT_FALSE(transmitter.taken.empty());
+  EXPECT_GE(transmitter.taken.front(), 98U) << "a frame from before the bus returned";
+  EXPECT_LE(transmitter.taken.front(), 116U) << "waited longer than the longest back-off";
+  EXPECT_EQ(transmitter.taken.back(), 149U);
+  EXPECT_EQ(transmitter.taken.size() + queue.counts().dropped_stale, 150U);
 }
 
 TEST(TransmitQueue, SendsAFrameThatIsExactlyAtItsLimit) {
   TransmitQueue queue;
-  FakeSender sender;
+  FakeTransmitter transmitter;
   queue.push(numbered(1), at(4ms));
   queue.push(numbered(2), at(4ms) - 1ns);
   queue.push(numbered(3), at(4ms));
-  queue.drain(at(4ms), sender);
-  EXPECT_EQ(sender.taken, (Ids{1, 3}));
+  queue.drain(at(4ms), transmitter);
+  EXPECT_EQ(transmitter.taken, (Ids{1, 3}));
   EXPECT_EQ(queue.counts().dropped_stale, 1U);
 }
 
 TEST(TransmitQueue, WaitsForPollWhenTheSocketBufferIsFull) {
   TransmitQueue queue;
-  FakeSender sender;
-  sender.answers = {SendResult::kWouldBlock};
+  FakeTransmitter transmitter;
+  transmitter.answers = {SendResult::kWouldBlock};
   queue.push(numbered(1), at(50ms));
-  queue.drain(at(0ms), sender);
+  queue.drain(at(0ms), transmitter);
   EXPECT_TRUE(queue.wants_writable());
-  queue.drain(at(40ms), sender);
-  EXPECT_EQ(sender.attempts, 1) << "tried although poll did not say writable";
+  queue.drain(at(40ms), transmitter);
+  EXPECT_EQ(transmitter.attempts, 1) << "tried although poll did not say writable";
   queue.on_writable();
   EXPECT_FALSE(queue.wants_writable());
-  queue.drain(at(41ms), sender);
-  EXPECT_EQ(sender.taken, (Ids{1}));
+  queue.drain(at(41ms), transmitter);
+  EXPECT_EQ(transmitter.taken, (Ids{1}));
 }
 
 TEST(TransmitQueue, DropsStaleFramesEvenWhileTheSocketBufferIsFull) {
   TransmitQueue queue;
-  FakeSender sender;
-  sender.answers = {SendResult::kWouldBlock};
+  FakeTransmitter transmitter;
+  transmitter.answers = {SendResult::kWouldBlock};
   queue.push(numbered(1), at(5ms));
-  queue.drain(at(0ms), sender);
+  queue.drain(at(0ms), transmitter);
   ASSERT_TRUE(queue.next_deadline());
-  queue.drain(*queue.next_deadline(), sender);
+  queue.drain(*queue.next_deadline(), transmitter);
   EXPECT_EQ(queue.size(), 0U);
   EXPECT_EQ(queue.counts().dropped_stale, 1U);
   EXPECT_FALSE(queue.wants_writable());
@@ -196,45 +196,45 @@ TEST(TransmitQueue, DropsStaleFramesEvenWhileTheSocketBufferIsFull) {
 
 TEST(TransmitQueue, DropsTheOldestWhenFull) {
   TransmitQueue queue({.capacity = 3});
-  FakeSender sender;
+  FakeTransmitter transmitter;
   for (std::uint32_t id = 0; id < 5; ++id)
     queue.push(numbered(id), at(50ms));
-  queue.drain(at(0ms), sender);
-  EXPECT_EQ(sender.taken, (Ids{2, 3, 4}));
+  queue.drain(at(0ms), transmitter);
+  EXPECT_EQ(transmitter.taken, (Ids{2, 3, 4}));
   EXPECT_EQ(queue.counts().dropped_overflow, 2U);
 }
 
 TEST(TransmitQueue, SkipsAFrameThatTheLinkCannotCarry) {
   TransmitQueue queue;
-  FakeSender sender;
-  sender.answers = {SendResult::kUnsupported, SendResult::kFailed};
+  FakeTransmitter transmitter;
+  transmitter.answers = {SendResult::kUnsupported, SendResult::kFailed};
   for (std::uint32_t id = 0; id < 3; ++id)
     queue.push(numbered(id), at(50ms));
-  queue.drain(at(0ms), sender);
-  EXPECT_EQ(sender.taken, (Ids{2}));
+  queue.drain(at(0ms), transmitter);
+  EXPECT_EQ(transmitter.taken, (Ids{2}));
   EXPECT_EQ(queue.counts().dropped_failed, 2U);
 }
 
 TEST(TransmitQueue, SaysThatTheLinkIsDownUntilAFrameGoesOut) {
   TransmitQueue queue;
-  FakeSender sender;
-  sender.answers = {SendResult::kLinkDown};
+  FakeTransmitter transmitter;
+  transmitter.answers = {SendResult::kLinkDown};
   queue.push(numbered(1), at(50ms));
-  queue.drain(at(0ms), sender);
+  queue.drain(at(0ms), transmitter);
   EXPECT_TRUE(queue.link_down());
-  queue.drain(at(1ms), sender);
+  queue.drain(at(1ms), transmitter);
   EXPECT_FALSE(queue.link_down());
-  EXPECT_EQ(sender.taken, (Ids{1}));
+  EXPECT_EQ(transmitter.taken, (Ids{1}));
 }
 
 TEST(TransmitQueue, TriesAgainWhenTheClockWasSetBack) {
   TransmitQueue queue;
-  FakeSender sender;
-  sender.answers = {SendResult::kNoBuffer};
+  FakeTransmitter transmitter;
+  transmitter.answers = {SendResult::kNoBuffer};
   queue.push(numbered(1), at(1h));
-  queue.drain(at(1h), sender);
-  queue.drain(at(0ms), sender);
-  EXPECT_EQ(sender.taken, (Ids{1}));
+  queue.drain(at(1h), transmitter);
+  queue.drain(at(0ms), transmitter);
+  EXPECT_EQ(transmitter.taken, (Ids{1}));
 }
 
 }  // namespace

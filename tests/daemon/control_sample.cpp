@@ -16,7 +16,7 @@ namespace {
 
 using namespace vgyro;
 
-struct Sample {
+struct SampleGateway {
   gateway::Plan plan = gateway::rig::two_gyros();
   daemon::Snapshot now;
   daemon::Log log;
@@ -24,7 +24,7 @@ struct Sample {
   daemon::MetricsFile* metrics = nullptr;
   int seconds = 0;
 
-  Sample() {
+  SampleGateway() {
     plan.gyros[0].name = "left \"one\" \\";
     plan.gyros[1].name = "right";
     now.plan = &plan;
@@ -95,7 +95,7 @@ struct Sample {
 };
 
 int on_second(sd_event_source* source, std::uint64_t, void* self) {
-  static_cast<Sample*>(self)->second_passed();
+  static_cast<SampleGateway*>(self)->second_passed();
   sd_event_source_set_time_relative(source, 1'000'000);
   return sd_event_source_set_enabled(source, SD_EVENT_ONESHOT);
 }
@@ -103,7 +103,7 @@ int on_second(sd_event_source* source, std::uint64_t, void* self) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  Sample sample;
+  SampleGateway sample;
   sd_event* events = nullptr;
   if (sd_event_new(&events) < 0) return 1;
   daemon::Control control(events,

@@ -80,8 +80,8 @@ gateway::Plan plan() {
          .temperature = {},
          .e2e = {.crc = {},
                  .counter = gateway::AliveCounter{"Counter", codec(48, 4, 1.0, false), 16}},
-         .valid = gateway::Condition{codec(52, 4, 1.0, false), gateway::Comparison::kEqual, 0.0,
-                                     "S == 0"},
+         .valid = gateway::ValidCondition{codec(52, 4, 1.0, false), gateway::Comparison::kEqual,
+                                          0.0, "S == 0"},
          .saturation_dps = {}});
   }
   plan.calibration.rest_s = kRest_s;
@@ -190,7 +190,7 @@ constexpr double kSigmas = 6.0;
 constexpr double kErrorMost_dps = 0.05;
 constexpr double kLateMost_s = 0.02;
 
-class Sequence final : public gateway::FrameSink, public can::Sender {
+class Sequence final : public gateway::FrameSink, public can::Transmitter {
  public:
   explicit Sequence(std::uint64_t seed, Duration later = Duration{0})
       : dice_{std::mt19937_64(seed)},

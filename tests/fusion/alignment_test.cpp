@@ -15,11 +15,11 @@ using namespace std::chrono_literals;
 
 constexpr TimePoint kStart = time_from_ns(1'700'000'000'000'000'000);
 
-struct Sample {
+struct GyroSample {
   TimePoint t;
   double rate_dps = 0.0;
 };
-using Stream = std::vector<Sample>;
+using Stream = std::vector<GyroSample>;
 using Signal = std::function<double(double)>;
 
 double seconds(TimePoint t) {
@@ -37,21 +37,21 @@ Stream stream_of(double rate_hz, Duration phase, double length_s, const Signal& 
 
 Stream without(Stream stream, double from_s, double to_s) {
   std::erase_if(stream,
-                [&](const Sample& s) { return seconds(s.t) >= from_s && seconds(s.t) < to_s; });
+                [&](const GyroSample& s) { return seconds(s.t) >= from_s && seconds(s.t) < to_s; });
   return stream;
 }
 
 struct Push {
   std::size_t gyro = 0;
-  Sample sample;
+  GyroSample sample;
 };
 
 /// In the order of the stamps, as one bus delivers them.
 std::vector<Push> merged(const Stream& a, const Stream& b) {
   std::vector<Push> pushes;
-  for (const Sample& s : a)
+  for (const GyroSample& s : a)
     pushes.push_back({0, s});
-  for (const Sample& s : b)
+  for (const GyroSample& s : b)
     pushes.push_back({1, s});
   std::stable_sort(pushes.begin(), pushes.end(),
                    [](const Push& x, const Push& y) { return x.sample.t < y.sample.t; });
@@ -187,7 +187,7 @@ TEST(Aligner, InterpolatesAtTheTrueStampsOfJitteringStreams) {
       Random random(seed);
       const auto jittered = [&random](double rate_hz, const Signal& signal) {
         Stream stream = stream_of(rate_hz, 0ms, 10.0, signal);
-        for (Sample& s : stream) {
+        for (GyroSample& s : stream) {
           s.t += from_seconds(random.uniform(0.0, 0.9 / rate_hz));
           s.rate_dps = signal(seconds(s.t));
         }
@@ -482,7 +482,7 @@ TEST(Aligner, GivesTheSamePairsHoweverTheStreamsInterleave) {
       const auto jittered = [&random](double rate_hz, Duration phase) {
         Stream stream =
             stream_of(rate_hz, phase, 4.0, [&random](double) { return random.normal(); });
-        for (Sample& s : stream)
+        for (GyroSample& s : stream)
           s.t += from_seconds(random.uniform(0.0, 0.4 / rate_hz));
         return without(stream, 2.0, 2.1);
       };
@@ -495,7 +495,7 @@ TEST(Aligner, GivesTheSamePairsHoweverTheStreamsInterleave) {
       std::vector<Arrival> arrivals;
       for (const std::size_t gyro : {0U, 1U}) {
         TimePoint last{};
-        for (const Sample& s : gyro == 0 ? a : b) {
+        for (const GyroSample& s : gyro == 0 ? a : b) {
           last = std::max(last, s.t + from_seconds(random.uniform(0.0, 0.05)));
           arrivals.push_back({last, {gyro, s}});
         }
@@ -628,7 +628,7 @@ TEST(Aligner, KeepsItsChoiceThroughJitterLossesAndHeaps) {
   Random random(31);
   Stream a = stream_of(100.0, 0ms, 300.0, line_a);
   Stream b = stream_of(100.0, 3ms, 300.0, line_b);
-  std::erase_if(a, [&](const Sample&) { return random.uniform(0.0, 1.0) < 0.25; });
+  std::erase_if(a, [&](const GyroSample&) { return random.uniform(0.0, 1.0) < 0.25; });
   for (std::size_t i = 0; i < b.size(); ++i) {
     const std::size_t heap = i / 5 * 5 + 4;
     const Duration late = heap < b.size() ? b[heap].t - b[i].t : Duration::zero();

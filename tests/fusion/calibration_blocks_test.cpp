@@ -23,7 +23,7 @@ CalibrationBlocks rest(double seconds, double sway_dps, double period_s, Random&
   const double omega = 2.0 * std::numbers::pi / period_s;
   const double phase = random.uniform(0.0, 2.0 * std::numbers::pi);
   for (double t = 0.0; t < seconds; t += kBlock_s) {
-    Block block;
+    CellBlock block;
     block.from_s = t;
     block.to_s = t + kBlock_s;
     block.count = 1;

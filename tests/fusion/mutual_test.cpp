@@ -118,7 +118,7 @@ TEST(MutualCorrector, DoesWhatThePapersStepsDo) {
       PaperSteps paper(order, drifts);
       const auto corrector = started(order, kWindow_s, calibration);
       RandomDrive drive(seed);
-      std::vector<PaperSteps::Sample> samples;
+      std::vector<PaperSteps::PaperSample> samples;
       std::vector<VirtualRate> ours;
       const auto take = [&](double t_s) {
         const RatePair pair = drive.at(t_s);

@@ -44,11 +44,11 @@ class Pair {
     }
   }
   void measure(NoiseTracker& tracker, double seconds, bool moving = false) {
-    run(seconds, [&](const Block& block) { tracker.measure(block, moving); });
+    run(seconds, [&](const CellBlock& block) { tracker.measure(block, moving); });
     tracker.settle(cells_.interval_s());
   }
   void watch(NoiseTracker& tracker, double seconds) {
-    run(seconds, [&](const Block& block) { tracker.watch(block); });
+    run(seconds, [&](const CellBlock& block) { tracker.watch(block); });
   }
 
  private:
@@ -183,7 +183,7 @@ TEST(NoiseTracker, FindsNoRiseWhereThePlatformOnlyTurns) {
   pair.measure(tracker, 300.0);
   const double usual = tracker.density()[0];
   pair.rate = [](double t_s) { return 60.0 * std::sin(2.0 * t_s); };
-  pair.run(120.0, [&](const Block& block) {
+  pair.run(120.0, [&](const CellBlock& block) {
     tracker.watch(block);
     EXPECT_FALSE(tracker.noisy(0) || tracker.noisy(1)) << block.from_s << " s, seed " << kSeed;
     EXPECT_LT(tracker.density()[0], 4.0 * usual) << block.from_s << " s, seed " << kSeed;
@@ -252,7 +252,7 @@ TEST(NoiseTracker, StaysFiniteWhereBothStepAlike) {
     NoiseTracker tracker({});
     pair.measure(tracker, 60.0, true);
     for (int i = 0; i < 2; ++i) {
-      pair.run(300.0, [&](const Block& block) {
+      pair.run(300.0, [&](const CellBlock& block) {
         tracker.watch(block);
         for (std::size_t k = 0; k < 3; ++k) {
           ASSERT_TRUE(std::isfinite(tracker.density()[k])) << block.from_s;
@@ -301,14 +301,15 @@ TEST(NoiseTracker, KnowsAnUnusualBlock) {
   pair.measure(tracker, 300.0);
   int unusual = 0;
   int blocks = 0;
-  pair.run(3600.0, [&](const Block& block) {
+  pair.run(3600.0, [&](const CellBlock& block) {
     unusual += tracker.usual(block) ? 0 : 1;
     ++blocks;
   });
   EXPECT_LT(unusual, blocks / 100) << "seed " << kSeed;
   pair.rate = [](double t_s) { return 0.1 * std::sin(40.0 * t_s); };
-  pair.run(1.0, [](const Block& /*of both*/) {});
-  pair.run(60.0, [&](const Block& block) { EXPECT_FALSE(tracker.usual(block)) << block.from_s; });
+  pair.run(1.0, [](const CellBlock& /*of both*/) {});
+  pair.run(60.0,
+           [&](const CellBlock& block) { EXPECT_FALSE(tracker.usual(block)) << block.from_s; });
 }
 
 // A value that is no measurement stands in one block, and spoils no other. Noise and motion, of
@@ -328,8 +329,8 @@ TEST(NoiseTracker, KnowsABlockWithASpike) {
       pair.measure(tracker, 300.0);
       pair.rate = motion;
       pair.scale[1] = other_feels;
-      pair.run(1.0, [](const Block& /*in which it begins*/) {});
-      pair.run(300.0, [&](const Block& block) { EXPECT_FALSE(tracker.spiked(block, 0.0)); });
+      pair.run(1.0, [](const CellBlock& /*in which it begins*/) {});
+      pair.run(300.0, [&](const CellBlock& block) { EXPECT_FALSE(tracker.spiked(block, 0.0)); });
     }
     for (const double spike_dps : {0.5, -1.0, 50.0}) {
       Pair pair({1e-3, 3e-3}, kSeed);
@@ -339,7 +340,7 @@ TEST(NoiseTracker, KnowsABlockWithASpike) {
       pair.rate = motion;
       pair.spike = [&](double t_s) { return std::abs(t_s - at_s) < 1e-6 ? spike_dps : 0.0; };
       int spiked = 0;
-      pair.run(300.0, [&](const Block& block) {
+      pair.run(300.0, [&](const CellBlock& block) {
         const bool holds_it = block.from_s - 1e-6 < at_s && at_s < block.to_s - 1e-6;
         EXPECT_EQ(tracker.spiked(block, 0.0), holds_it) << spike_dps << " at " << at_s;
         if (holds_it) at_s += 3.14;

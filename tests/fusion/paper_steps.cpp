@@ -17,7 +17,8 @@ Real PaperSteps::Drift::at(Real t_s) const {
 
 // Projection onto polynomials that are made orthogonal over the very samples, so that nothing is
 // lost to a badly conditioned matrix.
-PaperSteps::Drift PaperSteps::fit(Real from_s, Real width_s, const std::vector<Sample>& samples,
+PaperSteps::Drift PaperSteps::fit(Real from_s, Real width_s,
+                                  const std::vector<PaperSample>& samples,
                                   const std::vector<Real>& values) const {
   Drift result{from_s + width_s / 2, width_s / 2, {}};
   const auto size = static_cast<std::size_t>(order_) + 1;
@@ -27,7 +28,7 @@ PaperSteps::Drift PaperSteps::fit(Real from_s, Real width_s, const std::vector<S
   std::vector<Real> rest = values;
   for (std::size_t i = 0; i < size; ++i) {
     std::vector<Real> at_samples;
-    for (const Sample& sample : samples) {
+    for (const PaperSample& sample : samples) {
       const Real x = (static_cast<Real>(sample.t_s) - result.centre_s) / result.half_width_s;
       at_samples.push_back(std::pow(x, static_cast<Real>(i)));
     }
@@ -65,11 +66,11 @@ PaperSteps::Drift PaperSteps::fit(Real from_s, Real width_s, const std::vector<S
 }
 
 PaperSteps::Window PaperSteps::window(double from_s, double width_s,
-                                      const std::vector<Sample>& samples) {
+                                      const std::vector<PaperSample>& samples) {
   Window result;
   result.predicted = drift_;
   std::array<std::vector<Real>, 2> cross;
-  for (const Sample& sample : samples) {
+  for (const PaperSample& sample : samples) {
     const Real y1 = sample.rate_dps[0];
     const Real y2 = sample.rate_dps[1];
     const Real p1 = drift_[0].at(sample.t_s);

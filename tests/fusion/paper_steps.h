@@ -19,7 +19,7 @@ class PaperSteps {
     std::vector<Real> coefficient;
     [[nodiscard]] Real at(Real t_s) const;
   };
-  struct Sample {
+  struct PaperSample {
     double t_s = 0;
     std::array<double, 2> rate_dps{};
   };
@@ -34,10 +34,10 @@ class PaperSteps {
       : order_(order), drift_(std::move(calibration)) {}
 
   /// All samples of [from_s, from_s + width_s).
-  Window window(double from_s, double width_s, const std::vector<Sample>& samples);
+  Window window(double from_s, double width_s, const std::vector<PaperSample>& samples);
 
  private:
-  [[nodiscard]] Drift fit(Real from_s, Real width_s, const std::vector<Sample>& samples,
+  [[nodiscard]] Drift fit(Real from_s, Real width_s, const std::vector<PaperSample>& samples,
                           const std::vector<Real>& values) const;
 
   int order_;

@@ -10,7 +10,7 @@ namespace vgyro::fusion {
 namespace {
 
 using namespace std::chrono_literals;
-using Verdict = StampGuard::Verdict;
+using StampVerdict = StampGuard::StampVerdict;
 
 constexpr std::size_t kReference = 2;
 constexpr TimePoint kStart = time_from_ns(1'700'000'000'000'000'000);
@@ -21,19 +21,19 @@ StampGuard running_until(Duration until) {
   TimePoint t;
   for (Duration d{0}; d <= until; d += 10ms) {
     for (std::size_t stream = 0; stream < StampGuard::kStreams; ++stream)
-      EXPECT_EQ(guard.check(stream, kStart + d, t), Verdict::kAccepted);
+      EXPECT_EQ(guard.check(stream, kStart + d, t), StampVerdict::kAccepted);
   }
   return guard;
 }
 
 struct Checked {
-  Verdict verdict;
+  StampVerdict verdict;
   Duration since_start;
 };
 
 Checked check(StampGuard& guard, std::size_t stream, Duration since_start) {
   TimePoint t;
-  const Verdict verdict = guard.check(stream, kStart + since_start, t);
+  const StampVerdict verdict = guard.check(stream, kStart + since_start, t);
   return {verdict, t - kStart};
 }
 
@@ -44,7 +44,7 @@ TEST(StampGuard, PassesOrderlyStampsOnUnchanged) {
     TimePoint t;
     for (int i = 0; i < 1000; ++i) {
       const TimePoint raw = start + i * 10ms;
-      ASSERT_EQ(guard.check(static_cast<std::size_t>(i) % 3, raw, t), Verdict::kAccepted);
+      ASSERT_EQ(guard.check(static_cast<std::size_t>(i) % 3, raw, t), StampVerdict::kAccepted);
       ASSERT_EQ(t, raw);
     }
     EXPECT_EQ(guard.offset(), 0ns);
@@ -54,20 +54,20 @@ TEST(StampGuard, PassesOrderlyStampsOnUnchanged) {
 // The same frame seen twice must not count twice.
 TEST(StampGuard, RefusesARepeatedStamp) {
   StampGuard guard = running_until(100ms);
-  EXPECT_EQ(check(guard, 0, 100ms).verdict, Verdict::kRepeated);
-  EXPECT_EQ(check(guard, 0, 100ms).verdict, Verdict::kRepeated);
-  EXPECT_EQ(check(guard, 0, 110ms).verdict, Verdict::kAccepted);
-  EXPECT_EQ(check(guard, 1, 110ms).verdict, Verdict::kAccepted) << "streams may share a stamp";
+  EXPECT_EQ(check(guard, 0, 100ms).verdict, StampVerdict::kRepeated);
+  EXPECT_EQ(check(guard, 0, 100ms).verdict, StampVerdict::kRepeated);
+  EXPECT_EQ(check(guard, 0, 110ms).verdict, StampVerdict::kAccepted);
+  EXPECT_EQ(check(guard, 1, 110ms).verdict, StampVerdict::kAccepted) << "streams may share a stamp";
 }
 
 // Two queues of one kernel deliver a little out of order: that is no clock that was set.
 TEST(StampGuard, LetsSmallReorderingPass) {
   StampGuard guard = running_until(1s);
   const Checked late = check(guard, 0, 1s - 249ms);
-  EXPECT_EQ(late.verdict, Verdict::kAccepted);
+  EXPECT_EQ(late.verdict, StampVerdict::kAccepted);
   EXPECT_EQ(late.since_start, 751ms);
-  EXPECT_EQ(check(guard, 0, 1s).verdict, Verdict::kRepeated) << "the newest stays the newest";
-  EXPECT_EQ(check(guard, 0, 1010ms).verdict, Verdict::kAccepted);
+  EXPECT_EQ(check(guard, 0, 1s).verdict, StampVerdict::kRepeated) << "the newest stays the newest";
+  EXPECT_EQ(check(guard, 0, 1010ms).verdict, StampVerdict::kAccepted);
   EXPECT_EQ(guard.offset(), 0ns);
 }
 
@@ -77,10 +77,10 @@ TEST(StampGuard, RefusesSingleOutliers) {
                                                                 -252ms, 10s + 100ms, 24h * 365}) {
     StampGuard guard = running_until(1s);
     for (int i = 1; i <= 5; ++i) {
-      EXPECT_EQ(check(guard, 0, 1s + outlier + i * 1ms).verdict, Verdict::kUnconfirmed)
+      EXPECT_EQ(check(guard, 0, 1s + outlier + i * 1ms).verdict, StampVerdict::kUnconfirmed)
           << to_seconds(outlier);
       const Checked good = check(guard, 0, 1s + i * 10ms);
-      EXPECT_EQ(good.verdict, Verdict::kAccepted);
+      EXPECT_EQ(good.verdict, StampVerdict::kAccepted);
       EXPECT_EQ(good.since_start, 1s + i * 10ms);
     }
     EXPECT_EQ(guard.offset(), 0ns);
@@ -95,7 +95,7 @@ TEST(StampGuard, RefusesOutliersThatDoNotAgree) {
   StampGuard guard = running_until(1s);
   for (int i = 0; i < 10'000; ++i) {
     const auto outlier = std::chrono::hours(1 + static_cast<int>(random.below(100'000)));
-    ASSERT_EQ(check(guard, 0, i % 2 == 0 ? outlier : -outlier).verdict, Verdict::kUnconfirmed);
+    ASSERT_EQ(check(guard, 0, i % 2 == 0 ? outlier : -outlier).verdict, StampVerdict::kUnconfirmed);
   }
   EXPECT_EQ(check(guard, 0, 1010ms).since_start, 1010ms);
 }
@@ -104,7 +104,7 @@ TEST(StampGuard, RefusesOutliersThatDoNotAgree) {
 TEST(StampGuard, RefusesOutliersThatLieFarApart) {
   StampGuard guard = running_until(1s);
   for (int i = 1; i < 100; ++i)
-    ASSERT_EQ(check(guard, 0, i * 3600s).verdict, Verdict::kUnconfirmed);
+    ASSERT_EQ(check(guard, 0, i * 3600s).verdict, StampVerdict::kUnconfirmed);
   EXPECT_EQ(check(guard, 0, 1010ms).since_start, 1010ms);
 }
 
@@ -125,7 +125,7 @@ TEST(StampGuard, SurvivesEveryStampThatALogMayHold) {
   }
   for (int i = 1; i <= 200; ++i)
     guard.check(0, kStart + i * 10ms, t);
-  EXPECT_EQ(guard.check(0, kStart + 2010ms, t), Verdict::kAccepted);
+  EXPECT_EQ(guard.check(0, kStart + 2010ms, t), StampVerdict::kAccepted);
 }
 
 // A computer without a battery begins in 1970; once its clock is right, half a century has not
@@ -138,10 +138,10 @@ TEST(StampGuard, TakesDecadesForAClockThatWasSet) {
     guard.check(1, time_from_ns(0) + i * 10ms, t);
   }
   for (int i = 0; i < 2; ++i)
-    EXPECT_EQ(guard.check(0, kStart + i * 10ms, t), Verdict::kUnconfirmed);
-  EXPECT_EQ(guard.check(0, kStart + 20ms, t), Verdict::kClockStep);
+    EXPECT_EQ(guard.check(0, kStart + i * 10ms, t), StampVerdict::kUnconfirmed);
+  EXPECT_EQ(guard.check(0, kStart + 20ms, t), StampVerdict::kClockStep);
   EXPECT_EQ(t, time_from_ns(0) + 1s + 1us);
-  EXPECT_EQ(guard.check(1, kStart + 30ms, t), Verdict::kAccepted);
+  EXPECT_EQ(guard.check(1, kStart + 30ms, t), StampVerdict::kAccepted);
   EXPECT_EQ(t, time_from_ns(0) + 1s + 10ms + 1us);
 }
 
@@ -156,19 +156,20 @@ TEST(StampGuard, TakesNothingFromBeforeTheAxisBegins) {
     guard.check(0, kStart + i * 10ms, t);
   ASSERT_LT(guard.offset(), 0ns);
   for (int i = 1; i <= 10; ++i) {
-    EXPECT_EQ(guard.check(kReference, time_from_ns(0) + i * 10ms, t), Verdict::kUnconfirmed) << i;
+    EXPECT_EQ(guard.check(kReference, time_from_ns(0) + i * 10ms, t), StampVerdict::kUnconfirmed)
+        << i;
   }
-  EXPECT_EQ(guard.check(kReference, kStart + 40ms, t), Verdict::kAccepted);
+  EXPECT_EQ(guard.check(kReference, kStart + 40ms, t), StampVerdict::kAccepted);
   EXPECT_GE(t, TimePoint{});
 }
 
 // A silent bus comes back after minutes: the third stamp is believed, and time goes on as it says.
 TEST(StampGuard, BelievesThreeAgreeingStampsBehindALongGap) {
   StampGuard guard = running_until(1s);
-  EXPECT_EQ(check(guard, 0, 600s).verdict, Verdict::kUnconfirmed);
-  EXPECT_EQ(check(guard, 0, 600s + 10ms).verdict, Verdict::kUnconfirmed);
+  EXPECT_EQ(check(guard, 0, 600s).verdict, StampVerdict::kUnconfirmed);
+  EXPECT_EQ(check(guard, 0, 600s + 10ms).verdict, StampVerdict::kUnconfirmed);
   const Checked third = check(guard, 0, 600s + 20ms);
-  EXPECT_EQ(third.verdict, Verdict::kAccepted);
+  EXPECT_EQ(third.verdict, StampVerdict::kAccepted);
   EXPECT_EQ(third.since_start, 600s + 20ms);
   EXPECT_EQ(check(guard, 0, 600s + 30ms).since_start, 600s + 30ms);
   EXPECT_EQ(guard.offset(), 0ns);
@@ -177,16 +178,16 @@ TEST(StampGuard, BelievesThreeAgreeingStampsBehindALongGap) {
 // Up to one second needs no confirmation: no frame is lost to an ordinary pause.
 TEST(StampGuard, TakesAnOrdinaryPauseAtOnce) {
   StampGuard guard = running_until(1s);
-  EXPECT_EQ(check(guard, 0, 2s).verdict, Verdict::kAccepted);
+  EXPECT_EQ(check(guard, 0, 2s).verdict, StampVerdict::kAccepted);
 }
 
 // One stamp a few seconds ahead would make all that follow look set back, and move the axis.
 TEST(StampGuard, IsNotMovedByOneStampSecondsAhead) {
   StampGuard guard = running_until(1s);
-  EXPECT_EQ(check(guard, 0, 6s).verdict, Verdict::kUnconfirmed);
+  EXPECT_EQ(check(guard, 0, 6s).verdict, StampVerdict::kUnconfirmed);
   for (Duration raw = 1010ms; raw < 8s; raw += 10ms) {
     const Checked next = check(guard, 0, raw);
-    ASSERT_EQ(next.verdict, Verdict::kAccepted);
+    ASSERT_EQ(next.verdict, StampVerdict::kAccepted);
     ASSERT_EQ(next.since_start, raw);
   }
   EXPECT_EQ(guard.offset(), 0ns);
@@ -198,20 +199,20 @@ TEST(StampGuard, TakesASteppedBackClockUpMonotonically) {
   for (const Duration step : {300ms, 1000ms, 3'600'000ms}) {
     StampGuard guard = running_until(1s);
     TimePoint t;
-    ASSERT_EQ(guard.check(1, kStart + 1015ms, t), Verdict::kAccepted);
-    EXPECT_EQ(check(guard, 0, 1020ms - step).verdict, Verdict::kUnconfirmed);
-    EXPECT_EQ(check(guard, 0, 1030ms - step).verdict, Verdict::kUnconfirmed);
+    ASSERT_EQ(guard.check(1, kStart + 1015ms, t), StampVerdict::kAccepted);
+    EXPECT_EQ(check(guard, 0, 1020ms - step).verdict, StampVerdict::kUnconfirmed);
+    EXPECT_EQ(check(guard, 0, 1030ms - step).verdict, StampVerdict::kUnconfirmed);
     const Checked third = check(guard, 0, 1040ms - step);
-    EXPECT_EQ(third.verdict, Verdict::kClockStep);
+    EXPECT_EQ(third.verdict, StampVerdict::kClockStep);
     EXPECT_EQ(third.since_start, 1015ms + 1us) << "newest of all streams, and a little";
     EXPECT_EQ(guard.offset(), step - 25ms + 1us);
     for (int i = 0; i < 100; ++i) {
       const Duration raw = 1045ms + i * 10ms - step;
       const Checked other = check(guard, 1, raw);
-      EXPECT_EQ(other.verdict, Verdict::kAccepted);
+      EXPECT_EQ(other.verdict, StampVerdict::kAccepted);
       EXPECT_EQ(other.since_start, raw + guard.offset());
       EXPECT_GT(other.since_start, 1015ms);
-      EXPECT_EQ(check(guard, 0, raw + 5ms).verdict, Verdict::kAccepted);
+      EXPECT_EQ(check(guard, 0, raw + 5ms).verdict, StampVerdict::kAccepted);
     }
   }
 }
@@ -232,10 +233,10 @@ TEST(StampGuard, KeepsTheAxisMonotoneOverManySteps) {
       if (random.below(500) == 0) clock -= from_seconds(random.uniform(0.3, 5000.0));
       const std::size_t stream = static_cast<std::size_t>(i) % 2;
       TimePoint t;
-      const Verdict verdict = guard.check(stream, kStart + clock, t);
-      if (verdict == Verdict::kUnconfirmed) continue;
-      ASSERT_NE(verdict, Verdict::kRepeated);
-      if (verdict == Verdict::kClockStep) {
+      const StampVerdict verdict = guard.check(stream, kStart + clock, t);
+      if (verdict == StampVerdict::kUnconfirmed) continue;
+      ASSERT_NE(verdict, StampVerdict::kRepeated);
+      if (verdict == StampVerdict::kClockStep) {
         ++steps;
         ASSERT_GT(t, newest);
       }
@@ -254,10 +255,10 @@ TEST(StampGuard, KeepsTheAxisMonotoneOverManySteps) {
 TEST(StampGuard, LetsNoReferenceSetTheClockBack) {
   StampGuard guard = running_until(100s);
   for (int i = 0; i < 1000; ++i)
-    ASSERT_EQ(check(guard, kReference, 20s + i * 10ms).verdict, Verdict::kUnconfirmed);
+    ASSERT_EQ(check(guard, kReference, 20s + i * 10ms).verdict, StampVerdict::kUnconfirmed);
   EXPECT_EQ(guard.offset(), 0ns);
   EXPECT_EQ(check(guard, 0, 100s + 10ms).since_start, 100s + 10ms);
-  EXPECT_EQ(check(guard, kReference, 100s + 10ms).verdict, Verdict::kAccepted);
+  EXPECT_EQ(check(guard, kReference, 100s + 10ms).verdict, StampVerdict::kAccepted);
 }
 
 // A reference that ran an hour ahead must not pull the gyros there when their clock steps back.
@@ -268,9 +269,9 @@ TEST(StampGuard, LetsNoReferenceAheadMoveTheGyrosTime) {
   check(guard, 0, 5s);
   check(guard, 0, 5s + 10ms);
   const Checked third = check(guard, 0, 5s + 20ms);
-  EXPECT_EQ(third.verdict, Verdict::kClockStep);
+  EXPECT_EQ(third.verdict, StampVerdict::kClockStep);
   EXPECT_EQ(third.since_start, 10s + 1us);
-  EXPECT_EQ(check(guard, kReference, 5s + 30ms).verdict, Verdict::kAccepted)
+  EXPECT_EQ(check(guard, kReference, 5s + 30ms).verdict, StampVerdict::kAccepted)
       << "and its own clock, set right with theirs, is believed at once";
 }
 
@@ -280,7 +281,7 @@ TEST(StampGuard, CarriesTheReferenceOverAStepOfTheGyrosClock) {
   for (int i = 0; i < 3; ++i)
     check(guard, 0, 5s + i * 10ms);
   const Checked reference = check(guard, kReference, 5s + 25ms);
-  EXPECT_EQ(reference.verdict, Verdict::kAccepted);
+  EXPECT_EQ(reference.verdict, StampVerdict::kAccepted);
   EXPECT_EQ(reference.since_start, 10s + 5ms + 1us);
 }
 
@@ -293,8 +294,8 @@ int accepted_of(StampGuard& guard, std::size_t stream, Duration from, Duration i
   int accepted = 0;
   for (int i = 0; i < count; ++i) {
     for (int copy = 0; copy < times_each; ++copy) {
-      const Verdict verdict = check(guard, stream, from + i * interval).verdict;
-      if (verdict == Verdict::kAccepted || verdict == Verdict::kClockStep) ++accepted;
+      const StampVerdict verdict = check(guard, stream, from + i * interval).verdict;
+      if (verdict == StampVerdict::kAccepted || verdict == StampVerdict::kClockStep) ++accepted;
     }
   }
   return accepted;
@@ -331,7 +332,7 @@ TEST(StampGuard, BelievesDoubledFramesBehindAHole) {
   StampGuard guard = running_until(10s);
   int accepted = 0;
   for (int i = 0; i < 100; ++i) {
-    accepted += check(guard, 0, 12s + i * 10ms).verdict == Verdict::kAccepted ? 1 : 0;
+    accepted += check(guard, 0, 12s + i * 10ms).verdict == StampVerdict::kAccepted ? 1 : 0;
     check(guard, 0, 12s + (i - 1) * 10ms);
   }
   EXPECT_EQ(accepted, 98);

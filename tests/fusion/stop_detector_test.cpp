@@ -13,7 +13,7 @@
 namespace vgyro::fusion {
 namespace {
 
-using Verdict = StopDetector::Verdict;
+using Steadiness = StopDetector::Steadiness;
 
 constexpr double kWhite = 2e-3;  // deg/s/√Hz, of either gyro
 constexpr double kDoubt = 5e-3;  // deg/s, of the drift
@@ -28,7 +28,7 @@ class Platform {
   Wheels wheels = Wheels::kUnknown;
   double sway_dps = 0.0;  ///< rms, of each cell
 
-  Verdict block(double rate_dps) {
+  Steadiness block(double rate_dps) {
     BlockLevel level;
     level.length_s = kBlock_s;
     level.cells = kCells;
@@ -53,11 +53,11 @@ class Platform {
     }
     return detector.judge(level, wheels);
   }
-  /// Blocks with this verdict among those of some seconds at a constant rate.
-  int count(Verdict verdict, double seconds, double rate_dps = 0.0) {
+  /// Blocks of this steadiness among those of some seconds at a constant rate.
+  int count(Steadiness steadiness, double seconds, double rate_dps = 0.0) {
     int found = 0;
     for (int i = 0; i < static_cast<int>(seconds / kBlock_s); ++i)
-      found += block(rate_dps) == verdict ? 1 : 0;
+      found += block(rate_dps) == steadiness ? 1 : 0;
     return found;
   }
   /// Motion through an angle, about 10 deg/s, as a driver turns: not steadily, not even within a
@@ -73,7 +73,7 @@ class Platform {
   void shake(double seconds) {
     const double sway = sway_dps;
     sway_dps = 0.5;
-    count(Verdict::kMoving, seconds);
+    count(Steadiness::kMoving, seconds);
     sway_dps = sway;
   }
 
@@ -86,15 +86,15 @@ TEST(StopDetector, IsSureOfASteadyStretchAfterTwoAndAHalfSeconds) {
   Platform platform(kSeed);
   platform.turn(100.0);
   for (int block = 0; block < 4; ++block) {
-    EXPECT_EQ(platform.block(0.0), Verdict::kUnsure) << block;
+    EXPECT_EQ(platform.block(0.0), Steadiness::kUnsure) << block;
     EXPECT_EQ(platform.detector.run_begins(), block == 0) << block;
   }
-  EXPECT_EQ(platform.block(0.0), Verdict::kSteady) << "seed " << kSeed;
-  EXPECT_EQ(platform.block(5.0), Verdict::kMoving);
-  EXPECT_EQ(platform.block(0.0), Verdict::kUnsure) << "begins anew";
-  platform.count(Verdict::kSteady, 10.0);
+  EXPECT_EQ(platform.block(0.0), Steadiness::kSteady) << "seed " << kSeed;
+  EXPECT_EQ(platform.block(5.0), Steadiness::kMoving);
+  EXPECT_EQ(platform.block(0.0), Steadiness::kUnsure) << "begins anew";
+  platform.count(Steadiness::kSteady, 10.0);
   platform.detector.reset();
-  EXPECT_EQ(platform.block(0.0), Verdict::kUnsure) << "begins anew after a reset";
+  EXPECT_EQ(platform.block(0.0), Steadiness::kUnsure) << "begins anew after a reset";
 }
 
 // Noise alone seldom ends a stretch: the limits stand at 3.5 standard deviations. It is the same
@@ -104,7 +104,7 @@ TEST(StopDetector, KeepsALongStretchAtWhateverRate) {
     constexpr std::uint64_t kSeed = 2;
     Platform platform(kSeed);
     const int blocks = 20'000;
-    EXPECT_GT(platform.count(Verdict::kSteady, kBlock_s * blocks, rate_dps), 0.97 * blocks)
+    EXPECT_GT(platform.count(Steadiness::kSteady, kBlock_s * blocks, rate_dps), 0.97 * blocks)
         << rate_dps << " deg/s, seed " << kSeed;
     EXPECT_EQ(platform.detector.sway_variance(), 0.0);
   }
@@ -117,14 +117,14 @@ TEST(StopDetector, CallsAChangingRateMotion) {
   const double step_dps = 10.0 * kWhite / std::sqrt(kBlock_s);
   int moving = 0;
   for (int i = 0; i < 200; ++i)
-    moving += platform.block(i % 2 == 0 ? 0.0 : step_dps) != Verdict::kSteady ? 1 : 0;
+    moving += platform.block(i % 2 == 0 ? 0.0 : step_dps) != Steadiness::kSteady ? 1 : 0;
   EXPECT_EQ(moving, 200) << "seed " << kSeed;
 }
 
 TEST(StopDetector, FindsNothingSteadyWhileTheWheelsRoll) {
   Platform platform(6);
   platform.wheels = Wheels::kRolling;
-  EXPECT_EQ(platform.count(Verdict::kMoving, 600.0), 1200);
+  EXPECT_EQ(platform.count(Steadiness::kMoving, 600.0), 1200);
 }
 
 // Boarding passengers and wind are no motion where the wheels say so, and their sway is told: half
@@ -133,9 +133,9 @@ TEST(StopDetector, AllowsAStandingVehicleToSway) {
   constexpr std::uint64_t kSeed = 7;
   Platform platform(kSeed);
   platform.sway_dps = 0.02;
-  EXPECT_EQ(platform.count(Verdict::kSteady, 120.0), 0) << "without wheels, seed " << kSeed;
+  EXPECT_EQ(platform.count(Steadiness::kSteady, 120.0), 0) << "without wheels, seed " << kSeed;
   platform.wheels = Wheels::kStanding;
-  EXPECT_GT(platform.count(Verdict::kSteady, 120.0), 180) << "seed " << kSeed;
+  EXPECT_GT(platform.count(Steadiness::kSteady, 120.0), 180) << "seed " << kSeed;
   double told = 0.0;
   for (int i = 0; i < 100; ++i) {
     platform.block(0.0);
@@ -145,7 +145,7 @@ TEST(StopDetector, AllowsAStandingVehicleToSway) {
   EXPECT_GT(told, 0.5 * scatter) << "seed " << kSeed;
   EXPECT_LT(told, 2.0 * scatter) << "seed " << kSeed;
   platform.sway_dps = 0.3;
-  EXPECT_EQ(platform.count(Verdict::kSteady, 120.0), 0) << "that is motion";
+  EXPECT_EQ(platform.count(Steadiness::kSteady, 120.0), 0) << "that is motion";
 }
 
 // Wheels that stand while the platform turns are broken, until they have rolled.
@@ -154,7 +154,7 @@ TEST(StopDetector, DoesNotBelieveADeadWheelSensor) {
   Platform platform(kSeed);
   platform.wheels = Wheels::kStanding;
   platform.sway_dps = 0.02;
-  EXPECT_GT(platform.count(Verdict::kSteady, 60.0), 90);
+  EXPECT_GT(platform.count(Steadiness::kSteady, 60.0), 90);
   EXPECT_FALSE(platform.detector.wheels_distrusted());
   const double believed = platform.detector.log_turning(Wheels::kStanding);
   platform.turn(50.0);
@@ -162,11 +162,11 @@ TEST(StopDetector, DoesNotBelieveADeadWheelSensor) {
   EXPECT_EQ(platform.detector.log_turning(Wheels::kStanding),
             platform.detector.log_turning(Wheels::kUnknown))
       << "they say nothing";
-  EXPECT_EQ(platform.count(Verdict::kSteady, 300.0), 0) << "sway counts as motion again";
+  EXPECT_EQ(platform.count(Steadiness::kSteady, 300.0), 0) << "sway counts as motion again";
   platform.wheels = Wheels::kRolling;
   platform.turn(50.0);
   platform.wheels = Wheels::kStanding;
-  EXPECT_GT(platform.count(Verdict::kSteady, 60.0), 90) << "they live, seed " << kSeed;
+  EXPECT_GT(platform.count(Steadiness::kSteady, 60.0), 90) << "they live, seed " << kSeed;
   EXPECT_FALSE(platform.detector.wheels_distrusted());
   EXPECT_EQ(platform.detector.log_turning(Wheels::kStanding), believed);
 }
@@ -178,7 +178,7 @@ TEST(StopDetector, TakesNoDoubtOfTheDriftForATurnUnderStandingWheels) {
   Platform platform(kSeed);
   platform.wheels = Wheels::kStanding;
   for (const double rate_dps : {0.1, 0.5, 0.9}) {
-    platform.count(Verdict::kSteady, 60.0, rate_dps);
+    platform.count(Steadiness::kSteady, 60.0, rate_dps);
     EXPECT_FALSE(platform.detector.wheels_distrusted()) << rate_dps << ", seed " << kSeed;
   }
 }
@@ -201,7 +201,7 @@ TEST(StopDetector, TellsTheSameOfALengthHoweverItIsCut) {
     platform.wheels = wheels;
     double sum = 0.0;
     double covered_s = 0.0;
-    while (covered_s < 40.0 && platform.block(0.0) != Verdict::kMoving) {
+    while (covered_s < 40.0 && platform.block(0.0) != Steadiness::kMoving) {
       sum += platform.detector.log_turning_gain(wheels, kBlock_s);
       covered_s += kBlock_s;
     }
@@ -230,23 +230,23 @@ TEST(StopDetector, KnowsWhetherThePlatformHasMovedOn) {
   constexpr std::uint64_t kSeed = 12;
   Platform platform(kSeed);
   EXPECT_TRUE(platform.detector.moved_on()) << "nothing is known yet";
-  platform.count(Verdict::kSteady, 10.0);
+  platform.count(Steadiness::kSteady, 10.0);
   platform.detector.stay();
   EXPECT_FALSE(platform.detector.moved_on());
 
   // Somebody gets in, a wave comes: a few seconds that are not steady, and nothing has turned.
   platform.shake(5.0);
-  platform.count(Verdict::kSteady, 10.0);
+  platform.count(Steadiness::kSteady, 10.0);
   EXPECT_FALSE(platform.detector.moved_on()) << "seed " << kSeed;
 
   platform.turn(60.0);
   EXPECT_TRUE(platform.detector.moved_on()) << "it has turned";
-  platform.count(Verdict::kSteady, 10.0);
+  platform.count(Steadiness::kSteady, 10.0);
   platform.detector.stay();
 
   platform.shake(30.0);
   EXPECT_TRUE(platform.detector.moved_on()) << "half a minute of motion";
-  platform.count(Verdict::kSteady, 10.0);
+  platform.count(Steadiness::kSteady, 10.0);
   platform.detector.stay();
 
   platform.wheels = Wheels::kRolling;
@@ -259,10 +259,10 @@ TEST(StopDetector, KnowsWhetherThePlatformHasMovedOn) {
 TEST(StopDetector, CountsATurnThroughSmoothBlocks) {
   constexpr std::uint64_t kSeed = 13;
   Platform platform(kSeed);
-  platform.count(Verdict::kSteady, 10.0);
+  platform.count(Steadiness::kSteady, 10.0);
   platform.detector.stay();
   for (int i = 0; i < 18; ++i)
-    EXPECT_NE(platform.block(i % 2 == 0 ? 8.0 : 12.0), Verdict::kSteady);
+    EXPECT_NE(platform.block(i % 2 == 0 ? 8.0 : 12.0), Steadiness::kSteady);
   EXPECT_TRUE(platform.detector.moved_on()) << "seed " << kSeed;
 }
 

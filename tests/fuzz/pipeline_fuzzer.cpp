@@ -158,7 +158,7 @@ gateway::Plan plan_of(std::uint8_t choice) {
   plan.gyros[0].temperature = quantity(a, "Temp", 200.0);
   plan.gyros[0].e2e.counter = gateway::AliveCounter{"Counter", codec(a, "Counter"), 15};
   plan.gyros[0].valid =
-      gateway::Condition{codec(a, "Status"), gateway::Comparison::kLess, 9.0, "Status < 9"};
+      gateway::ValidCondition{codec(a, "Status"), gateway::Comparison::kLess, 9.0, "Status < 9"};
   plan.gyros[1].sign = codec(b, "Negative");
   plan.reference = gateway::ReferencePlan{
       "can0", "TABLE", {0, table.id, table.id_mask(), false}, quantity(table, "Rate", 1e5)};

@@ -37,7 +37,7 @@ can::Frame counted(std::uint8_t counter) {
   return frame_of(kIdA, {0x64, 0x00, counter, 0});
 }
 
-Condition condition(Comparison comparison, double value) {
+ValidCondition condition(Comparison comparison, double value) {
   return {codec_of(signal_of(24, 8, 0.5, 0.0, ValueType::kUnsigned)), comparison, value, "test"};
 }
 

@@ -41,8 +41,8 @@ Plan plan_of_gyros() {
   plan.corrector.order = 0;
   for (GyroPlan& gyro : plan.gyros) {
     gyro.valid =
-        Condition{rig::codec_of(rig::signal_of(32, 8, 1.0, 0.0, dbc::ValueType::kUnsigned)),
-                  Comparison::kEqual, 0.0, "S == 0"};
+        ValidCondition{rig::codec_of(rig::signal_of(32, 8, 1.0, 0.0, dbc::ValueType::kUnsigned)),
+                       Comparison::kEqual, 0.0, "S == 0"};
     gyro.e2e.counter = AliveCounter{
         "C", rig::codec_of(rig::signal_of(48, 8, 1.0, 0.0, dbc::ValueType::kUnsigned)), 256};
   }

@@ -61,8 +61,8 @@ Plan hostile_plan(std::uint32_t seed) {
       "C", rig::codec_of(rig::signal_of(48, 4, 1.0, 0.0, dbc::ValueType::kUnsigned)), 15};
   plan.gyros[1].temperature = rig::quantity_of(rig::signal_of(32, 16));
   plan.gyros[1].valid =
-      Condition{rig::codec_of(rig::signal_of(48, 2, 1.0, 0.0, dbc::ValueType::kUnsigned)),
-                Comparison::kNotEqual, 3.0, "S != 3"};
+      ValidCondition{rig::codec_of(rig::signal_of(48, 2, 1.0, 0.0, dbc::ValueType::kUnsigned)),
+                     Comparison::kNotEqual, 3.0, "S != 3"};
   return plan;
 }
 

@@ -73,8 +73,8 @@ TEST(InputFrames, CountTheFrames) {
 TEST(InputFrames, FulfilTheConditionThatTheyAreJudgedBy) {
   GyroPlan plan = small_plan();
   const auto status = [&](Comparison comparison, double value) {
-    plan.valid = Condition{codec_of(signal_of(24, 2, 1.0, 0.0, ValueType::kUnsigned), 4),
-                           comparison, value, "Status"};
+    plan.valid = ValidCondition{codec_of(signal_of(24, 2, 1.0, 0.0, ValueType::kUnsigned), 4),
+                                comparison, value, "Status"};
     EXPECT_TRUE(check_valid(plan)) << value;
     return gyro_frame(plan, 0.0).data[3];
   };

@@ -2,13 +2,11 @@
 
 #include <cmath>
 #include <limits>
-#include <map>
 #include <random>
 
 #include <gtest/gtest.h>
 
-#include "dbc/multiplex.h"
-#include "dbc/parser.h"
+#include "receiver.h"
 
 namespace vgyro::gateway {
 namespace {
@@ -16,37 +14,6 @@ namespace {
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr unsigned kSeed = 20240610;
-
-struct Field {
-  double value = 0.0;
-  std::int64_t raw = 0;
-  std::string label;
-};
-using Fields = std::map<std::string, Field>;
-
-/// Decodes as a receiver with nothing but the published DBC file would.
-class Receiver {
- public:
-  explicit Receiver(const std::string& file)
-      : database_(dbc::load(std::string(VGYRO_DBC_DIR) + "/" + file).value()) {}
-
-  [[nodiscard]] Fields decode(const can::Frame& frame) const {
-    Fields fields;
-    for (const dbc::Message& message : database_.messages) {
-      if (!message.matches(frame.id, frame.has(can::kExtended))) continue;
-      EXPECT_EQ(frame.length, message.size_bytes);
-      dbc::MessageCodec(message).for_each(
-          frame.payload(), [&](const dbc::Signal& signal, const dbc::Reading& reading) {
-            const std::string* label = signal.label(reading.raw);
-            fields[signal.name] = {reading.value, reading.raw, label ? *label : ""};
-          });
-    }
-    return fields;
-  }
-
- private:
-  dbc::Database database_;
-};
 
 RateOutput good_rate(double rate_dps) {
   return {.valid = true,

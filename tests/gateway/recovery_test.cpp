@@ -80,8 +80,8 @@ Plan plan_of(Method method) {
     gyro.rate.maximum = kLimit_dps;
     gyro.rate.step = rig::kInputStep_dps;
     gyro.valid =
-        Condition{rig::codec_of(rig::signal_of(32, 8, 1.0, 0.0, dbc::ValueType::kUnsigned)),
-                  Comparison::kEqual, 0.0, "S == 0"};
+        ValidCondition{rig::codec_of(rig::signal_of(32, 8, 1.0, 0.0, dbc::ValueType::kUnsigned)),
+                       Comparison::kEqual, 0.0, "S == 0"};
     gyro.e2e.counter = AliveCounter{
         "C", rig::codec_of(rig::signal_of(48, 8, 1.0, 0.0, dbc::ValueType::kUnsigned)), 256};
   }

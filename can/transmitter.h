@@ -18,9 +18,9 @@ enum class SendResult : std::uint8_t {
   kFailed        ///< anything else; this frame is lost
 };
 
-class Sender {
+class Transmitter {
  public:
-  virtual ~Sender() = default;
+  virtual ~Transmitter() = default;
   virtual SendResult send(const Frame& frame) = 0;
 };
 

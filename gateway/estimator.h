@@ -1,0 +1,107 @@
+#pragma once
+
+// From aligned pairs to virtual rates: first the calibration, at rest or against the reference, or
+// biases of an earlier run in its place; then the corrector. Owns all that was learned and what of
+// it is worth keeping. Knows no frame and no time-out: who is in use is the pipeline's to know, and
+// `both_in_use` says it. Times are on the axis of fusion::StampGuard; nothing is allocated after
+// construction.
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+
+#include "base/error.h"
+#include "base/time.h"
+#include "fusion/alignment.h"
+#include "fusion/calibration.h"
+#include "fusion/corrector.h"
+#include "gateway/output_frames.h"
+#include "gateway/plan.h"
+#include "gateway/reference_calibration.h"
+#include "gateway/saved_state.h"
+#include "gateway/status.h"
+#include "gateway/surroundings.h"
+
+namespace vgyro::gateway {
+
+/// The corrector that the plan asks for.
+std::unique_ptr<fusion::Corrector> make_corrector(const Plan& plan);
+
+class Estimator {
+ public:
+  /// The age of saved biases when the clock cannot tell it: it stands before their stamp.
+  static constexpr double kUnknownAge_s = 30 * 86400.0;
+
+  /// The plan must live as long.
+  Estimator(const Plan& plan, std::unique_ptr<fusion::Corrector> corrector);
+
+  /// Before the first pair, which takes this up instead of a calibration. Error when the state is
+  /// of other gyros, or the method keeps none; then nothing has changed.
+  Expected<void> offer(const SavedState& state);
+  /// The first pair stands at `t`, which is `stamp` on the clock of the frames. The estimation's
+  /// seconds count from here.
+  void begin(TimePoint t, TimePoint stamp);
+  [[nodiscard]] bool begun() const { return begun_; }
+  [[nodiscard]] bool calibrated() const { return calibrated_; }
+  /// Can a rate of one gyro alone be believed? Not of one that was never compared with the other,
+  /// whatever the method.
+  [[nodiscard]] bool knows_gyros() const { return calibrated_ && begun_; }
+
+  /// What the corrector weighs besides the rates, from now on: wheels, vibration, temperatures …
+  void hear(const Surroundings& surroundings, TimePoint t);
+  /// … and the smallest step that this gyro's values have shown, deg/s.
+  void set_resolution(std::size_t gyro, double step_dps);
+
+  /// A pair before calibrated().
+  void calibrate(const fusion::AlignedPair& pair);
+  /// A reference rate, which may complete the calibration.
+  void add_reference(TimePoint t, double rate_dps);
+
+  /// The next pair. Precondition: calibrated().
+  fusion::VirtualRate update(const fusion::AlignedPair& pair);
+  /// The next sample of one gyro alone. Precondition: knows_gyros().
+  fusion::VirtualRate update_alone(std::size_t gyro, TimePoint t, double rate_dps);
+
+  /// What the corrector thinks of its data, as of the newest rate.
+  [[nodiscard]] const fusion::Condition& condition() const { return condition_; }
+  /// What is known of the drifts at `t`. Precondition: knows_gyros().
+  [[nodiscard]] fusion::Drift drift(TimePoint t) const { return corrector_->drift(seconds(t)); }
+  /// Do the gyros contradict each other?
+  [[nodiscard]] bool disagree(bool both_in_use) const { return both_in_use && condition_.disagree; }
+  [[nodiscard]] Quality quality(bool both_in_use) const;
+  [[nodiscard]] BiasMode bias_mode(bool both_in_use, bool any_in_use) const;
+
+  /// What to keep across a restart, of a last rate at `t`, which is t − clock_offset on the clock
+  /// of the frames; nothing before there is anything worth it. What was offered and not taken up
+  /// yet is.
+  [[nodiscard]] std::optional<SavedState> memory(
+      TimePoint t, Duration clock_offset,
+      const std::array<std::optional<double>, 2>& temperature_c) const;
+
+  void tell(Status& status) const;
+
+ private:
+  void calibrate_with_reference();
+  void calibrate_with(const fusion::AlignedPair& pair, double true_rate_dps);
+  [[nodiscard]] bool result_can_be() const;
+  [[nodiscard]] double seconds(TimePoint t) const { return to_seconds(t - origin_); }
+
+  const Plan& plan_;
+  std::unique_ptr<fusion::Corrector> corrector_;
+  fusion::Calibrator calibrator_;
+  ReferenceCalibration reference_;
+  fusion::Condition condition_;
+  TimePoint origin_;  ///< zero of the estimation's seconds: the first pair
+  bool begun_ = false;
+  bool calibrated_;
+  bool moved_in_calibration_ = false;  ///< and that was accepted
+
+  std::optional<SavedState> saved_;  ///< to be taken up by the first pair
+  Restored restored_ = Restored::kNothing;
+  double restored_age_s_ = 0.0;
+  double restored_bias_sigma_dps_ = 0.0;
+};
+
+}  // namespace vgyro::gateway

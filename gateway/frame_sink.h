@@ -1,0 +1,18 @@
+#pragma once
+
+// Where the gateway's frames go: a socket's queue, a log, a test. The sink takes what it is given;
+// what becomes of a frame on a bus that is full or down is the sink's to count.
+
+#include "base/time.h"
+#include "can/frame.h"
+
+namespace vgyro::gateway {
+
+class FrameSink {
+ public:
+  virtual ~FrameSink() = default;
+  /// The stamp is that of the input frame (or of the time-out) that caused the output.
+  virtual void put(const can::Frame& frame, TimePoint stamp) = 0;
+};
+
+}  // namespace vgyro::gateway

@@ -1,0 +1,38 @@
+#include "gateway/known_effects.h"
+
+#include <algorithm>
+
+#include "gateway/model_plan.h"
+#include "model/catalogue.h"
+
+namespace vgyro::gateway {
+
+KnownEffects::KnownEffects(const Plan& plan) {
+  for (std::size_t gyro = 0; gyro < 2; ++gyro) {
+    const std::vector<model::Effect> effects = effects_of(plan, gyro);
+    compensations_[gyro] = fusion::Compensation(effects);
+    for (const model::Effect& effect : effects)
+      needs_[gyro] |= model::info(effect.kind).needs;
+  }
+}
+
+bool KnownEffects::needs_temperature(std::size_t gyro) const {
+  return (needs_[gyro] & model::kNeedsTemperature) != 0;
+}
+
+double KnownEffects::take_off(std::size_t gyro, double reading_dps,
+                              const Surroundings& surroundings, TimePoint t) const {
+  if (!take_any(gyro)) return reading_dps;  // and asks for no surroundings: most have no model
+  return compensations_[gyro].correct(reading_dps, surroundings.at(gyro, t));
+}
+
+double KnownEffects::zero_offset_dps(std::size_t gyro, const Surroundings& surroundings,
+                                     TimePoint t) const {
+  return compensations_[gyro].zero_offset_dps(surroundings.at(gyro, t));
+}
+
+Duration KnownEffects::lag_most() const {
+  return std::max({lag(0), lag(1), Duration::zero()});
+}
+
+}  // namespace vgyro::gateway

@@ -1,0 +1,43 @@
+#pragma once
+
+// What the model file knows of both gyros, taken off their readings; and what that needs to be
+// told. Without a model file every reading stays as it is.
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+#include "base/time.h"
+#include "fusion/compensation.h"
+#include "gateway/plan.h"
+#include "gateway/surroundings.h"
+
+namespace vgyro::gateway {
+
+class KnownEffects {
+ public:
+  explicit KnownEffects(const Plan& plan);
+
+  /// A bit mask of model::Need: what the effects of this gyro depend on.
+  [[nodiscard]] std::uint8_t needs(std::size_t gyro) const { return needs_[gyro]; }
+  [[nodiscard]] bool needs_temperature(std::size_t gyro) const;
+  [[nodiscard]] bool take_any(std::size_t gyro) const { return compensations_[gyro].takes_any(); }
+
+  /// The reading at `t` less what is known of it, deg/s.
+  [[nodiscard]] double take_off(std::size_t gyro, double reading_dps,
+                                const Surroundings& surroundings, TimePoint t) const;
+  /// What of it is the gyro's zero offset at `t`, deg/s.
+  [[nodiscard]] double zero_offset_dps(std::size_t gyro, const Surroundings& surroundings,
+                                       TimePoint t) const;
+
+  /// A sample stamped t is of the rate at t − lag.
+  [[nodiscard]] Duration lag(std::size_t gyro) const { return compensations_[gyro].lag(); }
+  /// What the bus has reached when a rate dated back comes out.
+  [[nodiscard]] Duration lag_most() const;
+
+ private:
+  std::array<fusion::Compensation, 2> compensations_;
+  std::array<std::uint8_t, 2> needs_{};
+};
+
+}  // namespace vgyro::gateway

@@ -1,0 +1,82 @@
+#include "gateway/sender.h"
+
+#include <algorithm>
+#include <cassert>
+#include <limits>
+
+namespace vgyro::gateway {
+
+namespace {
+
+constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+
+TimePoint next_on_grid(TimePoint t) {
+  const std::int64_t period = Sender::kBiasPeriod.count();
+  return TimePoint{Duration{to_ns(t) / period * period + period}};
+}
+
+}  // namespace
+
+Sender::Turn::Turn(Sender& sender, FrameSink& sink, TimePoint stamp) : sender_(sender) {
+  assert(sender.sink_ == nullptr);
+  sender.sink_ = &sink;
+  sender.stamp_ = stamp;
+}
+
+Sender::Sender(const OutputPlan& plan) : encoder_(plan), rate_dps_(kNone), sigma_dps_(kNone) {}
+
+void Sender::send_rate(const RateOutput& output) {
+  assert(sink_ != nullptr);
+  const bool in_range = encoder_.can_carry(output.rate_dps);
+  RateOutput carried = output;
+  carried.valid = output.valid && in_range;
+  ++rates_;
+  if (carried.valid) ++rates_valid_;
+  if (output.valid && !in_range) ++rates_out_of_range_;
+  rate_dps_ = carried.valid ? output.rate_dps : kNone;
+  sigma_dps_ = carried.valid ? output.sigma_dps : kNone;
+  quality_ = carried.valid ? output.quality : Quality::kUnusable;
+  sink_->put(encoder_.rate(carried), stamp_);
+}
+
+void Sender::send_bias(const BiasOutput& bias, const ModelOutput& model) {
+  assert(sink_ != nullptr);
+  ++biases_;
+  sink_->put(encoder_.bias(bias), stamp_);
+  sink_->put(encoder_.model(model), stamp_);
+}
+
+bool Sender::reach_grid(TimePoint t) {
+  const bool clock_set_back = next_bias_ - t > kGridAheadMax;
+  if (t < next_bias_ && !clock_set_back) return false;
+  next_bias_ = next_on_grid(t);
+  return true;
+}
+
+bool Sender::miss_grid(TimePoint t, Duration sample_interval) {
+  if (t < grid_missed_at(sample_interval)) return false;
+  next_bias_ = next_on_grid(t);
+  return true;
+}
+
+TimePoint Sender::grid_missed_at(Duration sample_interval) const {
+  return next_bias_ + std::max<Duration>(kBiasGrace, 2 * sample_interval);
+}
+
+void Sender::change_plan(const OutputPlan& plan) {
+  OutputEncoder changed(plan);
+  changed.count_on_from(encoder_);
+  encoder_ = changed;
+}
+
+void Sender::tell(Status& status) const {
+  status.rates_out = rates_;
+  status.rates_out_valid = rates_valid_;
+  status.rates_out_of_range = rates_out_of_range_;
+  status.biases_out = biases_;
+  status.rate_dps = rate_dps_;
+  status.sigma_dps = sigma_dps_;
+  status.quality = quality_;
+}
+
+}  // namespace vgyro::gateway

@@ -1,0 +1,77 @@
+#pragma once
+
+// What leaves the gateway: VG_Rate whenever there is one, VG_Bias with VG_Model on a grid of the
+// bus's time and whenever somebody wants them. Owns the frames with their counters, the grid, and
+// the count of what went out. Knows no estimation: it is told what the frames are to say, and
+// times on the axis of fusion::StampGuard. Reads no clock, allocates nothing.
+
+#include <cstdint>
+
+#include "base/time.h"
+#include "gateway/frame_sink.h"
+#include "gateway/output_frames.h"
+#include "gateway/plan.h"
+#include "gateway/status.h"
+
+namespace vgyro::gateway {
+
+class Sender {
+ public:
+  static constexpr Duration kBiasPeriod = std::chrono::milliseconds(100);
+  /// Samples drive the grid; the timer steps in only when none came for half a period more, so that
+  /// a replay sends the same frames at the same places.
+  static constexpr Duration kBiasGrace = kBiasPeriod / 2;
+  /// No sample lies so far before the grid, for it stands a period ahead: the clock was set back.
+  static constexpr Duration kGridAheadMax = std::chrono::seconds(1);
+
+  explicit Sender(const OutputPlan& plan);
+
+  /// As long as it lives, what is sent goes to its sink with its stamp. One at a time.
+  class Turn {
+   public:
+    Turn(Sender& sender, FrameSink& sink, TimePoint stamp);
+    ~Turn() { sender_.sink_ = nullptr; }
+    Turn(const Turn&) = delete;
+    Turn& operator=(const Turn&) = delete;
+
+   private:
+    Sender& sender_;
+  };
+
+  /// Precondition of both: a Turn. A rate that the frame cannot carry goes out as invalid.
+  void send_rate(const RateOutput& output);
+  /// At once, whatever the grid says.
+  void send_bias(const BiasOutput& bias, const ModelOutput& model);
+
+  /// A sample says that time is `t`. Is a point of the grid reached? Then it is used up: send.
+  bool reach_grid(TimePoint t);
+  /// As above, of a timer: only where samples should have driven the grid and did not.
+  /// `sample_interval` is that of the slower stream, 0 where nobody knows: its samples, however
+  /// slow, keep their right to drive the grid.
+  bool miss_grid(TimePoint t, Duration sample_interval);
+  /// When miss_grid() is true, at the earliest.
+  [[nodiscard]] TimePoint grid_missed_at(Duration sample_interval) const;
+
+  /// The counters of frames that both send go on where the other's stand.
+  void count_on_from(const Sender& before) { encoder_.count_on_from(before.encoder_); }
+  /// From now on as this plan says; counters, books and grid go on.
+  void change_plan(const OutputPlan& plan);
+
+  /// The books, and what the last rate said.
+  void tell(Status& status) const;
+
+ private:
+  OutputEncoder encoder_;
+  FrameSink* sink_ = nullptr;
+  TimePoint stamp_;
+  TimePoint next_bias_;  ///< the next point of the grid, or 0: at once
+  std::uint64_t rates_ = 0;
+  std::uint64_t rates_valid_ = 0;
+  std::uint64_t rates_out_of_range_ = 0;
+  std::uint64_t biases_ = 0;
+  double rate_dps_;   ///< of the last VG_Rate; NaN when that was invalid
+  double sigma_dps_;  ///< likewise
+  Quality quality_ = Quality::kUnusable;
+};
+
+}  // namespace vgyro::gateway

@@ -1,0 +1,298 @@
+// What leaves the gateway, without an estimation behind it: the grid of VG_Bias through gaps and
+// leaps of time, the books, and frames that say what the DBC file says they say.
+
+#include "gateway/sender.h"
+
+#include <cmath>
+#include <limits>
+#include <new>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "receiver.h"
+#include "rig.h"
+
+namespace vgyro::gateway {
+namespace {
+
+using rig::at_ms;
+using rig::ms;
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+constexpr std::uint32_t kRateId = 0x610;
+constexpr std::uint32_t kBiasId = 0x611;
+constexpr std::uint32_t kModelId = 0x612;
+
+RateOutput rate_of(double rate_dps) {
+  return {.valid = true,
+          .rate_dps = rate_dps,
+          .sigma_dps = 0.004,
+          .corrected_dps = {rate_dps, rate_dps},
+          .state = State::kRunning,
+          .quality = Quality::kTwoGyros,
+          .health = 0,
+          .age = ms(3),
+          .instant = at_ms(0)};
+}
+
+class SenderTest : public ::testing::Test {
+ protected:
+  void rate(TimePoint stamp, const RateOutput& output) {
+    const Sender::Turn turn(sender, out, stamp);
+    sender.send_rate(output);
+  }
+  void bias(TimePoint stamp, const BiasOutput& bias_output, const ModelOutput& model_output) {
+    const Sender::Turn turn(sender, out, stamp);
+    sender.send_bias(bias_output, model_output);
+  }
+  [[nodiscard]] Status status() const {
+    Status told;
+    sender.tell(told);
+    return told;
+  }
+  /// Samples at these instants: those of them that reached the grid.
+  std::vector<TimePoint> reached(TimePoint from, TimePoint to, Duration every) {
+    std::vector<TimePoint> found;
+    for (TimePoint t = from; t < to; t += every)
+      if (sender.reach_grid(t)) found.push_back(t);
+    return found;
+  }
+
+  const Receiver receiver{"vgyro.dbc"};
+  Sender sender{OutputPlan{}};
+  rig::Collector out;
+};
+
+// --- the grid ------------------------------------------------------------------------------------
+
+// Ten points a second at whole tenths of the axis, whatever the phase of the samples.
+TEST_F(SenderTest, GridStandsAtWholeTenthsOfASecond) {
+  const std::vector<TimePoint> found = reached(at_ms(1003), at_ms(3003), ms(10));
+  ASSERT_EQ(found.size(), 20U);
+  EXPECT_EQ(found[0], at_ms(1003));  // the first sample: at once
+  for (std::size_t i = 1; i < found.size(); ++i)
+    EXPECT_EQ(found[i], at_ms(1003 + 100 * static_cast<std::int64_t>(i))) << i;
+}
+
+// A point of the grid that fell into a gap of the samples is made up for once, not once for each.
+TEST_F(SenderTest, GapInTheSamplesCostsPointsAndBringsNoBurst) {
+  reached(at_ms(1000), at_ms(2000), ms(10));
+  const std::vector<TimePoint> behind = reached(at_ms(5555), at_ms(5900), ms(10));
+  const std::vector<TimePoint> expected{at_ms(5555), at_ms(5605), at_ms(5705), at_ms(5805)};
+  EXPECT_EQ(behind, expected);
+}
+
+// Samples slower than the grid drive it one by one.
+TEST_F(SenderTest, SlowSamplesAreAPointEach) {
+  EXPECT_EQ(reached(at_ms(0), at_ms(3000), ms(250)).size(), 12U);
+}
+
+// A leap ahead: the grid stands before the new time at once, and goes on from there.
+TEST_F(SenderTest, LeapAheadGoesOnAtTheNewTime) {
+  reached(at_ms(1000), at_ms(2000), ms(10));
+  const TimePoint later = at_ms(2000) + std::chrono::hours(24 * 365);
+  EXPECT_EQ(reached(later, later + ms(1000), ms(10)).size(), 10U);
+}
+
+// A clock that was set back by more than a second takes the grid back with it; samples that are
+// merely out of order do not.
+TEST_F(SenderTest, ClockSetBackTakesTheGridBack) {
+  reached(at_ms(100'000), at_ms(101'000), ms(10));  // the next point: 101 s
+  EXPECT_FALSE(sender.reach_grid(at_ms(100'000)));
+  EXPECT_TRUE(sender.reach_grid(at_ms(99'999)));
+  EXPECT_EQ(reached(at_ms(100'000), at_ms(101'000), ms(10)).size(), 10U);
+}
+
+// The timer leaves the grid to the samples, and steps in half a period after the point that none of
+// them reached; for slow samples later, after two of their intervals.
+TEST_F(SenderTest, TimerStepsInOnlyWhereSamplesDoNotCome) {
+  ASSERT_TRUE(sender.reach_grid(at_ms(1000)));  // the next point: 1.1 s
+  EXPECT_EQ(sender.grid_missed_at(Duration::zero()), at_ms(1150));
+  EXPECT_EQ(sender.grid_missed_at(ms(10)), at_ms(1150));
+  EXPECT_EQ(sender.grid_missed_at(ms(400)), at_ms(1900));
+  EXPECT_FALSE(sender.miss_grid(at_ms(1150) - Duration(1), ms(10)));
+  EXPECT_FALSE(sender.miss_grid(at_ms(1150), ms(400)));
+  EXPECT_TRUE(sender.miss_grid(at_ms(1150), ms(10)));
+  EXPECT_FALSE(sender.miss_grid(at_ms(1150), ms(10))) << "once";
+  EXPECT_FALSE(sender.reach_grid(at_ms(1199)));
+  EXPECT_TRUE(sender.reach_grid(at_ms(1200)));
+}
+
+// Driven by the timer alone, to the nanosecond at its deadlines, it is a heartbeat that never
+// hangs.
+TEST_F(SenderTest, TimerAloneIsAHeartbeat) {
+  TimePoint t = at_ms(777);
+  ASSERT_TRUE(sender.miss_grid(t, Duration::zero())) << "at once, before the first sample";
+  for (int i = 0; i < 100; ++i) {
+    const TimePoint due = sender.grid_missed_at(Duration::zero());
+    ASSERT_GT(due, t);
+    ASSERT_LE(due - t, Sender::kBiasPeriod + Sender::kBiasGrace);
+    t = due;
+    ASSERT_TRUE(sender.miss_grid(t, Duration::zero()));
+  }
+}
+
+// What is sent out of turn, for a change of state, does not shift the grid.
+TEST_F(SenderTest, BiasOutOfTurnLeavesTheGrid) {
+  ASSERT_TRUE(sender.reach_grid(at_ms(1000)));
+  bias(at_ms(1042), {}, {});
+  EXPECT_FALSE(sender.reach_grid(at_ms(1099)));
+  EXPECT_TRUE(sender.reach_grid(at_ms(1100)));
+}
+
+// --- frames --------------------------------------------------------------------------------------
+
+// Every frame says by the DBC file what the sender was told, and bears the stamp of its cause.
+TEST_F(SenderTest, FramesSayWhatTheDbcFileSays) {
+  rate(at_ms(1003), rate_of(-12.34565));
+  bias(at_ms(1004), {{0.12345, -1.5}, BiasMode::kStop, kGyro2Suspect}, {-2.5e-5, 0.003, 1e-5});
+  ASSERT_EQ(out.frames.size(), 3U);
+  Fields fields = receiver.decode(out.frames[0].frame);
+  EXPECT_NEAR(fields["VG_Rate"].value, -12.34565, 1e-9);
+  EXPECT_NEAR(fields["VG_Sigma"].value, 0.004, 1e-9);
+  EXPECT_NEAR(fields["VG_Age"].value, 3.0, 1e-9);
+  EXPECT_EQ(fields["VG_State"].label, "running");
+  EXPECT_EQ(fields["VG_Quality"].label, "two_gyros");
+  EXPECT_EQ(fields["VG_Valid"].raw, 1);
+  fields = receiver.decode(out.frames[1].frame);
+  EXPECT_NEAR(fields["VB_Bias1"].value, 0.12345, 1e-9);
+  EXPECT_NEAR(fields["VB_Bias2"].value, -1.5, 1e-9);
+  EXPECT_EQ(fields["VB_Mode"].label, "stop");
+  EXPECT_EQ(fields["VB_Health"].raw, kGyro2Suspect);
+  fields = receiver.decode(out.frames[2].frame);
+  EXPECT_NEAR(fields["VM_Slope"].value, -2.5e-5, 1e-12);
+  EXPECT_NEAR(fields["VM_BiasSigma"].value, 0.003, 1e-9);
+  EXPECT_NEAR(fields["VM_SlopeSigma"].value, 1e-5, 1e-12);
+  EXPECT_EQ(out.frames[0].stamp, at_ms(1003));
+  EXPECT_EQ(out.frames[1].stamp, at_ms(1004));
+  EXPECT_EQ(out.frames[2].stamp, at_ms(1004));
+}
+
+// Of every rate exactly one frame, of every bias two; valid ones and those that the frame cannot
+// carry are counted apart, and an invalid one is beyond nothing.
+TEST_F(SenderTest, BooksCountWhatWentOut) {
+  for (int i = 0; i < 7; ++i)
+    rate(at_ms(i), rate_of(1.0));
+  for (const double beyond : {420.0, -1e9, kNaN})
+    rate(at_ms(10), rate_of(beyond));
+  RateOutput invalid = rate_of(1e9);
+  invalid.valid = false;
+  rate(at_ms(11), invalid);
+  bias(at_ms(12), {}, {});
+  bias(at_ms(13), {}, {});
+  EXPECT_EQ(status().rates_out, 11U);
+  EXPECT_EQ(status().rates_out_valid, 7U);
+  EXPECT_EQ(status().rates_out_of_range, 3U);
+  EXPECT_EQ(status().biases_out, 2U);
+  EXPECT_EQ(out.with_id(kRateId).size(), 11U);
+  EXPECT_EQ(out.with_id(kBiasId).size(), 2U);
+  EXPECT_EQ(out.with_id(kModelId).size(), 2U);
+}
+
+// The status tells the last rate as the bus saw it: nothing that did not go out as valid.
+TEST_F(SenderTest, StatusTellsTheLastRateThatTheBusSaw) {
+  EXPECT_TRUE(std::isnan(status().rate_dps));
+  rate(at_ms(1), rate_of(1.5));
+  EXPECT_EQ(status().rate_dps, 1.5);
+  EXPECT_EQ(status().sigma_dps, 0.004);
+  EXPECT_EQ(status().quality, Quality::kTwoGyros);
+  rate(at_ms(2), rate_of(1e9));
+  EXPECT_TRUE(std::isnan(status().rate_dps));
+  EXPECT_TRUE(std::isnan(status().sigma_dps));
+  EXPECT_EQ(status().quality, Quality::kUnusable);
+  Fields fields = receiver.decode(out.frames.back().frame);
+  EXPECT_EQ(fields["VG_Rate"].label, "invalid");
+  EXPECT_EQ(fields["VG_Quality"].label, "unusable");
+}
+
+/// As a bus that is down: takes every `n`-th frame.
+class Refusing final : public FrameSink {
+ public:
+  explicit Refusing(std::uint64_t n) : n_(n) {}
+  void put(const can::Frame& frame, TimePoint) override {
+    if (++offered_ % n_ == 0) taken.push_back(frame);
+  }
+  std::vector<can::Frame> taken;
+
+ private:
+  std::uint64_t n_;
+  std::uint64_t offered_ = 0;
+};
+
+// A frame that its sink does not take is lost, not kept: the next one is of its own time, and its
+// counter shows the receiver how many are missing. The books count what was handed over.
+TEST_F(SenderTest, FrameThatTheSinkRefusesLeavesAGapInTheCounter) {
+  Refusing bus(4);
+  for (std::int64_t i = 0; i < 40; ++i) {
+    const Sender::Turn turn(sender, bus, at_ms(i));
+    sender.send_rate(rate_of(static_cast<double>(i)));
+  }
+  ASSERT_EQ(bus.taken.size(), 10U);
+  for (std::size_t k = 0; k < bus.taken.size(); ++k) {
+    const std::size_t sent = 4 * k + 3;
+    Fields fields = receiver.decode(bus.taken[k]);
+    EXPECT_NEAR(fields["VG_Rate"].value, static_cast<double>(sent), 1e-9);
+    EXPECT_EQ(fields["VG_Counter"].raw, static_cast<std::int64_t>(sent % 15)) << sent;
+  }
+  EXPECT_EQ(status().rates_out, 40U);
+}
+
+/// The program would end here.
+class Broken final : public FrameSink {
+ public:
+  void put(const can::Frame&, TimePoint) override { throw std::bad_alloc(); }
+};
+
+// A sink that throws ends its turn: the next one is another's.
+TEST_F(SenderTest, SinkThatThrowsEndsItsTurn) {
+  Broken broken;
+  EXPECT_THROW(
+      {
+        const Sender::Turn turn(sender, broken, at_ms(1));
+        sender.send_rate(rate_of(1.0));
+      },
+      std::bad_alloc);
+  rate(at_ms(2), rate_of(2.0));
+  ASSERT_EQ(out.frames.size(), 1U);
+  EXPECT_EQ(out.frames[0].stamp, at_ms(2));
+}
+
+// --- another plan --------------------------------------------------------------------------------
+
+// Counters go on under the same identifier, and begin anew under another one; books and grid go on.
+TEST_F(SenderTest, AnotherPlanGoesOnWithWhatItShares) {
+  ASSERT_TRUE(sender.reach_grid(at_ms(1000)));
+  for (int i = 0; i < 5; ++i) {
+    rate(at_ms(i), rate_of(1.0));
+    bias(at_ms(i), {}, {});
+  }
+  OutputPlan changed;
+  changed.bias_id = 0x711;
+  sender.change_plan(changed);
+  rate(at_ms(6), rate_of(1.0));
+  bias(at_ms(7), {}, {});
+  EXPECT_EQ(receiver.decode(out.with_id(kRateId).back().frame)["VG_Counter"].raw, 5);
+  EXPECT_EQ(receiver.decode(out.with_id(kModelId).back().frame)["VM_Counter"].raw, 5);
+  ASSERT_EQ(out.with_id(0x711).size(), 1U);
+  EXPECT_EQ(rig::bits(out.with_id(0x711).front().frame, 8, 4), 0U);
+  EXPECT_EQ(status().rates_out, 6U);
+  EXPECT_FALSE(sender.reach_grid(at_ms(1099)));
+}
+
+// Another sender takes up the counters of the frames, and nothing else.
+TEST_F(SenderTest, CountsOnFromAnotherOne) {
+  for (int i = 0; i < 9; ++i)
+    rate(at_ms(i), rate_of(1.0));
+  Sender next{OutputPlan{}};
+  next.count_on_from(sender);
+  const Sender::Turn turn(next, out, at_ms(20));
+  next.send_rate(rate_of(1.0));
+  EXPECT_EQ(receiver.decode(out.frames.back().frame)["VG_Counter"].raw, 9);
+  Status told;
+  next.tell(told);
+  EXPECT_EQ(told.rates_out, 1U);
+}
+
+}  // namespace
+}  // namespace vgyro::gateway
