@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 
 #include <fmt/core.h>
@@ -192,26 +193,36 @@ class Comparer {
     return terms;
   }
 
-  // `terms` and, where they explain what is there, a skew or a delay of the gyro.
+  // `terms` and, where it explains what is there, a skew or a delay of the gyro.
   [[nodiscard]] Effects late_clock(std::size_t gyro, const Effects& terms) const {
     const auto square = [&](const Effects& all) { return regression_.residual(all).squaredNorm(); };
-    Effects best = terms;
     const double without = square(terms);
-    double least = without;
-    const double step_ppm = kMillion * kLagStep_s / data_.about.seconds;
-    for (int i = -kSkewSteps; i <= kSkewSteps; ++i) {
-      for (const Kind kind : {Kind::kClockSkew, Kind::kDelay}) {
-        Fit fit{terms, fitted(regression_.residual(terms), true), 0.0, {}};
-        const double start = kind == Kind::kClockSkew ? step_ppm * i : kLagStep_s * i;
-        fit.terms.push_back({gyro, kind, {start}, 0});
-        regression_.keep_in_bounds(fit.terms.back());
-        if (square(fit.terms) >= least) continue;
-        regression_.improve(fit);
-        const double now = square(fit.terms);
-        if (now < least) least = now, best = fit.terms;
-      }
+    const PairNoise noise = fitted(regression_.residual(terms), true);
+    Effects best = terms;
+    double least = kLagExplains * without;
+    for (const Kind kind : {Kind::kClockSkew, Kind::kDelay}) {
+      Fit fit{nearest(gyro, kind, terms), noise, 0.0, {}};
+      regression_.improve(fit);
+      const double now = square(fit.terms);
+      if (now < least) least = now, best = fit.terms;
     }
-    return least <= kLagExplains * without ? best : terms;
+    return best;
+  }
+
+  // Of even steps of a skew or a delay the one that leaves least.
+  [[nodiscard]] Effects nearest(std::size_t gyro, Kind kind, const Effects& terms) const {
+    const double step =
+        kind == Kind::kClockSkew ? kMillion * kLagStep_s / data_.about.seconds : kLagStep_s;
+    Effects best;
+    double least = std::numeric_limits<double>::max();
+    for (int i = -kSkewSteps; i <= kSkewSteps; ++i) {
+      Effects trial = terms;
+      trial.push_back({gyro, kind, {step * i}, 0});
+      regression_.keep_in_bounds(trial.back());
+      const double now = regression_.residual(trial).squaredNorm();
+      if (now < least) least = now, best = std::move(trial);
+    }
+    return best;
   }
 
   [[nodiscard]] Difference difference(const Fit& fit, std::size_t index) const {

@@ -6,6 +6,7 @@
 #include <span>
 
 #include "model/catalogue.h"
+#include "model/equation.h"
 
 namespace vgyro::gap {
 
@@ -172,7 +173,7 @@ void set_surroundings(Observations& data, std::size_t gyro) {
 }
 
 bool is_moving(const Effect& effect) {
-  return row(effect.kind).is_timing;
+  return model::moves_in_time(effect.kind);
 }
 
 bool is_added(const Effect& effect) {
@@ -253,7 +254,7 @@ Eigen::VectorXd Observations::lateness_dps(std::size_t gyro, const Effects& movi
   for (Eigen::Index i = 0; i < size(); ++i) {
     const auto place = static_cast<std::size_t>(i);
     if (share_of(channel[place], gyro) == 0.0) continue;
-    lateness[i] = prediction.at(t_s[place]) - rate[gyro][place].value;
+    lateness[i] = prediction.late_dps(t_s[place]) - rate[gyro][place].value;
   }
   Remembered one{gyro, moving, lateness};
   if (remembered_.size() < kRemembered) {
@@ -267,13 +268,13 @@ Eigen::VectorXd Observations::lateness_dps(std::size_t gyro, const Effects& movi
 // Every response is to what has come.
 void Observations::add(std::size_t gyro, const Effects& added, const Eigen::VectorXd& lateness,
                        Eigen::VectorXd& sum) const {
+  const model::Equation equation(added);
   for (Eigen::Index i = 0; i < size(); ++i) {
     const auto place = static_cast<std::size_t>(i);
     const double share = share_of(channel[place], gyro);
     if (share == 0.0) continue;
     const double late_dps = rate[gyro][place].value + lateness[i];
-    for (const Effect& effect : added)
-      sum[i] += share * model::added_dps(effect, late_dps, surroundings[gyro][place]);
+    sum[i] += share * equation.added_dps(late_dps, surroundings[gyro][place]);
   }
 }
 

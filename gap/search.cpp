@@ -237,7 +237,7 @@ bool Search::add_round() {
   if (best == round.candidates.end() || best->margin() < 0.0) return false;
   const bool judged = is_timing(best->effect) && !study_->recording().has_reference;
   Found taken = judged ? judge_timing(*best, round.timing) : *best;
-  if (is_left_of_timing(taken)) return false;
+  if (taken.margin() < 0.0 || is_left_of_timing(taken)) return false;
   found_.push_back(std::move(taken));
   const bool is_step = row(found_.back().effect.kind).finder == Finder::kStep;
   settle();
@@ -293,6 +293,8 @@ Found Search::judge_timing(Found best, const std::vector<Score>& scores) const {
   if (is_clock) best.ambiguous_with.push_back({Kind::kClockSkew, 1 - first.effect.gyro});
   best.effect = first.effect;
   best.penalty = first.penalty;
+  // At the motion of the present terms any other lateness looks great: each has its own.
+  best.statistic = first.statistic - 2.0 * fit_with_motion(terms(0)).log_likelihood;
   for (std::size_t i = 1; i < rivals.size(); ++i) {
     const bool other_clock = is_clock && rivals[i].effect.kind == Kind::kClockSkew;
     if (!other_clock && is_close(rivals[i].adjusted(), first.adjusted(), gain))
