@@ -1,16 +1,16 @@
 #pragma once
 
-// Takes off one gyro's readings what the model file knows of it. Offsets are subtracted; the
-// response is inverted: the result is the rate at which model and reading agree. An effect whose
-// input is not known adds nothing, which is the same as an input at its reference.
-// Noise, clipping and lost frames cannot be taken back; `delay` is a matter of time, not of rates,
-// and only told here.
+// Takes off one gyro's readings what the model file knows of it: model/equation.h backwards.
+// Offsets are subtracted; the response is inverted: the result is the rate at which model and
+// reading agree. An effect whose input is not known adds nothing, which is the same as an input at
+// its reference. Noise, clipping and lost frames cannot be taken back; `delay` is a matter of time,
+// not of rates, and only told here.
 
 #include <span>
-#include <vector>
 
 #include "base/time.h"
 #include "model/effect.h"
+#include "model/equation.h"
 
 namespace vgyro::fusion {
 
@@ -24,7 +24,7 @@ class Compensation {
   /// `effects` of one gyro, of any kind.
   explicit Compensation(std::span<const model::Effect> effects);
 
-  [[nodiscard]] bool takes_any() const { return !offsets_.empty() || !responses_.empty(); }
+  [[nodiscard]] bool takes_any() const { return equation_.adds(); }
 
   /// Where the response has no inverse (a model far outside the rates it was made for), the reading
   /// less its offsets.
@@ -40,8 +40,8 @@ class Compensation {
  private:
   [[nodiscard]] double invert(double reading_dps, const model::Surroundings& surroundings) const;
 
-  std::vector<model::Effect> offsets_;
-  std::vector<model::Effect> responses_;
+  model::Equation equation_;
+  model::Equation lasting_;  ///< without lines
   Duration lag_{0};
 };
 

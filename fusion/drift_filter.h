@@ -13,6 +13,7 @@
 #include <Eigen/Core>
 
 #include "fusion/gyro_parameters.h"
+#include "model/effect.h"
 
 namespace vgyro::fusion {
 
@@ -35,7 +36,7 @@ struct DriftModel {
   SlopeModel slopes{};
   /// σ of the coefficients before anything is learned, deg/s/K. Both zero: no such states.
   std::array<double, 2> temperature_dps_k{};
-  std::array<std::array<GaussMarkov, GyroParameters::kGaussMarkovMax>, 2> gauss_markov{};
+  std::array<std::array<GaussMarkov, model::kGaussMarkovMax>, 2> gauss_markov{};
   std::array<std::size_t, 2> gauss_markov_count{};
 };
 
@@ -62,7 +63,7 @@ struct DriftMeasurement {
 
 class DriftFilter {
  public:
-  static constexpr int kStatesMax = 8 + 2 * static_cast<int>(GyroParameters::kGaussMarkovMax);
+  static constexpr int kStatesMax = 8 + 2 * static_cast<int>(model::kGaussMarkovMax);
   using Observables = Eigen::Matrix<double, kObservables, 1>;
   using Covariance = Eigen::Matrix<double, kObservables, kObservables>;
 

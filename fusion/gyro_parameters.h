@@ -6,6 +6,8 @@
 #include <cstddef>
 #include <optional>
 
+#include "model/effect.h"
+
 namespace vgyro::fusion {
 
 /// Exponentially correlated drift: a usual model of bias instability.
@@ -17,11 +19,9 @@ struct GaussMarkov {
 };
 
 struct GyroParameters {
-  static constexpr std::size_t kGaussMarkovMax = 3;
-
   std::optional<double> white_dps_rthz;  ///< N, angle random walk
   std::optional<double> walk_dps_rts;    ///< K, rate random walk
-  std::array<GaussMarkov, kGaussMarkovMax> gauss_markov{};
+  std::array<GaussMarkov, model::kGaussMarkovMax> gauss_markov{};
   std::size_t gauss_markov_count = 0;
   double rate_noise_rthz = 0.0;  ///< white noise of density rate_noise_rthz · |Ω|, on top of N
   double resolution_dps = 0.0;   ///< step of the values, 0 when unknown

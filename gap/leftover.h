@@ -12,7 +12,6 @@
 namespace vgyro::gap {
 
 /// `found` may lose effects.
-std::vector<Unexplained> leftovers(const Study& study, const Search& search,
-                                   std::vector<Found>& found);
+std::vector<Unexplained> leftovers(const Search& search, std::vector<Found>& found);
 
 }  // namespace vgyro::gap

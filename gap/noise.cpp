@@ -7,18 +7,61 @@
 
 #include <nlopt.hpp>
 
-#include "model/catalogue.h"
+#include "gap/kinds.h"
 
 namespace vgyro::gap {
 
 namespace {
 
-using model::Kind;
-
 // Below this a variance is rounding of the arithmetic, not noise: (1e-9 deg/s)².
 constexpr double kVarianceMin = 1e-18;
-// Times that a fitted correlated term must have room to forget.
+// Intervals shorter than this part of a term's memory: beyond, a difference of the exponential has
+// digits enough, here its series has.
+constexpr double kShortMemories = 1e-3;
+
+// Blocks whose white noise is about the same are one sum of squares: half octaves of the rate's
+// square above 1 (deg/s)², below which no rate noise shows, and twentieths of the gain.
+constexpr double kRateSquareMin = 1.0;
+constexpr double kClassesPerOctave = 2.0;
+constexpr double kClassesPerGain = 20.0;
+
+// The search is over logarithms, and begins inside its bounds by this margin, with steps of a
+// factor of two.
+constexpr double kBoundMargin = 0.05;
+constexpr double kFirstStep = 0.7;
+constexpr double kLogOf0 = 1e-300;
+// Of the white noise, where an evaluation costs nothing, and of the drift, where each filters the
+// whole recording: there the likelihood need not be known better than a fiftieth of a nat.
+constexpr int kFastEvaluations = 150;
+constexpr double kFastTolerance = 1e-3;
+constexpr int kSlowEvaluations = 60;  ///< for each unknown
+constexpr double kSlowTolerance = 2e-2;
+
+// Bounds of a fitted logarithm, about that of the density by which samples scatter within their
+// blocks; and where the search may begin, times that density. A walk's density is per √s of it.
+struct Range {
+  double down = 0.0;
+  double up = 0.0;
+  double start_low = 0.0;
+  double start_high = 0.0;
+};
+// White noise makes all of the scatter or, beside others, next to nothing of it.
+constexpr Range kWhiteRange{9.0, 2.0, 1e-3, 3.0};
+// Likewise rate noise at the highest rate, which is seldom: it may be three times the mean.
+constexpr Range kRatioRange{12.0, 2.0, 1e-3, 1.0};
+constexpr double kRatioMost = 3.0;
+// A walk shows over minutes far below the white noise of a sample.
+constexpr Range kWalkRange{12.0, 1.0, 1e-4, 1.0};
+// A correlated term may be far below it, and far above where the white noise is small.
+constexpr Range kSigmaRange{9.0, 6.0, 0.1, 0.1};
+// Below half a second blocks of a tenth cannot tell it from white noise.
+constexpr double kTauMin_s = 0.5;
+constexpr double kTauStart_s = 10.0;
+// A term whose memory is longer than this part of the recording is a bias or a walk: it would never
+// be seen to forget. Of a recording however short the bounds stay apart.
 constexpr double kMarkovSpans = 8.0;
+constexpr double kTauMaxLeast_s = 2.0;
+
 constexpr std::size_t kTermsMax = 1 + kMarkovMax;
 constexpr std::size_t kStatesMax = 2 * kTermsMax;
 
@@ -65,23 +108,23 @@ PairNoise noise_of(const std::vector<model::Effect>& effects) {
   for (const model::Effect& effect : effects) {
     NoiseTerms& terms = noise[effect.gyro];
     const double value = effect.parameters[0];
-    switch (effect.kind) {
-      case Kind::kWhiteNoise:
+    switch (row(effect.kind).random) {
+      case Random::kWhite:
         terms.white_dps_rthz = std::hypot(terms.white_dps_rthz, value);
         break;
-      case Kind::kRateNoise:
+      case Random::kRatio:
         terms.ratio_rthz = std::hypot(terms.ratio_rthz, value);
         break;
-      case Kind::kRateRandomWalk:
+      case Random::kWalk:
         terms.walk_dps_rts = std::hypot(terms.walk_dps_rts, value);
         break;
-      case Kind::kGaussMarkov:
+      case Random::kMarkov:
         terms.markov.push_back({value, effect.parameters[1]});
         break;
-      case Kind::kQuantization:
+      case Random::kRounding:
         terms.step_dps = std::hypot(terms.step_dps, value);
         break;
-      default:
+      case Random::kNone:
         break;
     }
   }
@@ -106,8 +149,8 @@ double drift_within(const NoiseTerms& terms, double seconds) {
   double variance = terms.walk_dps_rts * terms.walk_dps_rts * seconds / 6.0;
   for (const MarkovTerm& term : terms.markov) {
     const double x = seconds / term.tau_s;
-    const double of_mean =
-        x > 1e-3 ? 2.0 / (x * x) * (x - 1.0 + std::exp(-x)) : 1.0 - x / 3.0 + x * x / 12.0;
+    const double of_mean = x > kShortMemories ? 2.0 / (x * x) * (x - 1.0 + std::exp(-x))
+                                              : 1.0 - x / 3.0 + x * x / 12.0;
     variance += term.sigma_dps * term.sigma_dps * (1.0 - of_mean);
   }
   return variance;
@@ -151,67 +194,103 @@ Matrix block_means(const Matrix& columns, const Layout& layout) {
   return means;
 }
 
+namespace {
+
+// The Kalman filter of the drifts: one covariance, and a mean of the states for each column,
+// because all columns have the same noise.
+class DriftFilter {
+ public:
+  DriftFilter(const States& states, std::size_t columns)
+      : states_(states),
+        width_(columns),
+        x_(Matrix::Zero(static_cast<Eigen::Index>(states.count),
+                        static_cast<Eigen::Index>(columns))) {
+    for (std::size_t i = 0; i < states_.count; ++i)
+      p_[i][i] = states_.start_variance[i];
+  }
+
+  void predict(double step_s) {
+    const std::size_t n = states_.count;
+    for (std::size_t i = 0; i < n; ++i) {
+      if (states_.tau_s[i] == 0.0) {
+        p_[i][i] += states_.growth[i] * step_s;
+        continue;
+      }
+      const double decay = std::exp(-step_s / states_.tau_s[i]);
+      for (std::size_t j = 0; j < n; ++j) {
+        p_[i][j] *= decay;
+        p_[j][i] *= decay;
+      }
+      p_[i][i] += states_.stationary[i] * (1.0 - decay * decay);
+      x_.row(static_cast<Eigen::Index>(i)) *= decay;
+    }
+  }
+
+  // Observations of a channel, one for each column → innovations, in place; the states take them
+  // in. Returns the innovations' variance; `variance` is what the observation has beside the drift.
+  double take(Channel channel, double variance, double* observation) {
+    variance = std::max(expect(channel, variance, observation), kVarianceMin);
+    const std::size_t n = states_.count;
+    for (std::size_t i = 0; i < n; ++i) {
+      const double gain = ph_[i] / variance;
+      double* const state = x_.data() + i * width_;
+      for (std::size_t c = 0; c < width_; ++c)
+        state[c] += gain * observation[c];
+      for (std::size_t j = 0; j <= i; ++j) {
+        p_[i][j] -= gain * ph_[j];
+        p_[j][i] = p_[i][j];
+      }
+    }
+    return variance;
+  }
+
+ private:
+  // Takes the expected drift off; sets P·h. Returns the variance with that of the drift.
+  double expect(Channel channel, double variance, double* observation) {
+    const std::size_t n = states_.count;
+    for (std::size_t i = 0; i < n; ++i)
+      h_[i] = share_of(channel, states_.gyro[i]);
+    for (std::size_t i = 0; i < n; ++i) {
+      ph_[i] = 0.0;
+      for (std::size_t j = 0; j < n; ++j)
+        ph_[i] += p_[i][j] * h_[j];
+      variance += h_[i] * ph_[i];
+      if (h_[i] == 0.0) continue;
+      const double* const state = x_.data() + i * width_;
+      for (std::size_t c = 0; c < width_; ++c)
+        observation[c] -= h_[i] * state[c];
+    }
+    return variance;
+  }
+
+  const States& states_;
+  std::size_t width_;
+  std::array<std::array<double, kStatesMax>, kStatesMax> p_{};
+  Matrix x_;
+  std::array<double, kStatesMax> h_{};
+  std::array<double, kStatesMax> ph_{};
+};
+
+}  // namespace
+
 double whiten_means(Matrix& means, const Layout& layout, const PairNoise& noise, Part part) {
   const States states = states_of(noise, layout);
-  const std::size_t n = states.count;
-  std::array<std::array<double, kStatesMax>, kStatesMax> p{};
-  for (std::size_t i = 0; i < n; ++i)
-    p[i][i] = states.start_variance[i];
-  Matrix x = Matrix::Zero(static_cast<Eigen::Index>(n), means.cols());
   const auto width = static_cast<std::size_t>(means.cols());
-  std::array<double, kStatesMax> h{};
-  std::array<double, kStatesMax> ph{};
+  DriftFilter filter(states, width);
   double log_likelihood = 0.0;
   double last_s = 0.0;
   for (std::size_t b = 0; b < layout.blocks.size(); ++b) {
     const Block& block = layout.blocks[b];
-    const double step_s = std::max(0.0, block.t_s - last_s);
+    filter.predict(std::max(0.0, block.t_s - last_s));
     last_s = std::max(last_s, block.t_s);
-    for (std::size_t i = 0; i < n; ++i) {
-      if (states.tau_s[i] == 0.0) {
-        p[i][i] += states.growth[i] * step_s;
-        continue;
-      }
-      const double decay = std::exp(-step_s / states.tau_s[i]);
-      for (std::size_t j = 0; j < n; ++j) {
-        p[i][j] *= decay;
-        p[j][i] *= decay;
-      }
-      p[i][i] += states.stationary[i] * (1.0 - decay * decay);
-      x.row(static_cast<Eigen::Index>(i)) *= decay;
-    }
-    for (std::size_t i = 0; i < n; ++i)
-      h[i] = share_of(block.channel, states.gyro[i]);
     // A mean's increments are less than those of the drift at its middle, by as much as the drift
     // scatters within a block: then both variance and covariance of the means are right.
-    double s = mean_variance(block, noise, layout) -
-               drift_within(block.channel, noise, seconds_of(block, layout));
+    const double own_variance = mean_variance(block, noise, layout) -
+                                drift_within(block.channel, noise, seconds_of(block, layout));
     double* const innovation = means.data() + b * width;
-    for (std::size_t i = 0; i < n; ++i) {
-      ph[i] = 0.0;
-      for (std::size_t j = 0; j < n; ++j)
-        ph[i] += p[i][j] * h[j];
-      s += h[i] * ph[i];
-      if (h[i] == 0.0) continue;
-      const double* const state = x.data() + i * width;
-      for (std::size_t c = 0; c < width; ++c)
-        innovation[c] -= h[i] * state[c];
-    }
-    s = std::max(s, kVarianceMin);
-    for (std::size_t i = 0; i < n; ++i) {
-      const double gain = ph[i] / s;
-      double* const state = x.data() + i * width;
-      for (std::size_t c = 0; c < width; ++c)
-        state[c] += gain * innovation[c];
-      for (std::size_t j = 0; j <= i; ++j) {
-        p[i][j] -= gain * ph[j];
-        p[j][i] = p[i][j];
-      }
-    }
-    if (counts(block, part)) {
-      log_likelihood -= 0.5 * std::log(s);
-    }
-    const double scale = counts(block, part) ? 1.0 / std::sqrt(s) : 0.0;
+    const double variance = filter.take(block.channel, own_variance, innovation);
+    if (counts(block, part)) log_likelihood -= 0.5 * std::log(variance);
+    const double scale = counts(block, part) ? 1.0 / std::sqrt(variance) : 0.0;
     for (std::size_t c = 0; c < width; ++c)
       innovation[c] *= scale;
   }
@@ -242,8 +321,11 @@ std::vector<WithinBin> within_bins(const Eigen::VectorXd& residual, const Layout
     const auto values = residual.segment(block.first, block.count);
     const double squares = (values.array() - values.mean()).square().sum();
     const int rate_class =
-        block.rate_square < 1.0 ? 0 : 1 + static_cast<int>(2.0 * std::log2(block.rate_square));
-    const int gain_class = static_cast<int>(20.0 * (block.within_gain[0] + block.within_gain[1]));
+        block.rate_square < kRateSquareMin
+            ? 0
+            : 1 + static_cast<int>(kClassesPerOctave * std::log2(block.rate_square));
+    const int gain_class =
+        static_cast<int>(kClassesPerGain * (block.within_gain[0] + block.within_gain[1]));
     WithinBin& bin = bins[{static_cast<int>(block.channel), rate_class, gain_class}];
     const double freedom = static_cast<double>(block.count - 1);
     bin.channel = block.channel;
@@ -328,8 +410,8 @@ double maximise(PairNoise& noise, const std::vector<Unknown>& unknowns, int eval
   for (unsigned i = 0; i < count; ++i) {
     low[i] = unknowns[i].low;
     high[i] = unknowns[i].high;
-    x[i] = std::clamp(std::log(std::max(value_of(noise, unknowns[i]), 1e-300)), low[i] + 0.05,
-                      high[i] - 0.05);
+    x[i] = std::clamp(std::log(std::max(value_of(noise, unknowns[i]), kLogOf0)),
+                      low[i] + kBoundMargin, high[i] - kBoundMargin);
   }
   struct Context {
     PairNoise noise;
@@ -345,7 +427,7 @@ double maximise(PairNoise& noise, const std::vector<Unknown>& unknowns, int eval
   nlopt::opt search(nlopt::LN_SBPLX, count);
   search.set_lower_bounds(low);
   search.set_upper_bounds(high);
-  search.set_initial_step(0.7);
+  search.set_initial_step(kFirstStep);
   search.set_ftol_abs(tolerance);
   search.set_maxeval(evaluations);
   struct Call {
@@ -370,6 +452,57 @@ double maximise(PairNoise& noise, const std::vector<Unknown>& unknowns, int eval
   return log_likelihood_of(noise);
 }
 
+// What samples scatter by within the blocks that a gyro is in.
+struct Scatter {
+  double density_dps_rthz = 0.0;
+  double rate_square = 0.0;  // the highest of a bin, (deg/s)²
+};
+
+Scatter scatter_of(const std::vector<WithinBin>& bins, std::size_t gyro, double interval_s) {
+  double freedom = 0.0;
+  double squares = 0.0;
+  Scatter scatter;
+  for (const WithinBin& bin : bins) {
+    if (bin.gain[gyro] == 0.0) continue;
+    freedom += bin.freedom;
+    squares += bin.squares / (bin.gain[0] + bin.gain[1]);
+    scatter.rate_square = std::max(scatter.rate_square, bin.rate_square);
+  }
+  scatter.density_dps_rthz =
+      std::sqrt(std::max(squares / std::max(freedom, 1.0), kVarianceMin) * interval_s);
+  return scatter;
+}
+
+// Makes one term free: gives it a sane start, and bounds.
+void set_free(double& value, std::size_t gyro, Unknown::What what, double typical,
+              const Range& range, std::vector<Unknown>& unknowns) {
+  value = std::clamp(value, typical * range.start_low, typical * range.start_high);
+  unknowns.push_back({gyro, what, std::log(typical) - range.down, std::log(typical) + range.up});
+}
+
+void set_white_free(NoiseTerms& terms, std::size_t gyro, const Scatter& scatter,
+                    const Freedom& free, std::vector<Unknown>& unknowns) {
+  const double density = scatter.density_dps_rthz;
+  if (free.white)
+    set_free(terms.white_dps_rthz, gyro, Unknown::What::kWhite, density, kWhiteRange, unknowns);
+  if (free.ratio && scatter.rate_square > kRateSquareMin) {
+    const double most = kRatioMost * density / std::sqrt(scatter.rate_square);
+    set_free(terms.ratio_rthz, gyro, Unknown::What::kRatio, most, kRatioRange, unknowns);
+  }
+}
+
+void set_drift_free(NoiseTerms& terms, std::size_t gyro, double density, double seconds,
+                    const Freedom& free, std::vector<Unknown>& unknowns) {
+  if (free.walk)
+    set_free(terms.walk_dps_rts, gyro, Unknown::What::kWalk, density, kWalkRange, unknowns);
+  if (!free.markov) return;
+  terms.markov.push_back({0.0, kTauStart_s});
+  set_free(terms.markov.back().sigma_dps, gyro, Unknown::What::kSigma, density, kSigmaRange,
+           unknowns);
+  unknowns.push_back({gyro, Unknown::What::kTau, std::log(kTauMin_s),
+                      std::log(std::max(kTauMaxLeast_s, seconds / kMarkovSpans))});
+}
+
 }  // namespace
 
 NoiseFitResult fit_pair_noise(const Eigen::VectorXd& residual, const Layout& layout,
@@ -377,66 +510,31 @@ NoiseFitResult fit_pair_noise(const Eigen::VectorXd& residual, const Layout& lay
                               const std::array<bool, 2>& used, Part part) {
   NoiseFitResult result{start, 0.0};
   const std::vector<WithinBin> bins = within_bins(residual, layout, part);
+  const double seconds = layout.blocks.empty() ? 1.0 : layout.blocks.back().t_s;
   std::vector<Unknown> fast;
   std::vector<Unknown> slow;
   for (std::size_t gyro = 0; gyro < 2; ++gyro) {
     if (!used[gyro]) continue;
-    // The search needs a sane start: what the samples scatter within their blocks.
-    double freedom = 0.0;
-    double squares = 0.0;
-    double rate_square = 0.0;
-    for (const WithinBin& bin : bins) {
-      if (bin.gain[gyro] == 0.0) continue;
-      freedom += bin.freedom;
-      squares += bin.squares / (bin.gain[0] + bin.gain[1]);
-      rate_square = std::max(rate_square, bin.rate_square);
-    }
-    const double density = std::sqrt(std::max(squares / std::max(freedom, 1.0), kVarianceMin) *
-                                     layout.interval_s[gyro]);
+    const Scatter scatter = scatter_of(bins, gyro, layout.interval_s[gyro]);
     NoiseTerms& terms = result.noise[gyro];
-    if (free[gyro].white) {
-      terms.white_dps_rthz = std::clamp(terms.white_dps_rthz, density * 1e-3, density * 3.0);
-      fast.push_back(
-          {gyro, Unknown::What::kWhite, std::log(density) - 9.0, std::log(density) + 2.0});
-    }
-    if (free[gyro].ratio && rate_square > 1.0) {
-      const double most = 3.0 * density / std::sqrt(rate_square);
-      terms.ratio_rthz = std::clamp(terms.ratio_rthz, most * 1e-3, most);
-      fast.push_back({gyro, Unknown::What::kRatio, std::log(most) - 12.0, std::log(most) + 2.0});
-    }
-    if (free[gyro].walk) {
-      terms.walk_dps_rts = std::clamp(terms.walk_dps_rts, density * 1e-4, density);
-      slow.push_back(
-          {gyro, Unknown::What::kWalk, std::log(density) - 12.0, std::log(density) + 1.0});
-    }
-    if (free[gyro].markov) {
-      terms.markov.push_back({density * 0.1, 10.0});
-      slow.push_back(
-          {gyro, Unknown::What::kSigma, std::log(density) - 9.0, std::log(density) + 6.0});
-      // A term whose memory is longer than this is a bias or a walk: it would never be seen to
-      // forget.
-      const double seconds = layout.blocks.empty() ? 1.0 : layout.blocks.back().t_s;
-      slow.push_back({gyro, Unknown::What::kTau, std::log(0.5),
-                      std::log(std::max(2.0, seconds / kMarkovSpans))});
-    }
+    set_white_free(terms, gyro, scatter, free[gyro], fast);
+    set_drift_free(terms, gyro, scatter.density_dps_rthz, seconds, free[gyro], slow);
   }
+  const Eigen::VectorXd means = block_means(residual, layout).col(0);
   const auto within = [&](const PairNoise& noise) {
     return within_log_likelihood(bins, noise, layout);
   };
-  maximise(result.noise, fast, 150, 1e-3, within);
-  const Eigen::VectorXd means = block_means(residual, layout).col(0);
   const auto both = [&](const PairNoise& noise) {
-    return within_log_likelihood(bins, noise, layout) +
-           means_log_likelihood(means, layout, noise, part);
+    return within(noise) + means_log_likelihood(means, layout, noise, part);
   };
-  result.log_likelihood =
-      maximise(result.noise, slow, 60 * static_cast<int>(slow.size()), 2e-2, both);
+  const auto fit_once = [&] {
+    maximise(result.noise, fast, kFastEvaluations, kFastTolerance, within);
+    const int evaluations = kSlowEvaluations * static_cast<int>(slow.size());
+    result.log_likelihood = maximise(result.noise, slow, evaluations, kSlowTolerance, both);
+  };
+  fit_once();
   // A correlated term of short memory shares its variance with the white noise.
-  if ((free[0].markov || free[1].markov) && !fast.empty()) {
-    maximise(result.noise, fast, 150, 1e-3, within);
-    result.log_likelihood =
-        maximise(result.noise, slow, 60 * static_cast<int>(slow.size()), 2e-2, both);
-  }
+  if ((free[0].markov || free[1].markov) && !fast.empty()) fit_once();
   return result;
 }
 

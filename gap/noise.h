@@ -38,7 +38,10 @@ struct NoiseTerms {
   }
 };
 using PairNoise = std::array<NoiseTerms, 2>;
-inline constexpr std::size_t kMarkovMax = 4;
+/// What a model file and the corrector can hold of them; no more are named.
+inline constexpr std::size_t kMarkovNamedMax = model::kGaussMarkovMax;
+/// A fit allows one more, which no effect may pass for.
+inline constexpr std::size_t kMarkovMax = kMarkovNamedMax + 1;
 
 /// What a model's effects of nature kNoise say, densities adding in squares.
 PairNoise noise_of(const std::vector<model::Effect>& effects);

@@ -20,11 +20,10 @@ enum class Verdict : std::uint8_t { kNoGap, kExplained, kPartlyExplained, kUnexp
 std::string_view verdict_name(Verdict verdict);
 
 /// Negative log-likelihood per sample of the held-out samples, less what simulations of the final
-/// model score there.
+/// model score there: the floor, which is 0.
 struct Gap {
   double before = 0.0;
   double after = 0.0;
-  double floor = 0.0;
   std::array<double, 2> band95{};  ///< of simulations of the final model
 };
 

@@ -11,12 +11,7 @@ namespace {
 using model::Effect;
 using model::Kind;
 
-// A sample that a model calls impossible costs no more than this: the gap stays readable.
-constexpr double kNatsMax = 50.0;
 constexpr int kSimulations = 400;
-constexpr double kStampResolution_s = 3e-6;
-// A model without lost frames says that one in a million is lost.
-constexpr double kLostFloor = 1e-6;
 
 bool knows(const std::vector<Effect>& effects, std::size_t gyro, Kind kind) {
   return std::any_of(effects.begin(), effects.end(), [&](const Effect& effect) {
@@ -29,10 +24,10 @@ bool knows(const std::vector<Effect>& effects, std::size_t gyro, Kind kind) {
 Likelihood observed(const Study& study, const std::vector<Effect>& effects, Part part) {
   Likelihood sum;
   const PairNoise noise = noise_of(effects);
-  for (const Problem& problem : study.problems()) {
-    const Eigen::VectorXd residual = study.residual(problem, effects);
-    sum.nats -= log_likelihood(residual, problem.layout, noise, part);
-    for (const Block& block : problem.layout.blocks) {
+  for (const auto& data : study.observations()) {
+    const Eigen::VectorXd residual = data->residual(effects);
+    sum.nats -= log_likelihood(residual, data->layout, noise, part);
+    for (const Block& block : data->layout.blocks) {
       if (counts(block, part)) sum.samples += block.count;
     }
   }
@@ -43,40 +38,8 @@ double transport_nats(const Study& study, const std::vector<Effect>& effects, Pa
   double nats = 0.0;
   const double share = part == Part::kAll ? 1.0 : part == Part::kHeldOut ? 0.25 : 0.75;
   for (const Finding& finding : study.findings()) {
-    const std::size_t gyro = finding.effect.gyro;
-    if (knows(effects, gyro, finding.effect.kind)) continue;
-    const Transport& transport = study.transport(gyro);
-    const double frames = static_cast<double>(transport.t_s.size());
-    double cost = 0.0;
-    switch (finding.effect.kind) {
-      case Kind::kDroppedFrames:
-        cost = frames * transport.lost_share * std::log(1.0 / kLostFloor);
-        break;
-      case Kind::kTimestampJitter:
-        for (const double late_s : transport.late_s) {
-          const double z = late_s / kStampResolution_s;
-          cost += std::min(kNatsMax, 0.5 * z * z);
-        }
-        break;
-      case Kind::kQuantization:
-        // White noise of step²/12 is in the samples already; what a lattice saves is its own.
-        break;
-      case Kind::kSpikes:
-        cost = finding.effect.parameters[0] * study.recording().seconds * kNatsMax;
-        break;
-      case Kind::kStuck:
-        cost = (finding.effect.parameters[1] - finding.effect.parameters[0]) /
-               transport.interval_s * 0.2 * kNatsMax;
-        break;
-      default: {
-        double masked = 0.0;
-        for (const std::uint8_t mask : transport.masked)
-          masked += mask;
-        cost = masked * 0.5 * kNatsMax;
-        break;
-      }
-    }
-    nats += share * cost;
+    if (knows(effects, finding.effect.gyro, finding.effect.kind)) continue;
+    nats += share * finding.cost_nats;
   }
   return nats;
 }
@@ -86,11 +49,11 @@ Floor simulate_floor(const Study& study, const std::vector<Effect>& effects, Par
   const PairNoise noise = noise_of(effects);
   double nats = 0.0;
   double samples = 0.0;
-  for (const Problem& problem : study.problems()) {
+  for (const auto& data : study.observations()) {
     // Of a residual of zeros only the determinants are left.
-    const Eigen::VectorXd nothing = Eigen::VectorXd::Zero(problem.size());
-    nats -= log_likelihood(nothing, problem.layout, noise, part);
-    for (const Block& block : problem.layout.blocks) {
+    const Eigen::VectorXd nothing = Eigen::VectorXd::Zero(data->size());
+    nats -= log_likelihood(nothing, data->layout, noise, part);
+    for (const Block& block : data->layout.blocks) {
       if (counts(block, part)) samples += block.count;
     }
   }

@@ -4,20 +4,15 @@
 #include <array>
 #include <cmath>
 #include <numbers>
-#include <ranges>
 
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 
 #include "gap/median.h"
-#include "model/catalogue.h"
 
 namespace vgyro::gap {
 
 namespace {
-
-using model::Kind;
-using model::Nature;
 
 constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr std::array kTemperatureReach_s{1.0, 2.0, 4.0, 8.0};
@@ -104,8 +99,9 @@ Parabola fit_parabola(std::span<const double> t_s, std::span<const double> y, do
 // Of the parabolas about an instant the widest that scatters no more than sensor and frame do.
 Parabola widest_parabola(std::span<const double> t_s, std::span<const double> y, double at_s,
                          double scatter_most) {
-  for (const double reach_s : std::ranges::reverse_view(kTemperatureReach_s)) {
-    const Parabola parabola = fit_parabola(t_s, y, at_s, reach_s);
+  for (auto reach_s = kTemperatureReach_s.rbegin(); reach_s != kTemperatureReach_s.rend();
+       ++reach_s) {
+    const Parabola parabola = fit_parabola(t_s, y, at_s, *reach_s);
     if (parabola.scatter <= scatter_most) return parabola;
   }
   return fit_parabola(t_s, y, at_s, kTemperatureReach_s.front());
@@ -222,40 +218,27 @@ void set_acceleration(const AccelerationSeries& acceleration, Signals& signals) 
 }
 
 Prediction::Prediction(std::span<const model::Effect> effects, const Signals& signals)
-    : signals_(signals) {
-  for (const model::Effect& effect : effects) {
-    switch (effect.kind) {
-      case Kind::kDelay:
-        lag_s_ += effect.parameters[0];
-        continue;
-      case Kind::kClockSkew:
-        skew_ += effect.parameters[0] * 1e-6;
-        continue;
-      case Kind::kBandwidth:
-        low_passed_.push_back(low_passed_.empty()
-                                  ? signals.motion.low_passed(effect.parameters[0])
-                                  : low_pass(low_passed_.back(), quarters_of(low_passed_.back()),
-                                             effect.parameters[0]));
-        continue;
-      default:
-        break;
-    }
-    const Nature nature = model::info(effect.kind).nature;
-    if (nature == Nature::kOffset || nature == Nature::kResponse) added_.push_back(effect);
+    : equation_(effects), signals_(signals) {
+  for (const double cutoff_hz : equation_.cutoffs_hz()) {
+    low_passed_.push_back(
+        low_passed_.empty()
+            ? signals.motion.low_passed(cutoff_hz)
+            : low_pass(low_passed_.back(), quarters_of(low_passed_.back()), cutoff_hz));
   }
 }
 
+double Prediction::late_dps(double t_s) const {
+  const auto low_passed = [&](double felt_at_s) {
+    return low_passed_.empty() ? signals_.motion.rate(felt_at_s).value
+                               : low_passed_.back().at(felt_at_s).value;
+  };
+  return equation_.late_rate_dps(low_passed, equation_.true_time_s(t_s));
+}
+
 double Prediction::at(double t_s) const {
-  const double true_s = t_s / (1.0 + skew_);
-  const double lagged_s = true_s - lag_s_;
-  const double late_dps = low_passed_.empty() ? signals_.motion.rate(lagged_s).value
-                                              : low_passed_.back().at(lagged_s).value;
-  if (added_.empty()) return late_dps;
-  const model::Surroundings s = signals_.at(true_s);
-  double reading_dps = late_dps;
-  for (const model::Effect& effect : added_)
-    reading_dps += model::added_dps(effect, late_dps, s);
-  return reading_dps;
+  const double late_dps = this->late_dps(t_s);
+  if (!equation_.adds()) return late_dps;
+  return equation_.reading_dps(late_dps, signals_.at(equation_.true_time_s(t_s)));
 }
 
 }  // namespace vgyro::gap

@@ -11,6 +11,7 @@
 #include "gap/curve.h"
 #include "gap/recording.h"
 #include "model/effect.h"
+#include "model/equation.h"
 
 namespace vgyro::gap {
 
@@ -46,20 +47,21 @@ struct Signals {
 void smooth_temperature(const GyroSeries& gyro, Signals& signals);
 void set_acceleration(const AccelerationSeries& acceleration, Signals& signals);
 
-/// What one gyro's effects say it reads at `t_s`, deterministic kinds only, before clipping, in
-/// deg/s. Responses are to the rate behind delay and low-passes; offsets are of the instant itself.
+/// What one gyro's effects say it reads, by model::Equation along a motion: deterministic kinds
+/// only, before clipping, in deg/s.
 class Prediction {
  public:
   /// `effects` of this gyro. The signals must live as long.
   Prediction(std::span<const model::Effect> effects, const Signals& signals);
+  /// Ω' of what is stamped `t_s`.
+  [[nodiscard]] double late_dps(double t_s) const;
+  /// The reading that is stamped `t_s`.
   [[nodiscard]] double at(double t_s) const;
 
  private:
-  std::vector<model::Effect> added_;
+  model::Equation equation_;
   const Signals& signals_;
   std::vector<SampledCurve> low_passed_;  ///< one after the other
-  double lag_s_ = 0.0;
-  double skew_ = 0.0;
 };
 
 }  // namespace vgyro::gap

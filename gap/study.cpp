@@ -2,22 +2,32 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
+#include <optional>
 
 #include <fmt/core.h>
 
-#include "gap/median.h"
+#include "gap/rest.h"
+#include "gap/spikes.h"
 #include "gap/wiener.h"
-#include "model/catalogue.h"
 
 namespace vgyro::gap {
+
+// What no motion changes.
+struct Study::Facts {
+  explicit Facts(const Recording& from) : recording(from) {}
+
+  const Recording& recording;
+  std::array<Transport, 2> transports;
+  std::array<SampledCurve, 2> readings;  ///< samples that are not masked
+  RestingSeconds rest;
+  std::vector<Finding> findings;
+  std::vector<std::string> notes;
+};
 
 namespace {
 
 using model::Effect;
-using model::Kind;
 
-constexpr std::size_t kRemembered = 24;
 constexpr double kRecordingMin_s = 30.0;
 constexpr std::size_t kSamplesMin = 500;
 constexpr double kReferenceShareMin = 0.95;
@@ -26,28 +36,18 @@ constexpr double kReferenceShareMin = 0.95;
 constexpr double kSpanPerSecond = 10.0;
 constexpr double kPauseMost_s = 3600.0;
 constexpr double kRestMin_s = 10.0;
-/// Share of samples that repeat the last one.
+// Share of samples that repeat the last one.
 constexpr double kCoarseRepeats = 0.2;
-constexpr double kRestNear_dps = 2.0;
+// Late readings converge by half their phase a round.
 constexpr int kMotionRounds = 16;
 constexpr double kMotionSame_dps = 2e-6;
-constexpr double kHeldOutCell_s = 1.0;
-constexpr unsigned kHeldOutOneIn = 4;
-constexpr double kSpikeSigmas = 6.5;
-constexpr std::size_t kSpikesMin = 3;
-constexpr double kRestBelow_dps = 0.15;
-constexpr double kRestSteady = 3.0;
+// Of samples a curve may lack before what lies between is not known: a reference is smooth, a gyro
+// is not.
+constexpr double kReferenceHole = 3.0;
+constexpr double kGyroHole = 1.5;
 
-// A quarter of the seconds, scattered without a pattern that motion could have.
-bool held_out(double t_s) {
-  auto x = static_cast<std::uint64_t>(std::max(0.0, t_s / kHeldOutCell_s)) + 0x9e3779b97f4a7c15ULL;
-  x = (x ^ (x >> 30U)) * 0xbf58476d1ce4e5b9ULL;
-  x = (x ^ (x >> 27U)) * 0x94d049bb133111ebULL;
-  return ((x ^ (x >> 31U)) % kHeldOutOneIn) == 0;
-}
-
-std::vector<Effect> of_gyro(const std::vector<Effect>& effects, std::size_t gyro) {
-  std::vector<Effect> mine;
+Effects of_gyro(const Effects& effects, std::size_t gyro) {
+  Effects mine;
   for (const Effect& effect : effects) {
     if (effect.gyro == gyro) mine.push_back(effect);
   }
@@ -75,100 +75,6 @@ double noise_variance(const ScalarSeries& series) {
   return seconds[seconds.size() / 4];
 }
 
-struct Sample {
-  double t_s;
-  Channel channel;
-  double observed_dps;
-  double rate_dps;
-};
-
-// Where samples of another curve stand in what was observed: gyro 2's in a difference, the
-// reference's everywhere.
-struct Interpolated {
-  const SampledCurve* curve = nullptr;
-  std::size_t slot = 0;  ///< of the gains
-};
-
-// Of the samples' own noise, and of what is interpolated at their instants.
-void set_gains(Block& block, std::span<const double> t_s, const Interpolated& other) {
-  const double count = block.count;
-  for (std::size_t gyro = 0; gyro < 2; ++gyro) {
-    const bool interpolated = other.slot == gyro && block.channel == Channel::kDifference;
-    if (share_of(block.channel, gyro) == 0.0 || interpolated) continue;
-    block.within_gain[gyro] = 1.0;
-    block.mean_gain[gyro] = 1.0 / count;
-  }
-  if (other.curve == nullptr || (other.slot < 2 && block.channel != Channel::kDifference)) return;
-  std::vector<double> sums;  // of each of its samples' weights
-  std::size_t first = 0;
-  double squares = 0.0;
-  for (const double at_s : t_s) {
-    const SampledCurve::Weights weights = other.curve->weights_at(at_s);
-    if (sums.empty()) first = weights.first;
-    if (weights.first < first) continue;  // times within a block increase
-    sums.resize(std::max(sums.size(), weights.first - first + weights.value.size()), 0.0);
-    for (std::size_t i = 0; i < weights.value.size(); ++i) {
-      sums[weights.first - first + i] += weights.value[i];
-      squares += weights.value[i] * weights.value[i];
-    }
-  }
-  double of_mean = 0.0;
-  for (const double sum : sums)
-    of_mean += sum / count * sum / count;
-  block.mean_gain[other.slot] = of_mean;
-  if (block.count > 1) {
-    block.within_gain[other.slot] =
-        std::max(0.0, squares - count * of_mean) / static_cast<double>(block.count - 1);
-  }
-}
-
-// Samples of any order → blocks, in which a sample's place is its place in the columns.
-Problem assemble(std::vector<Sample> samples, std::array<double, 2> interval_s,
-                 const Interpolated& other) {
-  Problem problem;
-  problem.layout.interval_s = interval_s;
-  const double block_s = std::max(kBlock_s, 5.0 * std::max(interval_s[0], interval_s[1]));
-  std::stable_sort(samples.begin(), samples.end(), [&](const Sample& a, const Sample& b) {
-    const double cell_a = std::floor(a.t_s / block_s);
-    const double cell_b = std::floor(b.t_s / block_s);
-    if (cell_a != cell_b) return cell_a < cell_b;
-    if (a.channel != b.channel) return a.channel < b.channel;
-    return a.t_s < b.t_s;
-  });
-  const std::size_t n = samples.size();
-  problem.t_s.resize(n);
-  problem.channel.resize(n);
-  problem.observed_dps.resize(static_cast<Eigen::Index>(n));
-  problem.layout.samples = n;
-  double cell = -1.0;
-  for (std::size_t i = 0; i < n; ++i) {
-    const Sample& sample = samples[i];
-    problem.t_s[i] = sample.t_s;
-    problem.channel[i] = sample.channel;
-    problem.observed_dps[static_cast<Eigen::Index>(i)] = sample.observed_dps;
-    const double its_cell = std::floor(sample.t_s / block_s);
-    std::vector<Block>& blocks = problem.layout.blocks;
-    if (blocks.empty() || its_cell != cell || blocks.back().channel != sample.channel) {
-      cell = its_cell;
-      Block block;
-      block.channel = sample.channel;
-      block.first = static_cast<std::uint32_t>(i);
-      block.held_out = held_out((its_cell + 0.5) * block_s);
-      blocks.push_back(block);
-    }
-    Block& block = blocks.back();
-    ++block.count;
-    block.t_s += sample.t_s;
-    block.rate_square += sample.rate_dps * sample.rate_dps;
-  }
-  for (Block& block : problem.layout.blocks) {
-    block.t_s /= block.count;
-    block.rate_square /= block.count;
-    set_gains(block, std::span(problem.t_s).subspan(block.first, block.count), other);
-  }
-  return problem;
-}
-
 std::string span_text(const GyroSeries& gyro) {
   return fmt::format("{} from {:.1f} to {:.1f} s", gyro.name, gyro.t_s.front(), gyro.t_s.back());
 }
@@ -185,10 +91,8 @@ double seconds_filled(const std::vector<double>& t_s) {
   return filled;
 }
 
-}  // namespace
-
-Expected<void> Study::check_spans() const {
-  const auto& [a, b] = recording_.gyros;
+Expected<void> check_spans(const Recording& recording) {
+  const auto& [a, b] = recording.gyros;
   const double common_s =
       std::min(a.t_s.back(), b.t_s.back()) - std::max(a.t_s.front(), b.t_s.front());
   if (common_s < kRecordingMin_s) {
@@ -199,30 +103,30 @@ Expected<void> Study::check_spans() const {
         fmt::format("at least {:.0f} s of both, with the stamps of one clock", kRecordingMin_s));
   }
   const double filled_s = std::max(seconds_filled(a.t_s), seconds_filled(b.t_s));
-  if (recording_.seconds <= kSpanPerSecond * filled_s + kPauseMost_s) return {};
+  if (recording.seconds <= kSpanPerSecond * filled_s + kPauseMost_s) return {};
   return fail(
       "",
       fmt::format("from the first frame to the last it is {:.0f} s, and the gyros are there "
                   "in {:.0f} s of them: {}, {}",
-                  recording_.seconds, filled_s, span_text(a), span_text(b)),
+                  recording.seconds, filled_s, span_text(a), span_text(b)),
       "cut the recording at its pauses, or where the clock was set, and judge the parts");
 }
 
-Expected<void> Study::check() const {
-  for (const GyroSeries& gyro : recording_.gyros) {
-    if (gyro.t_s.size() < kSamplesMin || recording_.seconds < kRecordingMin_s) {
+Expected<void> check(const Recording& recording) {
+  for (const GyroSeries& gyro : recording.gyros) {
+    if (gyro.t_s.size() < kSamplesMin || recording.seconds < kRecordingMin_s) {
       return fail(
           "",
-          fmt::format("the recording is too short: {:.1f} s, {} samples of {}", recording_.seconds,
+          fmt::format("the recording is too short: {:.1f} s, {} samples of {}", recording.seconds,
                       gyro.t_s.size(), gyro.name),
           fmt::format("at least {:.0f} s and {} samples of each gyro; ten minutes with rest "
                       "and motion tell much more",
                       kRecordingMin_s, kSamplesMin));
     }
   }
-  if (auto good = check_spans(); !good) return good;
-  if (!recording_.has_reference) return {};
-  const std::vector<double>& t_s = recording_.reference_dps.t_s;
+  if (auto good = check_spans(recording); !good) return good;
+  if (!recording.has_reference) return {};
+  const std::vector<double>& t_s = recording.reference_dps.t_s;
   if (t_s.size() < kSamplesMin) {
     return fail("",
                 fmt::format("the configuration names a reference, but the recording holds {} of "
@@ -230,473 +134,240 @@ Expected<void> Study::check() const {
                             t_s.size()),
                 "record it too, or remove [reference] from the configuration");
   }
-  if (t_s.back() - t_s.front() < kReferenceShareMin * recording_.seconds) {
+  if (t_s.back() - t_s.front() < kReferenceShareMin * recording.seconds) {
     return fail("",
                 fmt::format("the reference is there from {:.1f} to {:.1f} s only, the recording "
                             "lasts {:.1f} s",
-                            t_s.front(), t_s.back(), recording_.seconds),
+                            t_s.front(), t_s.back(), recording.seconds),
                 "cut the recording to that part, or remove [reference] from the configuration");
   }
   return {};
 }
 
-Expected<std::unique_ptr<Study>> Study::begin(const Recording& recording,
-                                              const std::vector<Effect>& effects) {
-  std::unique_ptr<Study> study(new Study(recording));
-  if (auto good = study->check(); !good) return tl::unexpected(good.error());
-  for (std::size_t gyro = 0; gyro < 2; ++gyro) {
-    const GyroSeries& series = recording.gyros[gyro];
-    Transport transport = check_transport(series, gyro, of_gyro(effects, gyro));
-    study->findings_.insert(study->findings_.end(), transport.findings.begin(),
-                            transport.findings.end());
-    study->notes_.insert(study->notes_.end(), transport.notes.begin(), transport.notes.end());
-    study->transports_[gyro] = std::move(transport);
-    smooth_temperature(series, study->signals_[gyro]);
-    set_acceleration(recording.acceleration, study->signals_[gyro]);
+SampledCurve unmasked(const GyroSeries& series, const Transport& transport) {
+  std::vector<double> t_s;
+  std::vector<double> rate_dps;
+  for (std::size_t i = 0; i < series.t_s.size(); ++i) {
+    if (transport.masked[i] != 0) continue;
+    t_s.push_back(transport.t_s[i]);
+    rate_dps.push_back(series.rate_dps[i]);
   }
-  study->find_spikes(effects);
-  for (std::size_t gyro = 0; gyro < 2; ++gyro) {
-    const GyroSeries& series = recording.gyros[gyro];
-    const Transport& transport = study->transports_[gyro];
-    std::vector<double> t_s;
-    std::vector<double> rate;
-    for (std::size_t i = 0; i < series.t_s.size(); ++i) {
-      if (transport.masked[i] != 0) continue;
-      t_s.push_back(transport.t_s[i]);
-      rate.push_back(series.rate_dps[i]);
-    }
-    if (t_s.size() < kSamplesMin) {
-      return fail("",
-                  fmt::format("{} samples of {} are left when what is stuck, clipped or in a dead "
-                              "band is set aside",
-                              t_s.size(), series.name),
-                  "record with a sensor that moves");
-    }
-    study->readings_[gyro] = SampledCurve(t_s, rate);
-  }
-  if (recording.has_reference) {
-    const SampledCurve rate(recording.reference_dps.t_s, recording.reference_dps.value);
-    for (Signals& signals : study->signals_)
-      signals.motion = Motion(rate);
-    study->build();
-  } else {
-    study->find_rest();
-    if (study->rest_s_ < kRestMin_s) {
-      return fail("", "the recording holds no rest, and there is no reference",
-                  "without either nothing tells which gyro is wrong: record a minute at rest, or "
-                  "name a [reference]");
-    }
-    study->learn_motion(effects);
-  }
-  return study;
+  return {t_s, rate_dps};
+}
+
+// Weights of the two readings in their mean: by their white noise, where it is known.
+std::array<double, 2> weights(const PairNoise& noise) {
+  const double a = noise[0].white_dps_rthz;
+  const double b = noise[1].white_dps_rthz;
+  if (a <= 0.0 || b <= 0.0) return {0.5, 0.5};
+  const double first = 1.0 / (a * a);
+  const double second = 1.0 / (b * b);
+  return {first / (first + second), second / (first + second)};
+}
+
+double greatest_change(const std::vector<double>& a, const std::vector<double>& b) {
+  double change = 0.0;
+  for (std::size_t i = 0; i < a.size(); ++i)
+    change = std::max(change, std::abs(a[i] - b[i]));
+  return change;
+}
+
+Channel channel_of(std::size_t gyro) {
+  return gyro == 0 ? Channel::kGyro1 : Channel::kGyro2;
+}
+
+}  // namespace
+
+const Recording& Study::recording() const {
+  return facts_->recording;
+}
+const Transport& Study::transport(std::size_t gyro) const {
+  return facts_->transports[gyro];
+}
+const std::vector<Finding>& Study::findings() const {
+  return facts_->findings;
+}
+const std::vector<std::string>& Study::notes() const {
+  return facts_->notes;
 }
 
 bool Study::is_coarse(std::size_t gyro) const {
-  return transports_[gyro].lattice_dps > 0.0 && transports_[gyro].repeats > kCoarseRepeats;
+  const Transport& its = transport(gyro);
+  return its.lattice_dps > 0.0 && its.repeats > kCoarseRepeats;
 }
 
-void Study::use_for_fit(double from_s, double to_s) {
-  for_fit_s_.push_back({from_s, to_s});
-  for (Problem& problem : problems_)
-    set_aside(problem);
+std::size_t Study::place_of(std::size_t gyro) const {
+  return observations_.size() == 2 ? gyro : 0;
 }
 
-void Study::set_aside(Problem& problem) const {
-  for (Block& block : problem.layout.blocks) {
-    const auto holds = [&](const std::array<double, 2>& span) {
-      return block.t_s >= span[0] && block.t_s <= span[1];
-    };
-    if (std::any_of(for_fit_s_.begin(), for_fit_s_.end(), holds)) block.held_out = false;
-  }
-}
-
-std::size_t Study::problem_of(std::size_t gyro) const {
-  return problems_.size() == 2 ? gyro : 0;
-}
-
-// One sample that stands out from its four neighbours, seen against the reference or the other
-// gyro.
-void Study::find_spikes(const std::vector<Effect>& effects) {
-  std::array<std::vector<double>, 2> out;
-  std::array<std::vector<double>, 2> scale;
+Expected<std::shared_ptr<const Study>> Study::begin(const Recording& recording,
+                                                    const Effects& effects) {
+  if (auto good = check(recording); !good) return tl::unexpected(good.error());
+  auto facts = std::make_shared<Facts>(recording);
+  const std::shared_ptr<Study> study(new Study);
   for (std::size_t gyro = 0; gyro < 2; ++gyro) {
-    const GyroSeries& series = recording_.gyros[gyro];
-    const std::vector<double>& t_s = transports_[gyro].t_s;
-    const std::size_t n = series.t_s.size();
-    const SampledCurve truth =
-        recording_.has_reference
-            ? SampledCurve(recording_.reference_dps.t_s, recording_.reference_dps.value)
-            : SampledCurve(transports_[1 - gyro].t_s, recording_.gyros[1 - gyro].rate_dps);
-    const auto covered = [&](double at_s) { return at_s > truth.from_s() && at_s < truth.to_s(); };
-    std::vector<double> error(n);
-    for (std::size_t i = 0; i < n; ++i)
-      error[i] = series.rate_dps[i] - truth.at(t_s[i]).value;
-    out[gyro].assign(n, 0.0);
-    scale[gyro].assign(n, 0.0);
-    const std::vector<std::uint8_t>& masked = transports_[gyro].masked;
-    for (std::size_t i = 2; i + 2 < n; ++i) {
-      if (masked[i - 2] + masked[i - 1] + masked[i] + masked[i + 1] + masked[i + 2] > 0) continue;
-      if (!covered(t_s[i - 2]) || !covered(t_s[i + 2])) continue;
-      std::array<double, 4> near{error[i - 2], error[i - 1], error[i + 1], error[i + 2]};
-      std::sort(near.begin(), near.end());
-      out[gyro][i] = error[i] - 0.5 * (near[1] + near[2]);
-    }
-    const std::size_t reach =
-        static_cast<std::size_t>(std::clamp(0.75 / transports_[gyro].interval_s, 20.0, 1000.0));
-    // Scatter of each short stretch; a sample is judged by the widest of three, because noise may
-    // rise with the rate.
-    std::vector<double> sigmas;
-    std::vector<double> window;
-    for (std::size_t from = 0; from < n; from += reach) {
-      window.clear();
-      for (std::size_t i = from; i < std::min(n, from + reach); ++i) {
-        if (out[gyro][i] != 0.0) window.push_back(std::abs(out[gyro][i]));
-      }
-      sigmas.push_back(window.size() < 10 ? 0.0 : 1.4826 * median_of(window));
-    }
-    for (std::size_t i = 0; i < n; ++i) {
-      const std::size_t cell = i / reach;
-      double widest = sigmas[cell];
-      if (cell > 0) widest = std::max(widest, sigmas[cell - 1]);
-      if (cell + 1 < sigmas.size()) widest = std::max(widest, sigmas[cell + 1]);
-      // Nowhere near enough good neighbours: nothing stands out.
-      scale[gyro][i] = sigmas[cell] > 0.0 ? widest : 0.0;
-    }
+    const GyroSeries& series = recording.gyros[gyro];
+    facts->transports[gyro] = check_transport(series, gyro, of_gyro(effects, gyro));
+    auto signals = std::make_shared<Signals>();
+    smooth_temperature(series, *signals);
+    set_acceleration(recording.acceleration, *signals);
+    if (recording.has_reference)
+      signals->motion =
+          Motion(SampledCurve(recording.reference_dps.t_s, recording.reference_dps.value));
+    study->signals_[gyro] = std::move(signals);
   }
+  // What a finding costs is known when the spikes are masked too.
+  const std::vector<Finding> spikes = find_spikes(recording, facts->transports, effects);
+  for (const Transport& transport : facts->transports) {
+    facts->findings.insert(facts->findings.end(), transport.findings.begin(),
+                           transport.findings.end());
+    facts->notes.insert(facts->notes.end(), transport.notes.begin(), transport.notes.end());
+  }
+  facts->findings.insert(facts->findings.end(), spikes.begin(), spikes.end());
   for (std::size_t gyro = 0; gyro < 2; ++gyro) {
-    const GyroSeries& series = recording_.gyros[gyro];
-    Transport& transport = transports_[gyro];
-    std::vector<double> sizes;
-    Curve marks{"deviation from the neighbours", {}, {}, {}, true};
-    double last_s = -1.0;
-    for (std::size_t i = 2; i + 2 < series.t_s.size(); ++i) {
-      if (transport.masked[i] != 0 || scale[gyro][i] <= 0.0) continue;
-      const double size = std::abs(out[gyro][i]);
-      if (size < std::max(kSpikeSigmas * scale[gyro][i], 2.5 * transport.lattice_dps)) continue;
-      if (size < std::abs(out[gyro][i - 1]) || size < std::abs(out[gyro][i + 1])) continue;
-      if (!recording_.has_reference) {
-        // Whose it is: interpolation spreads the other's.
-        const std::vector<double>& t_s = transports_[1 - gyro].t_s;
-        const auto near = std::lower_bound(t_s.begin(), t_s.end(), transport.t_s[i]) - t_s.begin();
-        bool others = false;
-        for (std::ptrdiff_t j = near - 2; j <= near + 1; ++j) {
-          if (j < 2 || j + 2 >= static_cast<std::ptrdiff_t>(t_s.size())) continue;
-          others = others || std::abs(out[1 - gyro][static_cast<std::size_t>(j)]) > size ||
-                   transports_[1 - gyro].masked[static_cast<std::size_t>(j)] != 0;
-        }
-        if (others) continue;
-      }
-      transport.masked[i] = 1;
-      sizes.push_back(size);
-      marks.x.push_back(series.t_s[i]);
-      marks.y.push_back(out[gyro][i]);
-      last_s = series.t_s[i];
-    }
-    bool known = false;
-    for (const Effect& effect : effects)
-      known = known || (effect.gyro == gyro && effect.kind == Kind::kSpikes);
-    if (known || sizes.size() < kSpikesMin) continue;
-    const double count = static_cast<double>(sizes.size());
-    const double typical = median_of(sizes);
-    double noise = 0.0;
-    for (const double sigma : scale[gyro])
-      noise += sigma;
-    noise /= static_cast<double>(scale[gyro].size());
-    Finding finding;
-    finding.effect = Effect{gyro, Kind::kSpikes, {count / recording_.seconds, typical}, 0};
-    finding.sigma = {std::sqrt(count) / recording_.seconds, 1.25 * noise / std::sqrt(count)};
-    finding.statistic = count * (typical / noise) * (typical / noise);
-    finding.p_value = 1e-6;
-    finding.where = {marks.x.front(), last_s, 0.0, 0.5 / transport.interval_s};
-    finding.evidence = fmt::format(
-        "{:.0f} single samples of {} stand out by about {:.3g} deg/s, {:.0f} "
-        "times the noise",
-        count, series.name, typical, typical / noise);
-    finding.figure = Figure{"Samples that stand out", "time / s", "deg/s", false, false, {marks}};
-    findings_.push_back(std::move(finding));
+    facts->readings[gyro] = unmasked(recording.gyros[gyro], facts->transports[gyro]);
+    const std::size_t left = facts->readings[gyro].times_s().size();
+    if (left >= kSamplesMin) continue;
+    return fail("",
+                fmt::format("{} samples of {} are left when what is stuck, clipped or in a dead "
+                            "band is set aside",
+                            left, recording.gyros[gyro].name),
+                "record with a sensor that moves");
   }
+  if (!recording.has_reference) facts->rest = find_rest(recording, facts->transports);
+  if (!recording.has_reference && facts->rest.count() < kRestMin_s) {
+    return fail("", "the recording holds no rest, and there is no reference",
+                "without either nothing tells which gyro is wrong: record a minute at rest, or "
+                "name a [reference]");
+  }
+  study->facts_ = std::move(facts);
+  if (!recording.has_reference) study->learn_motion(effects);
+  study->observe();
+  return std::shared_ptr<const Study>(study);
 }
 
-// Seconds in which both gyros are as steady as in their steadiest seconds and read what they read
-// in the beginning.
-void Study::find_rest() {
-  const auto cells = static_cast<std::size_t>(recording_.seconds) + 1;
-  resting_.assign(cells, 1);
+std::shared_ptr<const Study> Study::with_motion(const Effects& effects) const {
+  const std::shared_ptr<Study> study(new Study(*this));
+  if (recording().has_reference) return study;
+  study->learn_motion(effects);
+  study->observe();
+  return study;
+}
+
+std::shared_ptr<const Study> Study::with_used_for_fit(Span span) const {
+  const std::shared_ptr<Study> study(new Study(*this));
+  study->for_fit_.push_back(span);
+  for (auto& data : study->observations_)
+    data = std::make_shared<Observations>(data->with_for_fit(study->for_fit_));
+  return study;
+}
+
+// The readings less what the effects say at the last motion, by their weights.
+std::vector<double> Study::mean_rate(const std::array<double, 2>& weight,
+                                     const std::array<Effects, 2>& taken_off) const {
+  const std::span<const double> t_s = facts_->readings[0].times_s();
+  std::vector<double> rate_dps(t_s.size(), 0.0);
   for (std::size_t gyro = 0; gyro < 2; ++gyro) {
-    // What is masked too: a dead band rests on 0.
-    const std::span<const double> t_s = transports_[gyro].t_s;
-    const std::span<const double> rate = recording_.gyros[gyro].rate_dps;
-    std::vector<double> sum(cells, 0.0), squares(cells, 0.0), count(cells, 0.0);
+    const SampledCurve& readings = facts_->readings[gyro];
+    std::optional<Prediction> prediction;
+    if (!signals_[gyro]->motion.curve().empty())
+      prediction.emplace(taken_off[gyro], *signals_[gyro]);
     for (std::size_t i = 0; i < t_s.size(); ++i) {
-      const std::size_t cell = std::min(cells - 1, static_cast<std::size_t>(std::max(0.0, t_s[i])));
-      sum[cell] += rate[i], squares[cell] += rate[i] * rate[i], count[cell] += 1.0;
-    }
-    std::vector<double> first;
-    std::vector<double> deviation(cells, 1e300);
-    for (std::size_t cell = 0; cell < cells; ++cell) {
-      if (count[cell] < 5.0) continue;
-      const double mean = sum[cell] / count[cell];
-      deviation[cell] = std::sqrt(std::max(0.0, squares[cell] / count[cell] - mean * mean));
-      if (static_cast<double>(cell) < std::max(5.0, recording_.rest_s)) first.push_back(mean);
-    }
-    // A gyro at its limit is steadier than any at rest.
-    std::vector<double> deviations;
-    const double start = first.empty() ? 0.0 : median_of(first);
-    for (std::size_t cell = 0; cell < cells; ++cell) {
-      if (count[cell] >= 5.0 && std::abs(sum[cell] / count[cell] - start) < kRestNear_dps)
-        deviations.push_back(deviation[cell]);
-    }
-    if (deviations.size() < 10 || first.empty()) {
-      resting_.assign(cells, 0);
-      return;
-    }
-    std::sort(deviations.begin(), deviations.end());
-    const double quiet =
-        std::max(deviations[deviations.size() / 10], recording_.gyros[gyro].step_dps);
-    for (std::size_t cell = 0; cell < cells; ++cell) {
-      if (count[cell] < 5.0 || deviation[cell] > kRestSteady * quiet ||
-          std::abs(sum[cell] / count[cell] - start) > kRestBelow_dps + 3.0 * quiet) {
-        resting_[cell] = 0;
-      }
+      double value_dps = gyro == 0 ? readings.values()[i] : readings.at(t_s[i]).value;
+      if (prediction)
+        value_dps -= prediction->at(t_s[i]) - signals_[gyro]->motion.rate(t_s[i]).value;
+      rate_dps[i] += weight[gyro] * value_dps;
     }
   }
-  // Single seconds are turning points of a motion.
-  std::vector<std::uint8_t> kept(cells, 0);
-  for (std::size_t from = 0; from < cells;) {
-    std::size_t to = from;
-    while (to < cells && resting_[to] != 0)
-      ++to;
-    if (to - from >= 4) {
-      // Its first and last second may hold the end of a motion.
-      const std::size_t first = from == 0 ? 0 : from + 1;
-      const std::size_t last = to == cells ? to : to - 1;
-      for (std::size_t cell = first; cell < last; ++cell)
-        kept[cell] = 1, rest_s_ += 1.0;
-    }
-    from = std::max(to, from + 1);
-  }
-  resting_ = kept;
-}
-
-bool Study::rests_at(double t_s) const {
-  const auto cell = static_cast<std::size_t>(std::max(0.0, t_s));
-  return cell < resting_.size() && resting_[cell] != 0;
-}
-
-void Study::learn_motion(const std::vector<Effect>& effects) {
-  if (recording_.has_reference) return;
-  const PairNoise noise = noise_of(effects);
-  std::array<double, 2> weight{0.5, 0.5};
-  std::array<double, 2> density{};
-  for (std::size_t gyro = 0; gyro < 2; ++gyro) {
-    density[gyro] = noise[gyro].white_dps_rthz;
-  }
-  if (density[0] > 0.0 && density[1] > 0.0) {
-    const double first = 1.0 / (density[0] * density[0]);
-    const double second = 1.0 / (density[1] * density[1]);
-    weight = {first / (first + second), second / (first + second)};
-  }
-  const std::span<const double> t_s = readings_[0].times_s();
-  // The first guess knows no errors; each further one takes off what the effects say at the last,
-  // until nothing changes. Late readings converge by half their phase.
-  const std::array<std::vector<Effect>, 2> mine{of_gyro(effects, 0), of_gyro(effects, 1)};
-  std::vector<double> rate;
-  for (int round = 0; round < kMotionRounds; ++round) {
-    std::vector<double> next(t_s.size(), 0.0);
-    for (std::size_t gyro = 0; gyro < 2; ++gyro) {
-      std::unique_ptr<Prediction> prediction;
-      if (round > 0) prediction = std::make_unique<Prediction>(mine[gyro], signals_[gyro]);
-      for (std::size_t i = 0; i < t_s.size(); ++i) {
-        double value = gyro == 0 ? readings_[0].values()[i] : readings_[1].at(t_s[i]).value;
-        if (prediction) value -= prediction->at(t_s[i]) - signals_[gyro].motion.rate(t_s[i]).value;
-        next[i] += weight[gyro] * value;
-      }
-    }
-    double change_dps = 0.0;
-    for (std::size_t i = 0; i < t_s.size(); ++i) {
-      if (rests_at(t_s[i])) next[i] = recording_.rest_rate_dps;
-      if (round > 0) change_dps = std::max(change_dps, std::abs(next[i] - rate[i]));
-    }
-    rate = std::move(next);
-    // Noise must not pass for motion, or what the effects make of it would come on top.
-    const Motion motion{without_noise(SampledCurve(t_s, rate))};
-    for (Signals& signals : signals_)
-      signals.motion = motion;
-    if (round > 0 && change_dps < kMotionSame_dps) break;
-  }
-  build();
-}
-
-Problem Study::build_against_reference(std::size_t gyro) {
-  const GyroSeries& series = recording_.gyros[gyro];
-  const Transport& transport = transports_[gyro];
-  const Motion& motion = signals_[gyro].motion;
-  std::vector<Sample> samples;
-  samples.reserve(series.t_s.size());
-  const double reach_s = 3.0 * motion.curve().interval_s();
-  for (std::size_t i = 0; i < series.t_s.size(); ++i) {
-    if (transport.masked[i] != 0 || motion.curve().hole_at(transport.t_s[i], reach_s)) continue;
-    if (transport.t_s[i] < motion.curve().from_s() || transport.t_s[i] > motion.curve().to_s())
-      continue;
-    const double rate_dps = motion.rate(transport.t_s[i]).value;
-    samples.push_back({transport.t_s[i], gyro == 0 ? Channel::kGyro1 : Channel::kGyro2,
-                       series.rate_dps[i] - rate_dps, rate_dps});
-  }
-  Problem problem =
-      assemble(std::move(samples), {transports_[0].interval_s, transports_[1].interval_s},
-               {&motion.curve(), 2});
-  problem.holds[gyro] = true;
-  problem.layout.reference_variance = noise_variance(recording_.reference_dps);
-  return problem;
-}
-
-Problem Study::build_pair() {
-  const Motion& motion = signals_[0].motion;
-  std::vector<Sample> samples;
-  for (std::size_t gyro = 0; gyro < 2; ++gyro) {
-    const std::span<const double> t_s = readings_[gyro].times_s();
-    for (std::size_t i = 0; i < t_s.size(); ++i) {
-      if (!rests_at(t_s[i])) continue;
-      samples.push_back({t_s[i], gyro == 0 ? Channel::kGyro1 : Channel::kGyro2,
-                         readings_[gyro].values()[i] - recording_.rest_rate_dps,
-                         recording_.rest_rate_dps});
-    }
-  }
-  const std::span<const double> t_s = readings_[0].times_s();
-  const double reach_s = 1.5 * readings_[1].interval_s();
   for (std::size_t i = 0; i < t_s.size(); ++i) {
-    if (rests_at(t_s[i]) || readings_[1].hole_at(t_s[i], reach_s)) continue;
+    if (facts_->rest.at(t_s[i])) rate_dps[i] = recording().rest_rate_dps;
+  }
+  return rate_dps;
+}
+
+// The first guess knows no errors; each further one takes off what the effects say at the last,
+// until nothing changes.
+void Study::learn_motion(const Effects& effects) {
+  const std::array<double, 2> weight = weights(noise_of(effects));
+  const std::array<Effects, 2> mine{of_gyro(effects, 0), of_gyro(effects, 1)};
+  std::array<std::shared_ptr<Signals>, 2> signals;
+  for (std::size_t gyro = 0; gyro < 2; ++gyro) {
+    signals[gyro] = std::make_shared<Signals>(*signals_[gyro]);
+    signals[gyro]->motion = Motion();
+    signals_[gyro] = signals[gyro];
+  }
+  std::vector<double> rate_dps;
+  for (int round = 0; round < kMotionRounds; ++round) {
+    std::vector<double> next_dps = mean_rate(weight, mine);
+    const bool settled = round > 0 && greatest_change(next_dps, rate_dps) < kMotionSame_dps;
+    rate_dps = std::move(next_dps);
+    // Noise must not pass for motion, or what the effects make of it would come on top.
+    const Motion motion{without_noise(SampledCurve(facts_->readings[0].times_s(), rate_dps))};
+    for (const auto& its : signals)
+      its->motion = motion;
+    if (settled) break;
+  }
+}
+
+Circumstances Study::circumstances() const {
+  return {recording().seconds,
+          recording().has_reference,
+          {transport(0).interval_s, transport(1).interval_s},
+          {is_coarse(0), is_coarse(1)},
+          signals_};
+}
+
+Observations Study::against_reference(std::size_t gyro) const {
+  const GyroSeries& series = recording().gyros[gyro];
+  const Motion& motion = signals_[gyro]->motion;
+  const double reach_s = kReferenceHole * motion.curve().interval_s();
+  std::vector<Observation> samples;
+  samples.reserve(series.t_s.size());
+  for (std::size_t i = 0; i < series.t_s.size(); ++i) {
+    const double t_s = transport(gyro).t_s[i];
+    if (transport(gyro).masked[i] != 0 || motion.curve().hole_at(t_s, reach_s)) continue;
+    if (t_s < motion.curve().from_s() || t_s > motion.curve().to_s()) continue;
+    const double rate_dps = motion.rate(t_s).value;
+    samples.push_back({t_s, channel_of(gyro), series.rate_dps[i] - rate_dps, rate_dps});
+  }
+  return make_observations(std::move(samples), circumstances(), {gyro == 0, gyro == 1},
+                           {&motion.curve(), 2}, noise_variance(recording().reference_dps),
+                           for_fit_);
+}
+
+// Each gyro at rest, the difference elsewhere.
+Observations Study::of_pair() const {
+  const auto& readings = facts_->readings;
+  std::vector<Observation> samples;
+  for (std::size_t gyro = 0; gyro < 2; ++gyro) {
+    const std::span<const double> t_s = readings[gyro].times_s();
+    const double rest_dps = recording().rest_rate_dps;
+    for (std::size_t i = 0; i < t_s.size(); ++i) {
+      if (!facts_->rest.at(t_s[i])) continue;
+      samples.push_back(
+          {t_s[i], channel_of(gyro), readings[gyro].values()[i] - rest_dps, rest_dps});
+    }
+  }
+  const std::span<const double> t_s = readings[0].times_s();
+  const double reach_s = kGyroHole * readings[1].interval_s();
+  for (std::size_t i = 0; i < t_s.size(); ++i) {
+    if (facts_->rest.at(t_s[i]) || readings[1].hole_at(t_s[i], reach_s)) continue;
     samples.push_back({t_s[i], Channel::kDifference,
-                       readings_[0].values()[i] - readings_[1].at(t_s[i]).value,
-                       motion.rate(t_s[i]).value});
+                       readings[0].values()[i] - readings[1].at(t_s[i]).value,
+                       signals_[0]->motion.rate(t_s[i]).value});
   }
-  Problem problem =
-      assemble(std::move(samples), {transports_[0].interval_s, transports_[1].interval_s},
-               {&readings_[1], 1});
-  problem.holds = {true, true};
-  return problem;
+  return make_observations(std::move(samples), circumstances(), {true, true}, {&readings[1], 1},
+                           0.0, for_fit_);
 }
 
-void Study::build() {
-  problems_.clear();
-  remembered_.clear();
-  forget_next_ = 0;
-  // Reserved, because what is remembered points at them.
-  problems_.reserve(2);
-  if (recording_.has_reference) {
-    problems_.push_back(build_against_reference(0));
-    problems_.push_back(build_against_reference(1));
-  } else {
-    problems_.push_back(build_pair());
+void Study::observe() {
+  observations_.clear();
+  if (!recording().has_reference) {
+    observations_.push_back(std::make_shared<Observations>(of_pair()));
+    return;
   }
-  excitations_ = {};
-  for (Problem& problem : problems_) {
-    cache(problem);
-    set_aside(problem);
-  }
-}
-
-void Study::cache(Problem& problem) {
-  for (std::size_t gyro = 0; gyro < 2; ++gyro) {
-    if (!problem.holds[gyro]) continue;
-    const Signals& signals = signals_[gyro];
-    Excitation& excitation = excitations_[gyro];
-    excitation.knows_temperature = !signals.temperature_c.empty();
-    excitation.knows_acceleration = !signals.vibration_g2.empty();
-    const std::size_t n = problem.t_s.size();
-    problem.rate[gyro].resize(n);
-    problem.surroundings[gyro].resize(n);
-    std::array<std::array<double, 2>, 6> range;
-    range.fill({1e300, -1e300});
-    const auto extend = [](std::array<double, 2>& r, double value) {
-      if (std::isnan(value)) return;
-      r[0] = std::min(r[0], value);
-      r[1] = std::max(r[1], value);
-    };
-    for (std::size_t i = 0; i < n; ++i) {
-      problem.rate[gyro][i] = signals.motion.rate(problem.t_s[i]);
-      const model::Surroundings s = signals.at(problem.t_s[i]);
-      problem.surroundings[gyro][i] = s;
-      if (share_of(problem.channel[i], gyro) == 0.0) continue;
-      excitation.rate_max_dps =
-          std::max(excitation.rate_max_dps, std::abs(problem.rate[gyro][i].value));
-      extend(range[0], s.temperature_c);
-      extend(range[1], s.temperature_slope_c_s);
-      for (std::size_t axis = 0; axis < 3; ++axis)
-        extend(range[2 + axis], s.acceleration_g[axis]);
-      extend(range[5], s.vibration_g2);
-    }
-    const auto width = [](const std::array<double, 2>& r) { return std::max(0.0, r[1] - r[0]); };
-    excitation.temperature_range_c = width(range[0]);
-    excitation.temperature_slope_range_c_s = width(range[1]);
-    for (std::size_t axis = 0; axis < 3; ++axis)
-      excitation.acceleration_range_g[axis] = width(range[2 + axis]);
-    excitation.vibration_range_g2 = width(range[5]);
-  }
-}
-
-Eigen::VectorXd Study::lateness_dps(const Problem& problem, std::size_t gyro,
-                                    const std::vector<Effect>& moving) const {
-  const auto same = [&](const Remembered& one) {
-    return one.problem == &problem && one.effect.kind == moving[0].kind &&
-           one.effect.gyro == moving[0].gyro && one.effect.parameters == moving[0].parameters;
-  };
-  if (moving.size() == 1) {
-    const auto found = std::find_if(remembered_.begin(), remembered_.end(), same);
-    if (found != remembered_.end()) return found->values;
-  }
-  Eigen::VectorXd lateness = Eigen::VectorXd::Zero(problem.size());
-  if (moving.empty()) return lateness;
-  const Prediction prediction(moving, signals_[gyro]);
-  for (Eigen::Index i = 0; i < problem.size(); ++i) {
-    const auto place = static_cast<std::size_t>(i);
-    if (share_of(problem.channel[place], gyro) == 0.0) continue;
-    lateness[i] = prediction.at(problem.t_s[place]) - problem.rate[gyro][place].value;
-  }
-  if (moving.size() > 1) return lateness;
-  const Remembered one{&problem, moving[0], lateness};
-  if (remembered_.size() < kRemembered) {
-    remembered_.push_back(one);
-  } else {
-    remembered_[forget_next_++ % kRemembered] = one;
-  }
-  return lateness;
-}
-
-// The rate comes late first, and every response is to what has come.
-Eigen::VectorXd Study::contribution(const Problem& problem, std::size_t gyro,
-                                    const std::vector<Effect>& effects) const {
-  if (!problem.holds[gyro]) return Eigen::VectorXd::Zero(problem.size());
-  std::vector<Effect> moving;
-  std::vector<Effect> added;
-  for (const Effect& effect : effects) {
-    if (effect.gyro != gyro) continue;
-    const model::Nature nature = model::info(effect.kind).nature;
-    if (nature == model::Nature::kLag || effect.kind == Kind::kClockSkew) moving.push_back(effect);
-    if (nature == model::Nature::kOffset || nature == model::Nature::kResponse)
-      added.push_back(effect);
-  }
-  Eigen::VectorXd sum = Eigen::VectorXd::Zero(problem.size());
-  const Eigen::VectorXd lateness = lateness_dps(problem, gyro, moving);
-  for (Eigen::Index i = 0; i < problem.size(); ++i) {
-    const auto place = static_cast<std::size_t>(i);
-    const double share = share_of(problem.channel[place], gyro);
-    if (share == 0.0) continue;
-    const double late_dps = problem.rate[gyro][place].value + lateness[i];
-    sum[i] = share * lateness[i];
-    for (const Effect& effect : added) {
-      sum[i] += share * model::added_dps(effect, late_dps, problem.surroundings[gyro][place]);
-    }
-  }
-  return sum;
-}
-
-Eigen::VectorXd Study::residual(const Problem& problem, const std::vector<Effect>& effects) const {
-  Eigen::VectorXd residual = problem.observed_dps;
-  for (std::size_t gyro = 0; gyro < 2; ++gyro) {
-    if (problem.holds[gyro]) residual -= contribution(problem, gyro, effects);
-  }
-  return residual;
+  for (std::size_t gyro = 0; gyro < 2; ++gyro)
+    observations_.push_back(std::make_shared<Observations>(against_reference(gyro)));
 }
 
 }  // namespace vgyro::gap

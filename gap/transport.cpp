@@ -2,7 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
+#include <limits>
+#include <numbers>
+#include <optional>
+#include <utility>
 
 #include <fmt/core.h>
 
@@ -17,17 +20,304 @@ using model::Kind;
 
 // Logs and kernels count microseconds; candump's rounding is no lateness.
 constexpr double kStampResolution_s = 3e-6;
+
+// One or two losses are told in a note: they are no property of the bus. Nor is one pause, which
+// holds more than half of what is missing.
+constexpr std::size_t kLostMin = 3;
+constexpr double kPauseShare = 0.5;
+// A model without lost frames says that one in so many is lost.
+constexpr double kFramesForALoss = 1e6;
+
+// Fewer stamps show no lower envelope.
+constexpr std::size_t kStampsMin = 200;
+// The envelope is the earliest stamp of each of so many stretches: enough to fit a line to. Of the
+// stamps in a stretch, this many at least, the earliest is hardly late.
+constexpr std::size_t kStretches = 200;
+constexpr std::size_t kStretchMin = 50;
+// Which stamps are the earliest depends on the line; the third does not move it any more.
+constexpr int kEnvelopeRounds = 3;
+// Random lateness differs between neighbours as much as all over, that of a wandering clock by far
+// less.
+constexpr double kRoughMin = 0.3;
+// Frames that scatter by more intervals than this are not late: the clock was set.
+constexpr double kLateIntervals = 3.0;
+// The folded normal has a skewness of 0.995, the exponential 2, the normal 0: half-way between.
+constexpr double kNormalSkewness = 0.5;
+constexpr double kExponentialSkewness = 1.5;
+// Of a figure, which a browser is to draw at once.
+constexpr std::size_t kLatePoints = 3000;
+constexpr double kMilli = 1e3;
+
+// The step of a float, which has none: below the rounding of any rate.
+constexpr double kStepMin_dps = 1e-12;
+// No error is told to be less.
+constexpr double kSigmaMin_dps = 1e-9;
+// Values nearer than this to each other, in steps of the frame, are the same one: over half a step,
+// because scaling rounds.
+constexpr double kSameSteps = 0.6;
+// Two levels have one distance, which is a lattice always.
+constexpr std::size_t kLevelsMin = 3;
+// The first guess of the step is the distance that one in so many is less than: the middle of the
+// least tenth.
+constexpr std::size_t kLeastStepOneIn = 20;
+// On three of the frame's steps or fewer every value would seem to stand on the lattice below.
+constexpr double kLatticeFrameSteps = 3.5;
+// The first guess of the step counts so many steps right, each better one half as many again.
+constexpr double kSureSteps = 20.0;
+constexpr double kSureGrowth = 1.5;
+constexpr int kLatticeRounds = 3;
+// A level this share of a step away is off the lattice. One in so many may be, by a frame that came
+// broken.
+constexpr double kOffShare = 0.2;
+constexpr std::size_t kOffOneIn = 50;
+constexpr std::size_t kLatticePoints = 2000;
+
+// A frozen value repeats itself this often and for this long: by less nothing is lost.
 constexpr std::size_t kStuckMin = 8;
 constexpr double kStuckMin_s = 0.15;
+// Of such a run anywhere in the recording, were the values independent.
 constexpr double kChance = 1e-9;
+// Runs count up to this length in the chance that a value repeats itself: longer ones are what is
+// looked for.
+constexpr std::size_t kRunCounted = 4;
+// A chance of 1 would make no run too long.
+constexpr double kRepeatsMost = 0.999;
 /// Share of equal neighbours above which a sensor is coarse.
 constexpr double kCoarse = 0.02;
+// A coarse sensor rests on one value: frozen is what lasts this many times longer than any other.
+constexpr double kCoarseRuns = 10.0;
+// The share of kImpossibleNats that a frozen sample costs: for most, the truth has not moved far.
+constexpr double kFrozenShare = 0.2;
+// Of a figure, before and after what is frozen, and about the first value at the limit.
+constexpr std::size_t kStuckAround = 200;
+constexpr std::size_t kLimitBefore = 300;
+constexpr std::size_t kLimitAfter = 600;
+
+// Values at the limit, or on 0: fewer are a chance.
 constexpr std::size_t kPlateauMin = 6;
-constexpr std::size_t kLostMin = 3;
+// How far inside the limit neighbours are counted: a thousandth, or some steps of the
+// lattice.
+constexpr double kNearShare = 0.001;
+constexpr double kNearSteps = 3.0;
+// A plateau holds so many times the values that its neighbours let expect, and this many more.
+constexpr double kPlateauTimes = 8.0;
+constexpr double kPlateauMore = 4.0;
+// Relative: nothing lies beyond the limit by more than the rounding of decoded values.
+constexpr double kRounding = 1e-9;
+// A limit of fewer steps of the lattice is where a steady turn stands.
+constexpr double kLimitSteps = 20.0;
+// Relative: readings this near to the limit may be clipped ones that were rounded afterwards.
+constexpr double kClippedShare = 1e-3;
+
+// On 0 within rounding, in steps of the frame.
+constexpr double kZeroSteps = 0.25;
+// Of fewer values that are not 0 the least tells no width.
+constexpr std::size_t kOutsideMin = 100;
+// A lattice alone has its next level one step away, and as often.
+constexpr double kBandSteps = 2.5;
+// Values go on right beyond the band: some lie within twice its width.
+constexpr double kBeyondWidths = 2.0;
+constexpr std::size_t kBeyondMin = 3;
+// The distance of values there: over the least so many.
+constexpr std::size_t kFollowers = 10;
+// Noise takes values across the edge: those near it are chosen by their noise.
+constexpr double kMaskedWidths = 1.5;
+// Of a figure: its height, in widths of the band.
+constexpr double kBandWidths = 5.0;
+constexpr std::size_t kBandPoints = 3000;
+
+// A plateau is far beyond what noise does (30 is 5.5 sigma), and the surer the more samples stand
+// on it: each at a limit counts for 10, each on 0, which every turn passes, for less.
+constexpr double kPlateauStatistic = 30.0;
+constexpr double kLimitStatistic = 10.0;
+constexpr double kZeroStatistic = 4.0;
+// The share of kImpossibleNats that a masked sample costs: those near the edge cost nothing, those
+// far beyond it all.
+constexpr double kMaskedShare = 0.5;
 
 bool knows(const std::vector<Effect>& effects, Kind kind) {
   return std::any_of(effects.begin(), effects.end(),
                      [&](const Effect& effect) { return effect.kind == kind; });
+}
+
+// Standard error of what so many values tell that are rounded to a step.
+double rounding_sigma_dps(double step_dps, std::size_t values) {
+  return std::max(step_dps, kSigmaMin_dps) / std::sqrt(12.0 * static_cast<double>(values));
+}
+
+// An even clock.
+struct Line {
+  double offset_s = 0.0;
+  double interval_s = 0.0;
+
+  // Of a stamp behind the clock.
+  [[nodiscard]] double late_s(double t_s, double number) const {
+    return t_s - offset_s - interval_s * number;
+  }
+};
+
+// Sums for a straight line through points.
+struct LineSums {
+  double x = 0.0;
+  double y = 0.0;
+  double xx = 0.0;
+  double xy = 0.0;
+  double count = 0.0;
+
+  void add(double at, double value) {
+    x += at, y += value, xx += at * at, xy += at * value, count += 1.0;
+  }
+};
+
+// Moves a line by the one that fits what is left of it, about `pivot`. False when none is told.
+bool move(Line& line, const LineSums& sums, double pivot) {
+  const double determinant = sums.count * sums.xx - sums.x * sums.x;
+  if (determinant <= 0.0) return false;
+  const double change = (sums.count * sums.xy - sums.x * sums.y) / determinant;
+  const double shift = (sums.y - change * sums.x) / sums.count;
+  line.interval_s += change;
+  line.offset_s += shift - change * pivot;
+  return true;
+}
+
+// The line below which hardly a stamp lies: first by least squares, then through the earliest of
+// each stretch. Nothing when the stamps tell none.
+std::optional<Line> envelope(const std::vector<double>& t_s, const std::vector<double>& number,
+                             double interval_s) {
+  const std::size_t n = t_s.size();
+  const std::size_t stretch = std::max(kStretchMin, n / kStretches);
+  const double pivot = number[n / 2];
+  Line line{t_s.front(), interval_s};
+  const auto late_s = [&](std::size_t i) { return line.late_s(t_s[i], number[i]); };
+  LineSums all;
+  for (std::size_t i = 0; i < n; ++i)
+    all.add(number[i] - pivot, late_s(i));
+  if (!move(line, all, pivot)) return {};
+  for (int round = 0; round < kEnvelopeRounds; ++round) {
+    LineSums earliest;
+    for (std::size_t from = 0; from < n; from += stretch) {
+      std::size_t best = from;
+      for (std::size_t i = from; i < std::min(n, from + stretch); ++i) {
+        if (late_s(i) < late_s(best)) best = i;
+      }
+      earliest.add(number[best] - pivot, late_s(best));
+    }
+    if (!move(line, earliest, pivot)) return {};
+  }
+  return line;
+}
+
+struct Lateness {
+  double mean_s = 0.0;
+  double deviation_s = 0.0;
+  double rough_s = 0.0;  // the deviation that neighbours' differences speak of
+  double skewness = 0.0;
+};
+
+// Precondition: two stamps at least.
+Lateness lateness_of(const std::vector<double>& late_s) {
+  const double n = static_cast<double>(late_s.size());
+  double sum = 0.0, squares = 0.0, cubes = 0.0, steps = 0.0;
+  for (const double late : late_s)
+    sum += late;
+  const double mean_s = sum / n;
+  for (const double late : late_s) {
+    const double x = late - mean_s;
+    squares += x * x;
+    cubes += x * x * x;
+  }
+  for (std::size_t i = 1; i < late_s.size(); ++i) {
+    const double x = late_s[i] - late_s[i - 1];
+    steps += x * x;
+  }
+  const double deviation_s = std::sqrt(squares / n);
+  return {mean_s, deviation_s, std::sqrt(0.5 * steps / (n - 1.0)),
+          cubes / n / (deviation_s * deviation_s * deviation_s)};
+}
+
+// Of |N(0, σ)|, where it looks like one.
+double sigma_of(const Lateness& lateness) {
+  const bool folded =
+      lateness.skewness > kNormalSkewness && lateness.skewness < kExponentialSkewness;
+  return folded ? lateness.deviation_s / std::sqrt(1.0 - 2.0 / std::numbers::pi)
+                : lateness.deviation_s;
+}
+
+// Distinct values, rising.
+std::vector<double> levels_of(std::vector<double> values, double tolerance_dps) {
+  std::sort(values.begin(), values.end());
+  std::vector<double> levels;
+  for (const double value : values) {
+    if (levels.empty() || value - levels.back() > tolerance_dps) levels.push_back(value);
+  }
+  return levels;
+}
+
+// Levels that neighbour each other are one step apart. Precondition: two levels at least.
+double least_step_dps(const std::vector<double>& levels) {
+  std::vector<double> steps;
+  for (std::size_t i = 1; i < levels.size(); ++i)
+    steps.push_back(levels[i] - levels[i - 1]);
+  std::sort(steps.begin(), steps.end());
+  return steps[steps.size() / kLeastStepOneIn];
+}
+
+// Every level is a whole number of steps; the number is sure near zero first. `sizes` rise.
+double refined_step_dps(double step_dps, const std::vector<double>& sizes) {
+  for (int round = 0; round < kLatticeRounds; ++round) {
+    double mm = 0.0;
+    double mv = 0.0;
+    double reach = kSureSteps * step_dps;
+    for (const double size : sizes) {
+      if (size > reach) {
+        step_dps = mm > 0.0 ? mv / mm : step_dps;
+        reach = std::max(size, kSureGrowth * reach);
+      }
+      const double m = std::round(size / step_dps);
+      mm += m * m;
+      mv += m * size;
+    }
+    if (mm > 0.0) step_dps = mv / mm;
+  }
+  return step_dps;
+}
+
+bool stands_on(double step_dps, const std::vector<double>& sizes, double tolerance_dps) {
+  std::size_t off = 0;
+  for (const double size : sizes) {
+    const double error = std::abs(size - step_dps * std::round(size / step_dps));
+    if (error > kOffShare * step_dps + tolerance_dps) ++off;
+  }
+  return off * kOffOneIn <= sizes.size();
+}
+
+// Samples that repeat one value.
+struct Run {
+  std::size_t first = 0;
+  std::size_t end = 0;
+
+  [[nodiscard]] std::size_t length() const { return end - first; }
+};
+
+std::vector<Run> runs_of(const std::vector<double>& values) {
+  std::vector<Run> runs;
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    if (i > 0 && values[i] == values[i - 1]) {
+      ++runs.back().end;
+    } else {
+      runs.push_back({i, i + 1});
+    }
+  }
+  return runs;
+}
+
+// That a value repeats the last, as the short runs show it.
+double repeat_chance(const std::vector<Run>& runs, std::size_t samples) {
+  std::size_t repeats = 0;
+  for (const Run& run : runs)
+    repeats += std::min(run.length(), kRunCounted) - 1;
+  const double n = static_cast<double>(samples);
+  return std::clamp(static_cast<double>(repeats) / n, 1.0 / n, kRepeatsMost);
 }
 
 class Check {
@@ -43,11 +333,11 @@ class Check {
     find_lost();
     find_lateness();
     find_lattice();
-    result_.lattice_dps = lattice_dps_;
     find_stuck();
     find_saturation();
     find_dead_band();
     count_repeats();
+    count_masked(result_);
     return std::move(result_);
   }
 
@@ -56,17 +346,37 @@ class Check {
     return {series_.t_s.front(), series_.t_s.back(), 0.0, 0.5 / result_.interval_s};
   }
 
-  void add(Kind kind, model::Parameters parameters, model::Parameters sigma, double statistic,
-           Where where, std::string evidence, Figure figure = {}) {
+  // What is known of a finding as numbers.
+  struct Told {
+    Kind kind = Kind::kBias;
+    model::Parameters parameters{};
+    model::Parameters sigma{};
+    double statistic = 0.0;
+    double cost_nats = 0.0;
+  };
+
+  void add(const Told& told, Where where, std::string evidence, Figure figure) {
     Finding finding;
-    finding.effect = Effect{gyro_, kind, parameters, 0};
-    finding.sigma = sigma;
-    finding.statistic = statistic;
-    finding.p_value = std::min(1e-6, std::exp(-0.5 * statistic));
+    finding.effect = Effect{gyro_, told.kind, told.parameters, 0};
+    finding.sigma = told.sigma;
+    finding.statistic = told.statistic;
+    finding.p_value = std::min(kFoundPValue, std::exp(-0.5 * told.statistic));
+    finding.cost_nats = told.cost_nats;
     finding.where = where;
     finding.evidence = std::move(evidence);
     finding.figure = std::move(figure);
     result_.findings.push_back(std::move(finding));
+  }
+
+  // Every so manieth reading of some, as far as there are.
+  [[nodiscard]] Curve readings(std::string label, std::size_t from, std::size_t to,
+                               std::size_t every, bool points) const {
+    Curve curve{std::move(label), {}, {}, {}, points};
+    for (std::size_t i = from; i < std::min(n_, to); i += every) {
+      curve.x.push_back(series_.t_s[i]);
+      curve.y.push_back(series_.rate_dps[i]);
+    }
+    return curve;
   }
 
   void count_repeats() {
@@ -124,102 +434,76 @@ class Check {
     const double share = lost / sent;
     result_.lost_share = share;
     if (lost == 0.0 || knows(known_, Kind::kDroppedFrames)) return;
-    if (events < kLostMin || longest > 0.5 * lost) {
+    if (events < kLostMin || longest > kPauseShare * lost) {
       result_.notes.push_back(fmt::format("{}: {:.0f} frames are missing, {:.0f} of them at once",
                                           series_.name, lost, longest));
       return;
     }
-    Figure figure{
-        "Frames that the counter says are missing", "time / s", "frames", false, false, {marks}};
-    add(Kind::kDroppedFrames, {share}, {std::sqrt(share * (1.0 - share) / sent)},
-        2.0 * lost * std::log(1e6 * share + 1.0), whole(),
+    const double frames = static_cast<double>(n_);
+    add({.kind = Kind::kDroppedFrames,
+         .parameters = {share},
+         .sigma = {std::sqrt(share * (1.0 - share) / sent)},
+         .statistic = 2.0 * lost * std::log(kFramesForALoss * share + 1.0),
+         .cost_nats = frames * share * std::log(kFramesForALoss)},
+        whole(),
         fmt::format("the counter of {} skips {:.0f} of {:.0f} frames, at {} places", series_.name,
                     lost, sent, events),
-        figure);
+        Figure{"Frames that the counter says are missing",
+               "time / s",
+               "frames",
+               false,
+               false,
+               {marks}});
   }
 
   // The even clock is the line below which no stamp lies, up to the stamps' resolution: nothing
-  // comes early. It is found on the lower envelope of short stretches.
+  // comes early.
   void find_lateness() {
-    if (n_ < 200) return;
-    const std::size_t stretch = std::max<std::size_t>(50, n_ / 200);
-    double slope = result_.interval_s;
-    double offset = series_.t_s.front();
-    const auto residual = [&](std::size_t i) {
-      return series_.t_s[i] - offset - slope * number_[i];
-    };
-    // First by least squares, then on the least residual of each stretch.
-    for (int round = 0; round < 4; ++round) {
-      double sx = 0.0, sy = 0.0, sxx = 0.0, sxy = 0.0, count = 0.0;
-      const double pivot = number_[n_ / 2];
-      for (std::size_t from = 0; from < n_; from += stretch) {
-        const std::size_t to = std::min(n_, from + stretch);
-        std::size_t best = from;
-        for (std::size_t i = from; i < to; ++i) {
-          if (residual(i) < residual(best)) best = i;
-          if (round > 0) continue;
-          const double x = number_[i] - pivot;
-          sx += x, sy += residual(i), sxx += x * x, sxy += x * residual(i), count += 1.0;
-        }
-        if (round == 0) continue;
-        const double x = number_[best] - pivot;
-        sx += x, sy += residual(best), sxx += x * x, sxy += x * residual(best), count += 1.0;
-      }
-      const double determinant = count * sxx - sx * sx;
-      if (determinant <= 0.0) return;
-      const double change = (count * sxy - sx * sy) / determinant;
-      const double shift = (sy - change * sx) / count;
-      slope += change;
-      offset += shift - change * pivot;
-    }
-    double least = 1e300;
+    if (n_ < kStampsMin) return;
+    const std::optional<Line> clock = envelope(series_.t_s, number_, result_.interval_s);
+    if (!clock) return;
+    double earliest_s = std::numeric_limits<double>::infinity();
     for (std::size_t i = 0; i < n_; ++i)
-      least = std::min(least, residual(i));
-    double sum = 0.0, squares = 0.0, cubes = 0.0;
-    for (std::size_t i = 0; i < n_; ++i) {
-      result_.late_s[i] = residual(i) - least;
-      sum += result_.late_s[i];
-    }
-    const double mean = sum / static_cast<double>(n_);
-    for (std::size_t i = 0; i < n_; ++i) {
-      const double x = result_.late_s[i] - mean;
-      squares += x * x;
-      cubes += x * x * x;
-    }
-    result_.interval_s = slope;
-    const double deviation = std::sqrt(squares / static_cast<double>(n_));
+      earliest_s = std::min(earliest_s, clock->late_s(series_.t_s[i], number_[i]));
+    for (std::size_t i = 0; i < n_; ++i)
+      result_.late_s[i] = clock->late_s(series_.t_s[i], number_[i]) - earliest_s;
+    result_.interval_s = clock->interval_s;
+    const Lateness lateness = lateness_of(result_.late_s);
     // A clock that wanders is no random lateness: neighbours then agree.
-    double steps = 0.0;
-    for (std::size_t i = 1; i < n_; ++i) {
-      const double x = result_.late_s[i] - result_.late_s[i - 1];
-      steps += x * x;
-    }
-    const double rough = std::sqrt(0.5 * steps / static_cast<double>(n_ - 1));
-    if (deviation < kStampResolution_s || rough < 0.3 * deviation) return;
-    if (deviation > 3.0 * slope) return;
-    const double skewness = cubes / static_cast<double>(n_) / (deviation * deviation * deviation);
-    // The folded normal has a skewness of 0.995, the exponential 2, the normal 0.
-    double sigma_s = deviation;
-    if (skewness > 0.5 && skewness < 1.5) sigma_s = deviation / std::sqrt(1.0 - 2.0 / M_PI);
+    if (lateness.deviation_s < kStampResolution_s ||
+        lateness.rough_s < kRoughMin * lateness.deviation_s ||
+        lateness.deviation_s > kLateIntervals * clock->interval_s)
+      return;
     for (std::size_t i = 0; i < n_; ++i)
-      result_.t_s[i] = offset + least + slope * number_[i];
+      result_.t_s[i] = clock->offset_s + earliest_s + clock->interval_s * number_[i];
     // Of symmetrical lateness the mean is the place of the clock.
-    if (skewness < 0.5) {
-      for (double& t : result_.t_s)
-        t += mean;
+    if (lateness.skewness < kNormalSkewness) {
+      for (double& t_s : result_.t_s)
+        t_s += lateness.mean_s;
     }
-    if (knows(known_, Kind::kTimestampJitter)) return;
+    if (!knows(known_, Kind::kTimestampJitter)) tell_lateness(sigma_of(lateness));
+  }
+
+  void tell_lateness(double sigma_s) {
     Curve curve{"lateness of each stamp", {}, {}, {}, true};
-    const std::size_t every = std::max<std::size_t>(1, n_ / 3000);
-    for (std::size_t i = 0; i < n_; i += every) {
+    for (std::size_t i = 0; i < n_; i += std::max<std::size_t>(1, n_ / kLatePoints)) {
       curve.x.push_back(series_.t_s[i]);
-      curve.y.push_back(result_.late_s[i] * 1e3);
+      curve.y.push_back(result_.late_s[i] * kMilli);
     }
-    add(Kind::kTimestampJitter, {sigma_s}, {sigma_s / std::sqrt(static_cast<double>(n_))},
-        static_cast<double>(n_), whole(),
-        fmt::format(
-            "stamps of {} stand up to {:.3g} ms behind an even clock of {:.6g} ms", series_.name,
-            1e3 * *std::max_element(result_.late_s.begin(), result_.late_s.end()), 1e3 * slope),
+    double cost_nats = 0.0;
+    for (const double late_s : result_.late_s) {
+      const double z = late_s / kStampResolution_s;
+      cost_nats += std::min(kImpossibleNats, 0.5 * z * z);
+    }
+    const double most_s = *std::max_element(result_.late_s.begin(), result_.late_s.end());
+    add({.kind = Kind::kTimestampJitter,
+         .parameters = {sigma_s},
+         .sigma = {sigma_s / std::sqrt(static_cast<double>(n_))},
+         .statistic = static_cast<double>(n_),
+         .cost_nats = cost_nats},
+        whole(),
+        fmt::format("stamps of {} stand up to {:.3g} ms behind an even clock of {:.6g} ms",
+                    series_.name, kMilli * most_s, kMilli * result_.interval_s),
         Figure{"How late each stamp is behind the even clock",
                "time / s",
                "lateness / ms",
@@ -229,198 +513,181 @@ class Check {
   }
 
   void find_lattice() {
-    std::vector<double> values = series_.rate_dps;
-    std::sort(values.begin(), values.end());
-    const double tolerance = std::max(0.6 * series_.step_dps, 1e-12);
-    std::vector<double> levels;
-    for (const double value : values) {
-      if (levels.empty() || value - levels.back() > tolerance) levels.push_back(value);
-    }
-    lattice_dps_ = series_.step_dps;
-    if (levels.size() < 3) return;
-    std::vector<double> steps;
-    for (std::size_t i = 1; i < levels.size(); ++i)
-      steps.push_back(levels[i] - levels[i - 1]);
-    // Levels that neighbour each other are one step apart: the tenth part with the least distance.
-    std::sort(steps.begin(), steps.end());
-    double step = steps[steps.size() / 20];
-    // On three of the frame's steps or fewer every value would seem to stand on the lattice below.
-    if (step < 3.5 * std::max(series_.step_dps, 1e-12)) return;
-    // Refine: every level is a whole number of steps; the number is sure near zero first.
+    result_.lattice_dps = series_.step_dps;
+    const double frame_step_dps = std::max(series_.step_dps, kStepMin_dps);
+    const double tolerance_dps = std::max(kSameSteps * series_.step_dps, kStepMin_dps);
+    const std::vector<double> levels = levels_of(series_.rate_dps, tolerance_dps);
+    if (levels.size() < kLevelsMin) return;
+    double step_dps = least_step_dps(levels);
+    if (step_dps < kLatticeFrameSteps * frame_step_dps) return;
     std::vector<double> sizes;
-    sizes.reserve(levels.size());
     for (const double level : levels)
       sizes.push_back(std::abs(level));
     std::sort(sizes.begin(), sizes.end());
-    for (int round = 0; round < 3; ++round) {
-      double mm = 0.0;
-      double mv = 0.0;
-      double reach = 20.0 * step;
-      for (const double size : sizes) {
-        if (size > reach) {
-          step = mm > 0.0 ? mv / mm : step;
-          reach *= 1.5;
-          if (size > reach) reach = size;
-        }
-        const double m = std::round(size / step);
-        mm += m * m;
-        mv += m * size;
-      }
-      if (mm > 0.0) step = mv / mm;
-    }
-    double worst = 0.0;
-    std::size_t off = 0;
-    for (const double size : sizes) {
-      const double error = std::abs(size - step * std::round(size / step));
-      worst = std::max(worst, error);
-      if (error > 0.2 * step + tolerance) ++off;
-    }
-    if (off * 50 > sizes.size()) return;
-    lattice_dps_ = step;
+    step_dps = refined_step_dps(step_dps, sizes);
+    if (!stands_on(step_dps, sizes, tolerance_dps)) return;
+    result_.lattice_dps = step_dps;
     if (knows(known_, Kind::kQuantization)) return;
-    Curve before{"values near zero", {}, {}, {}, true};
-    for (std::size_t i = 0; i < n_; i += std::max<std::size_t>(1, n_ / 2000)) {
-      before.x.push_back(series_.t_s[i]);
-      before.y.push_back(series_.rate_dps[i]);
-    }
-    add(Kind::kQuantization, {step},
-        {std::max(series_.step_dps, 1e-9) / std::sqrt(12.0 * static_cast<double>(levels.size()))},
-        2.0 * static_cast<double>(n_) * std::log(step / std::max(series_.step_dps, 1e-12)), whole(),
+    // White noise of step²/12 is in the samples already, so that it costs nothing here: what a
+    // lattice saves is its own.
+    add({.kind = Kind::kQuantization,
+         .parameters = {step_dps},
+         .sigma = {rounding_sigma_dps(series_.step_dps, levels.size())},
+         .statistic = 2.0 * static_cast<double>(n_) * std::log(step_dps / frame_step_dps)},
+        whole(),
         fmt::format(
             "all values of {} lie on multiples of {:.6g} deg/s, the frame could carry steps "
             "of {:.2g}",
-            series_.name, step, series_.step_dps),
-        Figure{"The readings stand on a lattice", "time / s", "deg/s", false, false, {before}});
+            series_.name, step_dps, series_.step_dps),
+        Figure{"The readings stand on a lattice",
+               "time / s",
+               "deg/s",
+               false,
+               false,
+               {readings("values near zero", 0, n_, std::max<std::size_t>(1, n_ / kLatticePoints),
+                         true)}});
   }
 
   void find_stuck() {
-    const std::vector<double>& y = series_.rate_dps;
-    const double extreme = *std::max_element(y.begin(), y.end());
-    const double least = *std::min_element(y.begin(), y.end());
-    double repeats = 0.0;
-    std::size_t run = 1;
-    for (std::size_t i = 1; i < n_; ++i) {
-      run = y[i] == y[i - 1] ? run + 1 : 1;
-      if (run > 1 && run < 5) repeats += 1.0;
-    }
-    const double chance =
-        std::clamp(repeats / static_cast<double>(n_), 1.0 / static_cast<double>(n_), 0.999);
-    // A coarse sensor repeats itself at rest: there only a run beyond all others counts.
-    std::vector<double> runs_s;
+    const std::vector<Run> runs = runs_of(series_.rate_dps);
+    const double chance = repeat_chance(runs, n_);
     coarse_ = chance > kCoarse;
-    if (coarse_) {
-      for (std::size_t i = 0; i < n_;) {
-        std::size_t end = i + 1;
-        while (end < n_ && y[end] == y[i])
-          ++end;
-        runs_s.push_back(series_.t_s[end - 1] - series_.t_s[i]);
-        i = end;
-      }
-      std::sort(runs_s.begin(), runs_s.end());
-    }
-    const double longest_s = runs_s.size() > 1 ? runs_s[runs_s.size() - 2] : 0.0;
-    for (std::size_t i = 0; i < n_;) {
-      std::size_t end = i + 1;
-      while (end < n_ && y[end] == y[i])
-        ++end;
-      const std::size_t length = end - i;
-      const double logp =
-          static_cast<double>(length - 1) * std::log(chance) + std::log(static_cast<double>(n_));
-      const bool long_enough = length >= kStuckMin && series_.t_s[end - 1] - series_.t_s[i] >=
-                                                          std::max(kStuckMin_s, 10.0 * longest_s);
-      if (long_enough && logp < std::log(kChance) && y[i] != extreme && y[i] != least &&
-          y[i] != 0.0) {
-        // Frozen from some instant between its first sample and the next.
-        const double from_s = 0.5 * (series_.t_s[i] + series_.t_s[i + 1]);
-        const double to_s = end < n_ ? series_.t_s[end] : series_.t_s[n_ - 1];
-        // The first value may be a fresh one.
-        for (std::size_t j = i + 1; j < end; ++j)
-          result_.masked[j] = 1;
-        bool known = false;
-        for (const Effect& effect : known_) {
-          known = known || (effect.kind == Kind::kStuck && effect.parameters[0] < to_s &&
-                            effect.parameters[1] > from_s);
-        }
-        if (!known) {
-          const double sigma_s = 0.5 * result_.interval_s;
-          Curve curve{"reading", {}, {}, {}, true};
-          for (std::size_t j = i > 200 ? i - 200 : 0; j < std::min(n_, end + 200); ++j) {
-            curve.x.push_back(series_.t_s[j]);
-            curve.y.push_back(y[j]);
-          }
-          add(Kind::kStuck, {from_s, to_s}, {sigma_s, sigma_s}, -2.0 * logp,
-              {from_s, to_s, 0.0, 0.5 / result_.interval_s},
-              fmt::format("{} repeats the value {:.6g} {} times", series_.name, y[i], length),
-              Figure{"The value freezes", "time / s", "deg/s", false, false, {curve}});
-        }
-      }
-      i = end;
+    const double least_s =
+        std::max(kStuckMin_s, coarse_ ? kCoarseRuns * second_longest_s(runs) : 0.0);
+    const auto [least, most] =
+        std::minmax_element(series_.rate_dps.begin(), series_.rate_dps.end());
+    for (const Run& run : runs) {
+      const double value = series_.rate_dps[run.first];
+      // At its ends a gyro is clipped, and on 0 in a dead band.
+      if (value == *least || value == *most || value == 0.0) continue;
+      if (run.length() < kStuckMin || length_s(run) < least_s) continue;
+      const double log_chance = static_cast<double>(run.length() - 1) * std::log(chance) +
+                                std::log(static_cast<double>(n_));
+      if (log_chance >= std::log(kChance)) continue;
+      // The first value may be a fresh one.
+      for (std::size_t i = run.first + 1; i < run.end; ++i)
+        result_.masked[i] = 1;
+      tell_stuck(run, log_chance);
     }
   }
 
+  [[nodiscard]] double length_s(const Run& run) const {
+    return series_.t_s[run.end - 1] - series_.t_s[run.first];
+  }
+
+  // 0 when there are no two.
+  [[nodiscard]] double second_longest_s(const std::vector<Run>& runs) const {
+    if (runs.size() < 2) return 0.0;
+    std::vector<double> lengths_s;
+    for (const Run& run : runs)
+      lengths_s.push_back(length_s(run));
+    std::nth_element(lengths_s.begin(), lengths_s.end() - 2, lengths_s.end());
+    return lengths_s[lengths_s.size() - 2];
+  }
+
+  void tell_stuck(const Run& run, double log_chance) {
+    // Frozen from some instant between its first sample and the next.
+    const double from_s = 0.5 * (series_.t_s[run.first] + series_.t_s[run.first + 1]);
+    const double to_s = series_.t_s[std::min(run.end, n_ - 1)];
+    for (const Effect& effect : known_) {
+      if (effect.kind == Kind::kStuck && effect.parameters[0] < to_s &&
+          effect.parameters[1] > from_s)
+        return;
+    }
+    const double sigma_s = 0.5 * result_.interval_s;
+    add({.kind = Kind::kStuck,
+         .parameters = {from_s, to_s},
+         .sigma = {sigma_s, sigma_s},
+         .statistic = -2.0 * log_chance,
+         .cost_nats = (to_s - from_s) / result_.interval_s * kFrozenShare * kImpossibleNats},
+        {from_s, to_s, 0.0, 0.5 / result_.interval_s},
+        fmt::format("{} repeats the value {:.6g} {} times", series_.name,
+                    series_.rate_dps[run.first], run.length()),
+        Figure{"The value freezes",
+               "time / s",
+               "deg/s",
+               false,
+               false,
+               {readings("reading", run.first - std::min(run.first, kStuckAround),
+                         run.end + kStuckAround, 1, true)}});
+  }
+
   void find_saturation() {
-    const std::vector<double>& y = series_.rate_dps;
-    const double top = *std::max_element(y.begin(), y.end());
-    const double bottom = *std::min_element(y.begin(), y.end());
-    double limit = 0.0;
-    std::size_t best = 0;
+    const auto [bottom, top] =
+        std::minmax_element(series_.rate_dps.begin(), series_.rate_dps.end());
+    double limit_dps = 0.0;
+    std::size_t most = 0;
     std::size_t total = 0;
-    for (const double level : {top, bottom}) {
-      std::size_t at = 0;
-      std::size_t near = 0;  // as far again inside as the lattice or half a per cent reaches
-      const double reach = std::max(3.0 * lattice_dps_, 0.001 * std::abs(level));
-      for (const double value : y) {
-        if (value == level) {
-          ++at;
-        } else if (std::abs(value - level) <= reach) {
-          ++near;
-        }
-      }
-      const double expected =
-          lattice_dps_ > 0.0 ? static_cast<double>(near) * lattice_dps_ / reach : 0.0;
-      if (at >= kPlateauMin && static_cast<double>(at) > 8.0 * expected + 4.0) {
-        total += at;
-        if (at > best) best = at, limit = std::abs(level);
-      }
+    for (const double level : {*top, *bottom}) {
+      const std::size_t at = plateau_at(level);
+      total += at;
+      if (at > most) most = at, limit_dps = std::abs(level);
     }
     for (const Effect& effect : known_) {
       if (effect.kind != Kind::kSaturation) continue;
       mask_beyond(effect.parameters[0]);
       return;
     }
-    if (best == 0) return;
+    if (most == 0) return;
     // Nothing lies beyond the limit on the other side either.
-    if (std::max(std::abs(top), std::abs(bottom)) > limit * (1.0 + 1e-9)) return;
+    if (std::max(std::abs(*top), std::abs(*bottom)) > limit_dps * (1.0 + kRounding)) return;
     // On a coarse lattice a steady turn stands on one value.
-    if (limit < 20.0 * lattice_dps_ || coarse_) return;
-    mask_beyond(limit);
-    Curve curve{"reading", {}, {}, {}, false};
-    std::size_t at = 0;
-    while (std::abs(y[at]) < limit)
-      ++at;
-    for (std::size_t j = at > 300 ? at - 300 : 0; j < std::min(n_, at + 600); ++j) {
-      curve.x.push_back(series_.t_s[j]);
-      curve.y.push_back(y[j]);
-    }
-    add(Kind::kSaturation, {limit}, {std::max(series_.step_dps, 1e-9) / std::sqrt(12.0)},
-        30.0 + 10.0 * static_cast<double>(total), whole(),
-        fmt::format("{} samples of {} read exactly {:.6g} deg/s, none more", total, series_.name,
-                    limit),
-        Figure{"Readings end at a limit", "time / s", "deg/s", false, false, {curve}});
+    if (limit_dps < kLimitSteps * result_.lattice_dps || coarse_) return;
+    mask_beyond(limit_dps);
+    tell_saturation(limit_dps, total);
   }
 
-  void mask_beyond(double limit) {
+  // Values that are exactly this one, its extreme; 0 when they are no more than chance would place
+  // there.
+  [[nodiscard]] std::size_t plateau_at(double level_dps) const {
+    const double lattice_dps = result_.lattice_dps;
+    const double reach_dps = std::max(kNearSteps * lattice_dps, kNearShare * std::abs(level_dps));
+    std::size_t at = 0;
+    std::size_t near = 0;
+    for (const double value : series_.rate_dps) {
+      if (value == level_dps) {
+        ++at;
+      } else if (std::abs(value - level_dps) <= reach_dps) {
+        ++near;
+      }
+    }
+    const double expected =
+        lattice_dps > 0.0 ? static_cast<double>(near) * lattice_dps / reach_dps : 0.0;
+    const bool stands =
+        at >= kPlateauMin && static_cast<double>(at) > kPlateauTimes * expected + kPlateauMore;
+    return stands ? at : 0;
+  }
+
+  void tell_saturation(double limit_dps, std::size_t samples) {
+    std::size_t at = 0;
+    while (std::abs(series_.rate_dps[at]) < limit_dps)
+      ++at;
+    add({.kind = Kind::kSaturation,
+         .parameters = {limit_dps},
+         .sigma = {rounding_sigma_dps(series_.step_dps, 1)},
+         .statistic = kPlateauStatistic + kLimitStatistic * static_cast<double>(samples)},
+        whole(),
+        fmt::format("{} samples of {} read exactly {:.6g} deg/s, none more", samples, series_.name,
+                    limit_dps),
+        Figure{"Readings end at a limit",
+               "time / s",
+               "deg/s",
+               false,
+               false,
+               {readings("reading", at - std::min(at, kLimitBefore), at + kLimitAfter, 1, false)}});
+  }
+
+  void mask_beyond(double limit_dps) {
     for (std::size_t i = 0; i < n_; ++i) {
-      if (std::abs(series_.rate_dps[i]) >= limit * (1.0 - 1e-3)) result_.masked[i] = 1;
+      if (std::abs(series_.rate_dps[i]) >= limit_dps * (1.0 - kClippedShare)) result_.masked[i] = 1;
     }
   }
 
   void find_dead_band() {
-    const std::vector<double>& y = series_.rate_dps;
     std::size_t zeros = 0;
     std::vector<double> sizes;
-    for (const double value : y) {
-      if (std::abs(value) <= 0.25 * series_.step_dps) {
+    for (const double value : series_.rate_dps) {
+      if (std::abs(value) <= kZeroSteps * series_.step_dps) {
         ++zeros;
       } else {
         sizes.push_back(std::abs(value));
@@ -431,35 +698,40 @@ class Check {
       mask_below(effect.parameters[0]);
       return;
     }
-    if (zeros < kPlateauMin || sizes.size() < 100) return;
+    if (zeros < kPlateauMin || sizes.size() < kOutsideMin) return;
     std::sort(sizes.begin(), sizes.end());
-    const double width = sizes.front();
-    // A lattice alone has its next level one step away and as often.
-    if (width < 2.5 * lattice_dps_) return;
-    std::size_t next = 0;
-    while (next < sizes.size() && sizes[next] < 2.0 * width)
-      ++next;
-    if (next < 3) return;
+    const double width_dps = sizes.front();
+    if (width_dps < kBandSteps * result_.lattice_dps) return;
+    const auto beyond = std::lower_bound(sizes.begin(), sizes.end(), kBeyondWidths * width_dps);
+    if (static_cast<std::size_t>(beyond - sizes.begin()) < kBeyondMin) return;
     // The edge lies below the least size, by the distance of its followers.
-    const std::size_t followers = std::min<std::size_t>(sizes.size() - 1, 10);
-    const double spacing = (sizes[followers] - sizes[0]) / static_cast<double>(followers);
-    mask_below(width);
+    const std::size_t followers = std::min(sizes.size() - 1, kFollowers);
+    const double spacing_dps = (sizes[followers] - sizes[0]) / static_cast<double>(followers);
+    mask_below(width_dps);
+    tell_dead_band(width_dps, spacing_dps, zeros);
+  }
+
+  void tell_dead_band(double width_dps, double spacing_dps, std::size_t zeros) {
+    const std::vector<double>& y = series_.rate_dps;
     Curve curve{"reading", {}, {}, {}, true};
-    for (std::size_t i = 0; i < n_ && curve.x.size() < 3000; ++i) {
-      if (std::abs(y[i]) > 5.0 * width) continue;
+    for (std::size_t i = 0; i < n_ && curve.x.size() < kBandPoints; ++i) {
+      if (std::abs(y[i]) > kBandWidths * width_dps) continue;
       curve.x.push_back(series_.t_s[i]);
       curve.y.push_back(y[i]);
     }
-    add(Kind::kDeadBand, {std::max(width - spacing, 0.0)}, {std::max(spacing, 1e-9)},
-        30.0 + 4.0 * static_cast<double>(zeros), whole(),
+    add({.kind = Kind::kDeadBand,
+         .parameters = {std::max(width_dps - spacing_dps, 0.0)},
+         .sigma = {std::max(spacing_dps, kSigmaMin_dps)},
+         .statistic = kPlateauStatistic + kZeroStatistic * static_cast<double>(zeros)},
+        whole(),
         fmt::format("{} samples of {} are exactly 0 and none lies between 0 and {:.4g} deg/s",
-                    zeros, series_.name, width),
+                    zeros, series_.name, width_dps),
         Figure{"Nothing is read near zero", "time / s", "deg/s", false, false, {curve}});
   }
 
-  void mask_below(double width) {
+  void mask_below(double width_dps) {
     for (std::size_t i = 0; i < n_; ++i) {
-      if (std::abs(series_.rate_dps[i]) < 1.5 * width) result_.masked[i] = 1;
+      if (std::abs(series_.rate_dps[i]) < kMaskedWidths * width_dps) result_.masked[i] = 1;
     }
   }
 
@@ -468,12 +740,21 @@ class Check {
   const std::vector<Effect>& known_;
   std::size_t n_;
   std::vector<double> number_;  ///< on the even clock
-  double lattice_dps_ = 0.0;
   bool coarse_ = false;
   Transport result_;
 };
 
 }  // namespace
+
+void count_masked(Transport& transport) {
+  double masked = 0.0;
+  for (const std::uint8_t mask : transport.masked)
+    masked += mask;
+  for (Finding& finding : transport.findings) {
+    if (finding.effect.kind == Kind::kSaturation || finding.effect.kind == Kind::kDeadBand)
+      finding.cost_nats = masked * kMaskedShare * kImpossibleNats;
+  }
+}
 
 Transport check_transport(const GyroSeries& series, std::size_t gyro,
                           const std::vector<Effect>& known) {

@@ -14,12 +14,19 @@
 
 namespace vgyro::gap {
 
+/// What a sample that a model calls impossible costs at most, in nats: the gap stays readable.
+inline constexpr double kImpossibleNats = 50.0;
+/// No finding is told as less sure: the frames show it by themselves.
+inline constexpr double kFoundPValue = 1e-6;
+
 /// An effect that the raw frames show by themselves.
 struct Finding {
   model::Effect effect;
   model::Parameters sigma{};
   double p_value = 0.0;
-  double statistic = 0.0;
+  double statistic = 0.0;  ///< 2·ΔlogL, or what stands for it
+  /// What it costs, over the whole recording, a model that knows nothing of it.
+  double cost_nats = 0.0;
   Where where;
   std::string evidence;
   Figure figure;
@@ -40,5 +47,9 @@ struct Transport {
 /// `known`: this gyro's effects in the model; what they explain is masked but not found again.
 Transport check_transport(const GyroSeries& series, std::size_t gyro,
                           const std::vector<model::Effect>& known);
+
+/// What clips, or vanishes in a dead band, costs what all masked samples of its gyro cost: counts
+/// them. To be called again when something else has masked more.
+void count_masked(Transport& transport);
 
 }  // namespace vgyro::gap

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
+#include <limits>
 #include <numbers>
 #include <numeric>
 #include <random>
@@ -20,6 +21,9 @@ constexpr std::size_t kSegmentMin = 64;
 constexpr double kPresentMin = 0.9;  ///< of a stretch that is transformed or averaged
 constexpr std::size_t kBins = 24;
 constexpr double kBinShareMin = 0.002;
+constexpr double kBinSamplesMin = 3.0;  ///< fewer have no scatter of their own
+/// Of the largest diagonal element, added to each: above the rounding of a sum over all samples.
+constexpr double kSilentShare = 1e-12;
 constexpr double kMostOfGain = 0.9;
 constexpr std::size_t kCellsMax = 600;
 
@@ -77,37 +81,37 @@ double weight_of(Channel channel, std::size_t gyro, Sight sight) {
   return share_of(channel, gyro);
 }
 
-Sight main_sight(const Problem& problem, std::size_t gyro) {
+Sight main_sight(const Observations& data, std::size_t gyro) {
   double own = 0.0;
   double difference = 0.0;
-  for (const Channel channel : problem.channel) {
+  for (const Channel channel : data.channel) {
     own += std::abs(weight_of(channel, gyro, Sight::kOwn));
     difference += std::abs(weight_of(channel, gyro, Sight::kDifference));
   }
   return difference > own ? Sight::kDifference : Sight::kOwn;
 }
 
-EvenSeries even_series(const Problem& problem, std::size_t gyro, Sight sight,
+EvenSeries even_series(const Observations& data, std::size_t gyro, Sight sight,
                        const Eigen::VectorXd& values) {
   EvenSeries series;
-  series.interval_s = problem.layout.interval_s[sight == Sight::kDifference ? 0 : gyro];
+  series.interval_s = data.layout.interval_s[sight == Sight::kDifference ? 0 : gyro];
   if (sight == Sight::kBoth) {
-    series.interval_s = problem.holds[1 - gyro]
-                            ? std::max(problem.layout.interval_s[0], problem.layout.interval_s[1])
-                            : problem.layout.interval_s[gyro];
+    series.interval_s = data.holds[1 - gyro]
+                            ? std::max(data.layout.interval_s[0], data.layout.interval_s[1])
+                            : data.layout.interval_s[gyro];
   }
-  if (problem.t_s.empty() || series.interval_s <= 0.0) return series;
-  const double end_s = *std::max_element(problem.t_s.begin(), problem.t_s.end());
+  if (data.t_s.empty() || series.interval_s <= 0.0) return series;
+  const double end_s = *std::max_element(data.t_s.begin(), data.t_s.end());
   const std::size_t slots = static_cast<std::size_t>(std::max(0.0, end_s) / series.interval_s) + 2;
   series.value.assign(slots, 0.0);
   series.present.assign(slots, 0);
   std::vector<float> count(slots, 0.0F);
-  for (std::size_t i = 0; i < problem.t_s.size(); ++i) {
-    const double weight = weight_of(problem.channel[i], gyro, sight);
+  for (std::size_t i = 0; i < data.t_s.size(); ++i) {
+    const double weight = weight_of(data.channel[i], gyro, sight);
     if (weight == 0.0) continue;
     const auto slot = std::min(
         slots - 1,
-        static_cast<std::size_t>(std::lround(std::max(0.0, problem.t_s[i]) / series.interval_s)));
+        static_cast<std::size_t>(std::lround(std::max(0.0, data.t_s[i]) / series.interval_s)));
     series.value[slot] += weight * values[static_cast<Eigen::Index>(i)];
     series.present[slot] = 1;
     count[slot] += 1.0F;
@@ -211,10 +215,10 @@ double noise_psd(const NoiseTerms& terms, double interval_s, double rate_square,
   return psd;
 }
 
-double mean_rate_square(const Problem& problem, std::size_t gyro) {
+double mean_rate_square(const Observations& data, std::size_t gyro) {
   double sum = 0.0;
   double count = 0.0;
-  for (const Block& block : problem.layout.blocks) {
+  for (const Block& block : data.layout.blocks) {
     if (share_of(block.channel, gyro) == 0.0) continue;
     sum += block.count * block.rate_square;
     count += block.count;
@@ -222,17 +226,16 @@ double mean_rate_square(const Problem& problem, std::size_t gyro) {
   return count > 0.0 ? sum / count : 0.0;
 }
 
-Eigen::VectorXd simulate_residual(const Problem& problem, const PairNoise& noise,
+Eigen::VectorXd simulate_residual(const Observations& data, const PairNoise& noise,
                                   std::uint64_t seed) {
   std::mt19937_64 random(seed);
   std::normal_distribution<double> normal;
-  std::vector<std::uint32_t> order(problem.t_s.size());
+  std::vector<std::uint32_t> order(data.t_s.size());
   std::iota(order.begin(), order.end(), 0U);
-  std::stable_sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
-    return problem.t_s[a] < problem.t_s[b];
-  });
-  std::vector<std::array<double, 3>> gain(problem.t_s.size());
-  for (const Block& block : problem.layout.blocks)
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::uint32_t a, std::uint32_t b) { return data.t_s[a] < data.t_s[b]; });
+  std::vector<std::array<double, 3>> gain(data.t_s.size());
+  for (const Block& block : data.layout.blocks)
     std::fill_n(gain.begin() + block.first, block.count, block.within_gain);
   std::array<double, 2> walk{};
   std::array<std::vector<double>, 2> markov;
@@ -240,15 +243,15 @@ Eigen::VectorXd simulate_residual(const Problem& problem, const PairNoise& noise
     for (const MarkovTerm& term : noise[gyro].markov)
       markov[gyro].push_back(term.sigma_dps * normal(random));
   }
-  Eigen::VectorXd residual(problem.size());
+  Eigen::VectorXd residual(data.size());
   double last_s = 0.0;
   for (const std::uint32_t i : order) {
-    const double step_s = std::max(0.0, problem.t_s[i] - last_s);
-    last_s = std::max(last_s, problem.t_s[i]);
+    const double step_s = std::max(0.0, data.t_s[i] - last_s);
+    last_s = std::max(last_s, data.t_s[i]);
     double value = 0.0;
-    double variance = gain[i][2] * problem.layout.reference_variance;
+    double variance = gain[i][2] * data.layout.reference_variance;
     for (std::size_t gyro = 0; gyro < 2; ++gyro) {
-      if (!problem.holds[gyro]) continue;
+      if (!data.holds[gyro]) continue;
       const NoiseTerms& terms = noise[gyro];
       walk[gyro] += terms.walk_dps_rts * std::sqrt(step_s) * normal(random);
       double drift = walk[gyro];
@@ -259,46 +262,28 @@ Eigen::VectorXd simulate_residual(const Problem& problem, const PairNoise& noise
                                                         normal(random);
         drift += markov[gyro][k];
       }
-      const double rate_dps = problem.rate[gyro][i].value;
-      value += share_of(problem.channel[i], gyro) * drift;
-      variance +=
-          gain[i][gyro] * terms.variance(rate_dps * rate_dps, problem.layout.interval_s[gyro]);
+      const double rate_dps = data.rate[gyro][i].value;
+      value += share_of(data.channel[i], gyro) * drift;
+      variance += gain[i][gyro] * terms.variance(rate_dps * rate_dps, data.layout.interval_s[gyro]);
     }
     residual[static_cast<Eigen::Index>(i)] = value + std::sqrt(variance) * normal(random);
   }
   return residual;
 }
 
-PairNoise usable_noise(const Problem& problem, const std::vector<model::Effect>& effects,
+PairNoise usable_noise(const Observations& data, const std::vector<model::Effect>& effects,
                        const Eigen::VectorXd& residual) {
   PairNoise noise = noise_of(effects);
   std::array<Freedom, 2> free;
   bool silent = false;
   for (std::size_t gyro = 0; gyro < 2; ++gyro) {
     const bool unknown =
-        problem.holds[gyro] && noise[gyro].white_dps_rthz <= 0.0 && noise[gyro].ratio_rthz <= 0.0;
+        data.holds[gyro] && noise[gyro].white_dps_rthz <= 0.0 && noise[gyro].ratio_rthz <= 0.0;
     free[gyro] = {unknown, unknown, unknown && noise[gyro].walk_dps_rts <= 0.0, false};
     silent = silent || unknown;
   }
   if (!silent) return noise;
-  return fit_pair_noise(residual, problem.layout, noise, free, problem.holds, Part::kAll).noise;
-}
-
-std::vector<double> distinct_steps(const Layout& layout, const std::vector<double>& at_s) {
-  std::vector<double> block_s;
-  block_s.reserve(layout.blocks.size());
-  for (const Block& block : layout.blocks)
-    block_s.push_back(block.t_s);
-  std::sort(block_s.begin(), block_s.end());
-  std::vector<double> distinct;
-  auto next = block_s.begin();
-  for (const double at : at_s) {
-    if (next == block_s.end()) break;
-    if (*next >= at) continue;
-    distinct.push_back(at);
-    next = std::lower_bound(next, block_s.end(), at);
-  }
-  return distinct;
+  return fit_pair_noise(residual, data.layout, noise, free, data.holds, Part::kAll).noise;
 }
 
 std::vector<double> block_gains(const Layout& layout, const PairNoise& noise,
@@ -347,25 +332,25 @@ void place_in_time(const Layout& layout, double seconds, const std::vector<doubl
 
 }  // namespace
 
-Where where_of(const Problem& problem, std::size_t gyro, const PairNoise& noise, double seconds,
+Where where_of(const Observations& data, std::size_t gyro, const PairNoise& noise, double seconds,
                const std::vector<double>& gains, const Eigen::VectorXd& shape) {
   Where where;
-  place_in_time(problem.layout, seconds, gains, where);
-  EvenSeries series = even_series(problem, gyro, Sight::kBoth, shape);
+  place_in_time(data.layout, seconds, gains, where);
+  EvenSeries series = even_series(data, gyro, Sight::kBoth, shape);
   const std::size_t length = power_of_two_from(series.value.size());
   series.value.resize(length, 0.0);
   Eigen::FFT<double> transform;
   std::vector<std::complex<double>> spectrum;
   transform.fwd(spectrum, series.value);
   const double resolution_hz = 1.0 / (static_cast<double>(length) * series.interval_s);
-  const double rate_square = mean_rate_square(problem, gyro);
+  const double rate_square = mean_rate_square(data, gyro);
   std::vector<double> until(length / 2 + 1, 0.0);
   for (std::size_t i = 0; i < length / 2; ++i) {
     const double frequency_hz = std::max(static_cast<double>(i), 0.25) * resolution_hz;
     double psd = 0.0;
     for (std::size_t k = 0; k < 2; ++k) {
-      if (problem.holds[k])
-        psd += noise_psd(noise[k], problem.layout.interval_s[k], rate_square, frequency_hz);
+      if (data.holds[k])
+        psd += noise_psd(noise[k], data.layout.interval_s[k], rate_square, frequency_hz);
     }
     const double weight = i == 0 ? 0.5 : 1.0;
     until[i + 1] = until[i] + weight * std::norm(spectrum[i]) / std::max(psd, 1e-300);
@@ -386,64 +371,107 @@ Where where_of(const Problem& problem, std::size_t gyro, const PairNoise& noise,
   return where;
 }
 
-Bins binned(const Problem& problem, std::size_t gyro, const PairNoise& noise,
-            const std::vector<const Eigen::VectorXd*>& residuals,
-            const std::vector<double>& against, const std::vector<double>& unit) {
-  const std::size_t n = problem.t_s.size();
-  double low = 1e300;
-  double high = -1e300;
-  double seen = 0.0;
-  const auto shows = [&](std::size_t i) {
-    return share_of(problem.channel[i], gyro) != 0.0 && std::isfinite(against[i]);
-  };
-  for (std::size_t i = 0; i < n; ++i) {
-    if (!shows(i)) continue;
-    low = std::min(low, against[i]);
-    high = std::max(high, against[i]);
-    seen += 1.0;
+namespace {
+
+// Which samples of a gyro fall into which bin of what they are shown against.
+class Binning {
+ public:
+  Binning(const Observations& data, std::size_t gyro, const std::vector<double>& against)
+      : data_(data), gyro_(gyro), against_(against) {
+    for (std::size_t i = 0; i < against_.size(); ++i) {
+      if (!shows(i)) continue;
+      low_ = std::min(low_, against_[i]);
+      high_ = std::max(high_, against_[i]);
+      seen_ += 1.0;
+    }
   }
-  Bins bins;
-  bins.value.resize(residuals.size());
-  if (!(high > low)) return bins;
-  const auto bin_of = [&](std::size_t i) {
-    const double place = (against[i] - low) / (high - low) * static_cast<double>(kBins);
+
+  /// What it is shown against does not change, or nothing shows: there are no bins.
+  [[nodiscard]] bool empty() const { return !(high_ > low_); }
+
+  /// Where the bins large enough to show stand. Precondition: not empty.
+  std::vector<double> choose() {
+    std::array<double, kBins> count{};
+    std::array<double, kBins> sum{};
+    for (std::size_t i = 0; i < against_.size(); ++i) {
+      if (!shows(i)) continue;
+      count[bin_of(i)] += 1.0;
+      sum[bin_of(i)] += against_[i];
+    }
+    std::vector<double> at;
+    for (std::size_t bin = 0; bin < kBins; ++bin) {
+      column_[bin] = -1;
+      if (count[bin] < std::max(kBinSamplesMin, kBinShareMin * seen_)) continue;
+      column_[bin] = static_cast<Eigen::Index>(at.size());
+      at.push_back(sum[bin] / count[bin]);
+    }
+    return at;
+  }
+
+  /// Of the chosen bins; −1: of none. Precondition: chosen.
+  [[nodiscard]] Eigen::Index column_of(std::size_t i) const {
+    return shows(i) ? column_[bin_of(i)] : -1;
+  }
+
+ private:
+  [[nodiscard]] bool shows(std::size_t i) const {
+    return share_of(data_.channel[i], gyro_) != 0.0 && std::isfinite(against_[i]);
+  }
+  [[nodiscard]] std::size_t bin_of(std::size_t i) const {
+    const double place = (against_[i] - low_) / (high_ - low_) * static_cast<double>(kBins);
     return std::min(kBins - 1, static_cast<std::size_t>(place));
-  };
-  std::array<double, kBins> count{};
-  std::array<double, kBins> sum{};
-  for (std::size_t i = 0; i < n; ++i) {
-    if (!shows(i)) continue;
-    count[bin_of(i)] += 1.0;
-    sum[bin_of(i)] += against[i];
   }
-  std::array<Eigen::Index, kBins> column{};
-  Eigen::Index width = 0;
-  for (std::size_t bin = 0; bin < kBins; ++bin) {
-    column[bin] = -1;
-    if (count[bin] < std::max(3.0, kBinShareMin * seen)) continue;
-    column[bin] = width++;
-    bins.at.push_back(sum[bin] / count[bin]);
-  }
+
+  const Observations& data_;
+  std::size_t gyro_;
+  const std::vector<double>& against_;
+  double low_ = std::numeric_limits<double>::infinity();
+  double high_ = -std::numeric_limits<double>::infinity();
+  double seen_ = 0.0;
+  std::array<Eigen::Index, kBins> column_{};
+};
+
+// A column for each bin, then the residuals.
+Matrix bin_columns(const Observations& data, std::size_t gyro, const Binning& binning,
+                   Eigen::Index width, const std::vector<const Eigen::VectorXd*>& residuals,
+                   const std::vector<double>& unit) {
   const auto wanted = static_cast<Eigen::Index>(residuals.size());
-  Matrix columns = Matrix::Zero(problem.size(), width + wanted);
+  Matrix columns = Matrix::Zero(data.size(), width + wanted);
   for (Eigen::Index k = 0; k < wanted; ++k)
     columns.col(width + k) = *residuals[static_cast<std::size_t>(k)];
-  for (std::size_t i = 0; i < n; ++i) {
+  for (std::size_t i = 0; i < data.t_s.size(); ++i) {
     const auto row = static_cast<Eigen::Index>(i);
-    if (share_of(problem.channel[i], gyro) == 0.0) continue;
-    const Eigen::Index place = shows(i) ? column[bin_of(i)] : -1;
+    const double share = share_of(data.channel[i], gyro);
+    if (share == 0.0) continue;
+    const Eigen::Index place = binning.column_of(i);
     // Samples of bins too small to show take no part.
     if (place < 0) columns.row(row).setZero();
     if (place < 0) continue;
-    columns(row, place) = share_of(problem.channel[i], gyro) * (unit.empty() ? 1.0 : unit[i]);
+    columns(row, place) = share * (unit.empty() ? 1.0 : unit[i]);
   }
-  Matrix means = block_means(columns, problem.layout);
-  whiten_within(columns, problem.layout, noise, Part::kAll);
-  whiten_means(means, problem.layout, noise, Part::kAll);
+  return columns;
+}
+
+}  // namespace
+
+Bins binned(const Observations& data, std::size_t gyro, const PairNoise& noise,
+            const std::vector<const Eigen::VectorXd*>& residuals,
+            const std::vector<double>& against, const std::vector<double>& unit) {
+  Bins bins;
+  bins.value.resize(residuals.size());
+  Binning binning(data, gyro, against);
+  if (binning.empty()) return bins;
+  bins.at = binning.choose();
+  const auto width = static_cast<Eigen::Index>(bins.at.size());
+  const auto wanted = static_cast<Eigen::Index>(residuals.size());
+  Matrix columns = bin_columns(data, gyro, binning, width, residuals, unit);
+  Matrix means = block_means(columns, data.layout);
+  whiten_within(columns, data.layout, noise, Part::kAll);
+  whiten_means(means, data.layout, noise, Part::kAll);
   const Eigen::MatrixXd gram = columns.transpose() * columns + means.transpose() * means;
   Eigen::MatrixXd normal = gram.topLeftCorner(width, width);
   // What says nothing of a bin leaves it at zero with a large error instead of a division by zero.
-  normal.diagonal().array() += 1e-12 * normal.diagonal().maxCoeff();
+  normal.diagonal().array() += kSilentShare * normal.diagonal().maxCoeff();
   const Eigen::LDLT<Eigen::MatrixXd> solver(normal);
   const Eigen::MatrixXd covariance = solver.solve(Eigen::MatrixXd::Identity(width, width));
   const Eigen::MatrixXd value = solver.solve(gram.topRightCorner(width, wanted));

@@ -11,8 +11,8 @@
 #include <Eigen/Core>
 
 #include "gap/noise.h"
+#include "gap/observations.h"
 #include "gap/result.h"
-#include "gap/study.h"
 
 namespace vgyro::gap {
 
@@ -21,7 +21,7 @@ enum class Sight : std::uint8_t { kOwn, kDifference, kBoth };
 /// How the gyro's error shows in an observation: 1, −1 or, where it is not to be seen, 0.
 double weight_of(Channel channel, std::size_t gyro, Sight sight);
 /// Its own readings against a known rate, or the difference of the two: of which there are more.
-Sight main_sight(const Problem& problem, std::size_t gyro);
+Sight main_sight(const Observations& data, std::size_t gyro);
 
 /// Values at even instants from time 0; 0 where there is none.
 struct EvenSeries {
@@ -29,7 +29,7 @@ struct EvenSeries {
   std::vector<double> value;
   std::vector<std::uint8_t> present;
 };
-EvenSeries even_series(const Problem& problem, std::size_t gyro, Sight sight,
+EvenSeries even_series(const Observations& data, std::size_t gyro, Sight sight,
                        const Eigen::VectorXd& values);
 
 /// √PSD, two-sided, so that white noise lies at its density in the model file; about 200 points.
@@ -43,19 +43,15 @@ double allan_deviation(const NoiseTerms& terms, double interval_s, double rate_s
 double noise_psd(const NoiseTerms& terms, double interval_s, double rate_square,
                  double frequency_hz);
 /// Mean square of the rate over what a gyro takes part in.
-double mean_rate_square(const Problem& problem, std::size_t gyro);
+double mean_rate_square(const Observations& data, std::size_t gyro);
 
 /// A residual such as a model with this noise leaves.
-Eigen::VectorXd simulate_residual(const Problem& problem, const PairNoise& noise,
+Eigen::VectorXd simulate_residual(const Observations& data, const PairNoise& noise,
                                   std::uint64_t seed);
 
 /// The effects' noise; fitted to the residual where they say nothing of a gyro's white noise.
-PairNoise usable_noise(const Problem& problem, const std::vector<model::Effect>& effects,
+PairNoise usable_noise(const Observations& data, const std::vector<model::Effect>& effects,
                        const Eigen::VectorXd& residual);
-
-/// Of these times, rising, those at which a step can be told from one at the time before: where
-/// nothing was recorded in between, both are the same.
-std::vector<double> distinct_steps(const Layout& layout, const std::vector<double>& at_s);
 
 /// ΔlogL of each block when `with` is left instead of `without`.
 std::vector<double> block_gains(const Layout& layout, const PairNoise& noise,
@@ -63,7 +59,7 @@ std::vector<double> block_gains(const Layout& layout, const PairNoise& noise,
 
 /// The shortest stretch of time that holds 90 % of the gains, and the narrowest band that holds
 /// 90 % of `shape`, seen above the noise.
-Where where_of(const Problem& problem, std::size_t gyro, const PairNoise& noise, double seconds,
+Where where_of(const Observations& data, std::size_t gyro, const PairNoise& noise, double seconds,
                const std::vector<double>& gains, const Eigen::VectorXd& shape);
 
 /// Means of a residual in bins of `against`, by least squares under the noise, so that drift counts
@@ -73,7 +69,7 @@ struct Bins {
   std::vector<std::vector<double>> value;  ///< of each residual
   std::vector<double> sigma;
 };
-Bins binned(const Problem& problem, std::size_t gyro, const PairNoise& noise,
+Bins binned(const Observations& data, std::size_t gyro, const PairNoise& noise,
             const std::vector<const Eigen::VectorXd*>& residuals,
             const std::vector<double>& against, const std::vector<double>& unit);
 

@@ -3,51 +3,105 @@
 #include <algorithm>
 #include <cmath>
 
-#include <fmt/core.h>
-
 #include "gap/describe.h"
 #include "gap/differences.h"
 #include "gap/figures.h"
+#include "gap/identifiable.h"
 #include "gap/leftover.h"
 #include "gap/score.h"
 #include "gap/search.h"
 #include "gap/study.h"
-#include "model/catalogue.h"
 
 namespace vgyro::gap {
 
 namespace {
 
-using model::Effect;
+// One of forty right models lies outside the band of 95 %, one of some 600 outside this.
+constexpr double kClosedBands = 1.5;
+// Places that the search looked at, for the p-value of the largest.
+constexpr double kTrials = 400.0;
+// How far the whole is, for people who wait; the search says what lies between.
+constexpr double kShareFrames = 0.02;
+constexpr double kShareScoring = 0.9;
+constexpr double kShareDrawing = 0.95;
 
+// Of χ² with one degree of freedom.
 double chi_square_tail(double statistic) {
   return std::erfc(std::sqrt(0.5 * std::max(0.0, statistic)));
 }
 
-// Places that the search looked at, for the p-value of the largest.
-// One of forty right models lies outside the band of 95 %, one of some 600 outside this.
-constexpr double kClosedBands = 1.5;
-constexpr double kTrials = 400.0;
-
-std::vector<Effect> with_transport(std::vector<Effect> effects,
-                                   const std::vector<Finding>& findings) {
-  for (const Finding& finding : findings)
-    effects.push_back(finding.effect);
-  return effects;
-}
-
-void fill_problem_facts(const Study& study, std::size_t& held_out,
-                        std::array<std::size_t, 2>& samples) {
+void fill_facts(const Study& study, std::size_t& held_out, std::array<std::size_t, 2>& samples) {
   held_out = 0;
   samples = {};
-  for (const Problem& problem : study.problems()) {
-    for (const Block& block : problem.layout.blocks) {
+  for (const auto& data : study.observations()) {
+    for (const Block& block : data->layout.blocks) {
       if (block.held_out) held_out += block.count;
       for (std::size_t gyro = 0; gyro < 2; ++gyro) {
         if (share_of(block.channel, gyro) != 0.0) samples[gyro] += block.count;
       }
     }
   }
+}
+
+NamedEffect named(const Finding& finding) {
+  NamedEffect named;
+  named.effect = finding.effect;
+  named.sigma = finding.sigma;
+  named.p_value = finding.p_value;
+  named.statistic = finding.statistic;
+  named.where = finding.where;
+  named.evidence = finding.evidence;
+  named.figure = finding.figure;
+  return named;
+}
+
+NamedEffect named(const Found& one, bool with_reference) {
+  NamedEffect named;
+  named.effect = one.effect;
+  named.sigma = one.sigma;
+  named.statistic = one.statistic;
+  named.p_value = std::min(1.0, kTrials * chi_square_tail(one.adjusted()));
+  named.ambiguous_with = one.ambiguous_with;
+  if (!one.ambiguous_with.empty()) {
+    named.experiment =
+        experiment_for(reading_of(one.effect), one.ambiguous_with.front(), with_reference);
+  }
+  return named;
+}
+
+Verdict verdict_of(const Result& result) {
+  const bool closed = result.gap.after <= kClosedBands * result.gap.band95[1];
+  const bool rest = !result.unexplained.empty() || !closed;
+  if (result.effects.empty()) return rest ? Verdict::kUnexplained : Verdict::kNoGap;
+  return rest ? Verdict::kPartlyExplained : Verdict::kExplained;
+}
+
+// The gap before and after each effect, in the order in which they were added, against the floor of
+// the model with all of them.
+void score(const Study& study, const Effects& given, std::uint64_t seed, Result& result) {
+  Effects now = given;
+  for (const NamedEffect& one : result.effects)
+    now.push_back(one.effect);
+  const Floor floor = simulate_floor(study, now, Part::kHeldOut, seed);
+  now.resize(given.size());
+  double gap = gap_of(study, now, floor, Part::kHeldOut);
+  result.gap.before = gap;
+  result.gap.band95 = floor.band95;
+  for (NamedEffect& one : result.effects) {
+    one.gap_before = gap;
+    now.push_back(one.effect);
+    gap = gap_of(study, now, floor, Part::kHeldOut);
+    one.gap_after = gap;
+  }
+  result.gap.after = gap;
+}
+
+// What the raw frames show by themselves is in from the start.
+Effects known_effects(const Effects& given, const std::vector<Finding>& findings) {
+  Effects known = given;
+  for (const Finding& finding : findings)
+    known.push_back(finding.effect);
+  return known;
 }
 
 }  // namespace
@@ -71,102 +125,56 @@ Expected<Result> find_gap(const Recording& recording, const model::Model& model,
   const auto tell = [&](std::string_view what, double share) {
     if (settings.progress) settings.progress(what, share);
   };
-  tell("checking frames and stamps", 0.02);
-  auto study = Study::begin(recording, model.effects);
-  if (!study) return tl::unexpected(study.error());
-  Study& data = **study;
-
-  // What the raw frames show by themselves is in from the start.
-  const std::vector<Effect> known = with_transport(model.effects, data.findings());
-  Search search(data, known);
+  tell("checking frames and stamps", kShareFrames);
+  auto begun = Study::begin(recording, model.effects);
+  if (!begun) return tl::unexpected(begun.error());
+  Search search(*begun, known_effects(model.effects, (*begun)->findings()));
   search.progress = settings.progress;
   search.run();
+  const Study& study = search.study();
 
+  tell("scoring held-out samples", kShareScoring);
   Result result;
   result.seconds = recording.seconds;
   result.with_reference = recording.has_reference;
-  result.notes = data.notes();
+  result.notes = study.notes();
   result.model = model;
-  result.not_identifiable = not_identifiable(data);
-  fill_problem_facts(data, result.held_out, result.samples);
-
-  tell("scoring held-out samples", 0.9);
+  result.not_identifiable = not_identifiable(study);
+  fill_facts(study, result.held_out, result.samples);
   std::vector<Found> found = search.found();
-  std::vector<Unexplained> leftover = leftovers(data, search, found);
-  std::vector<Effect> last = known;
+  result.unexplained = leftovers(search, found);
+  for (const Finding& finding : study.findings())
+    result.effects.push_back(named(finding));
   for (const Found& one : found)
-    last.push_back(one.term.effect);
-  const Floor floor = simulate_floor(data, last, Part::kHeldOut, settings.seed);
-  std::vector<Effect> now = model.effects;
-  double gap = gap_of(data, now, floor, Part::kHeldOut);
-  result.gap.before = gap;
-  result.gap.band95 = floor.band95;
-  for (const Finding& finding : data.findings()) {
-    NamedEffect named;
-    named.effect = finding.effect;
-    named.sigma = finding.sigma;
-    named.p_value = finding.p_value;
-    named.statistic = finding.statistic;
-    named.where = finding.where;
-    named.evidence = finding.evidence;
-    named.figure = finding.figure;
-    named.gap_before = gap;
-    now.push_back(finding.effect);
-    gap = gap_of(data, now, floor, Part::kHeldOut);
-    named.gap_after = gap;
-    result.effects.push_back(std::move(named));
-  }
-  for (const Found& one : found) {
-    NamedEffect named;
-    named.effect = one.term.effect;
-    named.sigma = one.sigma;
-    named.statistic = one.statistic;
-    named.p_value = std::min(1.0, kTrials * chi_square_tail(one.statistic - one.penalty));
-    named.ambiguous_with = one.ambiguous_with;
-    if (!one.ambiguous_with.empty()) {
-      named.experiment = experiment_for({one.term.effect.kind, one.term.effect.gyro},
-                                        one.ambiguous_with.front(), recording.has_reference);
-    }
-    named.gap_before = gap;
-    now.push_back(one.term.effect);
-    gap = gap_of(data, now, floor, Part::kHeldOut);
-    named.gap_after = gap;
-    result.effects.push_back(std::move(named));
-  }
-  result.gap.after = gap;
-  result.unexplained = std::move(leftover);
+    result.effects.push_back(named(one, recording.has_reference));
   for (const NamedEffect& effect : result.effects)
     result.model.effects.push_back(effect.effect);
-  const bool closed = result.gap.after <= kClosedBands * floor.band95[1];
-  const bool rest = !result.unexplained.empty() || !closed;
-  if (result.effects.empty()) {
-    result.verdict = rest ? Verdict::kUnexplained : Verdict::kNoGap;
-  } else {
-    result.verdict = rest ? Verdict::kPartlyExplained : Verdict::kExplained;
-  }
-  tell("drawing", 0.95);
-  describe_effects(data, model.effects, result);
-  result.figures = gyro_figures(data, model.effects, result.model.effects, settings.seed);
+  score(study, model.effects, settings.seed, result);
+  result.verdict = verdict_of(result);
+
+  tell("drawing", kShareDrawing);
+  describe_effects(study, model.effects, result);
+  result.figures = gyro_figures(study, model.effects, result.model.effects, settings.seed);
   tell("done", 1.0);
   return result;
 }
 
 Expected<Comparison> compare(const Recording& recording, const model::Model& model,
                              const Settings& settings) {
-  auto study = Study::begin(recording, model.effects);
-  if (!study) return tl::unexpected(study.error());
-  const Study& data = **study;
+  auto begun = Study::begin(recording, model.effects);
+  if (!begun) return tl::unexpected(begun.error());
+  const Study& study = **begun;
   Comparison comparison;
-  const Floor floor = simulate_floor(data, model.effects, Part::kHeldOut, settings.seed);
-  const double gap = gap_of(data, model.effects, floor, Part::kHeldOut);
-  comparison.gap = {gap, gap, 0.0, floor.band95};
+  const Floor floor = simulate_floor(study, model.effects, Part::kHeldOut, settings.seed);
+  const double gap = gap_of(study, model.effects, floor, Part::kHeldOut);
+  comparison.gap = {gap, gap, floor.band95};
   comparison.seconds = recording.seconds;
   comparison.with_reference = recording.has_reference;
-  comparison.notes = data.notes();
+  comparison.notes = study.notes();
   std::size_t held_out = 0;
-  fill_problem_facts(data, held_out, comparison.samples);
-  comparison.differences = differences(data, model.effects);
-  comparison.figures = gyro_figures(data, model.effects, model.effects, settings.seed);
+  fill_facts(study, held_out, comparison.samples);
+  comparison.differences = differences(study, model.effects);
+  comparison.figures = gyro_figures(study, model.effects, model.effects, settings.seed);
   return comparison;
 }
 

@@ -5,6 +5,8 @@
 
 #include <fmt/core.h>
 
+#include "base/fnv1a.h"
+
 namespace vgyro::gateway {
 
 namespace {
@@ -50,9 +52,9 @@ void add_limit(const model::Effect& effect, GyroPlan& gyro) {
   }
 }
 
-// FNV-1a: the same effects give the same eight digits on every machine.
+// The same effects give the same eight digits on every machine.
 std::string digest_of(const std::vector<model::Effect>& effects) {
-  std::uint32_t hash = 2166136261U;
+  std::uint32_t hash = kFnv1aBegin;
   bool any = false;
   for (const model::Effect& effect : effects) {
     if (treatment(effect.kind) != kTakesBack) continue;
@@ -60,26 +62,41 @@ std::string digest_of(const std::vector<model::Effect>& effects) {
     std::string text(model::info(effect.kind).name);
     for (const double parameter : effect.parameters)
       text += fmt::format(" {}", parameter);
-    for (const char c : text)
-      hash = (hash ^ static_cast<unsigned char>(c)) * 16777619U;
+    hash = fnv1a(text, hash);
   }
   return any ? fmt::format("{:08x}", hash) : std::string();
 }
 
+struct Input {
+  model::Need need;
+  std::string_view word;
+  bool (*is_configured)(const Plan& plan, std::size_t gyro);
+  std::string (*lacking)(const GyroPlan& gyro);
+  std::string_view remedy;
+};
+constexpr Input kInputs[] = {
+    {model::kNeedsTemperature, "temperature",
+     [](const Plan& plan, std::size_t gyro) { return plan.gyros[gyro].temperature.has_value(); },
+     [](const GyroPlan& gyro) {
+       return fmt::format("the temperature of gyro {}, which the configuration does not name",
+                          gyro.name);
+     },
+     "temperature = \"SIGNAL\" in its [[gyro]] table"},
+    {model::kNeedsAcceleration, "acceleration",
+     [](const Plan& plan, std::size_t) { return plan.accelerometer.has_value(); },
+     [](const GyroPlan&) { return std::string("an [accelerometer]"); },
+     "an [accelerometer] table in the configuration"},
+};
+static_assert(model::answers_each_need(kInputs));
+
 void check_inputs(const model::Effect& effect, const Plan& plan, const std::string& place,
                   std::vector<Error>& errors) {
   const model::KindInfo& kind = model::info(effect.kind);
-  const std::string& gyro = plan.gyros[effect.gyro].name;
-  if ((kind.needs & model::kNeedsTemperature) != 0 && !plan.gyros[effect.gyro].temperature) {
+  for (const Input& input : kInputs) {
+    if ((kind.needs & input.need) == 0 || input.is_configured(plan, effect.gyro)) continue;
     errors.push_back({place,
-                      fmt::format("{} needs the temperature of gyro {}, which the configuration "
-                                  "does not name",
-                                  kind.name, gyro),
-                      "temperature = \"SIGNAL\" in its [[gyro]] table"});
-  }
-  if ((kind.needs & model::kNeedsAcceleration) != 0 && !plan.accelerometer) {
-    errors.push_back({place, fmt::format("{} needs an [accelerometer]", kind.name),
-                      "an [accelerometer] table in the configuration"});
+                      fmt::format("{} needs {}", kind.name, input.lacking(plan.gyros[effect.gyro])),
+                      std::string(input.remedy)});
   }
 }
 
@@ -120,8 +137,9 @@ std::vector<model::Effect> effects_of(const Plan& plan, std::size_t gyro) {
 
 std::vector<std::string_view> inputs_text(std::uint8_t needs) {
   std::vector<std::string_view> words;
-  if ((needs & model::kNeedsTemperature) != 0) words.emplace_back("temperature");
-  if ((needs & model::kNeedsAcceleration) != 0) words.emplace_back("acceleration");
+  for (const Input& input : kInputs) {
+    if ((needs & input.need) != 0) words.push_back(input.word);
+  }
   return words;
 }
 

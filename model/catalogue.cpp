@@ -192,6 +192,14 @@ constexpr bool in_order_of_kind() {
 }
 static_assert(in_order_of_kind());
 
+constexpr bool needs_are_counted() {
+  for (const KindInfo& row : kCatalogue) {
+    if (row.needs >> kNeedCount != 0) return false;
+  }
+  return true;
+}
+static_assert(needs_are_counted());
+
 // Products, quotients and squares of a few of them, and of times, stay finite and are not lost.
 constexpr bool is_sane(const Parameter& parameter) {
   constexpr double kMagnitudeMax = 1e9;

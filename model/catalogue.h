@@ -1,13 +1,15 @@
 #pragma once
 
 // Every kind of effect: its name and parameters in the model file, what it does to a gyro, and, of
-// the deterministic ones, its equation. The simulator adds what the live path takes back, so both
-// ask here. A new offset or response is a new row; HACKING.md says what else another kind touches.
+// the deterministic ones, its equation. A new offset or response is a new row; HACKING.md says what
+// else another kind touches.
 //
-// A gyro reads  clip(Ω' + responses(Ω') + offsets + noise), where Ω' is the rate behind delay and
-// low-passes: every response is to the late rate, and offsets depend on no rate.
+// How the effects of one gyro act together is said in model/equation.h: every response is to the
+// rate behind delay and low-passes, and offsets depend on no rate.
 
+#include <cstddef>
 #include <cstdint>
+#include <iterator>
 #include <optional>
 #include <span>
 #include <string>
@@ -30,6 +32,18 @@ enum class Nature : std::uint8_t {
 
 /// What an equation needs to know of the surroundings; a bit mask.
 enum Need : std::uint8_t { kNeedsNothing = 0, kNeedsTemperature = 1, kNeedsAcceleration = 2 };
+inline constexpr std::size_t kNeedCount = 2;
+
+/// Of a table that says something of each need: one row for each bit, in their order. To be
+/// asserted where it stands, so that a new need does not compile before all who must know it do.
+template <typename Rows>
+constexpr bool answers_each_need(const Rows& rows) {
+  if (std::size(rows) != kNeedCount) return false;
+  for (std::size_t bit = 0; bit < kNeedCount; ++bit) {
+    if (rows[bit].need != 1U << bit) return false;
+  }
+  return true;
+}
 
 struct Parameter {
   enum class Form : std::uint8_t { kNumber, kWhole, kAxis };

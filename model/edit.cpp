@@ -1,9 +1,6 @@
 #include "model/edit.h"
 
 #include <algorithm>
-#include <cassert>
-#include <cmath>
-#include <optional>
 
 #include <fmt/core.h>
 
@@ -90,55 +87,6 @@ Expected<void> check_form(std::string_view text) {
               "write each of them as an [[effect]] table");
 }
 
-// Columns count code points.
-std::size_t offset_of(std::string_view text, toml::source_position position) {
-  std::size_t offset = 0;
-  for (unsigned line = 1; line < position.line; ++line)
-    offset = text.find('\n', offset) + 1;
-  if (position.line == 1 && text.starts_with("\xEF\xBB\xBF")) offset = 3;
-  for (unsigned column = 1; column < position.column; ++column) {
-    ++offset;
-    while (offset < text.size() && (static_cast<unsigned char>(text[offset]) & 0xC0U) == 0x80U)
-      ++offset;
-  }
-  return offset;
-}
-
-// The one table that begins on this line; null where there is none, or more than one.
-const toml::table* table_on(const toml::table& root, unsigned line) {
-  const toml::table* found = nullptr;
-  for (const toml::node& node : *root["effect"].as_array()) {
-    if (node.source().begin.line != line) continue;
-    if (found != nullptr) return nullptr;
-    found = node.as_table();
-  }
-  return found;
-}
-
-Expected<std::string> with_value(std::string_view text, unsigned line, std::string_view name,
-                                 const std::string& value) {
-  const Expected<toml::table> parsed = parse_toml(text, kFile);
-  if (!parsed) return tl::unexpected(parsed.error());
-  const toml::table* table = table_on(*parsed, line);
-  std::string edited(text);
-  if (table == nullptr)
-    return fail(at_line(kFile, line), "holds several effects", "one table a line is needed");
-  if (const toml::node* node = table->get(name)) {
-    const std::size_t begin = offset_of(text, node->source().begin);
-    const std::size_t end = offset_of(text, node->source().end);
-    return edited.replace(begin, end - begin, value);
-  }
-  if (table->is_inline()) {
-    return fail(at_line(kFile, line), fmt::format("{} cannot be added to an inline table", name),
-                "write the effect as an [[effect]] table");
-  }
-  const std::string_view newline = newline_of(text);
-  const std::size_t head_end = text.find('\n', offset_of(text, table->source().begin));
-  // The table holds gyro and kind, so its first line ends.
-  assert(head_end != std::string_view::npos);
-  return edited.insert(head_end + 1, fmt::format("{} = {}{}", name, value, newline));
-}
-
 }  // namespace
 
 Expected<std::string> append_effect(std::string_view text, const Effect& effect,
@@ -157,27 +105,6 @@ Expected<std::string> append_effect(std::string_view text, const Effect& effect,
   std::vector<Effect> wanted = before->effects;
   wanted.push_back(effect);
   return read_back(std::move(result), wanted);
-}
-
-Expected<std::string> replace_parameter(std::string_view text, unsigned line_of_table,
-                                        std::string_view name, double value) {
-  auto model = read(text);
-  if (!model) return tl::unexpected(model.error());
-  const auto effect = std::find_if(model->effects.begin(), model->effects.end(),
-                                   [&](const Effect& e) { return e.line == line_of_table; });
-  if (effect == model->effects.end())
-    return fail(at_line(kFile, line_of_table), "no effect begins here");
-  const std::span<const Parameter> parameters = info(effect->kind).parameters;
-  const auto parameter = std::find_if(parameters.begin(), parameters.end(),
-                                      [&](const Parameter& p) { return p.name == name; });
-  if (parameter == parameters.end()) {
-    return fail(at_line(kFile, line_of_table),
-                fmt::format("{} has no parameter {}", info(effect->kind).name, name));
-  }
-  auto edited = with_value(text, line_of_table, name, value_text(*parameter, value));
-  if (!edited) return edited;
-  effect->parameters[static_cast<std::size_t>(parameter - parameters.begin())] = value;
-  return read_back(*std::move(edited), model->effects);
 }
 
 std::string to_toml(const Model& model) {

@@ -44,6 +44,10 @@ enum class Kind : std::uint8_t {
 };
 inline constexpr std::size_t kKindCount = 30;
 
+/// Effects of kind gauss_markov for one gyro. Three, a decade apart, are flicker noise over the
+/// times that a gyro is used for (docs/allan.md); each is a state of every filter of the gateway.
+inline constexpr std::size_t kGaussMarkovMax = 3;
+
 inline constexpr std::size_t kParametersMax = 3;
 /// In the order of the catalogue; an axis is 0, 1 or 2.
 using Parameters = std::array<double, kParametersMax>;

@@ -24,8 +24,6 @@ struct Model {
 using ModelResult = tl::expected<Model, std::vector<Error>>;
 
 inline constexpr std::size_t kEffectsMax = 256;
-/// Effects of this kind for one gyro.
-inline constexpr std::size_t kGaussMarkovMax = 3;
 
 ModelResult load_model(const std::string& path);
 /// `file` names the text in complaints.

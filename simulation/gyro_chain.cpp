@@ -21,37 +21,30 @@ bool is_random(const Effect& effect) {
 }  // namespace
 
 GyroChain::GyroChain(std::span<const Effect> effects, double interval_s, std::uint64_t seed)
-    : interval_s_(interval_s) {
+    : equation_(effects), interval_s_(interval_s) {
   assert(interval_s > 0.0);
   for (const Effect& effect : effects) {
-    const Nature nature = model::info(effect.kind).nature;
-    if (nature == Nature::kOffset || nature == Nature::kResponse) added_.push_back(effect);
-    if (nature == Nature::kClip) clips_.push_back(effect);
     if (effect.kind == Kind::kStuck) stuck_.push_back(effect);
     if (!is_random(effect)) continue;
     const auto ordinal = std::count_if(randoms_.begin(), randoms_.end(), [&](const Random& other) {
       return other.effect.kind == effect.kind;
     });
-    randoms_.push_back(
-        {effect,
-         NoiseSource(seed, static_cast<std::uint32_t>(effect.gyro),
-                     static_cast<std::uint32_t>(effect.kind), static_cast<std::uint32_t>(ordinal)),
-         0.0});
+    randoms_.push_back({effect,
+                        NoiseSource(seed, kGyroSenders[effect.gyro], model::info(effect.kind).name,
+                                    static_cast<std::uint32_t>(ordinal)),
+                        0.0});
   }
-  // Saturation, dead band, quantisation: the order of Kind.
-  std::stable_sort(clips_.begin(), clips_.end(),
-                   [](const Effect& a, const Effect& b) { return a.kind < b.kind; });
 }
 
 // Exact between samples, however far apart. A stationary process begins as it goes on; a walk
 // begins at 0, because where it begins is a bias.
-double GyroChain::noise_dps(Random& random, double sensed_dps, double since_s) {
+double GyroChain::noise_dps(Random& random, double late_dps, double since_s) {
   const model::Parameters& p = random.effect.parameters;
   switch (random.effect.kind) {
     case Kind::kWhiteNoise:
       return p[0] / std::sqrt(interval_s_) * random.source.normal();
     case Kind::kRateNoise:
-      return p[0] * std::abs(sensed_dps) / std::sqrt(interval_s_) * random.source.normal();
+      return p[0] * std::abs(late_dps) / std::sqrt(interval_s_) * random.source.normal();
     case Kind::kRateRandomWalk:
       random.state_dps += p[0] * std::sqrt(since_s) * random.source.normal();
       return random.state_dps;
@@ -72,20 +65,12 @@ double GyroChain::noise_dps(Random& random, double sensed_dps, double since_s) {
   }
 }
 
-double GyroChain::clip(double reading_dps) const {
-  for (const Effect& effect : clips_)
-    reading_dps = model::clipped_dps(effect, reading_dps);
-  return reading_dps;
-}
-
-double GyroChain::next(double sensed_dps, const model::Surroundings& surroundings) {
+double GyroChain::next(double late_dps, const model::Surroundings& surroundings) {
   const double since_s = begun_ ? surroundings.t_s - last_s_ : 0.0;
-  double reading_dps = sensed_dps;
-  for (const Effect& effect : added_)
-    reading_dps += model::added_dps(effect, sensed_dps, surroundings);
+  double reading_dps = equation_.reading_dps(late_dps, surroundings);
   for (Random& random : randoms_)
-    reading_dps += noise_dps(random, sensed_dps, since_s);
-  reading_dps = clip(reading_dps);
+    reading_dps += noise_dps(random, late_dps, since_s);
+  reading_dps = equation_.clipped_dps(reading_dps);
   const bool frozen =
       begun_ && std::any_of(stuck_.begin(), stuck_.end(), [&](const Effect& stuck) {
         return surroundings.t_s >= stuck.parameters[0] && surroundings.t_s < stuck.parameters[1];

@@ -1,14 +1,15 @@
 #pragma once
 
-// One gyro, sample by sample: what it reads of the rate that reaches its sensing element,
-//   frozen(rounded(dead band(clipped(rate + responses + offsets + noise + spikes)))).
-// Delay and low-pass come before it (readings.h), lost frames and wrong stamps after it
-// (simulator.h).
+// One gyro, sample by sample: the equation of its effects (model/equation.h) with what is random,
+//   frozen(clipped(rate + responses + offsets + noise + spikes)),
+// of the rate that reaches its sensing element. Delay and low-pass come before it, lost frames and
+// wrong stamps after it (simulator.h).
 
 #include <span>
 #include <vector>
 
 #include "model/effect.h"
+#include "model/equation.h"
 #include "simulation/noise_source.h"
 
 namespace vgyro::simulation {
@@ -20,7 +21,7 @@ class GyroChain {
   GyroChain(std::span<const model::Effect> effects, double interval_s, std::uint64_t seed);
 
   /// Precondition: surroundings.t_s grows.
-  double next(double sensed_dps, const model::Surroundings& surroundings);
+  double next(double late_dps, const model::Surroundings& surroundings);
 
  private:
   /// A random effect, its stream, and where its walk stands.
@@ -29,11 +30,9 @@ class GyroChain {
     NoiseSource source;
     double state_dps = 0.0;
   };
-  double noise_dps(Random& random, double sensed_dps, double since_s);
-  double clip(double reading_dps) const;
+  double noise_dps(Random& random, double late_dps, double since_s);
 
-  std::vector<model::Effect> added_;
-  std::vector<model::Effect> clips_;  ///< in the order in which they act
+  model::Equation equation_;
   std::vector<model::Effect> stuck_;
   std::vector<Random> randoms_;
   double interval_s_;

@@ -2,22 +2,24 @@
 
 #include <cmath>
 
+#include "base/fnv1a.h"
+
 namespace vgyro::simulation {
 
 namespace {
 
-std::mt19937_64 engine_for(std::uint64_t seed, std::uint32_t gyro, std::uint32_t purpose,
+std::mt19937_64 engine_for(std::uint64_t seed, std::string_view sender, std::string_view purpose,
                            std::uint32_t ordinal) {
   std::seed_seq sequence{static_cast<std::uint32_t>(seed), static_cast<std::uint32_t>(seed >> 32U),
-                         gyro, purpose, ordinal};
+                         fnv1a(sender), fnv1a(purpose), ordinal};
   return std::mt19937_64(sequence);
 }
 
 }  // namespace
 
-NoiseSource::NoiseSource(std::uint64_t seed, std::uint32_t gyro, std::uint32_t purpose,
+NoiseSource::NoiseSource(std::uint64_t seed, std::string_view sender, std::string_view purpose,
                          std::uint32_t ordinal)
-    : engine_(engine_for(seed, gyro, purpose, ordinal)) {}
+    : engine_(engine_for(seed, sender, purpose, ordinal)) {}
 
 double NoiseSource::uniform() {
   return static_cast<double>(engine_() >> 11U) * 0x1p-53;

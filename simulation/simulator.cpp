@@ -4,14 +4,15 @@
 #include <cassert>
 #include <cmath>
 #include <numbers>
+#include <span>
 
 #include <fmt/core.h>
 
 #include "model/catalogue.h"
+#include "model/equation.h"
 #include "simulation/gyro_chain.h"
 #include "simulation/low_pass.h"
 #include "simulation/noise_source.h"
-#include "simulation/readings.h"
 
 namespace vgyro::simulation {
 
@@ -24,10 +25,10 @@ constexpr double kRadPerDeg = std::numbers::pi / 180.0;
 constexpr double kVibrationWindow_s = 1.0;
 // A bus keeps the order of a sender's frames; a log tells them apart by a microsecond.
 constexpr double kStampStep_s = 1e-6;
-// Streams of random numbers beside those of the kinds.
-constexpr auto kJitterOfAll = static_cast<std::uint32_t>(model::kKindCount);
-constexpr std::uint32_t kReferenceStream = 2;
-constexpr std::uint32_t kAccelerometerStream = 3;
+// Names of streams of random numbers, beside the gyros and the kinds; docs/simulate.md has them.
+constexpr std::string_view kJitterOfAll = "jitter";
+constexpr std::string_view kReferenceSender = "reference";
+constexpr std::string_view kAccelerometerSender = "accelerometer";
 
 // A sample at the very end of the motion still belongs to it.
 std::size_t sample_count(const Timing& timing, double length_s) {
@@ -42,19 +43,20 @@ double sample_time_s(const Timing& timing, std::size_t n) {
 // When the log says that a frame came: the sender's clock, then what held it up.
 class Stamps {
  public:
-  Stamps(std::span<const Effect> effects, const Settings& settings, std::uint32_t stream)
-      : jitters_{{settings.jitter_s, NoiseSource(settings.seed, stream, kJitterOfAll, 0)}} {
+  Stamps(std::span<const Effect> effects, const Settings& settings, std::string_view sender)
+      : equation_(effects),
+        jitters_{{settings.jitter_s, NoiseSource(settings.seed, sender, kJitterOfAll, 0)}} {
+    std::uint32_t ordinal = 0;
     for (const Effect& effect : effects) {
-      if (effect.kind == Kind::kClockSkew) pace_ += effect.parameters[0] * 1e-6;
       if (effect.kind != Kind::kTimestampJitter) continue;
-      const auto ordinal = static_cast<std::uint32_t>(jitters_.size());
-      const auto kind = static_cast<std::uint32_t>(effect.kind);
-      jitters_.push_back({effect.parameters[0], NoiseSource(settings.seed, stream, kind, ordinal)});
+      const std::string_view purpose = model::info(effect.kind).name;
+      jitters_.push_back(
+          {effect.parameters[0], NoiseSource(settings.seed, sender, purpose, ordinal++)});
     }
   }
 
   double next(double t_s) {
-    double stamp_s = t_s * pace_;
+    double stamp_s = equation_.stamp_s(t_s);
     for (Jitter& jitter : jitters_)
       stamp_s += std::abs(jitter.sigma_s * jitter.source.normal());
     last_s_ = std::max(stamp_s, last_s_ + kStampStep_s);
@@ -66,8 +68,8 @@ class Stamps {
     double sigma_s;
     NoiseSource source;
   };
+  model::Equation equation_;
   std::vector<Jitter> jitters_;
-  double pace_ = 1.0;
   double last_s_ = -1.0;
 };
 
@@ -77,10 +79,9 @@ class Losses {
   Losses(std::span<const Effect> effects, std::uint64_t seed) {
     for (const Effect& effect : effects) {
       if (effect.kind != Kind::kDroppedFrames) continue;
-      losses_.push_back(
-          {effect.parameters[0], NoiseSource(seed, static_cast<std::uint32_t>(effect.gyro),
-                                             static_cast<std::uint32_t>(effect.kind),
-                                             static_cast<std::uint32_t>(losses_.size()))});
+      losses_.push_back({effect.parameters[0],
+                         NoiseSource(seed, kGyroSenders[effect.gyro], model::info(effect.kind).name,
+                                     static_cast<std::uint32_t>(losses_.size()))});
     }
   }
 
@@ -106,15 +107,37 @@ std::vector<Effect> effects_of(const model::Model& model, std::size_t gyro) {
   return effects;
 }
 
-// Nothing where it is there.
+std::string missing_temperature(const Effect& /*effect*/, const Profile& profile) {
+  return profile.temperature_c ? "" : "temperature_c";
+}
+
+// Of the axis of a kind that has one, or of any.
+std::string missing_acceleration(const Effect& effect, const Profile& profile) {
+  const std::span<const model::Parameter> parameters = model::info(effect.kind).parameters;
+  for (std::size_t i = 0; i < parameters.size(); ++i) {
+    if (parameters[i].form != model::Parameter::Form::kAxis) continue;
+    const auto axis = static_cast<std::size_t>(effect.parameters[i]);
+    return profile.acceleration_g[axis] ? "" : fmt::format("acc_{}_g", "xyz"[axis]);
+  }
+  return profile.has_acceleration() ? "" : "acc_x_g, acc_y_g, acc_z_g";
+}
+
+struct InputColumn {
+  model::Need need;
+  /// Nothing where it is there.
+  std::string (*missing)(const Effect& effect, const Profile& profile);
+};
+constexpr InputColumn kInputColumns[] = {{model::kNeedsTemperature, missing_temperature},
+                                         {model::kNeedsAcceleration, missing_acceleration}};
+static_assert(model::answers_each_need(kInputColumns));
+
 std::string missing_column(const Effect& effect, const Profile& profile) {
-  const std::uint8_t needs = model::info(effect.kind).needs;
-  if ((needs & model::kNeedsTemperature) != 0 && !profile.temperature_c) return "temperature_c";
-  if ((needs & model::kNeedsAcceleration) == 0) return {};
-  if (effect.kind != Kind::kGSensitivity)
-    return profile.has_acceleration() ? "" : "acc_x_g, acc_y_g, acc_z_g";
-  const auto axis = static_cast<std::size_t>(effect.parameters[0]);
-  return profile.acceleration_g[axis] ? "" : fmt::format("acc_{}_g", "xyz"[axis]);
+  for (const InputColumn& input : kInputColumns) {
+    if ((model::info(effect.kind).needs & input.need) == 0) continue;
+    std::string missing = input.missing(effect, profile);
+    if (!missing.empty()) return missing;
+  }
+  return {};
 }
 
 Expected<void> check_columns(const model::Model& model, const Profile& profile) {
@@ -134,8 +157,10 @@ Expected<void> check_columns(const model::Model& model, const Profile& profile) 
 Expected<Simulator> Simulator::make(model::Model model, Profile profile, const Settings& settings) {
   if (const auto good = check_columns(model, profile); !good) return tl::unexpected(good.error());
   for (std::size_t gyro = 0; gyro < 2; ++gyro) {
-    const auto lags = lags_of(effects_of(model, gyro));
-    if (!lags) return fail(model.file, lags.error().what, lags.error().remedy);
+    const std::size_t count = model::Equation(effects_of(model, gyro)).cutoffs_hz().size();
+    if (count <= LowPass::kStagesMax) continue;
+    return fail(model.file, fmt::format("a gyro has {} effects of kind bandwidth", count),
+                fmt::format("at most {}", LowPass::kStagesMax));
   }
   for (const Timing& timing :
        {settings.gyros[0], settings.gyros[1], settings.reference, settings.accelerometer}) {
@@ -213,25 +238,26 @@ model::Surroundings Simulator::surroundings(double t_s) const {
 std::vector<GyroSample> Simulator::gyro(std::size_t index) const {
   const std::vector<Effect> effects = effects_of(model_, index);
   const Timing& timing = settings_.gyros[index];
-  const Lags lags = lags_of(effects).value();
-  LowPass low_pass(profile_.rate_dps, lags.cutoffs_hz);
+  const model::Equation equation(effects);
+  LowPass low_pass(profile_.rate_dps, equation.cutoffs_hz());
+  const auto low_passed = [&](double t_s) { return low_pass.at(t_s); };
   GyroChain chain(effects, 1.0 / timing.rate_hz, settings_.seed);
-  Stamps stamps(effects, settings_, static_cast<std::uint32_t>(index));
+  Stamps stamps(effects, settings_, kGyroSenders[index]);
   Losses losses(effects, settings_.seed);
   std::vector<GyroSample> samples(sample_count(timing, profile_.length_s));
   for (std::size_t n = 0; n < samples.size(); ++n) {
     const double t_s = sample_time_s(timing, n);
-    const double sensed_dps = low_pass.at(t_s - lags.delay_s);
+    const double late_dps = equation.late_rate_dps(low_passed, t_s);
     samples[n] = {.t_s = t_s,
                   .stamp_s = stamps.next(t_s),
-                  .reading_dps = chain.next(sensed_dps, surroundings(t_s)),
+                  .reading_dps = chain.next(late_dps, surroundings(t_s)),
                   .lost = losses.next()};
   }
   return samples;
 }
 
 std::vector<RateSample> Simulator::reference() const {
-  Stamps stamps({}, settings_, kReferenceStream);
+  Stamps stamps({}, settings_, kReferenceSender);
   std::vector<RateSample> samples(sample_count(settings_.reference, profile_.length_s));
   for (std::size_t n = 0; n < samples.size(); ++n) {
     const double t_s = sample_time_s(settings_.reference, n);
@@ -241,7 +267,7 @@ std::vector<RateSample> Simulator::reference() const {
 }
 
 std::vector<AccelerationSample> Simulator::acceleration() const {
-  Stamps stamps({}, settings_, kAccelerometerStream);
+  Stamps stamps({}, settings_, kAccelerometerSender);
   std::vector<AccelerationSample> samples(sample_count(settings_.accelerometer, profile_.length_s));
   for (std::size_t n = 0; n < samples.size(); ++n) {
     const double t_s = sample_time_s(settings_.accelerometer, n);

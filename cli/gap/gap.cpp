@@ -35,31 +35,9 @@ std::string comment_of(const GapSubject& subject, const gap::NamedEffect& named)
   return text;
 }
 
-// Numbers of the given model that were estimated anew, in their place.
-Expected<std::string> with_new_numbers(std::string text, const model::Model& given,
-                                       const model::Model& found) {
-  for (std::size_t i = 0; i < given.effects.size() && i < found.effects.size(); ++i) {
-    const model::Effect& old_one = given.effects[i];
-    const model::Effect& new_one = found.effects[i];
-    if (new_one.kind != old_one.kind || new_one.gyro != old_one.gyro) continue;
-    const auto parameters = model::info(old_one.kind).parameters;
-    for (std::size_t p = 0; p < parameters.size(); ++p) {
-      if (new_one.parameters[p] == old_one.parameters[p]) continue;
-      // Tables above grow by a line when a preset becomes a number.
-      const auto now = model::parse_model(text, given.file);
-      if (!now) return tl::unexpected(now.error().front());
-      auto edited = model::replace_parameter(text, now->effects[i].line, parameters[p].name,
-                                             new_one.parameters[p]);
-      if (!edited) return edited;
-      text = std::move(*edited);
-    }
-  }
-  return text;
-}
-
 Expected<std::string> extended_model(const GapInputs& inputs, const std::string& given_text,
                                      const gap::Result& result) {
-  auto text = with_new_numbers(given_text, inputs.model, result.model);
+  Expected<std::string> text = given_text;
   for (const gap::NamedEffect& named : result.effects) {
     if (!text) return text;
     text = model::append_effect(*text, named.effect, comment_of(inputs.subject, named));

@@ -13,6 +13,9 @@ namespace vgyro::cli {
 
 namespace {
 
+// What simulations of the final model score: gaps are counted from there.
+constexpr double kFloor = 0.0;
+
 using Json = nlohmann::ordered_json;
 using model::Parameter;
 
@@ -148,7 +151,7 @@ std::string subject_text(const GapSubject& subject, double seconds,
 }
 
 std::string floor_text(const gap::Gap& gap) {
-  return fmt::format("floor {} (95 % of simulations: {} to {})", gap_number(gap.floor),
+  return fmt::format("floor {} (95 % of simulations: {} to {})", gap_number(kFloor),
                      gap_number(gap.band95[0]), gap_number(gap.band95[1]));
 }
 
@@ -238,7 +241,7 @@ Json gap_json(const gap::Result& result) {
   json["gap"] = {{"unit", kUnit},
                  {"before", result.gap.before},
                  {"after", result.gap.after},
-                 {"floor", result.gap.floor},
+                 {"floor", kFloor},
                  {"band95", {result.gap.band95[0], result.gap.band95[1]}}};
   json["effects"] = Json::array();
   for (const gap::NamedEffect& named : result.effects)
@@ -265,7 +268,7 @@ Json comparison_json(const gap::Comparison& comparison) {
   Json json{{"format", kFormat}};
   json["gap"] = {{"unit", kUnit},
                  {"value", comparison.gap.before},
-                 {"floor", comparison.gap.floor},
+                 {"floor", kFloor},
                  {"band95", {comparison.gap.band95[0], comparison.gap.band95[1]}}};
   json["where"] = Json::array();
   for (const gap::Difference& difference : comparison.differences) {

@@ -138,8 +138,6 @@ void IdCounts::add_extended(can::BusIndex bus, const can::Frame& frame) {
     ++known->second;
   } else if (extended_.size() < kExtendedMax) {
     extended_.emplace(key, 1);
-  } else {
-    ++beyond_limit_;
   }
 }
 

@@ -17,7 +17,8 @@
 
 namespace vgyro::cli {
 
-/// Frames by interface and identifier. Bounded: identifiers beyond the limit are counted together.
+/// Frames by interface and identifier. Bounded: of extended identifiers the first kExtendedMax; how
+/// many frames there were in all stands in the counts of the logs.
 class IdCounts {
  public:
   void add(can::BusIndex bus, const can::Frame& frame) {
@@ -38,7 +39,6 @@ class IdCounts {
   /// By interface, then identifier.
   [[nodiscard]] std::vector<Row> rows() const;
   [[nodiscard]] std::uint64_t error_frames() const { return error_frames_; }
-  [[nodiscard]] std::uint64_t beyond_limit() const { return beyond_limit_; }
 
  private:
   static constexpr std::size_t kExtendedMax = 4096;
@@ -46,7 +46,6 @@ class IdCounts {
   std::vector<std::array<std::uint64_t, can::kStandardIdMax + 1>> standard_;
   std::unordered_map<std::uint64_t, std::uint64_t> extended_;
   std::uint64_t error_frames_ = 0;
-  std::uint64_t beyond_limit_ = 0;
 };
 
 struct LogSummary {

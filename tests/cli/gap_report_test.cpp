@@ -49,7 +49,7 @@ TEST(GapReportTest, LeavesOutWhatAnUnexplainedRestDoesNotHave) {
 
 TEST(GapReportTest, ComparisonHoldsTheFieldsOfTheInterface) {
   gap::Comparison comparison;
-  comparison.gap = {.before = 0.81, .after = 0.81, .floor = 0.0, .band95 = {-0.006, 0.007}};
+  comparison.gap = {.before = 0.81, .after = 0.81, .band95 = {-0.006, 0.007}};
   comparison.differences = {{1, {60.0, 410.0, 0.0, 8.0}, "rate", 900.0, "too little"}};
   const Json json = comparison_json(comparison);
   EXPECT_EQ(json["format"], 1);
@@ -99,7 +99,7 @@ TEST(GapReportTest, TellsPeopleTheStoryInSomeTwentyLines) {
 
 TEST(GapReportTest, SaysThatAComparisonFoundNothing) {
   gap::Comparison comparison;
-  comparison.gap = {.before = 0.004, .after = 0.004, .floor = 0.0, .band95 = {-0.006, 0.007}};
+  comparison.gap = {.before = 0.004, .after = 0.004, .band95 = {-0.006, 0.007}};
   const std::string text = comparison_text(plain_subject(), comparison);
   EXPECT_NE(text.find("within"), std::string::npos) << text;
   EXPECT_NE(text.find("nowhere"), std::string::npos) << text;

@@ -42,7 +42,7 @@ inline gap::Figure made_up_figure(const char* title, bool logarithmic, bool poin
 inline gap::Result made_up_result() {
   gap::Result result;
   result.verdict = gap::Verdict::kPartlyExplained;
-  result.gap = {.before = 0.81, .after = 0.014, .floor = 0.0, .band95 = {-0.006, 0.007}};
+  result.gap = {.before = 0.81, .after = 0.014, .band95 = {-0.006, 0.007}};
   gap::NamedEffect scale;
   scale.effect = {1, model::Kind::kScaleFactor, {-4.2123456e-4}};
   scale.sigma = {3.123e-6};

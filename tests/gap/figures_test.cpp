@@ -23,7 +23,7 @@ struct Studied {
     if (begun) study = std::move(*begun);
   }
   Recording recording;
-  std::unique_ptr<Study> study;
+  std::shared_ptr<const Study> study;
 };
 
 Result described(const Study& study, const std::vector<Effect>& before, const Effect& effect) {

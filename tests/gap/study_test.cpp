@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include "gap/views.h"
+#include "gap/scan.h"
 #include "tests/gap/made_recording.h"
 
 namespace vgyro::gap {
@@ -81,11 +81,11 @@ TEST(Study, ResponsesSeeTheLateRate) {
   }
   const auto study = Study::begin(recording, effects);
   ASSERT_TRUE(study) << study.error().message();
-  ASSERT_EQ((*study)->problems().size(), 2U);
-  for (const Problem& problem : (*study)->problems()) {
+  ASSERT_EQ((*study)->observations().size(), 2U);
+  for (const auto& data : (*study)->observations()) {
     // Asked twice, because what a delay does is remembered.
     for (int time = 0; time < 2; ++time)
-      EXPECT_LT((*study)->residual(problem, effects).cwiseAbs().maxCoeff(), 10.0 * kNoise_dps);
+      EXPECT_LT(data->residual(effects).cwiseAbs().maxCoeff(), 10.0 * kNoise_dps);
   }
 }
 

@@ -24,6 +24,41 @@ ARROWS = {
     "cli": {"base", "can", "dbc", "model", "simulation", "fusion", "analysis", "gap", "gateway", "cli"},
 }
 
+# The gap workflow is as much as all other layers together, so it has arrows of its own: file → the files of its folder
+# that it may include. The search decides on top of what only answers; what answers knows no search.
+GAP_BASE = {"curve", "median", "recording", "result", "kinds"}
+GAP_DATA = GAP_BASE | {"noise", "signals", "observations"}
+GAP_REGRESSION = GAP_DATA | {"least_squares", "regression", "found"}
+GAP_STUDY = GAP_DATA | {"transport", "study"}
+GAP_ARROWS = {
+    "curve": {"median"}, "median": set(), "recording": set(), "result": set(), "least_squares": set(), "kinds": set(),
+    "wiener": {"curve", "median"},
+    "signals": {"curve", "median", "recording"},
+    "noise": {"kinds"},
+    "found": {"result"},
+    "evidence": {"kinds"},
+    "transport": {"median", "recording", "result"},
+    "spikes": {"curve", "median", "recording", "result", "transport"},
+    "rest": {"median", "recording", "transport"},
+    "observations": GAP_DATA - {"observations"},
+    "regression": GAP_DATA | {"least_squares"},
+    "periodogram": GAP_DATA,
+    "whiteness": GAP_DATA,
+    "views": GAP_DATA,
+    "scan": GAP_REGRESSION | {"periodogram"},
+    "noise_search": GAP_REGRESSION,
+    "steadiness": GAP_REGRESSION,
+    "study": GAP_DATA | {"rest", "spikes", "transport", "wiener"},
+    "identifiable": GAP_STUDY,
+    "score": GAP_STUDY,
+    "figures": GAP_STUDY | {"views"},
+    "describe": GAP_STUDY | {"views", "evidence"},
+    "differences": GAP_STUDY | GAP_REGRESSION | {"scan", "views", "evidence"},
+    "search": GAP_STUDY | GAP_REGRESSION | {"scan", "noise_search", "steadiness"},
+    "leftover": GAP_STUDY | {"search", "whiteness"},
+    "workflow": GAP_STUDY | {"describe", "differences", "figures", "identifiable", "leftover", "score", "search"},
+}
+
 # What, as a pattern of an included header → the files that may include it.
 SYSTEM_HEADERS = (
     (r"linux/can.*|net/if\.h", r"can/socket\.(h|cpp)"),
@@ -53,6 +88,14 @@ def sources(root):
                 yield layer, path
 
 
+def gap_complaint(file, other):
+    if file not in GAP_ARROWS:
+        return f"gap/{file} has no arrows in tests/layers/check_layers.py"
+    if other != file and other not in GAP_ARROWS[file]:
+        return f"gap/{file} includes gap/{other}.h; it may include {', '.join(sorted(GAP_ARROWS[file])) or 'none'} only"
+    return None
+
+
 def include_complaint(root, layer, name, quote, header):
     for pattern, allowed in SYSTEM_HEADERS:
         if re.fullmatch(pattern, header) and not re.fullmatch(allowed, name):
@@ -61,6 +104,8 @@ def include_complaint(root, layer, name, quote, header):
     if first in ARROWS and "/" in header:
         if first not in ARROWS[layer]:
             return f"{layer} includes {header}; it may include {', '.join(sorted(ARROWS[layer]))} only"
+        if layer == first == "gap":
+            return gap_complaint(Path(name).stem, Path(header).stem)
     elif quote == '"':
         return f'includes "{header}", which is no path from the root such as "{layer}/{Path(header).name}"'
     return None
@@ -94,6 +139,11 @@ PLANTED = (  # file, text, is it a breach?
     ("daemon/c.cpp", '#include "model/file.h"', True),
     ("simulation/a.cpp", '#include "fusion/compensation.h"', True),
     ("gateway/a.cpp", '#include "daemon/loop.h"', True),
+    ("gap/scan.cpp", '#include "gap/search.h"', True),
+    ("gap/kinds.cpp", '#include "gap/noise.h"', True),
+    ("gap/regression.h", '#include "gap/study.h"', True),
+    ("gap/a.cpp", '#include "gap/noise.h"', True),
+    ("gap/search.cpp", '#include "gap/scan.h"\n#include "gap/search.h"', False),
     ("gateway/b.cpp", '#include <cli/replay.h>', True),
     ("analysis/a.cpp", '#include "can/frame.h"', True),
     ("daemon/a.cpp", '#include "fusion/mutual.h"', True),

@@ -137,54 +137,5 @@ TEST(ModelEdit, RefusesWhatItCannotDoRight) {
   EXPECT_NE(refusal(append_effect("", wrong, "")).find("axis"), std::string::npos);
 }
 
-constexpr const char* kThree =
-    "# µ in front\nformat = 1\n[[effect]] # one\ngyro = 1\nkind = \"white_noise\"\n"
-    "density_dps_rthz = 2.0e-4  # N, in May\n\n"
-    "[[effect]]\nkind = \"temperature_bias\"\ncoefficient_dps_k=1e-3# close\ngyro = 2\n"
-    "[[effect]]\n\"gyro\" = 1\nkind = \"gauss_markov\" # ä\n  'sigma_dps' =\t3e-4\t\ntau_s = "
-    "1_00\n";
-
-TEST(ModelEdit, ChangesOneNumberAndNothingElse) {
-  const std::string text = kThree;
-  const auto expect = [&](unsigned line, const char* name, double value, const std::string& from,
-                          const std::string& to) {
-    std::string wanted = text;
-    wanted.replace(wanted.find(from), from.size(), to);
-    const auto edited = replace_parameter(text, line, name, value);
-    ASSERT_TRUE(edited) << edited.error().message();
-    EXPECT_EQ(*edited, wanted);
-  };
-  expect(3, "density_dps_rthz", 2.13e-4, "2.0e-4", "0.000213");
-  expect(8, "coefficient_dps_k", -0.5, "1e-3", "-0.5");
-  expect(12, "sigma_dps", 1e-7, "3e-4", "1e-07");
-  expect(12, "tau_s", 250.0, "1_00", "250");
-  expect(8, "reference_c", 20.0, "[[effect]]\nkind", "[[effect]]\nreference_c = 20\nkind");
-}
-
-TEST(ModelEdit, ChangesANumberBehindLettersOfSeveralBytes) {
-  const std::string text =
-      "format = 1\neffect = [{gyro=1,\"kind\"=\"bias\",value_dps=1.5} # ö\n]\n";
-  const auto edited = replace_parameter(text, 2, "value_dps", 2.5);
-  ASSERT_TRUE(edited) << edited.error().message();
-  EXPECT_EQ(*edited, "format = 1\neffect = [{gyro=1,\"kind\"=\"bias\",value_dps=2.5} # ö\n]\n");
-}
-
-TEST(ModelEdit, ChangesNothingThatIsNotThere) {
-  const auto refusal = [](const Expected<std::string>& result) {
-    return result ? std::string("done") : result.error().message();
-  };
-  EXPECT_NE(refusal(replace_parameter(kThree, 4, "tau_s", 1.0)).find(":4: no effect begins here"),
-            std::string::npos);
-  EXPECT_NE(refusal(replace_parameter(kThree, 3, "tau_s", 1.0)).find("has no parameter tau_s"),
-            std::string::npos);
-  EXPECT_NE(refusal(replace_parameter(kThree, 12, "tau_s", -1.0)).find("0.001 to"),
-            std::string::npos);
-  const char* two =
-      "format = 1\neffect = [{gyro=1,kind=\"bias\",value_dps=1}, "
-      "{gyro=2,kind=\"bias\",value_dps=1}]\n";
-  EXPECT_NE(refusal(replace_parameter(two, 2, "value_dps", 3.0)).find("several effects"),
-            std::string::npos);
-}
-
 }  // namespace
 }  // namespace vgyro::model

@@ -15,6 +15,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 import rig  # noqa: E402
 from rig import effect  # noqa: E402
+from streams import Stream, Twister64  # noqa: E402
 
 SEED = 3
 SIGMAS = 4.0
@@ -215,6 +216,73 @@ class Chance(unittest.TestCase):
         alone, _ = self.frames(20, white)
         both, _ = self.frames(20, effect("spikes", rate_hz=0.5, size_dps=1.0), white, effect("white_noise", 2, density_dps_rthz=1e-3))
         np.testing.assert_allclose(np.mod(both.rate() + 0.5, 1.0) - 0.5, alone.rate(), atol=1.1e-6)
+
+
+class Streams(unittest.TestCase):
+    """A seed gives the same recording in every version: each stream of random numbers is known by names, not by
+    where a kind stands in a list. The names are those of the model file."""
+
+    SECONDS, JITTER_S, SEED = 8, 2e-4, 2**40 + 11
+
+    def setUp(self):
+        effects = [effect("white_noise", density_dps_rthz=2e-4), effect("rate_random_walk", density_dps_rts=1e-3),
+                   effect("gauss_markov", sigma_dps=5e-3, tau_s=0.5), effect("white_noise", density_dps_rthz=3e-4),
+                   effect("spikes", rate_hz=4.0, size_dps=3.0), effect("timestamp_jitter", sigma_s=3e-4),
+                   effect("white_noise", 2, density_dps_rthz=2e-4), effect("rate_noise", 2, ratio_rthz=1e-4),
+                   effect("dropped_frames", 2, fraction=0.2), effect("bias", 2, value_dps=1.0)]
+        text = rig.profile(self.SECONDS, motion=lambda t: np.full_like(t, 20.0))
+        with tempfile.TemporaryDirectory() as folder:
+            log = rig.simulate(folder, effects, text, "--seed", self.SEED, "--jitter", self.JITTER_S)
+        self.a, self.b, self.table, self.accelerometer = (rig.Frames(log, i) for i in (0x101, 0x102, 0x200, 0x210))
+
+    def normals(self, count, *names):
+        stream = Stream(self.SEED, *names)
+        return np.array([stream.normal() for _ in range(count)])
+
+    def test_the_generator_here_is_the_standards(self):
+        """[rand.predef] has the 10000th number of one that was begun with 5489 and no seed_seq."""
+        twister = Twister64([0])
+        state = [5489]
+        for i in range(1, 312):
+            state.append((6364136223846793005 * (state[-1] ^ state[-1] >> 62) + i) % 2**64)
+        twister.state, twister.next = state, 312
+        for _ in range(9999):
+            twister.draw()
+        self.assertEqual(twister.draw(), 9981545732273789042)
+
+    def test_readings(self):
+        n = len(self.a.t)
+        root = math.sqrt(RATE_HZ)
+        wanted = 20.0 + root * (2e-4 * self.normals(n, "gyro 1", "white_noise") + 3e-4 * self.normals(n, "gyro 1", "white_noise", 1))
+        walk = 1e-3 / root * self.normals(n, "gyro 1", "rate_random_walk")
+        wanted += np.cumsum(np.where(np.arange(n) == 0, 0.0, walk))
+        keep, drift = math.exp(-1 / RATE_HZ / 0.5), 0.0
+        for i, normal in enumerate(self.normals(n, "gyro 1", "gauss_markov")):
+            drift = 5e-3 * normal if i == 0 else keep * drift + 5e-3 * math.sqrt(1 - keep**2) * normal
+            wanted[i] += drift
+        spikes = Stream(self.SEED, "gyro 1", "spikes")
+        for i in range(n):
+            hit, sign = spikes.uniform() < 1 - math.exp(-4.0 / RATE_HZ), -1 if spikes.uniform() < 0.5 else 1
+            wanted[i] += 3.0 * sign * hit
+        np.testing.assert_allclose(self.a.rate(), wanted, rtol=0, atol=CLOSE_DPS)
+
+    def test_losses(self):
+        sent = round(self.SECONDS * RATE_HZ)
+        losses = Stream(self.SEED, "gyro 2", "dropped_frames")
+        kept = np.array([losses.uniform() >= 0.2 for _ in range(sent)])
+        np.testing.assert_array_equal(self.b.counter(), np.arange(sent)[kept] % 256)
+        wanted = 21.0 + math.sqrt(RATE_HZ) * (2e-4 * self.normals(sent, "gyro 2", "white_noise")
+                                              + 1e-4 * 20.0 * self.normals(sent, "gyro 2", "rate_noise"))
+        np.testing.assert_allclose(self.b.rate(), wanted[kept], rtol=0, atol=CLOSE_DPS)
+
+    def test_stamps(self):
+        for frames, sender, rate_hz, offset in ((self.a, "gyro 1", 100, 0.0), (self.table, "reference", 200, 0.22),
+                                                (self.accelerometer, "accelerometer", 100, 0.06)):
+            n = len(frames.t)
+            late = np.abs(self.JITTER_S * self.normals(n, sender, "jitter"))
+            if sender == "gyro 1":
+                late += np.abs(3e-4 * self.normals(n, sender, "timestamp_jitter"))
+            np.testing.assert_allclose(frames.t, (np.arange(n) + offset) / rate_hz + late, rtol=0, atol=1.1e-6, err_msg=sender)
 
 
 if __name__ == "__main__":

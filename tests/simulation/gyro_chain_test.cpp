@@ -1,9 +1,7 @@
-#include "simulation/readings.h"
+#include "simulation/gyro_chain.h"
 
 #include <algorithm>
 #include <cmath>
-#include <complex>
-#include <numbers>
 
 #include <gtest/gtest.h>
 
@@ -18,6 +16,11 @@ constexpr std::uint64_t kSeed = 5;
 /// Standard errors that a measured figure may be off.
 constexpr double kSigmas = 4.0;
 
+struct Instant {
+  double rate_dps = 0.0;
+  model::Surroundings surroundings;
+};
+
 std::vector<Instant> turning(double rate_dps, std::size_t count) {
   std::vector<Instant> instants(count);
   for (std::size_t i = 0; i < count; ++i)
@@ -27,7 +30,11 @@ std::vector<Instant> turning(double rate_dps, std::size_t count) {
 
 std::vector<double> read(const std::vector<Effect>& effects, const std::vector<Instant>& instants,
                          std::uint64_t seed = kSeed) {
-  return readings(effects, instants, 1.0 / kRate_hz, seed).value();
+  GyroChain chain(effects, 1.0 / kRate_hz, seed);
+  std::vector<double> readings;
+  for (const Instant& instant : instants)
+    readings.push_back(chain.next(instant.rate_dps, instant.surroundings));
+  return readings;
 }
 
 double variance(const std::vector<double>& values) {
@@ -49,12 +56,12 @@ void expect_variance(const std::vector<double>& values, double wanted) {
   EXPECT_NEAR(variance(values), wanted, kSigmas * error);
 }
 
-TEST(Readings, WithoutEffectsAreTheRate) {
+TEST(GyroChain, WithoutEffectsAreTheRate) {
   const auto values = read({}, turning(12.5, 10));
   EXPECT_EQ(values, std::vector<double>(10, 12.5));
 }
 
-TEST(Readings, WhiteNoiseHasItsDensity) {
+TEST(GyroChain, WhiteNoiseHasItsDensity) {
   RecordProperty("seed", kSeed);
   const auto values =
       read({{.kind = Kind::kWhiteNoise, .parameters = {2e-4}}}, turning(0, 100'000));
@@ -62,14 +69,14 @@ TEST(Readings, WhiteNoiseHasItsDensity) {
   expect_variance(differences(values, 1), 2.0 * 2e-4 * 2e-4 * kRate_hz);
 }
 
-TEST(Readings, RateNoiseGrowsWithTheRate) {
+TEST(GyroChain, RateNoiseGrowsWithTheRate) {
   auto values = read({{.kind = Kind::kRateNoise, .parameters = {1e-4}}}, turning(-30.0, 100'000));
   for (double& value : values)
     value += 30.0;
   expect_variance(values, 1e-4 * 30.0 * 1e-4 * 30.0 * kRate_hz);
 }
 
-TEST(Readings, ARandomWalkSpreadsWithTheRootOfTime) {
+TEST(GyroChain, ARandomWalkSpreadsWithTheRootOfTime) {
   const std::vector<Effect> walk{{.kind = Kind::kRateRandomWalk, .parameters = {1e-3}}};
   const auto values = read(walk, turning(0.0, 200'000));
   EXPECT_EQ(values.front(), 0.0) << "where it begins is a bias";
@@ -78,7 +85,7 @@ TEST(Readings, ARandomWalkSpreadsWithTheRootOfTime) {
 }
 
 // The walk's law does not care how often it is looked at.
-TEST(Readings, ARandomWalkIsExactOverGaps) {
+TEST(GyroChain, ARandomWalkIsExactOverGaps) {
   std::vector<Instant> instants;
   for (int i = 0; i < 40'000; ++i)
     instants.push_back({0.0, {.t_s = std::floor(i / 2.0) * 1.0 + (i % 2) * 0.01}});
@@ -91,7 +98,7 @@ TEST(Readings, ARandomWalkIsExactOverGaps) {
   expect_variance(far, 1e-6 * 0.99);
 }
 
-TEST(Readings, GaussMarkovIsStationaryWithItsTimeConstant) {
+TEST(GyroChain, GaussMarkovIsStationaryWithItsTimeConstant) {
   constexpr double kSigma = 3e-4;
   constexpr double kTau_s = 2.0;
   const std::vector<Effect> drift{{.kind = Kind::kGaussMarkov, .parameters = {kSigma, kTau_s}}};
@@ -112,7 +119,7 @@ TEST(Readings, GaussMarkovIsStationaryWithItsTimeConstant) {
   EXPECT_NEAR(mean, kSigma * kSigma * share, kSigmas * error);
 }
 
-TEST(Readings, SpikesComeAsOftenAsTheyShouldWithBothSigns) {
+TEST(GyroChain, SpikesComeAsOftenAsTheyShouldWithBothSigns) {
   const auto values =
       read({{.kind = Kind::kSpikes, .parameters = {0.5, 7.0}}}, turning(0, 400'000));
   const auto up = std::count(values.begin(), values.end(), 7.0);
@@ -122,7 +129,7 @@ TEST(Readings, SpikesComeAsOftenAsTheyShouldWithBothSigns) {
   EXPECT_NEAR(static_cast<double>(up - down), 0.0, kSigmas * std::sqrt(2000.0));
 }
 
-TEST(Readings, ClipsComeLastAndInTheirOrder) {
+TEST(GyroChain, ClipsComeLastAndInTheirOrder) {
   // 9.87 + 0.5 → saturated at 10 → above the dead band → rounded to 0.3.
   const std::vector<Effect> effects{{.kind = Kind::kQuantization, .parameters = {0.3}},
                                     {.kind = Kind::kDeadBand, .parameters = {1.0}},
@@ -133,7 +140,7 @@ TEST(Readings, ClipsComeLastAndInTheirOrder) {
   EXPECT_NEAR(read(effects, turning(0.52, 1)).front(), 0.9, 1e-12) << "1.02 does not";
 }
 
-TEST(Readings, AStuckGyroRepeatsWhatItSaidLast) {
+TEST(GyroChain, AStuckGyroRepeatsWhatItSaidLast) {
   const auto values = read({{.kind = Kind::kWhiteNoise, .parameters = {1e-3}},
                             {.kind = Kind::kStuck, .parameters = {0.1, 0.2}}},
                            turning(0.0, 40));
@@ -142,7 +149,7 @@ TEST(Readings, AStuckGyroRepeatsWhatItSaidLast) {
     EXPECT_EQ(values[i], i >= 10 && i < 20 ? free[9] : free[i]) << i;
 }
 
-TEST(Readings, OneMoreEffectLeavesTheOthersNoiseAsItIs) {
+TEST(GyroChain, OneMoreEffectLeavesTheOthersNoiseAsItIs) {
   const Effect white{.kind = Kind::kWhiteNoise, .parameters = {1e-3}};
   const Effect walk{.kind = Kind::kRateRandomWalk, .parameters = {1e-3}};
   const Effect spikes{.kind = Kind::kSpikes, .parameters = {1.0, 1.0}};
@@ -156,38 +163,6 @@ TEST(Readings, OneMoreEffectLeavesTheOthersNoiseAsItIs) {
   EXPECT_NE(read({second}, turning(0.0, 500)), alone) << "the gyros' noises are their own";
   EXPECT_NE(read({white}, turning(0.0, 500), kSeed + 1), alone);
   EXPECT_EQ(read({white}, turning(0.0, 500)), alone);
-}
-
-// The steady answer to a sine, in complex arithmetic.
-TEST(Readings, LowPassAndDelayTurnASineAsTheyShould) {
-  constexpr double kW = 2.0 * std::numbers::pi * 3.0;
-  std::vector<Instant> instants = turning(0.0, 600);
-  for (Instant& instant : instants)
-    instant.rate_dps = std::sin(kW * instant.surroundings.t_s);
-  for (const std::vector<double>& cutoffs_hz :
-       {std::vector<double>{2.0}, {40.0}, {5.0, 20.0}, {8.0, 8.0}, {9.0, 9.0, 9.0}, {3e4}}) {
-    std::vector<Effect> effects{{.kind = Kind::kDelay, .parameters = {0.0137}}};
-    std::complex<double> gain = std::exp(std::complex<double>(0.0, -kW * 0.0137));
-    for (const double cutoff_hz : cutoffs_hz) {
-      effects.push_back({.kind = Kind::kBandwidth, .parameters = {cutoff_hz}});
-      gain /= std::complex<double>(1.0, kW / (2.0 * std::numbers::pi * cutoff_hz));
-    }
-    const auto values = read(effects, instants);
-    // Equal cutoffs are moved apart by a thousandth.
-    const double tolerance = cutoffs_hz.size() > 1 && cutoffs_hz[0] == cutoffs_hz[1] ? 1e-3 : 1e-8;
-    for (std::size_t i = 300; i < 590; ++i) {
-      const double t_s = instants[i].surroundings.t_s;
-      const auto answer = std::exp(std::complex<double>(0.0, kW * t_s)) * gain;
-      ASSERT_NEAR(values[i], answer.imag(), tolerance) << cutoffs_hz[0] << " Hz at " << t_s;
-    }
-  }
-}
-
-TEST(Readings, RefuseMoreLowPassesThanCanBeToldApart) {
-  const std::vector<Effect> effects(4, {.kind = Kind::kBandwidth, .parameters = {10.0}});
-  const auto result = readings(effects, turning(0.0, 3), 0.01, kSeed);
-  ASSERT_FALSE(result);
-  EXPECT_NE(result.error().message().find("at most 3"), std::string::npos);
 }
 
 }  // namespace

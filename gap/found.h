@@ -1,0 +1,36 @@
+#pragma once
+
+// Value types of the search: what the scan proposes, and what the search has named.
+
+#include <vector>
+
+#include "gap/result.h"
+#include "model/effect.h"
+
+namespace vgyro::gap {
+
+/// A proposal: an effect with its size as the linear look has it.
+struct Score {
+  model::Effect effect;
+  double statistic = 0.0;  ///< what 2·log-likelihood gains at the noise that the scan was given
+  double penalty = 0.0;    ///< what looking in so many places brings by chance
+  [[nodiscard]] double adjusted() const { return statistic - penalty; }
+};
+
+/// A name.
+struct Found {
+  model::Effect effect;
+  model::Parameters sigma{};  ///< 0 where nothing was estimated
+  double statistic = 0.0;     ///< what 2·log-likelihood gains, noise fitted again on both sides
+  double penalty = 0.0;
+  double needed = 0.0;  ///< of statistic less penalty
+  std::vector<Reading> ambiguous_with;
+  [[nodiscard]] double adjusted() const { return statistic - penalty; }
+  [[nodiscard]] double margin() const { return adjusted() - needed; }
+};
+
+inline Reading reading_of(const model::Effect& effect) {
+  return {effect.kind, effect.gyro};
+}
+
+}  // namespace vgyro::gap

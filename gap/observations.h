@@ -1,0 +1,115 @@
+#pragma once
+
+// What is to be explained: readings of one gyro less the true rate, or, without a reference, of
+// both at rest and their difference elsewhere. Cut into blocks, a part of which is set aside, with
+// all that an error may depend on at each sample. And what effects say of it. Never changes once
+// made.
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "gap/kinds.h"
+#include "gap/noise.h"
+#include "gap/signals.h"
+#include "model/effect.h"
+
+namespace vgyro::gap {
+
+using Effects = std::vector<model::Effect>;
+
+/// One sample of one channel.
+struct Observation {
+  double t_s = 0.0;
+  Channel channel = Channel::kGyro1;
+  double observed_dps = 0.0;  ///< reading less true rate, or the difference of the readings
+  double rate_dps = 0.0;      ///< the true rate
+};
+
+/// How far the inputs moved where a gyro was seen.
+struct Excitation {
+  std::array<double, kInputCount> range{};  ///< in the inputs' own units; of the rate its magnitude
+  std::array<bool, kInputCount> known{};
+
+  [[nodiscard]] double of(Input input) const { return range[static_cast<std::size_t>(input)]; }
+  [[nodiscard]] bool knows(Input input) const { return known[static_cast<std::size_t>(input)]; }
+  /// All of these inputs, by bits, moved far enough to show something.
+  [[nodiscard]] bool moves(std::uint8_t needs) const;
+};
+
+/// Samples of a curve that stand in others' observations: gyro 2's in a difference (slot 1), the
+/// reference's everywhere (slot 2). A slot is the place in a block's gains.
+struct Interpolated {
+  const SampledCurve* curve = nullptr;
+  std::size_t slot = 0;
+};
+
+/// Seconds that are not set aside, whatever the lot says.
+struct Span {
+  double from_s = 0.0;
+  double to_s = 0.0;
+};
+
+/// What all observations of a recording have in common.
+struct Circumstances {
+  double seconds = 0.0;  ///< of the recording
+  bool with_reference = false;
+  std::array<double, 2> interval_s{};  ///< of the gyros' even clocks
+  /// A gyro's values are so far apart that rounding is no noise: only great effects can be judged.
+  std::array<bool, 2> coarse{};
+  std::array<std::shared_ptr<const Signals>, 2> signals;  ///< as each gyro is judged against
+};
+
+class Observations {
+ public:
+  std::array<bool, 2> holds{};  ///< which gyros
+  Circumstances about;
+  Layout layout;
+  std::vector<double> t_s;       ///< of each sample, in the order of the layout
+  std::vector<Channel> channel;  ///< of each sample
+  Eigen::VectorXd observed_dps;  ///< of each sample
+  /// What the error of gyro k depends on, at each sample.
+  std::array<std::vector<SampledCurve::Point>, 2> rate;
+  std::array<std::vector<model::Surroundings>, 2> surroundings;
+  std::array<Excitation, 2> excitation;
+
+  [[nodiscard]] Eigen::Index size() const { return observed_dps.size(); }
+
+  /// What is observed less what the effects say, of every sample.
+  [[nodiscard]] Eigen::VectorXd residual(const Effects& effects) const;
+  /// What effects of one gyro add to what is observed, in deg/s.
+  [[nodiscard]] Eigen::VectorXd contribution(std::size_t gyro, const Effects& effects) const;
+  /// What `effect` adds to it beside `others`.
+  [[nodiscard]] Eigen::VectorXd contribution_beside(const Effects& others,
+                                                    const model::Effect& effect) const;
+  /// d contribution / d parameter beside `others`.
+  [[nodiscard]] Eigen::VectorXd derivative(const Effects& others, const model::Effect& effect,
+                                           const Free& free) const;
+  /// With these seconds for the fit. `spans`: all such.
+  [[nodiscard]] Observations with_for_fit(const std::vector<Span>& spans) const;
+
+ private:
+  [[nodiscard]] Eigen::VectorXd lateness_dps(std::size_t gyro, const Effects& moving) const;
+  [[nodiscard]] Eigen::VectorXd late_with(const Effects& others, const model::Effect& effect) const;
+  void add(std::size_t gyro, const Effects& added, const Eigen::VectorXd& lateness,
+           Eigen::VectorXd& sum) const;
+
+  /// The last answers of lateness_dps, which are dear and asked for again and again.
+  struct Remembered {
+    std::size_t gyro = 0;
+    Effects moving;
+    Eigen::VectorXd values;
+  };
+  mutable std::vector<Remembered> remembered_;
+  mutable std::size_t forget_next_ = 0;
+};
+
+/// Samples in any order. `reference_variance`: of one sample of the rate, (deg/s)².
+Observations make_observations(std::vector<Observation> samples, const Circumstances& about,
+                               std::array<bool, 2> holds, const Interpolated& other,
+                               double reference_variance, const std::vector<Span>& for_fit);
+
+}  // namespace vgyro::gap

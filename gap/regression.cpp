@@ -1,0 +1,183 @@
+#include "gap/regression.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace vgyro::gap {
+
+namespace {
+
+using model::Effect;
+
+constexpr int kStepsMax = 8;
+// A step that makes it worse is tried shorter: after six of these nothing is left of it.
+constexpr int kShorterMax = 6;
+constexpr double kShorter = 0.4;
+// Of the sum of squares in units of the noise: rounding, and what no longer matters.
+constexpr double kSame = 1e-9;
+constexpr double kSettledGain = 0.01;
+// Terms and noise in turn, until the likelihood stands.
+constexpr int kTurns = 3;
+constexpr double kSettledLikelihood = 0.05;
+// Two more parameters, as an information criterion counts them.
+constexpr double kDriftGain = 2.0;
+
+bool is_linear(const Effects& terms) {
+  return std::all_of(terms.begin(), terms.end(), [](const Effect& term) {
+    const auto free = *row(term.kind).free;
+    return std::all_of(free.begin(), free.end(), [](const Free& one) { return one.linear; });
+  });
+}
+
+}  // namespace
+
+Eigen::Index free_count(const Effects& terms) {
+  Eigen::Index count = 0;
+  for (const Effect& term : terms)
+    count += static_cast<Eigen::Index>((*row(term.kind).free).size());
+  return count;
+}
+
+Matrix whitened(Matrix columns, Matrix means, const Layout& layout, const PairNoise& noise,
+                Part part) {
+  whiten_within(columns, layout, noise, part);
+  whiten_means(means, layout, noise, part);
+  Matrix all(columns.rows() + means.rows(), columns.cols());
+  all.topRows(columns.rows()) = columns;
+  all.bottomRows(means.rows()) = means;
+  return all;
+}
+
+Matrix whitened(const Matrix& columns, const Layout& layout, const PairNoise& noise, Part part) {
+  return whitened(columns, block_means(columns, layout), layout, noise, part);
+}
+
+Regression::Regression(std::shared_ptr<const Observations> data, Effects known, Part part)
+    : data_(std::move(data)),
+      known_(std::move(known)),
+      known_noise_(noise_of(known_)),
+      part_(part) {}
+
+void Regression::keep_in_bounds(Effect& effect) const {
+  clamp(effect);
+  // Nothing reads ahead of time; a reference may be late, but the other gyro has a name of its own.
+  if (effect.kind == model::Kind::kDelay && !data_->about.with_reference)
+    effect.parameters[0] = std::max(0.0, effect.parameters[0]);
+}
+
+Eigen::VectorXd Regression::residual(const Effects& terms) const {
+  Effects all = known_;
+  all.insert(all.end(), terms.begin(), terms.end());
+  return data_->residual(all);
+}
+
+Matrix Regression::derivatives(const Effects& terms, std::size_t index) const {
+  Effects others = known_;
+  for (std::size_t i = 0; i < terms.size(); ++i) {
+    if (i != index) others.push_back(terms[i]);
+  }
+  const auto free = *row(terms[index].kind).free;
+  Matrix columns(data_->size(), static_cast<Eigen::Index>(free.size()));
+  for (std::size_t i = 0; i < free.size(); ++i) {
+    columns.col(static_cast<Eigen::Index>(i)) = data_->derivative(others, terms[index], free[i]);
+  }
+  return columns;
+}
+
+Matrix Regression::columns(const Effects& terms, Eigen::Index spare, std::size_t left_out) const {
+  Eigen::Index width = 1 + free_count(terms) + spare;
+  if (left_out != kNone) width -= free_count({terms[left_out]});
+  Matrix columns = Matrix::Zero(data_->size(), width);
+  columns.col(0) = residual(terms);
+  Eigen::Index at = 1;
+  for (std::size_t i = 0; i < terms.size(); ++i) {
+    const Eigen::Index count = free_count({terms[i]});
+    if (count == 0 || i == left_out) continue;
+    columns.middleCols(at, count) = derivatives(terms, i);
+    at += count;
+  }
+  return columns;
+}
+
+Matrix Regression::whitened(const Matrix& columns, const PairNoise& noise) const {
+  return gap::whitened(columns, data_->layout, noise, part_);
+}
+
+double Regression::log_likelihood(const Effects& terms, const PairNoise& noise) const {
+  return gap::log_likelihood(residual(terms), data_->layout, noise, part_);
+}
+
+// One step, shortened until it makes nothing worse. False: this was the last.
+bool Regression::step(Fit& fit, double& square) const {
+  const Matrix white = whitened(columns(fit.terms), fit.noise);
+  const Solution solution = explain_first(white.transpose() * white);
+  fit.covariance = solution.covariance;
+  double scale = 1.0;
+  for (int shorter = 0; shorter < kShorterMax; ++shorter, scale *= kShorter) {
+    Effects trial = fit.terms;
+    Eigen::Index place = 0;
+    for (Effect& term : trial) {
+      for (const Free& free : *row(term.kind).free)
+        term.parameters[free.parameter] += scale * solution.x[place++];
+      keep_in_bounds(term);
+    }
+    const double now = whitened(Matrix(residual(trial)), fit.noise).squaredNorm();
+    if (now > square + kSame) continue;
+    const double gained = square - now;
+    fit.terms = std::move(trial);
+    square = now;
+    return gained >= kSettledGain && !is_linear(fit.terms);
+  }
+  return false;
+}
+
+void Regression::improve(Fit& fit) const {
+  if (fit.terms.empty()) return;
+  double square = whitened(Matrix(residual(fit.terms)), fit.noise).squaredNorm();
+  for (int i = 0; i < kStepsMax; ++i) {
+    if (!step(fit, square)) return;
+  }
+}
+
+// White noise, that of the rate, and walk; correlated drift as the model has it.
+void Regression::fit_noise(Fit& fit) const {
+  const Eigen::VectorXd residual = this->residual(fit.terms);
+  PairNoise start = fit.noise;
+  for (std::size_t gyro = 0; gyro < 2; ++gyro)
+    start[gyro].markov = known_noise_[gyro].markov;
+  const NoiseFitResult plain =
+      fit_pair_noise(residual, data_->layout, start, {}, data_->holds, part_);
+  fit.noise = plain.noise;
+  fit.log_likelihood = plain.log_likelihood;
+}
+
+// Drift of a few seconds' or minutes' memory must not pass for an effect.
+void Regression::allow_drift(Fit& fit, std::size_t gyro) const {
+  if (!data_->holds[gyro] || fit.noise[gyro].markov.size() >= kMarkovMax) return;
+  std::array<Freedom, 2> free;
+  free[gyro].markov = true;
+  const NoiseFitResult with =
+      fit_pair_noise(residual(fit.terms), data_->layout, fit.noise, free, data_->holds, part_);
+  if (with.log_likelihood < fit.log_likelihood + kDriftGain) return;
+  Fit richer = fit;
+  richer.noise = with.noise;
+  improve(richer);
+  richer.log_likelihood = log_likelihood(richer.terms, richer.noise);
+  if (richer.log_likelihood > fit.log_likelihood) fit = std::move(richer);
+}
+
+Fit Regression::fit(Effects terms, const PairNoise& start) const {
+  Fit fit{std::move(terms), start, 0.0, {}};
+  const int turns = fit.terms.empty() ? 1 : kTurns;
+  for (int turn = 0; turn < turns; ++turn) {
+    improve(fit);
+    const double before = fit.log_likelihood;
+    fit_noise(fit);
+    if (turn > 0 && std::abs(fit.log_likelihood - before) < kSettledLikelihood) break;
+  }
+  for (std::size_t gyro = 0; gyro < 2; ++gyro)
+    allow_drift(fit, gyro);
+  return fit;
+}
+
+}  // namespace vgyro::gap

@@ -1,0 +1,22 @@
+#pragma once
+
+// Single samples that stand out from their neighbours: glitches of a sensor or of its bus. A sample
+// is seen against the reference, or, where there is none, against the other gyro; then whichever of
+// the two stands out further has the spike. Only single samples: what stands out for longer is no
+// spike, and is left to the regression.
+
+#include <array>
+#include <vector>
+
+#include "gap/recording.h"
+#include "gap/transport.h"
+#include "model/effect.h"
+
+namespace vgyro::gap {
+
+/// Masks every spike of both gyros in `transports`. Returns what is beyond `known`, gyro 1's first.
+/// Precondition: the transports are those of the recording.
+std::vector<Finding> find_spikes(const Recording& recording, std::array<Transport, 2>& transports,
+                                 const std::vector<model::Effect>& known);
+
+}  // namespace vgyro::gap

@@ -1,0 +1,80 @@
+#include "simulation/simulator.h"
+
+#include <cmath>
+#include <complex>
+#include <functional>
+#include <numbers>
+
+#include <gtest/gtest.h>
+
+#include "simulation/low_pass.h"
+
+namespace vgyro::simulation {
+namespace {
+
+using model::Effect;
+using model::Kind;
+
+constexpr double kRate_hz = 100.0;
+
+Profile sampled(const std::function<double(double)>& rate_dps, std::size_t count) {
+  std::vector<double> times_s;
+  std::vector<double> rates_dps;
+  for (std::size_t i = 0; i < count; ++i) {
+    times_s.push_back(static_cast<double>(i) / kRate_hz);
+    rates_dps.push_back(rate_dps(times_s.back()));
+  }
+  Profile profile;
+  profile.file = "p.csv";
+  profile.length_s = times_s.back();
+  profile.rate_dps = Curve(times_s, rates_dps);
+  return profile;
+}
+
+// The steady answer to a sine, in complex arithmetic.
+TEST(Simulator, LowPassAndDelayTurnASineAsTheyShould) {
+  constexpr double kW = 2.0 * std::numbers::pi * 3.0;
+  const Profile sine = sampled([](double t_s) { return std::sin(kW * t_s); }, 600);
+  for (const std::vector<double>& cutoffs_hz :
+       {std::vector<double>{2.0}, {40.0}, {5.0, 20.0}, {8.0, 8.0}, {9.0, 9.0, 9.0}, {3e4}}) {
+    model::Model model{.file = "m.toml",
+                       .effects = {{.kind = Kind::kDelay, .parameters = {0.0137}}}};
+    std::complex<double> gain = std::exp(std::complex<double>(0.0, -kW * 0.0137));
+    for (const double cutoff_hz : cutoffs_hz) {
+      model.effects.push_back({.kind = Kind::kBandwidth, .parameters = {cutoff_hz}});
+      gain /= std::complex<double>(1.0, kW / (2.0 * std::numbers::pi * cutoff_hz));
+    }
+    const auto simulator = Simulator::make(model, sine, {});
+    ASSERT_TRUE(simulator) << simulator.error().message();
+    const std::vector<GyroSample> samples = simulator->gyro(0);
+    ASSERT_EQ(samples.size(), 600U);
+    // Equal cutoffs are moved apart by a thousandth.
+    const double tolerance = cutoffs_hz.size() > 1 && cutoffs_hz[0] == cutoffs_hz[1] ? 1e-3 : 1e-8;
+    for (std::size_t i = 300; i < 590; ++i) {
+      const double t_s = samples[i].t_s;
+      const auto answer = std::exp(std::complex<double>(0.0, kW * t_s)) * gain;
+      ASSERT_NEAR(samples[i].reading_dps, answer.imag(), tolerance)
+          << cutoffs_hz[0] << " Hz at " << t_s;
+    }
+  }
+}
+
+TEST(Simulator, RefusesMoreLowPassesThanCanBeToldApart) {
+  const Effect low_pass{.kind = Kind::kBandwidth, .parameters = {10.0}};
+  const Profile rest = sampled([](double) { return 0.0; }, 3);
+  model::Model model{.file = "m.toml",
+                     .effects = std::vector<Effect>(LowPass::kStagesMax, low_pass)};
+  EXPECT_TRUE(Simulator::make(model, rest, {}));
+  // One of the other gyro is none too many.
+  model.effects.push_back(low_pass);
+  model.effects.back().gyro = 1;
+  EXPECT_TRUE(Simulator::make(model, rest, {}));
+  model.effects.back().gyro = 0;
+  const auto result = Simulator::make(model, rest, {});
+  ASSERT_FALSE(result);
+  EXPECT_EQ(result.error().where, "m.toml");
+  EXPECT_NE(result.error().message().find("at most 3"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace vgyro::simulation
