@@ -2,8 +2,9 @@
 
 // Single samples that stand out from their neighbours: glitches of a sensor or of its bus. A sample
 // is seen against the reference, or, where there is none, against the other gyro; then whichever of
-// the two stands out further has the spike. Only single samples: what stands out for longer is no
-// spike, and is left to the regression.
+// the two stands out further has the spike. That is told by what interpolation leaves of it in the
+// other: gyros that sample at the very same instants show a spike alike. What stands out for longer
+// loses its edges at most, and is left to the regression.
 
 #include <array>
 #include <vector>

@@ -1,0 +1,270 @@
+#include "gap/spikes.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "made_faults.h"
+
+namespace vgyro::gap {
+namespace {
+
+using model::Kind;
+
+// Between spikes of either gyro: further apart than the deviations of one reach.
+constexpr std::size_t kApart = 12;
+constexpr double kSpikeShare = 0.004;
+// In units of the noise of a sample: well beyond 6.5, the noise of both gyros together.
+constexpr double kSpikeSigmas = 40.0;
+// What a spike costs whoever knows nothing of it, in nats.
+constexpr double kSpikeNats = 50.0;
+
+Making making_of(std::uint64_t seed) {
+  Making making;
+  making.seconds = 120.0;
+  making.rest_s = 30.0;
+  making.seed = seed;
+  return making;
+}
+
+// Gyro 2 samples between gyro 1's samples, as two sensors with clocks of their own do: at the very
+// same instants a spike would look the same in both.
+Recording recording_of(const Making& making, bool with_reference) {
+  Recording recording = make_recording(making);
+  for (double& t_s : recording.gyros[1].t_s)
+    t_s += 0.43 * making.interval_s;
+  return with_reference ? recording : without_reference(std::move(recording));
+}
+
+struct Planted {
+  Recording recording;
+  std::array<std::vector<std::size_t>, 2> at;
+  std::array<double, 2> size_dps{};
+};
+
+// Spikes of both gyros, far from each other.
+Planted plant(std::uint64_t seed, bool with_reference) {
+  const Making making = making_of(seed);
+  Planted planted{recording_of(making, with_reference), {}, {}};
+  const std::vector<std::size_t> all =
+      scattered(planted.recording.gyros[0].t_s.size(), kApart, kSpikeShare, seed);
+  for (std::size_t k = 0; k < all.size(); ++k)
+    planted.at[k % 2].push_back(all[k]);
+  for (std::size_t gyro = 0; gyro < 2; ++gyro) {
+    planted.size_dps[gyro] = kSpikeSigmas * sample_noise_dps(making, gyro);
+    add_spikes(planted.recording.gyros[gyro], planted.at[gyro], planted.size_dps[gyro]);
+  }
+  return planted;
+}
+
+const Finding* spikes_of(const std::vector<Finding>& findings, std::size_t gyro) {
+  for (const Finding& finding : findings) {
+    if (finding.effect.gyro == gyro && finding.effect.kind == Kind::kSpikes) return &finding;
+  }
+  return nullptr;
+}
+
+class Spikes : public testing::TestWithParam<bool> {
+ protected:
+  [[nodiscard]] static Recording clean(std::uint64_t seed) {
+    return recording_of(making_of(seed), GetParam());
+  }
+};
+INSTANTIATE_TEST_SUITE_P(WithAndWithoutAReference, Spikes, testing::Bool(), [](const auto& with) {
+  return with.param ? "WithReference" : "WithoutReference";
+});
+
+TEST_P(Spikes, NoneAreFoundWhereNoneArePlanted) {
+  for (const std::uint64_t seed : {21U, 22U, 23U, 24U, 25U}) {
+    const Recording recording = clean(seed);
+    std::array<Transport, 2> transports = check_both(recording);
+    EXPECT_TRUE(find_spikes(recording, transports, {}).empty()) << "seed " << seed;
+    for (const Transport& transport : transports)
+      EXPECT_TRUE(masked_samples(transport).empty()) << "seed " << seed;
+  }
+}
+
+TEST_P(Spikes, ThoseThatWerePlantedAreMaskedAndNoOthers) {
+  for (const std::uint64_t seed : {1U, 2U, 3U}) {
+    const Planted planted = plant(seed, GetParam());
+    std::array<Transport, 2> transports = check_both(planted.recording);
+    find_spikes(planted.recording, transports, {});
+    for (std::size_t gyro = 0; gyro < 2; ++gyro) {
+      ASSERT_GT(planted.at[gyro].size(), 10U);
+      EXPECT_EQ(masked_samples(transports[gyro]), planted.at[gyro])
+          << "seed " << seed << ", gyro " << gyro + 1;
+    }
+  }
+}
+
+TEST_P(Spikes, TheirRateSizeAndCostAreToldOfEachGyro) {
+  const Planted planted = plant(4, GetParam());
+  std::array<Transport, 2> transports = check_both(planted.recording);
+  const std::vector<Finding> findings = find_spikes(planted.recording, transports, {});
+  ASSERT_EQ(findings.size(), 2U);
+  for (std::size_t gyro = 0; gyro < 2; ++gyro) {
+    const Finding* const finding = spikes_of(findings, gyro);
+    ASSERT_NE(finding, nullptr);
+    const double count = static_cast<double>(planted.at[gyro].size());
+    EXPECT_DOUBLE_EQ(finding->effect.parameters[0], count / planted.recording.seconds);
+    EXPECT_NEAR(finding->effect.parameters[1], planted.size_dps[gyro], 5.0 * finding->sigma[1]);
+    EXPECT_LT(finding->sigma[1], 0.1 * planted.size_dps[gyro]);
+    EXPECT_NEAR(finding->cost_nats, count * kSpikeNats, 1e-6);
+    const std::vector<double>& t_s = planted.recording.gyros[gyro].t_s;
+    EXPECT_EQ(finding->where.from_s, t_s[planted.at[gyro].front()]);
+    EXPECT_EQ(finding->where.to_s, t_s[planted.at[gyro].back()]);
+    ASSERT_EQ(finding->figure.curves.size(), 1U);
+    EXPECT_EQ(finding->figure.curves[0].x.size(), planted.at[gyro].size());
+  }
+}
+
+TEST_P(Spikes, WhatTheModelKnowsIsMaskedButNotFoundAgain) {
+  const Planted planted = plant(5, GetParam());
+  std::array<Transport, 2> transports = check_both(planted.recording);
+  const std::vector<Finding> findings =
+      find_spikes(planted.recording, transports, {{0, Kind::kSpikes, {0.2, 0.4}, 0}});
+  EXPECT_EQ(spikes_of(findings, 0), nullptr);
+  EXPECT_NE(spikes_of(findings, 1), nullptr);
+  EXPECT_EQ(masked_samples(transports[0]), planted.at[0]);
+}
+
+TEST_P(Spikes, TwoAreAnAccidentAndThreeAreFound) {
+  for (const std::size_t count : {2U, 3U}) {
+    Recording recording = clean(6);
+    std::vector<std::size_t> at{2000, 6000, 9000};
+    at.resize(count);
+    add_spikes(recording.gyros[0], at, 0.5);
+    std::array<Transport, 2> transports = check_both(recording);
+    EXPECT_EQ(find_spikes(recording, transports, {}).size(), count == 3 ? 1U : 0U);
+    EXPECT_EQ(masked_samples(transports[0]), at);
+  }
+}
+
+// The sample before a step and the one after it stand half-way out of their neighbours: two masked
+// samples are no finding.
+TEST_P(Spikes, AStepIsNone) {
+  Making making = making_of(7);
+  making.error = [](std::size_t gyro, double t_s, double) {
+    return gyro == 0 && t_s >= 60.0 ? 0.5 : 0.0;
+  };
+  const Recording recording = recording_of(making, GetParam());
+  std::array<Transport, 2> transports = check_both(recording);
+  EXPECT_TRUE(find_spikes(recording, transports, {}).empty());
+  EXPECT_LE(masked_samples(transports[0]).size() + masked_samples(transports[1]).size(), 2U);
+}
+
+// Of what lasts longer the edges stand out, as they do of a step; the regression sees the rest.
+TEST_P(Spikes, OfWhatLastsForLongerOnlyTheEdgesAreMasked) {
+  constexpr std::size_t kLength = 8;
+  Recording recording = clean(8);
+  for (const std::size_t from : {3000U, 5000U, 7000U, 9000U}) {
+    for (std::size_t k = 0; k < kLength; ++k)
+      recording.gyros[1].rate_dps[from + k] += 1.0;
+  }
+  std::array<Transport, 2> transports = check_both(recording);
+  find_spikes(recording, transports, {});
+  for (const std::size_t from : {3000U, 5000U, 7000U, 9000U}) {
+    for (std::size_t k = 1; k + 1 < kLength; ++k)
+      EXPECT_EQ(transports[1].masked[from + k], 0) << from + k;
+  }
+}
+
+TEST_P(Spikes, NoiseThatRisesWithTheRateIsNone) {
+  Making making = making_of(9);
+  std::mt19937_64 random(9);
+  std::normal_distribution<double> normal;
+  making.error = [&](std::size_t, double, double rate_dps) {
+    return 2e-2 * std::abs(rate_dps) * normal(random);
+  };
+  const Recording recording = recording_of(making, GetParam());
+  std::array<Transport, 2> transports = check_both(recording);
+  EXPECT_TRUE(find_spikes(recording, transports, {}).empty());
+}
+
+TEST_P(Spikes, NoneAreSeenAcrossMaskedSamples) {
+  Recording recording = clean(10);
+  add_spikes(recording.gyros[0], {4000, 6000, 8000}, 0.5);
+  std::array<Transport, 2> transports = check_both(recording);
+  transports[0].masked[4001] = 1;
+  find_spikes(recording, transports, {});
+  EXPECT_EQ(transports[0].masked[4000], 0);
+  EXPECT_EQ(transports[0].masked[6000], 1);
+}
+
+// Against a reference each gyro is judged by itself, however near the other's spike is.
+TEST(SpikesOfBoth, WhereTheyMeetAreBothFoundAgainstAReference) {
+  Recording recording = recording_of(making_of(11), true);
+  const std::vector<std::size_t> at = scattered(recording.gyros[0].t_s.size(), 40, 0.01, 11);
+  add_spikes(recording.gyros[0], at, 0.4);
+  add_spikes(recording.gyros[1], at, 0.9);
+  std::array<Transport, 2> transports = check_both(recording);
+  EXPECT_EQ(find_spikes(recording, transports, {}).size(), 2U);
+  for (const Transport& transport : transports)
+    EXPECT_EQ(masked_samples(transport), at);
+}
+
+// Without one the smaller of two that meet cannot be told from the trace of the larger.
+TEST(SpikesOfBoth, OfTwoThatMeetTheLargerIsFoundWithoutAReference) {
+  for (const std::size_t larger : {0U, 1U}) {
+    Recording recording = recording_of(making_of(12), false);
+    const std::vector<std::size_t> at = scattered(recording.gyros[0].t_s.size(), 40, 0.01, 12);
+    add_spikes(recording.gyros[larger], at, 3.0);
+    add_spikes(recording.gyros[1 - larger], at, -0.8);
+    std::array<Transport, 2> transports = check_both(recording);
+    const std::vector<Finding> findings = find_spikes(recording, transports, {});
+    ASSERT_EQ(findings.size(), 1U);
+    EXPECT_EQ(findings[0].effect.gyro, larger);
+    EXPECT_EQ(masked_samples(transports[larger]), at);
+    EXPECT_TRUE(masked_samples(transports[1 - larger]).empty());
+  }
+}
+
+// Interpolation spreads them over the other gyro's samples.
+TEST(SpikesOfBoth, AreOfTheGyroThatHasThem) {
+  for (const std::size_t gyro : {0U, 1U}) {
+    Recording recording = recording_of(making_of(13), false);
+    const std::vector<std::size_t> at = scattered(recording.gyros[0].t_s.size(), 40, 0.01, 13);
+    add_spikes(recording.gyros[gyro], at, 1.5);
+    std::array<Transport, 2> transports = check_both(recording);
+    const std::vector<Finding> findings = find_spikes(recording, transports, {});
+    ASSERT_EQ(findings.size(), 1U);
+    EXPECT_EQ(findings[0].effect.gyro, gyro);
+    EXPECT_EQ(masked_samples(transports[gyro]), at);
+    EXPECT_TRUE(masked_samples(transports[1 - gyro]).empty());
+  }
+}
+
+// Rounding to a coarse lattice makes samples jump by a step or two: they are no spikes.
+TEST(SpikesOfBoth, AreMoreThanStepsOfTheLattice) {
+  Recording recording = recording_of(making_of(14), true);
+  constexpr double kStep_dps = 0.2;
+  GyroSeries& series = recording.gyros[0];
+  for (double& rate_dps : series.rate_dps)
+    rate_dps = kStep_dps * std::round(rate_dps / kStep_dps);
+  const std::vector<std::size_t> at{1000, 1500, 2000, 2500};
+  add_spikes(series, at, 2.0 * kStep_dps);
+  std::array<Transport, 2> transports = check_both(recording);
+  ASSERT_NEAR(transports[0].lattice_dps, kStep_dps, 1e-3 * kStep_dps);
+  EXPECT_EQ(spikes_of(find_spikes(recording, transports, {}), 0), nullptr);
+}
+
+// What clips is told with the cost of all that is masked, and spikes are masked after it was found.
+TEST(SpikesOfBoth, CountInTheCostOfWhatClips) {
+  Recording recording = recording_of(making_of(15), true);
+  add_spikes(recording.gyros[0], {500, 1000, 1500, 2000}, 0.5);
+  for (double& rate_dps : recording.gyros[0].rate_dps)
+    rate_dps = std::clamp(rate_dps, -35.0, 35.0);
+  std::array<Transport, 2> transports = check_both(recording);
+  ASSERT_EQ(transports[0].findings.size(), 1U);
+  ASSERT_EQ(transports[0].findings[0].effect.kind, Kind::kSaturation);
+  const double clipped = static_cast<double>(masked_samples(transports[0]).size());
+  EXPECT_DOUBLE_EQ(transports[0].findings[0].cost_nats, 0.5 * kSpikeNats * clipped);
+  find_spikes(recording, transports, {});
+  const double masked = static_cast<double>(masked_samples(transports[0]).size());
+  EXPECT_EQ(masked, clipped + 4.0);
+  EXPECT_DOUBLE_EQ(transports[0].findings[0].cost_nats, 0.5 * kSpikeNats * masked);
+}
+
+}  // namespace
+}  // namespace vgyro::gap
