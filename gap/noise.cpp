@@ -251,14 +251,16 @@ class DriftFilter {
     for (std::size_t i = 0; i < n; ++i)
       h_[i] = share_of(channel, states_.gyro[i]);
     for (std::size_t i = 0; i < n; ++i) {
-      ph_[i] = 0.0;
+      double sum = 0.0;
       for (std::size_t j = 0; j < n; ++j)
-        ph_[i] += p_[i][j] * h_[j];
-      variance += h_[i] * ph_[i];
-      if (h_[i] == 0.0) continue;
+        sum += p_[i][j] * h_[j];
+      ph_[i] = sum;
+      const double share = h_[i];
+      variance += share * sum;
+      if (share == 0.0) continue;
       const double* const state = x_.data() + i * width_;
       for (std::size_t c = 0; c < width_; ++c)
-        observation[c] -= h_[i] * state[c];
+        observation[c] -= share * state[c];
     }
     return variance;
   }
@@ -271,12 +273,35 @@ class DriftFilter {
   std::array<double, kStatesMax> ph_{};
 };
 
+// drift_within of blocks one after the other: it is dear, and most are as long as the last.
+class BlockDrift {
+ public:
+  BlockDrift(const PairNoise& noise, const Layout& layout) : noise_(noise), layout_(layout) {}
+
+  double variance(const Block& block) {
+    if (block.channel != channel_ || block.count != count_) {
+      channel_ = block.channel;
+      count_ = block.count;
+      variance_ = drift_within(channel_, noise_, seconds_of(block, layout_));
+    }
+    return variance_;
+  }
+
+ private:
+  const PairNoise& noise_;
+  const Layout& layout_;
+  Channel channel_ = Channel::kGyro1;
+  std::uint32_t count_ = 0;  // of no block
+  double variance_ = 0.0;
+};
+
 }  // namespace
 
 double whiten_means(Matrix& means, const Layout& layout, const PairNoise& noise, Part part) {
   const States states = states_of(noise, layout);
   const auto width = static_cast<std::size_t>(means.cols());
   DriftFilter filter(states, width);
+  BlockDrift drift(noise, layout);
   double log_likelihood = 0.0;
   double last_s = 0.0;
   for (std::size_t b = 0; b < layout.blocks.size(); ++b) {
@@ -285,8 +310,7 @@ double whiten_means(Matrix& means, const Layout& layout, const PairNoise& noise,
     last_s = std::max(last_s, block.t_s);
     // A mean's increments are less than those of the drift at its middle, by as much as the drift
     // scatters within a block: then both variance and covariance of the means are right.
-    const double own_variance = mean_variance(block, noise, layout) -
-                                drift_within(block.channel, noise, seconds_of(block, layout));
+    const double own_variance = mean_variance(block, noise, layout) - drift.variance(block);
     double* const innovation = means.data() + b * width;
     const double variance = filter.take(block.channel, own_variance, innovation);
     if (counts(block, part)) log_likelihood -= 0.5 * std::log(variance);
