@@ -8,7 +8,7 @@
 #include <cstddef>
 #include <functional>
 #include <memory>
-#include <string>
+#include <random>
 #include <vector>
 
 #include "gap/observations.h"
@@ -125,6 +125,83 @@ inline std::shared_ptr<const Observations> planted(
         share * error_dps(data->t_s[i], clean.rate[gyro][i].value);
   }
   return data;
+}
+
+/// Both gyros' signals of a motion in closed form, and nothing else that moves.
+inline std::shared_ptr<const Signals> signals_of(const Making& making) {
+  std::vector<double> t_s;
+  std::vector<double> rate_dps;
+  const auto count = static_cast<std::size_t>(making.seconds / making.interval_s) + 1;
+  for (std::size_t i = 0; i < count; ++i) {
+    t_s.push_back(static_cast<double>(i) * making.interval_s);
+    rate_dps.push_back(true_rate_dps(making, t_s.back()));
+  }
+  auto signals = std::make_shared<Signals>();
+  signals->motion = Motion(SampledCurve(t_s, rate_dps));
+  return signals;
+}
+
+/// White noise and walk of one gyro at even instants from 0 on, the walk beginning at 0.
+inline std::vector<double> drawn_noise(const Making& making, std::size_t gyro,
+                                       std::mt19937_64& random) {
+  std::normal_distribution<double> normal;
+  const auto count = static_cast<std::size_t>(making.seconds / making.interval_s);
+  std::vector<double> values;
+  double walk_dps = 0.0;
+  for (std::size_t i = 0; i < count; ++i) {
+    if (i > 0)
+      walk_dps += making.walk_dps_rts[gyro] * std::sqrt(making.interval_s) * normal(random);
+    values.push_back(walk_dps +
+                     making.white_dps_rthz[gyro] / std::sqrt(making.interval_s) * normal(random));
+  }
+  return values;
+}
+
+inline Circumstances circumstances_of(const Making& making, bool with_reference) {
+  const auto signals = signals_of(making);
+  return {making.seconds,
+          with_reference,
+          {making.interval_s, making.interval_s},
+          {},
+          {signals, signals}};
+}
+
+/// Noise and `making.error` of gyro 1 against a rate that is known exactly: no recording, no study.
+inline std::shared_ptr<const Observations> observations_of_one(const Making& making) {
+  std::mt19937_64 random(making.seed);
+  const std::vector<double> noise = drawn_noise(making, 0, random);
+  std::vector<Observation> samples;
+  for (std::size_t i = 0; i < noise.size(); ++i) {
+    const double t_s = static_cast<double>(i) * making.interval_s;
+    const double rate_dps = true_rate_dps(making, t_s);
+    samples.push_back({t_s, Channel::kGyro1, noise[i] + making.error(0, t_s, rate_dps), rate_dps});
+  }
+  return std::make_shared<Observations>(make_observations(
+      std::move(samples), circumstances_of(making, true), {true, false}, {nullptr, 2}, 0.0, {}));
+}
+
+/// Both gyros at rest and then their difference, read at the same instants.
+inline std::shared_ptr<const Observations> observations_of_two(const Making& making) {
+  std::mt19937_64 random(making.seed);
+  const std::array noise{drawn_noise(making, 0, random), drawn_noise(making, 1, random)};
+  std::vector<double> t_s;
+  for (std::size_t i = 0; i < noise[0].size(); ++i)
+    t_s.push_back(static_cast<double>(i) * making.interval_s);
+  const SampledCurve second(t_s, noise[1]);
+  std::vector<Observation> samples;
+  for (std::size_t i = 0; i < t_s.size(); ++i) {
+    const double rate_dps = true_rate_dps(making, t_s[i]);
+    const std::array error{noise[0][i] + making.error(0, t_s[i], rate_dps),
+                           noise[1][i] + making.error(1, t_s[i], rate_dps)};
+    if (t_s[i] <= making.rest_s) {
+      samples.push_back({t_s[i], Channel::kGyro1, error[0], rate_dps});
+      samples.push_back({t_s[i], Channel::kGyro2, error[1], rate_dps});
+    } else {
+      samples.push_back({t_s[i], Channel::kDifference, error[0] - error[1], rate_dps});
+    }
+  }
+  return std::make_shared<Observations>(make_observations(
+      std::move(samples), circumstances_of(making, false), {true, true}, {&second, 1}, 0.0, {}));
 }
 
 }  // namespace vgyro::gap
