@@ -3,7 +3,7 @@
 // The random part of two gyros, and the likelihood of what was observed under it. Observations are
 // cut into short blocks. Inside a block drift stands still: what is left of white noise there is
 // judged by its sum of squares. The means of the blocks go through a Kalman filter of the drifts,
-// random walk and up to four exponentially correlated terms for each gyro.
+// random walk and some exponentially correlated terms for each gyro.
 
 #include <array>
 #include <cstddef>
