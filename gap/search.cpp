@@ -24,7 +24,7 @@ constexpr double kNoiseMin = 24.0;
 constexpr double kStatisticMinAgainstNoise = 13.0;
 // Of great effects the arithmetic of interpolation is not sure to better than this share.
 constexpr double kLeadShare = 3e-3;
-// No recording has shown more effects than can be told apart.
+// Beyond that a recording is no longer explained, only described.
 constexpr std::size_t kFoundMax = 10;
 constexpr int kNoiseRoundsMax = 6;
 // Fitting is dear: so many of the likeliest proposals are fitted, of three times as many that may

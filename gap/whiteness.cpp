@@ -13,7 +13,7 @@ namespace vgyro::gap {
 namespace {
 
 constexpr double kChunk_s = 10.0;
-// What two hundred clean recordings stayed below, by what is looked at: many stretches, one sum.
+// Beyond what chance reaches over all that is looked at: many stretches, one sum.
 constexpr double kFastSigmas = 7.0;
 constexpr double kSlowSigmas = 5.5;
 constexpr double kColourSigmas = 6.5;
