@@ -48,6 +48,11 @@ void print_gyro(const gateway::GyroPlan& gyro) {
     detail("temperature", fmt::format("{} in {}, {}", gyro.temperature->name,
                                       printable(gyro.temperature->unit), gyro.temperature->layout));
   }
+  if (gyro.supply_voltage) {
+    detail("supply",
+           fmt::format("{} in {}, {}", gyro.supply_voltage->name,
+                       printable(gyro.supply_voltage->unit), gyro.supply_voltage->layout));
+  }
   print_e2e(gyro.e2e);
   if (gyro.valid) detail("valid when", gyro.valid->text);
   if (gyro.max_bias_dps) detail("bias", fmt::format("at most {:g} deg/s", *gyro.max_bias_dps));

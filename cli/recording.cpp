@@ -65,6 +65,7 @@ class Recorder {
     for (gap::GyroSeries& gyro : recording_.gyros) {
       shift(gyro.t_s);
       fill_beginning(gyro.temperature_c);
+      fill_beginning(gyro.supply_v);
     }
     shift(recording_.reference_dps.t_s);
     shift(recording_.acceleration.t_s);
@@ -99,6 +100,7 @@ class Recorder {
     if (counter) series.counter.push_back(inputs_[i].input().counter());
     if (plan_.gyros[i].temperature)
       series.temperature_c.push_back(inputs_[i].input().temperature_c());
+    if (plan_.gyros[i].supply_voltage) series.supply_v.push_back(inputs_[i].input().supply_v());
   }
 
   void take_reference(const can::LogRecord& record) {
@@ -131,15 +133,15 @@ class Recorder {
     }
   }
 
-  // The temperature may stand on a page that comes later; one that never came is not known.
-  static void fill_beginning(std::vector<double>& temperature_c) {
-    const auto known = std::find_if_not(temperature_c.begin(), temperature_c.end(),
+  // It may stand on a page that comes later; what never came is not known.
+  static void fill_beginning(std::vector<double>& beside) {
+    const auto known = std::find_if_not(beside.begin(), beside.end(),
                                         [](double value) { return std::isnan(value); });
-    if (known == temperature_c.end()) {
-      temperature_c.clear();
+    if (known == beside.end()) {
+      beside.clear();
       return;
     }
-    std::fill(temperature_c.begin(), known, *known);
+    std::fill(beside.begin(), known, *known);
   }
 
   const gateway::Plan& plan_;

@@ -32,18 +32,35 @@ using gateway::Plan;
 constexpr std::array<double, 2> kGyroOffsets{0.0, 0.23};
 constexpr double kReferenceOffset = 0.22;
 constexpr double kAccelerometerOffset = 0.06;
-// A temperature on a page of its own goes out with every tenth sample, a little later.
+// What stands on a page of its own goes out with every tenth sample, a little later.
 constexpr std::size_t kPageEvery = 10;
 constexpr double kPageAfter_s = 1e-4;
 constexpr double kMicro = 1e6;
 
 enum Part : std::uint8_t { kGyroA = 0, kGyroB = 1, kReference = 2, kAccelerometer = 3 };
 
+/// What a gyro's message tells besides its rate, and where the simulator has it from.
+struct Beside {
+  std::optional<gateway::Quantity> gateway::GyroPlan::*quantity;
+  double (simulation::Simulator::*value)(double t_s) const;
+};
+constexpr std::array kBesides{
+    Beside{&gateway::GyroPlan::temperature, &simulation::Simulator::temperature_c},
+    Beside{&gateway::GyroPlan::supply_voltage, &simulation::Simulator::supply_v}};
+constexpr bool all_besides_are_played() {
+  if (kBesides.size() != gateway::kBesides.size()) return false;
+  for (std::size_t i = 0; i < kBesides.size(); ++i) {
+    if (kBesides[i].quantity != gateway::kBesides[i]) return false;
+  }
+  return true;
+}
+static_assert(all_besides_are_played());
+
 /// One message: its parts, and the next of its samples to be sent.
 struct SimulatedMessage {
   const FrameMatch* match = nullptr;
   std::vector<Part> parts{};
-  bool temperature_page = false;
+  const gateway::Quantity* page = nullptr;  ///< set: only this, and what else stands on its page
   std::size_t next = 0;
   double stamp_s = 0.0;
 };
@@ -109,7 +126,10 @@ class Recording {
   [[nodiscard]] can::Frame frame(const SimulatedMessage& message);
   void put(Part part, std::size_t n, can::Frame& frame);
   [[nodiscard]] const gateway::E2ePlan& e2e_of(Part part) const;
-  void add_temperature_pages();
+  void put_besides(Part part, std::size_t n, can::Frame& frame) const;
+  void put_page(Part part, std::size_t n, const gateway::Quantity& page, can::Frame& frame) const;
+  void add_pages(Part part);
+  void say_constants() const;
   bool find_next(SimulatedMessage& message) const;
 
   const Plan& plan_;
@@ -134,17 +154,27 @@ Recording::Recording(const Plan& plan, const simulation::Simulator& simulator,
       if (part == kAccelerometer) acceleration_ = simulator.acceleration();
     }
   }
-  add_temperature_pages();
+  add_pages(kGyroA);
+  add_pages(kGyroB);
 }
 
-void Recording::add_temperature_pages() {
-  for (const Part part : {kGyroA, kGyroB}) {
-    const gateway::GyroPlan& gyro = plan_.gyros[part];
-    if (!gyro.temperature) continue;
-    can::Frame frame = gateway::empty_frame(gyro.match);
-    gateway::put_gyro(gyro, 0.0, 0, frame);
-    if (gateway::carries_temperature(gyro, frame)) continue;
-    messages_.push_back({.match = &gyro.match, .parts = {part}, .temperature_page = true});
+// One for all that stands on it.
+void Recording::add_pages(Part part) {
+  const gateway::GyroPlan& gyro = plan_.gyros[part];
+  can::Frame with_rate = gateway::empty_frame(gyro.match);
+  gateway::put_gyro(gyro, 0.0, 0, with_rate);
+  std::vector<can::Frame> pages;
+  for (const Beside& beside : kBesides) {
+    const auto& quantity = gyro.*beside.quantity;
+    if (!quantity || gateway::carries(gyro, *quantity, with_rate)) continue;
+    const bool has_one = std::any_of(pages.begin(), pages.end(), [&](const can::Frame& page) {
+      return quantity->presence.holds(page.payload());
+    });
+    if (has_one) continue;
+    can::Frame page = gateway::empty_frame(gyro.match);
+    gateway::put_quantity(*quantity, 0.0, page);
+    pages.push_back(page);
+    messages_.push_back({.match = &gyro.match, .parts = {part}, .page = &*quantity});
   }
 }
 
@@ -168,11 +198,11 @@ bool Recording::lost(const SimulatedMessage& message) const {
 // From message.next on; false where there is none.
 bool Recording::find_next(SimulatedMessage& message) const {
   const Part leader = message.parts.front();
-  const std::size_t step = message.temperature_page ? kPageEvery : 1;
+  const std::size_t step = message.page != nullptr ? kPageEvery : 1;
   while (message.next < count(leader) && lost(message))
     message.next += step;
   if (message.next >= count(leader)) return false;
-  message.stamp_s = stamp_s(leader, message.next) + (message.temperature_page ? kPageAfter_s : 0.0);
+  message.stamp_s = stamp_s(leader, message.next) + (message.page != nullptr ? kPageAfter_s : 0.0);
   return true;
 }
 
@@ -194,8 +224,30 @@ void Recording::put(Part part, std::size_t n, can::Frame& frame) {
   const simulation::GyroSample& sample = gyros_[part][n];
   if (std::abs(sample.reading_dps) > gateway::carried_dps(gyro)) ++beyond_[part];
   gateway::put_gyro(gyro, sample.reading_dps, n, frame);
-  if (gyro.temperature && gateway::carries_temperature(gyro, frame)) {
-    gateway::put_quantity(*gyro.temperature, simulator_.temperature_c(sample.t_s), frame);
+  put_besides(part, n, frame);
+}
+
+// Beside a rate that stands on every page those on pages of their own take turns.
+void Recording::put_besides(Part part, std::size_t n, can::Frame& frame) const {
+  const gateway::GyroPlan& gyro = plan_.gyros[part];
+  bool page_is_chosen = false;
+  for (std::size_t i = 0; i < kBesides.size(); ++i) {
+    const Beside& beside = kBesides[(n + i) % kBesides.size()];
+    const auto& quantity = gyro.*beside.quantity;
+    if (!quantity || !gateway::carries(gyro, *quantity, frame)) continue;
+    if (page_is_chosen && !quantity->presence.holds(frame.payload())) continue;
+    gateway::put_quantity(*quantity, (simulator_.*beside.value)(gyros_[part][n].t_s), frame);
+    page_is_chosen = page_is_chosen || !quantity->presence.always();
+  }
+}
+
+void Recording::put_page(Part part, std::size_t n, const gateway::Quantity& page,
+                         can::Frame& frame) const {
+  page.presence.arrange({frame.data.data(), frame.length});
+  for (const Beside& beside : kBesides) {
+    const auto& quantity = plan_.gyros[part].*beside.quantity;
+    if (!quantity || !quantity->presence.holds(frame.payload())) continue;
+    gateway::put_quantity(*quantity, (simulator_.*beside.value)(gyros_[part][n].t_s), frame);
   }
 }
 
@@ -206,10 +258,8 @@ const gateway::E2ePlan& Recording::e2e_of(Part part) const {
 
 can::Frame Recording::frame(const SimulatedMessage& message) {
   can::Frame frame = gateway::empty_frame(*message.match);
-  if (message.temperature_page) {
-    const Part part = message.parts.front();
-    const double t_s = gyros_[part][message.next].t_s;
-    gateway::put_quantity(*plan_.gyros[part].temperature, simulator_.temperature_c(t_s), frame);
+  if (message.page != nullptr) {
+    put_page(message.parts.front(), message.next, *message.page, frame);
   } else {
     for (const Part part : message.parts)
       put(part, message.next, frame);
@@ -241,7 +291,7 @@ void Recording::write(OutputFile& output, double start_s) {
         output.room(can::kLineBytesMax), time_from_ns(start_ns + since_ns), frame(message), 6));
     progress.update(static_cast<std::uint64_t>(message.stamp_s * 1e3),
                     static_cast<std::uint64_t>(simulator_.profile().length_s * 1e3), ++frames_);
-    message.next += message.temperature_page ? kPageEvery : 1;
+    message.next += message.page != nullptr ? kPageEvery : 1;
     if (!find_next(message)) alive.erase(first);
   }
 }
@@ -262,10 +312,19 @@ void Recording::summarize(const SimulateOptions& options) const {
          acceleration_.empty() ? "no frames; the profile has no column acc_x_g, acc_y_g, acc_z_g"
                                : fmt::format("{} samples", acceleration_.size()));
   }
+  say_constants();
+}
+
+void Recording::say_constants() const {
   const bool tells_temperature = plan_.gyros[0].temperature || plan_.gyros[1].temperature;
   if (tells_temperature && !simulator_.profile().temperature_c) {
     tell("  temperature: {:g} degC throughout; the profile has no column temperature_c\n",
          simulation::Simulator::kTemperature_c);
+  }
+  const bool tells_supply = plan_.gyros[0].supply_voltage || plan_.gyros[1].supply_voltage;
+  if (tells_supply && !simulator_.profile().supply_v) {
+    tell("  supply voltage: {:g} V throughout; the profile has no column supply_v\n",
+         simulation::Simulator::kSupply_v);
   }
 }
 

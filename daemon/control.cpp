@@ -90,6 +90,7 @@ int append_gyro(sd_bus_message* reply, const Snapshot& now, std::size_t k) {
   fields.put("slope_dps_s", now.slope_dps_s[k]);
   fields.put("slope_sigma_dps_s", now.slope_sigma_dps_s[k]);
   fields.put("temperature_c", gyro.temperature_c);
+  if (plan.supply_voltage) fields.put("supply_v", gyro.supply_v);
   fields.put("frames", gyro.frames);
   fields.put("samples", gyro.samples);
   fields.put("missing", gyro.missing);

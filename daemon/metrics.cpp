@@ -180,6 +180,17 @@ void add_gyros(Text& text, const Snapshot& now) {
   });
 }
 
+// Few gyros tell it: of the others there is no family of NaN.
+void add_supply(Text& text, const Snapshot& now) {
+  const auto& gyros = now.plan->gyros;
+  if (!gyros[0].supply_voltage && !gyros[1].supply_voltage) return;
+  text.family("vgyro_gyro_supply_volts", "gauge", "NaN where it was not told yet.");
+  for (std::size_t k = 0; k < gyros.size(); ++k) {
+    if (gyros[k].supply_voltage)
+      text.sample({{"gyro", gyros[k].name}}, now.status.gyros[k].supply_v);
+  }
+}
+
 void add_buses(Text& text, const Snapshot& now) {
   const std::vector<BusStatus>& buses = now.traffic.buses;
   text.family("vgyro_bus_up", "gauge", "1 while the interface is there and its link is up.");
@@ -229,6 +240,7 @@ std::string metrics_text(const Snapshot& now) {
   add_rate(text, now);
   add_counters(text, now);
   add_gyros(text, now);
+  add_supply(text, now);
   add_buses(text, now);
   return text.take();
 }

@@ -83,12 +83,26 @@ constexpr AxisRow kAxes[] = {
      [](const Seen& s) { return s.around.acceleration_g[static_cast<std::size_t>(s.p[0])]; }},
     {Axis::kVibration, "the vibration", "variance of the acceleration / g²",
      [](const Seen& s) { return s.around.vibration_g2; }},
+    {Axis::kSupply, "the supply voltage", "supply voltage / V",
+     [](const Seen& s) { return s.around.supply_v; }},
     {Axis::kRateSlope, "the slope of the rate", "slope of the rate / (deg/s²)",
      [](const Seen& s) { return s.rate.slope; }},
     {Axis::kGrowingLag, "time, as a lag that grows", "time / s",
      [](const Seen& s) { return s.t_s; }},
     {Axis::kAngle, "the angle", "angle within a turn / deg", turn_deg},
 };
+// Of every instant but for these three, which have figures of their own.
+constexpr bool is_of_instants(Axis axis) {
+  return axis != Axis::kTime && axis != Axis::kFrequency && axis != Axis::kAveraging;
+}
+constexpr bool axes_in_order() {
+  for (std::size_t i = 0; i < std::size(kAxes); ++i) {
+    if (static_cast<std::size_t>(kAxes[i].axis) != i) return false;
+  }
+  return is_of_instants(kAxes[std::size(kAxes) - 1].axis) &&
+         !is_of_instants(static_cast<Axis>(std::size(kAxes)));
+}
+static_assert(axes_in_order());
 constexpr double kMsPerS = 1e3;
 
 Against against_of(const Subject& s) {

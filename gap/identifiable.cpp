@@ -37,6 +37,7 @@ class Lacks {
     temperature();
     rate();
     acceleration();
+    supply();
   }
 
  private:
@@ -95,6 +96,18 @@ class Lacks {
     if (x_.moves(bit(Input::kVibration))) return;
     for (const Kind kind : speakers(bit(Input::kVibration)))
       add(kind, "there is no vibration in this recording", "shake the platform in bursts");
+  }
+
+  // Few gyros tell it: who names none is not told to.
+  void supply() {
+    const std::uint8_t needs = bit(Input::kSupply);
+    if (!x_.knows(Input::kSupply) || x_.moves(needs)) return;
+    for (const Kind kind : speakers(needs)) {
+      add(kind,
+          fmt::format("the supply voltage is constant in this recording, within {:.2g} V",
+                      x_.of(Input::kSupply)),
+          "let the supply voltage change by half a volt, up and down");
+    }
   }
 
   bool with_reference_;

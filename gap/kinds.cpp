@@ -20,6 +20,7 @@ constexpr double kTemperatureMin_c = 0.5;
 constexpr double kTemperatureSlopeMin_c_s = 0.01;
 constexpr double kAccelerationMin_g = 0.02;
 constexpr double kVibrationMin_g2 = 1e-5;
+constexpr double kSupplyMin_v = 0.05;
 
 constexpr InputRow kInputs[] = {
     {Input::kRate, [](double rate_dps, const S&) { return rate_dps; }, kRateMin_dps},
@@ -33,6 +34,7 @@ constexpr InputRow kInputs[] = {
     {Input::kAccelerationZ, [](double, const S& s) { return s.acceleration_g[2]; },
      kAccelerationMin_g},
     {Input::kVibration, [](double, const S& s) { return s.vibration_g2; }, kVibrationMin_g2},
+    {Input::kSupply, [](double, const S& s) { return s.supply_v; }, kSupplyMin_v},
 };
 static_assert(std::size(kInputs) == kInputCount);
 
@@ -48,8 +50,10 @@ constexpr std::uint8_t kNothing = 0;
 constexpr std::uint8_t kRate = bit(Input::kRate);
 constexpr std::uint8_t kTemperature = bit(Input::kTemperature);
 
-// A reference temperature is no free parameter: another one is another bias or scale factor.
+// A reference temperature or voltage is no free parameter: another one is another bias or scale
+// factor.
 constexpr double kReference_c = 25.0;
+constexpr double kReference_v = 5.0;
 
 constexpr std::array<Free, 0> kNoFree{};
 constexpr std::array kFirst{Free{0}};
@@ -67,6 +71,7 @@ constexpr std::array<Parameters, 0> kNoStart{};
 constexpr std::array<Parameters, 1> kUnit{Parameters{1.0}};
 constexpr std::array<Parameters, 1> kZero{Parameters{0.0}};
 constexpr std::array<Parameters, 1> kUnitAtReference{Parameters{1.0, kReference_c}};
+constexpr std::array<Parameters, 1> kUnitAtSupply{Parameters{1.0, kReference_v}};
 constexpr std::array kAxes{Parameters{0.0, 1.0}, Parameters{1.0, 1.0}, Parameters{2.0, 1.0}};
 // Twice as long each time: between two of them the shape is met to a few per cent.
 constexpr std::array kWarmUps{Parameters{1.0, 3.0},   Parameters{1.0, 7.0},  Parameters{1.0, 15.0},
@@ -340,6 +345,9 @@ constexpr KindRow kKinds[] = {
            Axis::kGrowingLag, false, "stamps",
            "the lag of {name} grows by {p0:+.3g} µs every second", 0),
     frames(Kind::kTimestampJitter, "stamps"),
+    speaking(added(Kind::kSupplyVoltageBias, bit(Input::kSupply), kUnitAtSupply, Axis::kSupply,
+                   Experiment::kSupplySteps, "supply", "supply",
+                   "the residual of {name} follows its supply voltage: {p0:+.3g} deg/s per V")),
 };
 static_assert(std::size(kKinds) == model::kKindCount);
 
@@ -391,6 +399,8 @@ std::string_view experiment_text(Experiment experiment) {
       return "let the temperature rise and fall twice, at different speeds";
     case Experiment::kTilt:
       return "tilt about both horizontal axes, and shake in bursts";
+    case Experiment::kSupplySteps:
+      return "let the supply voltage rise and fall by half a volt, several times";
     case Experiment::kLonger:
       break;
   }

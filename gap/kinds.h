@@ -25,8 +25,9 @@ enum class Input : std::uint8_t {
   kAccelerationY,
   kAccelerationZ,
   kVibration,
+  kSupply,
 };
-inline constexpr std::size_t kInputCount = 7;
+inline constexpr std::size_t kInputCount = 8;
 
 /// One input: where it is read, how far it must move to show anything, and what to say where it
 /// does not.
@@ -83,6 +84,7 @@ enum class Axis : std::uint8_t {
   kRateTimesTemperature,
   kAcceleration,
   kVibration,
+  kSupply,
   kRateSlope,
   kGrowingLag,
   kAngle,
@@ -97,6 +99,7 @@ enum class Experiment : std::uint8_t {
   kManyRates,
   kTemperatureCycles,
   kTilt,
+  kSupplySteps,
   kLonger,
 };
 std::string_view experiment_text(Experiment experiment);
@@ -144,6 +147,8 @@ struct KindRow {
 };
 inline constexpr std::size_t kNoErrors = model::kParametersMax;
 
+// One more input than the bits of a mask have places for would be lost without a word.
+static_assert(kInputCount <= 8);
 constexpr std::uint8_t bit(Input input) {
   return static_cast<std::uint8_t>(1U << static_cast<unsigned>(input));
 }

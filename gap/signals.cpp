@@ -162,6 +162,7 @@ model::Surroundings Signals::at(double t_s) const {
     }
     s.vibration_g2 = vibration_g2.linear(t_s);
   }
+  if (!supply_v.empty()) s.supply_v = supply_v.linear(t_s);
   s.angle_rad = motion.angle_rad(t_s);
   return s;
 }
@@ -184,6 +185,17 @@ void smooth_temperature(const GyroSeries& gyro, Signals& signals) {
   }
   signals.temperature_c = SampledCurve(t_s, value);
   signals.temperature_slope_c_s = SampledCurve(t_s, slope);
+}
+
+void set_supply(const GyroSeries& gyro, Signals& signals) {
+  std::vector<double> t_s;
+  std::vector<double> value;
+  for (std::size_t i = 0; i < gyro.supply_v.size(); ++i) {
+    if (std::isnan(gyro.supply_v[i])) continue;
+    t_s.push_back(gyro.t_s[i]);
+    value.push_back(gyro.supply_v[i]);
+  }
+  signals.supply_v = SampledCurve(t_s, value);
 }
 
 void set_acceleration(const AccelerationSeries& acceleration, Signals& signals) {
@@ -215,6 +227,13 @@ void set_acceleration(const AccelerationSeries& acceleration, Signals& signals) 
     variance[i] = std::max(0.0, squares / count - (sum / count) * (sum / count));
   }
   signals.vibration_g2 = SampledCurve(acceleration.t_s, variance);
+}
+
+void set_circumstances(const GyroSeries& gyro, const AccelerationSeries& acceleration,
+                       Signals& signals) {
+  smooth_temperature(gyro, signals);
+  set_supply(gyro, signals);
+  set_acceleration(acceleration, signals);
 }
 
 Prediction::Prediction(std::span<const model::Effect> effects, const Signals& signals)

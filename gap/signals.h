@@ -1,8 +1,8 @@
 #pragma once
 
 // What a gyro's error may depend on, at any instant of a recording: the true rate with its slope
-// and angle, the gyro's temperature, acceleration, vibration. And from that, what a gyro should
-// read.
+// and angle, the gyro's temperature and supply voltage, acceleration, vibration. And from that,
+// what a gyro should read.
 
 #include <array>
 #include <span>
@@ -39,13 +39,20 @@ struct Signals {
   SampledCurve temperature_slope_c_s;
   std::array<SampledCurve, 3> acceleration_g;
   SampledCurve vibration_g2;
+  SampledCurve supply_v;
 
   [[nodiscard]] model::Surroundings at(double t_s) const;
 };
 
 /// Temperature smoothed by local parabolas over `reach_s` to both sides, with its slope.
 void smooth_temperature(const GyroSeries& gyro, Signals& signals);
+/// As it is told: it steps, and a parabola through a step follows nothing.
+void set_supply(const GyroSeries& gyro, Signals& signals);
 void set_acceleration(const AccelerationSeries& acceleration, Signals& signals);
+
+/// All of them, as the recording holds them.
+void set_circumstances(const GyroSeries& gyro, const AccelerationSeries& acceleration,
+                       Signals& signals);
 
 /// What one gyro's effects say it reads, by model::Equation along a motion: deterministic kinds
 /// only, before clipping, in deg/s.

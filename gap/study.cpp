@@ -209,8 +209,7 @@ Expected<std::shared_ptr<const Study>> Study::begin(const Recording& recording,
     const GyroSeries& series = recording.gyros[gyro];
     facts->transports[gyro] = check_transport(series, gyro, of_gyro(effects, gyro));
     auto signals = std::make_shared<Signals>();
-    smooth_temperature(series, *signals);
-    set_acceleration(recording.acceleration, *signals);
+    set_circumstances(series, recording.acceleration, *signals);
     if (recording.has_reference)
       signals->motion =
           Motion(SampledCurve(recording.reference_dps.t_s, recording.reference_dps.value));

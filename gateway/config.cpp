@@ -150,6 +150,7 @@ std::optional<GyroPlan> read_gyro(const toml::table& table, std::size_t index, C
   const dbc::Signal* rate_signal = resolver.signal("rate", true);
   const dbc::Signal* sign_signal = resolver.signal("sign_signal", false);
   const dbc::Signal* temperature_signal = resolver.signal("temperature", false);
+  const dbc::Signal* supply_signal = resolver.signal("supply_voltage", false);
   const auto unit = reader.text("unit");
   std::optional<GyroPlan> gyro;
   std::optional<Quantity> rate;
@@ -177,6 +178,10 @@ std::optional<GyroPlan> read_gyro(const toml::table& table, std::size_t index, C
     if (temperature_signal != nullptr) {
       gyro->temperature =
           resolver.quantity(*temperature_signal, "temperature", Dimension::kTemperature);
+    }
+    if (supply_signal != nullptr) {
+      gyro->supply_voltage =
+          resolver.quantity(*supply_signal, "supply_voltage", Dimension::kVoltage);
     }
   } else {
     // Ask for the rest, so that a good key is not called unknown on top of the real trouble.

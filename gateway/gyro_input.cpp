@@ -11,8 +11,11 @@ namespace {
 std::size_t bytes_of(const GyroPlan& plan) {
   std::size_t bytes = plan.rate.codec.bytes_needed();
   if (plan.sign) bytes = std::max(bytes, plan.sign->bytes_needed());
-  const bool same_page = plan.temperature && plan.temperature->presence.always();
-  if (same_page) bytes = std::max(bytes, plan.temperature->codec.bytes_needed());
+  for (const std::optional<Quantity> GyroPlan::*beside : kBesides) {
+    const std::optional<Quantity>& quantity = plan.*beside;
+    const bool same_page = quantity && quantity->presence.always();
+    if (same_page) bytes = std::max(bytes, quantity->codec.bytes_needed());
+  }
   if (plan.e2e.counter) bytes = std::max(bytes, plan.e2e.counter->codec.bytes_needed());
   if (plan.valid) bytes = std::max(bytes, plan.valid->codec.bytes_needed());
   return bytes;
@@ -58,13 +61,28 @@ std::optional<Reject> decode_quantity(const Quantity& quantity, const can::Frame
 }
 
 GyroInput::GyroInput(const GyroPlan& plan)
-    : plan_(plan), bytes_needed_(bytes_of(plan)), e2e_(plan.e2e) {}
+    : plan_(plan),
+      bytes_needed_(bytes_of(plan)),
+      temperature_(plan.temperature),
+      supply_voltage_(plan.supply_voltage),
+      e2e_(plan.e2e) {}
 
-double GyroInput::temperature_c() const {
-  double temperature_c = 0.0;
-  const bool known = plan_.temperature && newest_.length > 0 &&
-                     !decode_quantity(*plan_.temperature, newest_, temperature_c);
-  return known ? temperature_c : std::numeric_limits<double>::quiet_NaN();
+double Beside::value() const {
+  double value = 0.0;
+  const bool known =
+      quantity_ && newest_.length > 0 && !decode_quantity(*quantity_, newest_, value);
+  return known ? value : std::numeric_limits<double>::quiet_NaN();
+}
+
+void Beside::keep(const can::Frame& frame) {
+  if (!quantity_) return;
+  const dbc::Presence& presence = quantity_->presence;
+  if (presence.always() || presence.holds(frame.payload())) newest_ = frame;
+}
+
+void GyroInput::keep_besides(const can::Frame& frame) {
+  temperature_.keep(frame);
+  supply_voltage_.keep(frame);
 }
 
 GyroInput::Result GyroInput::decode(const can::Frame& frame) {
@@ -73,7 +91,7 @@ GyroInput::Result GyroInput::decode(const can::Frame& frame) {
   if (result.reject) return result;
   const auto payload = frame.payload();
   if (!plan_.rate.presence.always() && !plan_.rate.presence.holds(payload)) {
-    keep_temperature(frame);
+    keep_besides(frame);
     result.reject = Reject::kOtherPage;
     return result;
   }
@@ -90,15 +108,8 @@ GyroInput::Result GyroInput::decode(const can::Frame& frame) {
   result.reject = convert(plan_.rate, payload, result.rate_dps);
   if (result.reject) return result;
   if (plan_.sign && plan_.sign->decode(payload).raw != 0) result.rate_dps = -result.rate_dps;
-  keep_temperature(frame);
+  keep_besides(frame);
   return result;
-}
-
-// It may stand on a page of its own.
-void GyroInput::keep_temperature(const can::Frame& frame) {
-  if (!plan_.temperature) return;
-  const dbc::Presence& presence = plan_.temperature->presence;
-  if (presence.always() || presence.holds(frame.payload())) newest_ = frame;
 }
 
 }  // namespace vgyro::gateway

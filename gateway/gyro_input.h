@@ -14,6 +14,21 @@
 
 namespace vgyro::gateway {
 
+/// What a gyro's message tells besides the rate, perhaps on a page of its own: of the newest frame
+/// that carried it. Decoded when asked for.
+class Beside {
+ public:
+  /// The plan's part must live as long.
+  explicit Beside(const std::optional<Quantity>& quantity) : quantity_(quantity) {}
+  void keep(const can::Frame& frame);
+  /// In the product's unit; NaN where there is none.
+  [[nodiscard]] double value() const;
+
+ private:
+  const std::optional<Quantity>& quantity_;
+  can::Frame newest_;  ///< length 0 before the first
+};
+
 class GyroInput {
  public:
   explicit GyroInput(const GyroPlan& plan);
@@ -31,16 +46,17 @@ class GyroInput {
   /// As the newest frame that was used carried it.
   [[nodiscard]] std::uint32_t counter() const { return e2e_.counter(); }
 
-  /// Of the newest frame that was used or told nothing else; NaN when there is none. Decoded when
-  /// asked for.
-  [[nodiscard]] double temperature_c() const;
+  /// Of the newest frame that was used or told nothing else; NaN when there is none.
+  [[nodiscard]] double temperature_c() const { return temperature_.value(); }
+  [[nodiscard]] double supply_v() const { return supply_voltage_.value(); }
 
  private:
-  void keep_temperature(const can::Frame& frame);
+  void keep_besides(const can::Frame& frame);
 
   const GyroPlan& plan_;
   std::size_t bytes_needed_;
-  can::Frame newest_;  ///< that carried the temperature; length 0 before the first
+  Beside temperature_;
+  Beside supply_voltage_;
   E2eCheck e2e_;
 };
 

@@ -70,8 +70,8 @@ void seal(const E2ePlan& e2e, can::Frame& frame) {
   if (e2e.crc) e2e.crc->protection.seal(payload_of(frame));
 }
 
-bool carries_temperature(const GyroPlan& plan, const can::Frame& frame) {
-  const dbc::Presence& page = plan.temperature->presence;
+bool carries(const GyroPlan& plan, const Quantity& beside, const can::Frame& frame) {
+  const dbc::Presence& page = beside.presence;
   return page.always() || plan.rate.presence.always() || page.holds(frame.payload());
 }
 

@@ -27,8 +27,9 @@ void put_counter(const E2ePlan& e2e, std::uint64_t count, can::Frame& frame);
 /// The check value, when everything else stands in the frame.
 void seal(const E2ePlan& e2e, can::Frame& frame);
 
-/// Does the frame that put_gyro() filled have room for the temperature, or has that its own page?
-bool carries_temperature(const GyroPlan& plan, const can::Frame& frame);
+/// Does the frame that put_gyro() filled have room for this quantity of the gyro's (kBesides), or
+/// has that a page of its own?
+bool carries(const GyroPlan& plan, const Quantity& beside, const can::Frame& frame);
 
 /// The largest magnitude that the rate's signal can carry on both sides, deg/s.
 double carried_dps(const GyroPlan& plan);

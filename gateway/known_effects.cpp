@@ -16,10 +16,6 @@ KnownEffects::KnownEffects(const Plan& plan) {
   }
 }
 
-bool KnownEffects::needs_temperature(std::size_t gyro) const {
-  return (needs_[gyro] & model::kNeedsTemperature) != 0;
-}
-
 double KnownEffects::take_off(std::size_t gyro, double reading_dps,
                               const Surroundings& surroundings, TimePoint t) const {
   if (!take_any(gyro)) return reading_dps;  // and asks for no surroundings: most have no model

@@ -20,7 +20,6 @@ class KnownEffects {
 
   /// A bit mask of model::Need: what the effects of this gyro depend on.
   [[nodiscard]] std::uint8_t needs(std::size_t gyro) const { return needs_[gyro]; }
-  [[nodiscard]] bool needs_temperature(std::size_t gyro) const;
   [[nodiscard]] bool take_any(std::size_t gyro) const { return compensations_[gyro].takes_any(); }
 
   /// The reading at `t` less what is known of it, deg/s.

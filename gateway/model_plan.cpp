@@ -86,6 +86,13 @@ constexpr Input kInputs[] = {
      [](const Plan& plan, std::size_t) { return plan.accelerometer.has_value(); },
      [](const GyroPlan&) { return std::string("an [accelerometer]"); },
      "an [accelerometer] table in the configuration"},
+    {model::kNeedsSupply, "supply voltage",
+     [](const Plan& plan, std::size_t gyro) { return plan.gyros[gyro].supply_voltage.has_value(); },
+     [](const GyroPlan& gyro) {
+       return fmt::format("the supply voltage of gyro {}, which the configuration does not name",
+                          gyro.name);
+     },
+     "supply_voltage = \"SIGNAL\" in its [[gyro]] table"},
 };
 static_assert(model::answers_each_need(kInputs));
 

@@ -16,6 +16,7 @@
 #include "gateway/router.h"
 #include "gateway/sender.h"
 #include "gateway/surroundings.h"
+#include "model/catalogue.h"
 
 namespace vgyro::gateway {
 
@@ -172,9 +173,9 @@ void Pipeline::Impl::step_clock() {
 // The reading less what the model knows of it.
 double Pipeline::Impl::take_back(std::size_t gyro, TimePoint t, double reading_dps) {
   surroundings.reach(t);
-  if (known_effects.needs_temperature(gyro) || plan.corrector.gyros[gyro].learns_temperature) {
-    surroundings.add_temperature(gyro, t, inputs[gyro].input().temperature_c());
-  }
+  std::uint8_t needs = known_effects.needs(gyro);
+  if (plan.corrector.gyros[gyro].learns_temperature) needs |= model::kNeedsTemperature;
+  surroundings.hear_gyro(gyro, t, inputs[gyro].input(), needs);
   return known_effects.take_off(gyro, reading_dps, surroundings, t);
 }
 
@@ -426,6 +427,7 @@ const Status& Pipeline::Impl::refreshed_status() {
     GyroStatus& own = status.gyros[gyro];
     own.bias_dps = drift.bias_dps[gyro];
     own.temperature_c = inputs[gyro].input().temperature_c();
+    own.supply_v = inputs[gyro].input().supply_v();
     own.waits_for = surroundings.missing(gyro, known_effects.needs(gyro));
     own.unpaired = aligner.counts().unpaired[gyro];
   }

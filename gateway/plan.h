@@ -39,8 +39,8 @@ struct Quantity {
   std::string unit;  ///< as in the DBC file
   dbc::SignalCodec codec;
   dbc::Presence presence;  ///< of a multiplexed signal: the page it stands on
-  double scale = 1.0;    ///< value · scale + shift is in the product's unit: deg/s, degC, g, m/s;
-  double shift = 0.0;    ///< the sign of the configuration is part of the scale
+  double scale = 1.0;  ///< value · scale + shift is in the product's unit: deg/s, degC, g, m/s, V;
+  double shift = 0.0;  ///< the sign of the configuration is part of the scale
   double minimum = 0.0;  ///< accepted values, in the DBC's unit
   double maximum = 0.0;
   std::string layout;  ///< for people: "32 bits from bit 0, Intel, signed, x 1e-06"
@@ -101,6 +101,7 @@ struct GyroPlan {
   Quantity rate;
   std::optional<dbc::SignalCodec> sign;  ///< separate sign bit: 1 means negative
   std::optional<Quantity> temperature;
+  std::optional<Quantity> supply_voltage = {};
   E2ePlan e2e = {};
   std::optional<ValidCondition> valid;
   std::optional<double> saturation_dps = {};  ///< from the model file: it clips at ± this
@@ -110,6 +111,9 @@ struct GyroPlan {
 
   friend bool operator==(const GyroPlan&, const GyroPlan&) = default;
 };
+
+/// What a gyro's message may tell besides its rate.
+inline constexpr std::array kBesides{&GyroPlan::temperature, &GyroPlan::supply_voltage};
 
 struct ReferencePlan {
   std::string bus;

@@ -18,7 +18,7 @@ namespace {
 constexpr std::size_t kInterfaceNameMax = 15;  // IFNAMSIZ less the closing zero
 constexpr std::size_t kDiagnosticsShown = 5;
 // What lies beyond is a bit pattern, not a measurement: no gyro turns faster, no part that measures
-// gets hotter, no vehicle goes on after such a knock.
+// gets hotter, no vehicle goes on after such a knock, no sensor is fed with more.
 double widest_of(Dimension dimension) {
   switch (dimension) {
     case Dimension::kRate:
@@ -28,6 +28,7 @@ double widest_of(Dimension dimension) {
     case Dimension::kAcceleration:
       return 10'000.0;
     case Dimension::kSpeed:
+    case Dimension::kVoltage:
       break;
   }
   return 1'000.0;

@@ -4,8 +4,6 @@
 #include <cmath>
 #include <numbers>
 
-#include "model/catalogue.h"
-
 namespace vgyro::gateway {
 
 namespace {
@@ -19,9 +17,33 @@ fusion::TemperatureFilter filter_of(const GyroPlan& gyro) {
 
 }  // namespace
 
+/// Of one input: who tells it, and whether anybody has.
+struct Surroundings::Source {
+  model::Need need;
+  /// Null where it is not the gyro.
+  void (*from_gyro)(Surroundings& to, std::size_t gyro, TimePoint t, const GyroInput& input);
+  bool (*heard)(const Surroundings& from, std::size_t gyro);
+};
+constexpr std::array<Surroundings::Source, model::kNeedCount> Surroundings::kSources{{
+    {model::kNeedsTemperature,
+     [](Surroundings& to, std::size_t gyro, TimePoint t, const GyroInput& input) {
+       to.add_temperature(gyro, t, input.temperature_c());
+     },
+     [](const Surroundings& from, std::size_t gyro) { return from.temperatures_[gyro].known(); }},
+    {model::kNeedsAcceleration, nullptr,
+     [](const Surroundings& from, std::size_t) { return from.vibration_.count() > 0; }},
+    {model::kNeedsSupply,
+     [](Surroundings& to, std::size_t gyro, TimePoint, const GyroInput& input) {
+       to.add_supply(gyro, input.supply_v());
+     },
+     [](const Surroundings& from, std::size_t gyro) { return !std::isnan(from.supply_v_[gyro]); }},
+}};
+
 Surroundings::Surroundings(const Plan& plan)
     : temperatures_{filter_of(plan.gyros[0]), filter_of(plan.gyros[1])},
       rate_dps_(plan.calibration.rate_dps) {
+  static_assert(model::answers_each_need(kSources));
+  supply_v_.fill(model::Surroundings::kUnknown);
   acceleration_g_.fill(model::Surroundings::kUnknown);
   if (plan.accelerometer) accelerometer_.emplace(accelerometer_intake(*plan.accelerometer));
   if (plan.speed) speed_.emplace(speed_intake(*plan.speed));
@@ -46,6 +68,18 @@ void Surroundings::reach(TimePoint t) {
   if (step <= kLeap) return;
   zero_ += step;
   angle_at_ += step;
+}
+
+void Surroundings::hear_gyro(std::size_t gyro, TimePoint t, const GyroInput& input,
+                             std::uint8_t needs) {
+  for (const Source& source : kSources) {
+    if ((needs & source.need) != 0 && source.from_gyro != nullptr)
+      source.from_gyro(*this, gyro, t, input);
+  }
+}
+
+void Surroundings::add_supply(std::size_t gyro, double supply_v) {
+  if (!std::isnan(supply_v)) supply_v_[gyro] = supply_v;
 }
 
 void Surroundings::add_temperature(std::size_t gyro, TimePoint t, double temperature_c) {
@@ -88,6 +122,7 @@ model::Surroundings Surroundings::at(std::size_t gyro, TimePoint t) const {
           .temperature_slope_c_s = temperatures_[gyro].slope_c_s(),
           .acceleration_g = acceleration_g_,
           .vibration_g2 = vibration_.variance(),
+          .supply_v = supply_v_[gyro],
           .angle_rad = angle_rad_ + rate_dps_ * to_seconds(ahead) * kRadPerDeg};
 }
 
@@ -103,8 +138,9 @@ double Surroundings::vibration_g2() const {
 
 std::uint8_t Surroundings::missing(std::size_t gyro, std::uint8_t needs) const {
   std::uint8_t heard = 0;
-  if (temperatures_[gyro].known()) heard |= model::kNeedsTemperature;
-  if (vibration_.count() > 0) heard |= model::kNeedsAcceleration;
+  for (const Source& source : kSources) {
+    if (source.heard(*this, gyro)) heard |= source.need;
+  }
   return static_cast<std::uint8_t>(needs & ~heard);
 }
 

@@ -1,9 +1,10 @@
 #pragma once
 
 // What the gyros' errors depend on besides the rate, gathered from the frames that tell it:
-// temperatures, acceleration, the angle turned so far, and time since the first frame. Also what
-// the wheels do. Values that were never heard are unknown; acceleration and temperature that fall
-// silent are held, because gravity and heat go on, speed is not.
+// temperatures, supply voltages, acceleration, the angle turned so far, and time since the first
+// frame. Also what the wheels do. Values that were never heard are unknown; acceleration,
+// temperature and voltage that fall silent are held, because gravity, heat and supply go on, speed
+// is not.
 
 #include <array>
 #include <optional>
@@ -14,8 +15,10 @@
 #include "fusion/moving_variance.h"
 #include "fusion/stamp_guard.h"
 #include "fusion/temperature_filter.h"
+#include "gateway/gyro_input.h"
 #include "gateway/intake.h"
 #include "gateway/plan.h"
+#include "model/catalogue.h"
 #include "model/effect.h"
 
 namespace vgyro::gateway {
@@ -39,8 +42,11 @@ class Surroundings {
   /// A sample was accepted: its time is believed.
   void reach(TimePoint t);
 
+  /// What the gyro itself tells of its surroundings, as far as it is in `needs` (model::Need).
+  void hear_gyro(std::size_t gyro, TimePoint t, const GyroInput& input, std::uint8_t needs);
   /// NaN is passed over.
   void add_temperature(std::size_t gyro, TimePoint t, double temperature_c);
+  void add_supply(std::size_t gyro, double supply_v);
   /// False when the frame cannot be used.
   bool receive_acceleration(const can::Frame& frame, TimePoint raw, fusion::StampGuard& guard);
   bool receive_speed(const can::Frame& frame, TimePoint raw, fusion::StampGuard& guard);
@@ -60,12 +66,16 @@ class Surroundings {
   [[nodiscard]] std::uint8_t missing(std::size_t gyro, std::uint8_t needs) const;
 
  private:
+  struct Source;
+  static const std::array<Source, model::kNeedCount> kSources;
+
   void set_zero(TimePoint t);
 
   bool begun_ = false;
   TimePoint zero_;
   TimePoint newest_;
   std::array<fusion::TemperatureFilter, 2> temperatures_;
+  std::array<double, 2> supply_v_;
   std::array<double, 3> acceleration_g_;
   fusion::MovingVariance vibration_;
   TimePoint angle_at_;

@@ -63,6 +63,10 @@ constexpr Spelling kSpellings[] = {
     {Dimension::kSpeed, "kmh", {1.0 / 3.6}},
     {Dimension::kSpeed, "mph", {kMetrePerMile / 3600.0}},
     {Dimension::kSpeed, "mi/h", {kMetrePerMile / 3600.0}},
+    {Dimension::kVoltage, "v", {1.0}},
+    {Dimension::kVoltage, "volt", {1.0}},
+    {Dimension::kVoltage, "volts", {1.0}},
+    {Dimension::kVoltage, "mv", {1e-3}},
 };
 
 std::string normalised(std::string_view unit) {
@@ -93,6 +97,8 @@ std::string_view recommended_units(Dimension dimension) {
       return "g, m/s^2";
     case Dimension::kSpeed:
       return "m/s, km/h, mph";
+    case Dimension::kVoltage:
+      return "V, mV";
   }
   return "";
 }

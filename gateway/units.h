@@ -1,6 +1,6 @@
 #pragma once
 
-// Units as DBC files spell them → the product's own: deg/s, degC, g, m/s.
+// Units as DBC files spell them → the product's own: deg/s, degC, g, m/s, V.
 
 #include <cstdint>
 #include <optional>
@@ -10,7 +10,7 @@
 
 namespace vgyro::gateway {
 
-enum class Dimension : std::uint8_t { kRate, kTemperature, kAcceleration, kSpeed };
+enum class Dimension : std::uint8_t { kRate, kTemperature, kAcceleration, kSpeed, kVoltage };
 
 struct Conversion {
   double scale = 1.0;  ///< own = value · scale + shift

@@ -40,6 +40,10 @@ constexpr double kFrequencyMax_hz = 1e5;
 constexpr Parameter kReference{
     .name = "reference_c", .unit = "degC", .minimum = -273.15, .maximum = 1000.0, .preset = 25.0};
 
+// What sensors of vehicles are fed with; those of 3.3 or 12 V say so.
+constexpr Parameter kReferenceSupply{
+    .name = "reference_v", .unit = "V", .minimum = 0.0, .maximum = 1000.0, .preset = 5.0};
+
 constexpr Parameter number(std::string_view name, std::string_view unit, double limit) {
   return {.name = name, .unit = unit, .minimum = -limit, .maximum = limit};
 }
@@ -98,6 +102,8 @@ constexpr std::array kStuck{number("from_s", "s", kTimeMax_s), number("to_s", "s
 constexpr std::array kDroppedFrames{not_negative("fraction", "", 1.0)};
 constexpr std::array kClockSkew{number("ppm", "1e-6", 1e5)};
 constexpr std::array kTimestampJitter{not_negative("sigma_s", "s", 10.0)};
+constexpr std::array kSupplyVoltageBias{number("coefficient_dps_v", "(deg/s)/V", 1e3),
+                                        kReferenceSupply};
 
 constexpr KindInfo kCatalogue[] = {
     {Kind::kBias, Nature::kOffset, kNeedsNothing, "bias", "value", kBias,
@@ -181,6 +187,9 @@ constexpr KindInfo kCatalogue[] = {
      "stamps run fast (positive)", kClockSkew},
     {Kind::kTimestampJitter, Nature::kDisturbance, kNeedsNothing, "timestamp_jitter",
      "stamps randomly late", kTimestampJitter},
+    {Kind::kSupplyVoltageBias, Nature::kOffset, kNeedsSupply, "supply_voltage_bias",
+     "c * (V - ref)", kSupplyVoltageBias,
+     [](const P& p, double, const S& s) { return p[0] * (s.supply_v - p[1]); }},
 };
 static_assert(std::size(kCatalogue) == kKindCount);
 

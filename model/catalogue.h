@@ -31,8 +31,13 @@ enum class Nature : std::uint8_t {
 };
 
 /// What an equation needs to know of the surroundings; a bit mask.
-enum Need : std::uint8_t { kNeedsNothing = 0, kNeedsTemperature = 1, kNeedsAcceleration = 2 };
-inline constexpr std::size_t kNeedCount = 2;
+enum Need : std::uint8_t {
+  kNeedsNothing = 0,
+  kNeedsTemperature = 1U << 0U,
+  kNeedsAcceleration = 1U << 1U,
+  kNeedsSupply = 1U << 2U
+};
+inline constexpr std::size_t kNeedCount = 3;
 
 /// Of a table that says something of each need: one row for each bit, in their order. To be
 /// asserted where it stands, so that a new need does not compile before all who must know it do.

@@ -40,9 +40,10 @@ enum class Kind : std::uint8_t {
   kStuck,
   kDroppedFrames,
   kClockSkew,
-  kTimestampJitter
+  kTimestampJitter,
+  kSupplyVoltageBias
 };
-inline constexpr std::size_t kKindCount = 30;
+inline constexpr std::size_t kKindCount = 31;
 
 /// Effects of kind gauss_markov for one gyro. Three, a decade apart, are flicker noise over the
 /// times that a gyro is used for (docs/allan.md); each is a state of every filter of the gateway.
@@ -70,6 +71,7 @@ struct Surroundings {
   double temperature_slope_c_s = kUnknown;
   std::array<double, 3> acceleration_g{kUnknown, kUnknown, kUnknown};
   double vibration_g2 = kUnknown;  ///< variance of |a| over the last second
+  double supply_v = kUnknown;      ///< at the gyro
   double angle_rad = 0.0;          ///< ∫Ω dt, up to whole turns
 };
 

@@ -44,6 +44,8 @@ constexpr Evidence kEvidence[] = {
     {Kind::kDroppedFrames, "an alive counter, or gaps in the stamps", ""},
     {Kind::kClockSkew, "a long recording with turns, stamps of the same clock", "delay"},
     {Kind::kTimestampJitter, "stamps that scatter about an even clock", "dropped_frames"},
+    {Kind::kSupplyVoltageBias, "a supply voltage that rises and falls by some tenths of a volt",
+     "bias_step, rate_random_walk"},
 };
 
 static_assert(std::size(kEvidence) == kKindCount);

@@ -24,14 +24,19 @@ constexpr std::size_t kTime = 0;
 constexpr std::size_t kRate = 1;
 constexpr std::size_t kTemperature = 2;
 constexpr std::size_t kAcceleration = 3;
-constexpr std::array<Column, 6> kColumns{{{"t_s", -1e9, 1e9, true},
+constexpr std::size_t kSupply = 6;
+constexpr std::array<Column, 7> kColumns{{{"t_s", -1e9, 1e9, true},
                                           {"rate_dps", -1e5, 1e5, true},
                                           {"temperature_c", -273.15, 1000.0, false},
                                           {"acc_x_g", -1000.0, 1000.0, false},
                                           {"acc_y_g", -1000.0, 1000.0, false},
-                                          {"acc_z_g", -1000.0, 1000.0, false}}};
-constexpr const char* kHeaderForm = "t_s,rate_dps[,temperature_c][,acc_x_g,acc_y_g,acc_z_g]";
-// Temperature and acceleration come from sensors with noise of their own.
+                                          {"acc_z_g", -1000.0, 1000.0, false},
+                                          {"supply_v", 0.0, 1000.0, false}}};
+static_assert(kColumns[kTemperature].name == "temperature_c" &&
+              kColumns[kAcceleration].name == "acc_x_g" && kColumns[kSupply].name == "supply_v");
+constexpr const char* kHeaderForm =
+    "t_s,rate_dps[,temperature_c][,acc_x_g,acc_y_g,acc_z_g][,supply_v]";
+// Temperature, acceleration and voltage come from sensors with noise of their own.
 constexpr std::size_t kSlowPoints = 6;
 
 std::string_view trimmed(std::string_view text) {
@@ -191,13 +196,15 @@ Expected<Profile> parse_profile(std::string_view text, const std::string& file) 
                   .length_s = times_s.back(),
                   .rate_dps = Curve(times_s, table.column(kRate)),
                   .temperature_c = {},
-                  .acceleration_g = {}};
+                  .acceleration_g = {},
+                  .supply_v = {}};
   if (table.has(kTemperature))
     profile.temperature_c = Curve(times_s, table.column(kTemperature), kSlowPoints);
   for (std::size_t axis = 0; axis < 3; ++axis) {
     if (!table.has(kAcceleration + axis)) continue;
     profile.acceleration_g[axis] = Curve(times_s, table.column(kAcceleration + axis), kSlowPoints);
   }
+  if (table.has(kSupply)) profile.supply_v = Curve(times_s, table.column(kSupply), kSlowPoints);
   return profile;
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
-// A motion as a table: time, true rate, and, where they are known, temperature and acceleration.
+// A motion as a table: time, true rate, and, where they are known, temperature, acceleration and
+// supply voltage.
 // Its text is CSV with a header line; docs/simulate.md describes it.
 
 #include <array>
@@ -23,6 +24,7 @@ struct Profile {
   Curve rate_dps;
   std::optional<Curve> temperature_c;
   std::array<std::optional<Curve>, 3> acceleration_g;
+  std::optional<Curve> supply_v;
 
   [[nodiscard]] bool has_acceleration() const;
 };

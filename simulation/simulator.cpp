@@ -122,13 +122,18 @@ std::string missing_acceleration(const Effect& effect, const Profile& profile) {
   return profile.has_acceleration() ? "" : "acc_x_g, acc_y_g, acc_z_g";
 }
 
+std::string missing_supply(const Effect& /*effect*/, const Profile& profile) {
+  return profile.supply_v ? "" : "supply_v";
+}
+
 struct InputColumn {
   model::Need need;
   /// Nothing where it is there.
   std::string (*missing)(const Effect& effect, const Profile& profile);
 };
 constexpr InputColumn kInputColumns[] = {{model::kNeedsTemperature, missing_temperature},
-                                         {model::kNeedsAcceleration, missing_acceleration}};
+                                         {model::kNeedsAcceleration, missing_acceleration},
+                                         {model::kNeedsSupply, missing_supply}};
 static_assert(model::answers_each_need(kInputColumns));
 
 std::string missing_column(const Effect& effect, const Profile& profile) {
@@ -218,12 +223,17 @@ double Simulator::temperature_c(double t_s) const {
   return profile_.temperature_c ? profile_.temperature_c->value(t_s) : kTemperature_c;
 }
 
+double Simulator::supply_v(double t_s) const {
+  return profile_.supply_v ? profile_.supply_v->value(t_s) : kSupply_v;
+}
+
 model::Surroundings Simulator::surroundings(double t_s) const {
   model::Surroundings s{.t_s = t_s, .angle_rad = profile_.rate_dps.integral(t_s) * kRadPerDeg};
   if (profile_.temperature_c) {
     s.temperature_c = profile_.temperature_c->value(t_s);
     s.temperature_slope_c_s = profile_.temperature_c->slope(t_s);
   }
+  if (profile_.supply_v) s.supply_v = profile_.supply_v->value(t_s);
   if (!profile_.has_acceleration()) return s;
   s.acceleration_g = acceleration_at(t_s);
   const Timing& timing = settings_.accelerometer;

@@ -65,6 +65,9 @@ class Simulator {
   /// the temperature is kTemperature_c.
   [[nodiscard]] double temperature_c(double t_s) const;
   static constexpr double kTemperature_c = 25.0;
+  /// Likewise.
+  [[nodiscard]] double supply_v(double t_s) const;
+  static constexpr double kSupply_v = 5.0;
 
  private:
   Simulator(model::Model model, Profile profile, const Settings& settings);

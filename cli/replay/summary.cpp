@@ -73,19 +73,21 @@ std::uint64_t rejected_total(const gateway::GyroStatus& gyro) {
 
 Json gyro_json(const ReplaySummary& summary, const gateway::Plan& plan, std::size_t index) {
   const gateway::GyroStatus& gyro = summary.status.gyros[index];
-  return {{"name", plan.gyros[index].name},
-          {"frames", gyro.frames},
-          {"samples", gyro.samples},
-          {"rejected", rejected_json(gyro)},
-          {"missing_by_counter", gyro.missing},
-          {"unpaired", gyro.unpaired},
-          {"time_outs", times(gyro, gateway::Fault::kSilent)},
-          {"faults", faults_json(gyro)},
-          {"mean_rate_dps", number(mean_of(summary.raw_sum_dps[index], summary.raws[index]))},
-          {"bias_dps", number(gyro.bias_dps)},
-          {"slope_dps_s", number(summary.slope_dps_s[index])},
-          {"slope_sigma_dps_s", number(summary.slope_sigma_dps_s[index])},
-          {"temperature_c", number(gyro.temperature_c)}};
+  Json json{{"name", plan.gyros[index].name},
+            {"frames", gyro.frames},
+            {"samples", gyro.samples},
+            {"rejected", rejected_json(gyro)},
+            {"missing_by_counter", gyro.missing},
+            {"unpaired", gyro.unpaired},
+            {"time_outs", times(gyro, gateway::Fault::kSilent)},
+            {"faults", faults_json(gyro)},
+            {"mean_rate_dps", number(mean_of(summary.raw_sum_dps[index], summary.raws[index]))},
+            {"bias_dps", number(gyro.bias_dps)},
+            {"slope_dps_s", number(summary.slope_dps_s[index])},
+            {"slope_sigma_dps_s", number(summary.slope_sigma_dps_s[index])},
+            {"temperature_c", number(gyro.temperature_c)}};
+  if (plan.gyros[index].supply_voltage) json["supply_v"] = number(gyro.supply_v);
+  return json;
 }
 
 // Null without a model; `waits_for` names what was never heard, so that its effects stayed in.

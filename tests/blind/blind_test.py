@@ -29,6 +29,7 @@ CASES = [
     Case("single", 308, "delay", short=True),
     Case("single", 309, "dropped_frames", short=True),
     Case("single", 310, "scale_factor", reference=False, short=True),
+    Case("single", 316, "supply_voltage_bias", short=True),
     Case("pair", 315, short=True),
     Case("outside", 312, "loud_minute", short=True),
 ]

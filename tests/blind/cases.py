@@ -18,6 +18,8 @@ RIVALS = [
     {"saturation", "dead_band", "quantization", "stuck"},
     {"delay", "bandwidth", "clock_skew", "timestamp_jitter"},
 ]
+# A seed goes on hiding what it hid: what the catalogue learned since hides alone.
+HIDE_ALONE = {"supply_voltage_bias"}
 DECOYS = ["shuffled", "reversed", "flat", "common"]
 
 
@@ -86,7 +88,8 @@ def _chosen_kinds(case, rng):
         return [case.kind]
     count = {"pair": 2, "triple": 3}.get(case.group, 0)
     while True:
-        chosen = [str(k) for k in rng.choice(kinds.KINDS, count, replace=False)]
+        several = [k for k in kinds.KINDS if k not in HIDE_ALONE]
+        chosen = [str(k) for k in rng.choice(several, count, replace=False)]
         if all(len(group & set(chosen)) < 2 for group in RIVALS):
             return chosen
 
@@ -94,6 +97,11 @@ def _chosen_kinds(case, rng):
 def shake(world, rng):
     """Gives the platform the vibration without which its effect would be nothing."""
     world.acceleration = surroundings.Acceleration(world.motion.duration_s, rng, vibration=True)
+
+
+def feed(world, rng):
+    """Gives each gyro a supply voltage that moves, and lets it tell it."""
+    world.supplies = [surroundings.Supply(world.motion.duration_s, rng) for _ in range(2)]
 
 
 def hidden_in(case, world, rng):
@@ -104,6 +112,8 @@ def hidden_in(case, world, rng):
     for kind in chosen:
         if kind == "vibration_rectification":
             shake(world, rng)
+        if kind == "supply_voltage_bias":
+            feed(world, rng)
         found.append(kinds.draw(kind, gyro, case.strength, world, rng))
         gyro = int(rng.integers(1, 3))
     if case.group == "outside":

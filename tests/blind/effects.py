@@ -8,6 +8,7 @@ import strength
 OFFSETS = [
     "bias", "bias_ramp", "bias_step", "warm_up", "temperature_bias", "temperature_bias_quadratic",
     "temperature_rate_bias", "g_sensitivity", "vibration_rectification", "angle_harmonic", "line",
+    "supply_voltage_bias",
 ]  # fmt: skip
 RESPONSES = [
     "scale_factor", "scale_factor_asymmetry", "scale_factor_quadratic", "scale_factor_cubic",
@@ -32,6 +33,7 @@ SIZE = {
     "vibration_rectification": ("coefficient_dps_g2", 0.03, 0.3),
     "angle_harmonic": ("amplitude_dps", 0.002, 0.008),
     "line": ("amplitude_dps", 0.001, 0.006),
+    "supply_voltage_bias": ("coefficient_dps_v", 0.005, 0.03),
     "scale_factor": ("error", 2e-4, 2e-3),
     "scale_factor_asymmetry": ("error", 1e-4, 1e-3),
     "scale_factor_quadratic": ("coefficient_per_dps", 1e-6, 1e-5),
@@ -59,7 +61,7 @@ MANNERS = {
     "timestamp_jitter": ["late", "about the due time"],
     "dropped_frames": ["single", "in rows"],
 }
-REFERENCE_C = 25.0
+REFERENCE_C, REFERENCE_V = 25.0, 5.0
 # Below these a stamp of whole microseconds and samples of finite rate decide, not the noise.
 LEAST_DELAY_S = 3e-5
 HIGHEST_CUTOFF_HZ = 250.0
@@ -74,6 +76,8 @@ def companions(kind, world, rng, plain):
         return {"tau_s": round(float(rng.uniform(25.0, 0.3 * duration_s)), 1)}
     if kind in ("temperature_bias", "temperature_bias_quadratic", "scale_factor_temperature"):
         return {"reference_c": REFERENCE_C}
+    if kind == "supply_voltage_bias":
+        return {"reference_v": REFERENCE_V}
     if kind == "g_sensitivity":
         return {"axis": str(rng.choice(["x", "y"]))}
     if kind == "angle_harmonic":
@@ -110,6 +114,8 @@ def shape(kind, p, gyro, t, world, late_rate=None):
         if kind == "temperature_rate_bias":
             return temperature.slope(t)
         return (temperature.value(t) - p["reference_c"]) ** (2 if kind.endswith("quadratic") else 1)
+    if kind == "supply_voltage_bias":
+        return world.supplies[gyro - 1].value(t) - p["reference_v"]
     if kind == "bias":
         return np.ones_like(t)
     if kind == "bias_ramp":

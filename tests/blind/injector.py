@@ -30,6 +30,8 @@ def make(case, folder, answer_path):
     hidden, odd, label = cases.hidden_in(case, worlds[0], np.random.default_rng([*root, 2]))
     if any(e["kind"] == "vibration_rectification" for e in hidden):
         cases.shake(worlds[1], np.random.default_rng([*root, 3]))
+    if any(e["kind"] == "supply_voltage_bias" for e in hidden):
+        cases.feed(worlds[1], np.random.default_rng([*root, 3]))
     (folder / "vgyro.toml").write_text(recording.config_text(worlds[0]))
     (folder / "bench.dbc").write_text(recording.DBC)
     (folder / "model.toml").write_text(recording.model_text(worlds[0]))

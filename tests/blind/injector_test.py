@@ -37,6 +37,7 @@ def small_world(seed, rate_hz=4.0, reference=True):
         rates_hz=[rate_hz, rate_hz],
         offset_s=0.0023,
         reference=reference,
+        supplies=[surroundings.Supply(240.0, rng) for _ in range(2)],
     )
 
 

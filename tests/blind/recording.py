@@ -29,11 +29,13 @@ BO_ 289 LEFT_GYRO: 8 STAND
  SG_ YawRate : 0|32@1- (1E-06,0) [-2000|2000] "deg/s" STAND
  SG_ Celsius : 32|16@1- (0.01,0) [-60|150] "degC" STAND
  SG_ Alive : 48|8@1+ (1,0) [0|255] "" STAND
+ SG_ Vcc : 56|8@1+ (0.02,0) [0|5.1] "V" STAND
 
 BO_ 290 RIGHT_GYRO: 8 STAND
  SG_ YawRate : 7|32@0- (1E-06,0) [-2000|2000] "deg/s" STAND
  SG_ Celsius : 39|16@0- (0.01,0) [-60|150] "degC" STAND
  SG_ Alive : 48|8@1+ (1,0) [0|255] "" STAND
+ SG_ Vcc : 56|8@1+ (0.02,0) [0|5.1] "V" STAND
 
 BO_ 416 RATE_TABLE: 8 STAND
  SG_ Speed : 0|32@1- (1E-06,0) [-2000|2000] "deg/s" STAND
@@ -47,7 +49,8 @@ BO_ 432 CUBE: 8 STAND
 
 def config_text(world):
     gyro = '[[gyro]]\nname = "{0}"\nbus = "{1}"\ndbc = "bench.dbc"\nmessage = "{2}_GYRO"\nrate = "YawRate"\n'
-    gyro += 'temperature = "Celsius"\ncounter = "Alive"\n\n'
+    gyro += 'temperature = "Celsius"\ncounter = "Alive"\n'
+    gyro += 'supply_voltage = "Vcc"\n\n' if world.supplies else "\n"
     reference = '[reference]\nbus = "can0"\ndbc = "bench.dbc"\nmessage = "RATE_TABLE"\nrate = "Speed"\n\n'
     return (
         gyro.format("left", "can0", "LEFT")
@@ -102,11 +105,14 @@ def streams(world, effects, strangers, recorded_temperatures, rng):
     out = []
     for gyro, can_id, order in ((1, LEFT_ID, "<"), (2, RIGHT_ID, ">")):
         t, stamps, counter, rate = truth.reading(world, gyro, effects, strangers, rng)
-        payloads = _payloads(
+        columns = [
             _integers(rate, RATE_STEP_DPS, order + "i4"),
             _integers(recorded_temperatures[gyro - 1](t), TEMPERATURE_STEP_C, order + "i2"),
             (counter % 256).astype(np.uint8),
-        )
+        ]
+        if world.supplies:
+            columns.append(_integers(world.supplies[gyro - 1].value(t), truth.surroundings.Supply.STEP_V, "u1"))
+        payloads = _payloads(*columns)
         out.append(_stream(f"can{gyro - 1}", can_id, stamps, payloads))
     if world.reference:
         t = np.arange(int(world.motion.duration_s * truth.REFERENCE_HZ)) / truth.REFERENCE_HZ

@@ -1,4 +1,5 @@
-"""What besides the rotation acts on the gyros: a temperature for each, and the platform's acceleration."""
+"""What besides the rotation acts on the gyros: a temperature for each, the platform's acceleration, and,
+where wanted, a supply voltage for each."""
 
 import numpy as np
 
@@ -43,6 +44,21 @@ class Flat:
 
     def slope(self, t):
         return np.zeros_like(t)
+
+
+class Supply:
+    """Levels between 4.6 and 5.1 V that change at random, at once: what a frame of 0.02 V a step carries as it is."""
+
+    STEP_V = 0.02
+
+    def __init__(self, duration_s, rng):
+        self.t = [0.0]
+        while self.t[-1] < duration_s:
+            self.t.append(self.t[-1] + rng.uniform(4.0, 20.0))
+        self.v = np.round(rng.uniform(4.6, 5.1, len(self.t)) / self.STEP_V) * self.STEP_V
+
+    def value(self, t):
+        return self.v[np.maximum(np.searchsorted(self.t, t, side="right") - 1, 0)]
 
 
 class Acceleration:

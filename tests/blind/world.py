@@ -32,6 +32,7 @@ class World:
     rates_hz: list
     offset_s: float  # of the second gyro's stamps
     reference: bool
+    supplies: list | None = None  # None: the gyros do not tell it
 
     def times(self, gyro):
         """True instants of a gyro's samples."""

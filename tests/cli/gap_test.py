@@ -17,7 +17,8 @@ KINDS = set("""
 bias bias_ramp bias_step warm_up temperature_bias temperature_bias_quadratic temperature_rate_bias scale_factor
 scale_factor_asymmetry scale_factor_quadratic scale_factor_cubic scale_factor_temperature g_sensitivity
 vibration_rectification delay bandwidth angle_harmonic line saturation dead_band quantization white_noise rate_random_walk
-gauss_markov rate_noise spikes stuck dropped_frames clock_skew timestamp_jitter""".split())
+gauss_markov rate_noise spikes stuck dropped_frames clock_skew timestamp_jitter
+supply_voltage_bias""".split())
 
 DBC = """\
 VERSION ""

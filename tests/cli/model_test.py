@@ -20,14 +20,26 @@ class ModelList(bench.Bench):
     def test_says_of_every_kind_what_shows_it_and_names_only_kinds_it_may_be_taken_for(self):
         lines = self.good("model", "list").stdout.decode().splitlines()
         kinds = {line.split()[0] for line in lines if re.match(r"  \S", line)}
-        self.assertEqual(len(kinds), 30)
-        self.assertEqual(sum(line.startswith("    shown by ") for line in lines), 30)
+        self.assertEqual(len(kinds), 31)
+        self.assertEqual(sum(line.startswith("    shown by ") for line in lines), len(kinds))
         kind = ""
         for line in lines:
             kind = line.split()[0] if re.match(r"  \S", line) else kind
             if line.startswith("    may be taken for "):
                 others = set(line.removeprefix("    may be taken for ").strip().split(", "))
                 self.assertLessEqual(others, kinds - {kind})
+
+    def test_every_kind_is_told_and_has_equations_of_its_own(self):
+        """A kind that the catalogue learned is nowhere forgotten: the documentation's tables, what judges the
+        simulator and what hides from the gap workflow."""
+        lines = self.good("model", "list").stdout.decode().splitlines()
+        kinds = {line.split()[0] for line in lines if re.match(r"  \S", line)}
+        source = lambda name: (bench.SOURCE / name).read_text(encoding="utf-8")
+        self.assertEqual(set(re.findall(r"^\| `(\w+)` \| `", source("docs/model-file.md"), re.MULTILINE)), kinds)
+        blind = source("tests/blind/effects.py").split("SIZE = {")[1].split("\n}")[0]
+        self.assertEqual(set(re.findall(r'^    "(\w+)": \(', blind, re.MULTILINE)), kinds)
+        judged = set(re.findall(r'effect\("(\w+)"', source("tests/simulation/effects_test.py")))
+        self.assertEqual(kinds - judged, set(), "nobody plays it against its equation")
 
     def test_lines_fit_a_terminal(self):
         for line in self.good("model", "list").stdout.decode().splitlines():

@@ -1,5 +1,6 @@
 #include "cli/recording.h"
 
+#include <cmath>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -7,6 +8,8 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include "gap/kinds.h"
+#include "gap/signals.h"
 #include "gateway/config.h"
 
 namespace vgyro::cli {
@@ -22,6 +25,7 @@ BO_ 257 GYRO_A: 8 RIG
  SG_ Rate : 0|32@1- (1E-006,0) [-2000|2000] "deg/s" RIG
  SG_ Temp : 32|16@1- (0.01,0) [-40|125] "degC" RIG
  SG_ Counter : 48|4@1+ (1,0) [0|15] "" RIG
+ SG_ Volt : 56|8@1+ (50,0) [0|12000] "mV" RIG
 
 BO_ 258 GYRO_B: 4 RIG
  SG_ Rate : 0|32@1- (1,0) [0|0] "deg/s" RIG
@@ -189,6 +193,37 @@ TEST_F(RecordingTest, TellsWhichGyroIsMissingAndWhatTheLogHolds) {
   EXPECT_NE(recording.error().message().find("no frame of gyro right (GYRO_B 102 on can1)"),
             std::string::npos)
       << recording.error().message();
+}
+
+// Where every input is named and sent, the workflow knows every one. A new input is tried here
+// without being named, and wants its signal in this configuration.
+TEST_F(RecordingTest, HoldsEveryInputOfTheWorkflow) {
+  std::string log;
+  for (int i = 0; i < 100; ++i) {
+    const double t_s = 1'700'000'000.0 + 0.01 * i;
+    log += fmt::format("({:.6f}) can0 103#40420F00\n", t_s);
+    log += fmt::format("({:.6f}) can0 101#20A10700C409{:02X}{:02X}\n", t_s + 0.001, i % 16,
+                       i < 50 ? 100 : 96);
+    log += fmt::format("({:.6f}) can1 102#0000803E\n", t_s + 0.002);
+    log += fmt::format("({:.6f}) can0 104#E80300000CFE\n", t_s + 0.003);
+  }
+  std::string config(kConfig);
+  config.replace(config.find("counter ="), 0, "supply_voltage = \"Volt\"\n");
+  const auto recording = read(log, config);
+  ASSERT_TRUE(recording) << recording.error().message();
+  const gap::GyroSeries& left = recording->gyros[0];
+  ASSERT_EQ(left.supply_v.size(), left.t_s.size());
+  EXPECT_NEAR(left.supply_v.front(), 5.0, 1e-12);
+  EXPECT_NEAR(left.supply_v.back(), 4.8, 1e-12);
+  EXPECT_TRUE(recording->gyros[1].supply_v.empty());
+  gap::Signals signals;
+  gap::set_circumstances(left, recording->acceleration, signals);
+  signals.motion =
+      gap::Motion(gap::SampledCurve(recording->reference_dps.t_s, recording->reference_dps.value));
+  for (const gap::InputRow& input : gap::inputs()) {
+    EXPECT_TRUE(std::isfinite(input.value(signals.motion.rate(0.5).value, signals.at(0.5))))
+        << "input " << static_cast<int>(input.input);
+  }
 }
 
 }  // namespace

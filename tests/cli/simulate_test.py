@@ -25,7 +25,7 @@ with redirect_stdout(io.StringIO()):  # canmatrix tells on stdout which other fo
 
 SEED = 17
 
-# The gyros' signals in one message of CAN FD; a temperature that has a page of its own; a sender's sign bit.
+# The gyros' signals in one message of CAN FD; a temperature and a supply voltage that share a page of their own; a sender's sign bit.
 ODD_DBC = """\
 VERSION ""
 
@@ -44,6 +44,7 @@ BO_ 300 PAGED: 5 RIG
  SG_ B m1 : 8|20@1+ (0.5,0) [0|0] "deg/h" RIG
  SG_ Negative m1 : 28|1@1+ (1,0) [0|1] "" RIG
  SG_ Warmth m2 : 8|8@1+ (0.5,-40) [0|0] "degC" RIG
+ SG_ Volts m2 : 16|8@1+ (0.05,0) [0|0] "V" RIG
 
 SIG_VALTYPE_ 2566844158 A : 1;
 """
@@ -67,6 +68,7 @@ message = "PAGED"
 rate = "B"
 sign_signal = "Negative"
 temperature = "Warmth"
+supply_voltage = "Volts"
 
 [accelerometer]
 bus = "can0"
@@ -126,6 +128,7 @@ class Simulate(bench.Bench):
             seen[str(int(values["Page"]))] += 1
             if values["Page"] == 2:
                 self.assertAlmostEqual(values["Warmth"], rig.temperature(t), delta=0.26)
+                self.assertAlmostEqual(values["Volts"], rig.supply(t), delta=0.026)
             elif 0.3 < t < 3.7:
                 self.assertAlmostEqual(values["B"] * (1 - 2 * values["Negative"]) / 3600, slow(t), delta=0.25 / 3600 + 2e-5)
         self.assertEqual(seen, {"FD": 401, "1": 400, "2": 40})
@@ -165,7 +168,7 @@ class Simulate(bench.Bench):
         self.write("model.toml", rig.model(
             effect("bias", value_dps=0.3), effect("bias_ramp", 2, slope_dps_s=1e-4), effect("scale_factor", error=3e-3),
             effect("scale_factor_quadratic", 2, coefficient_per_dps=1e-4), effect("g_sensitivity", 2, axis="x", coefficient_dps_g=0.05),
-            effect("delay", seconds=0.004)))
+            effect("supply_voltage_bias", coefficient_dps_v=0.1), effect("delay", seconds=0.004)))
         self.write("profile.csv", rig.profile(60, motion=motion))
         self.simulate("-o", "out.log")
         wrong = []
@@ -178,6 +181,10 @@ class Simulate(bench.Bench):
             used = (frames[:, 3] >> 3 & 1 == 1) & (t > 36)
             self.assertGreater(np.count_nonzero(used), 2000)
             wrong.append(np.sqrt(np.mean((rate[used] - motion(t[used])) ** 2)))
+        self.good("replay", "--config", "vgyro.toml", "-o", "again.log", "--json", "sum.json", "out.log")
+        gyros = json.loads(self.read("sum.json"))["gyros"]
+        self.assertAlmostEqual(gyros[0]["supply_v"], rig.supply(60.0), delta=0.51 * rig.SUPPLY_STEP_V)
+        self.assertNotIn("supply_v", gyros[1], "of a gyro that tells none")
         # What is left is the straight line by which the pairs are interpolated.
         self.assertGreater(wrong[0], 0.02, "there was nothing to take back")
         self.assertLess(wrong[1], 0.01)
@@ -212,6 +219,8 @@ class Simulate(bench.Bench):
                       said(model="warm.toml"))
         self.write("g.toml", rig.model(effect("g_sensitivity", axis="y", coefficient_dps_g=1e-3)))
         self.assertIn("acc_y_g", said(model="g.toml"))
+        self.write("v.toml", rig.model(effect("supply_voltage_bias", coefficient_dps_v=1e-3)))
+        self.assertIn("a profile with the column supply_v", said(model="v.toml"))
         self.write("odd.toml", rig.model(effect("scale_facter", error=1e-3)))
         self.assertIn("did you mean \"scale_factor\"?", said(model="odd.toml"))
         self.write("low.toml", rig.model(*[effect("bandwidth", cutoff_hz=9.0)] * 4))

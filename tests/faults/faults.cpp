@@ -78,6 +78,7 @@ gateway::Plan plan() {
                   .step = 1e-6},
          .sign = {},
          .temperature = {},
+         .supply_voltage = {},
          .e2e = {.crc = {},
                  .counter = gateway::AliveCounter{"Counter", codec(48, 4, 1.0, false), 16}},
          .valid = gateway::ValidCondition{codec(52, 4, 1.0, false), gateway::Comparison::kEqual,

@@ -50,7 +50,10 @@ double drawn(const Parameter& parameter, Random& random) {
     return parameter.minimum +
            static_cast<double>(random.below(static_cast<std::uint64_t>(choices)));
   }
-  if (parameter.preset) return *parameter.preset + random.uniform(-60.0, 60.0);
+  if (parameter.preset) {
+    const double reference = *parameter.preset + random.uniform(-60.0, 60.0);
+    return std::clamp(reference, parameter.minimum, parameter.maximum);
+  }
   if (!is_strength(parameter)) {
     const double powers = std::log(parameter.maximum / parameter.minimum);
     return parameter.minimum * std::exp(random.uniform(0.0, powers));
@@ -81,6 +84,7 @@ Surroundings somewhere(Random& random, bool may_be_unknown) {
   for (double& axis_g : s.acceleration_g)
     axis_g = known(-2.0, 2.0);
   s.vibration_g2 = known(0.0, 0.1);
+  s.supply_v = known(3.0, 14.0);
   return s;
 }
 
@@ -210,15 +214,15 @@ TEST(CompensationKinds, SeveralAtOnceAreTakenBackTogether) {
   }
 }
 
-/// Where docs/model-file.md says that an effect adds nothing: temperature at the effect's reference
-/// and steady, no acceleration.
+/// Where docs/model-file.md says that an effect adds nothing: temperature and voltage at the
+/// effect's reference and steady, no acceleration.
 Surroundings at_reference(const Effect& effect) {
   Surroundings s{.t_s = 10.0, .temperature_c = 25.0, .temperature_slope_c_s = 0.0};
   s.acceleration_g = {0.0, 0.0, 0.0};
   s.vibration_g2 = 0.0;
   const auto parameters = model::info(effect.kind).parameters;
   for (std::size_t i = 0; i < parameters.size(); ++i) {
-    if (parameters[i].preset) s.temperature_c = effect.parameters[i];
+    if (parameters[i].preset) s.temperature_c = s.supply_v = effect.parameters[i];
   }
   return s;
 }

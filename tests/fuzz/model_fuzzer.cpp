@@ -22,12 +22,13 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     return 0;
   }
   const fusion::Compensation compensation(loaded->effects);
-  for (const double temperature_c : {std::nan(""), -40.0, 85.0}) {
+  for (const double told : {std::nan(""), -40.0, 85.0}) {
     const model::Surroundings surroundings{.t_s = 1e6,
-                                           .temperature_c = temperature_c,
+                                           .temperature_c = told,
                                            .temperature_slope_c_s = 0.1,
                                            .acceleration_g = {1.0, -1.0, 0.5},
                                            .vibration_g2 = 0.1,
+                                           .supply_v = told,
                                            .angle_rad = 2.0};
     for (const double reading_dps : {-1e5, -1.0, 0.0, 1e-6, 300.0})
       assert(std::isfinite(compensation.correct(reading_dps, surroundings)));

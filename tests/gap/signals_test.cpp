@@ -1,9 +1,12 @@
 #include "gap/signals.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
 #include <gtest/gtest.h>
+
+#include "gap/kinds.h"
 
 namespace vgyro::gap {
 namespace {
@@ -109,6 +112,47 @@ TEST(Temperature, SlopeIsThatOfTheTruthBehindCoarseSteps) {
     const double slope = 8.0 * 2.0 * kPi / 120.0 * std::cos(2.0 * kPi * t / 120.0);
     EXPECT_NEAR(signals.temperature_slope_c_s.linear(t), slope, 0.02 * 8.0 * 2.0 * kPi / 120.0);
   }
+}
+
+TEST(SupplyVoltage, IsWhatWasToldLast) {
+  GyroSeries gyro;
+  for (int i = 0; i < 100; ++i) {
+    gyro.t_s.push_back(kInterval_s * i);
+    gyro.supply_v.push_back(i == 30 ? std::nan("") : i < 50 ? 5.0 : 4.5);
+  }
+  Signals signals;
+  set_supply(gyro, signals);
+  EXPECT_DOUBLE_EQ(signals.supply_v.linear(0.3), 5.0) << "a gap is bridged";
+  EXPECT_NEAR(signals.supply_v.linear(0.495), 4.75, 1e-9);
+  EXPECT_DOUBLE_EQ(signals.supply_v.linear(0.9), 4.5);
+  Signals without;
+  set_supply({}, without);
+  EXPECT_TRUE(without.supply_v.empty());
+}
+
+// What a recording holds of an input reaches whoever asks for it. A new input is tried here without
+// being named.
+TEST(Signals, TellEveryInput) {
+  GyroSeries gyro;
+  AccelerationSeries acceleration;
+  for (int i = 0; i < 1000; ++i) {
+    gyro.t_s.push_back(kInterval_s * i);
+    gyro.temperature_c.push_back(20.0 + 0.01 * i);
+    gyro.supply_v.push_back(5.0);
+    acceleration.t_s.push_back(kInterval_s * i);
+    for (std::vector<double>& axis_g : acceleration.g)
+      axis_g.push_back(0.5 + 0.1 * (i % 2));
+  }
+  Signals signals = turning_at(1.0, 40.0);
+  const auto all_are_known = [&] {
+    const model::Surroundings s = signals.at(5.0);
+    return std::all_of(inputs().begin(), inputs().end(), [&](const InputRow& input) {
+      return std::isfinite(input.value(signals.motion.rate(5.0).value, s));
+    });
+  };
+  EXPECT_FALSE(all_are_known());
+  set_circumstances(gyro, acceleration, signals);
+  EXPECT_TRUE(all_are_known());
 }
 
 TEST(Acceleration, VibrationIsTheVarianceOfItsSizeOverASecond) {

@@ -232,6 +232,18 @@ TEST_F(Config, ResolvesSignals) {
   EXPECT_FALSE(right.temperature || right.valid);
 }
 
+// In the product's unit; without the key there is none.
+TEST_F(Config, ResolvesTheSupplyVoltage) {
+  EXPECT_FALSE(plan_of(kGood).gyros[1].supply_voltage);
+  const Plan plan = plan_of(replaced(kGood, "sign_signal = \"Flag\"", "supply_voltage = \"Volt\""));
+  ASSERT_EQ(plan.gyros.size(), 2U);
+  EXPECT_FALSE(plan.gyros[0].supply_voltage);
+  ASSERT_TRUE(plan.gyros[1].supply_voltage);
+  EXPECT_EQ(plan.gyros[1].supply_voltage->name, "Volt");
+  EXPECT_DOUBLE_EQ(plan.gyros[1].supply_voltage->scale, 1.0);
+  EXPECT_DOUBLE_EQ(plan.gyros[1].supply_voltage->maximum, 65.0);
+}
+
 // The optional inputs, each with its unit.
 TEST_F(Config, ResolvesReferenceAccelerometerAndSpeed) {
   const Plan plan = plan_of(kGood);
@@ -481,6 +493,8 @@ TEST_F(Config, NamesTheNearestMessageAndSignal) {
                {"has no signal \"Tablerat\"", "did you mean \"TableRate\"?"});
   expect_error("temperature = \"Temp\"", "temperature = \"Tmp\"", "\"Tmp\"",
                {"did you mean \"Temp\"?"});
+  expect_error("sign_signal = \"Flag\"", "supply_voltage = \"Vlt\"", "\"Vlt\"",
+               {"did you mean \"Volt\"?"});
   expect_error("\"Status == 0\"", "\"Stats == 0\"", "Stats",
                {"has no signal \"Stats\"", "did you mean \"Status\"?"});
 }
@@ -506,6 +520,8 @@ TEST_F(Config, RefusesUnitsThatAreNoRates) {
                "unit = ", {"\"furlong\"", "deg/s, rad/s, deg/h"});
   expect_error("temperature = \"Temp\"", "temperature = \"RateZ\"", "temperature",
                {"has the unit \"deg/s\"", "degC, K"});
+  expect_error("temperature = \"Temp\"", "supply_voltage = \"Temp\"", "supply_voltage",
+               {"has the unit \"degC\"", "V, mV"});
   expect_error("x = \"AccX\"\ny = \"AccY\"\nz = \"AccZ\"",
                "x = \"AccX\"\ny = \"AccY\"\nz = \"AccZZ\"", "AccZZ", {"did you mean \"AccZ\"?"});
   expect_error("message = \"WHEEL\"\nsignal = \"Speed\"",

@@ -297,6 +297,22 @@ TEST(GyroInput, TellsTheTemperatureOfTheNewestUsedFrame) {
   EXPECT_TRUE(std::isnan(without.temperature_c()));
 }
 
+// Each of what stands beside the rate is of the newest frame that carried it.
+TEST(GyroInput, TellsTheSupplyVoltageBesideTheTemperature) {
+  GyroPlan plan = small_plan();
+  plan.temperature = quantity_of(signal_of(16, 8, 1.0, -50.0, ValueType::kUnsigned));
+  plan.supply_voltage = quantity_of(signal_of(24, 8, 0.05, 0.0, ValueType::kUnsigned), 10.0);
+  GyroInput input(plan);
+  EXPECT_TRUE(std::isnan(input.supply_v()));
+  EXPECT_FALSE(input.decode(frame_of(kIdA, {1, 0, 75, 98})).reject);
+  EXPECT_NEAR(input.supply_v(), 4.9, 1e-12);
+  EXPECT_DOUBLE_EQ(input.temperature_c(), 25.0);
+  EXPECT_EQ(input.decode(frame_of(kIdA, {1, 0, 76})).reject, Reject::kTruncated);
+  EXPECT_FALSE(input.decode(frame_of(kIdA, {1, 0, 76, 255})).reject);
+  EXPECT_TRUE(std::isnan(input.supply_v())) << "12.75 V are out of range";
+  EXPECT_DOUBLE_EQ(input.temperature_c(), 26.0);
+}
+
 // A temperature that cannot be believed is no temperature, and does not cost the rate.
 TEST(GyroInput, KeepsTheRateWhenTheTemperatureIsOutOfRange) {
   GyroPlan plan = small_plan();

@@ -111,11 +111,11 @@ TEST(InputFrames, TurnToTheQuantitysPage) {
   plan.temperature = quantity("Near");
   can::Frame frame = gyro_frame(plan, 1.0);
   EXPECT_EQ(bytes_of(frame), (std::vector<int>{3, 100, 0, 0}));
-  EXPECT_TRUE(carries_temperature(plan, frame));
+  EXPECT_TRUE(carries(plan, *plan.temperature, frame));
   put_quantity(*plan.temperature, 21.0, frame);
   EXPECT_EQ(bytes_of(frame), (std::vector<int>{3, 100, 0, 21}));
   plan.temperature = quantity("Far");
-  EXPECT_FALSE(carries_temperature(plan, frame));
+  EXPECT_FALSE(carries(plan, *plan.temperature, frame));
   can::Frame other = empty_frame(plan.match);
   put_quantity(*plan.temperature, 21.0, other);
   EXPECT_EQ(bytes_of(other), (std::vector<int>{4, 21, 0, 0}));

@@ -113,14 +113,17 @@ TEST(ModelPlan, ComplainsAtTheModelsLineOfAnInputThatIsNotConfigured) {
   plan.gyros[0].temperature = rig::quantity_of(rig::signal_of(32, 16));
   const auto errors = apply(model_of({{0, Kind::kTemperatureBias, {1e-3, 25.0}, 3},
                                       {1, Kind::kTemperatureBias, {1e-3, 25.0}, 8},
-                                      {0, Kind::kGSensitivity, {0.0, 1e-3}, 13}}),
+                                      {0, Kind::kGSensitivity, {0.0, 1e-3}, 13},
+                                      {1, Kind::kSupplyVoltageBias, {1e-3, 5.0}, 18}}),
                             plan);
-  ASSERT_EQ(errors.size(), 2U);
+  ASSERT_EQ(errors.size(), 3U);
   EXPECT_EQ(errors[0].where, "known.toml:8");
   EXPECT_NE(errors[0].message().find("gyro b"), std::string::npos);
   EXPECT_NE(errors[0].remedy.find("temperature = "), std::string::npos);
   EXPECT_EQ(errors[1].where, "known.toml:13");
   EXPECT_NE(errors[1].remedy.find("[accelerometer]"), std::string::npos);
+  EXPECT_EQ(errors[2].where, "known.toml:18");
+  EXPECT_NE(errors[2].remedy.find("supply_voltage = "), std::string::npos);
 }
 
 TEST(ModelPlan, RefusesMoreLagThanTheBuffersHold) {

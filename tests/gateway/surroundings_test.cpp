@@ -28,6 +28,7 @@ Quantity float_at(std::uint16_t start, double limit) {
 Plan with_everything() {
   Plan plan = rig::two_gyros();
   plan.gyros[0].temperature = rig::quantity_of(rig::signal_of(32, 16, 0.01));
+  plan.gyros[0].supply_voltage = rig::quantity_of(rig::signal_of(48, 16, 0.001), 32.0);
   plan.accelerometer = AccelerometerPlan{"can0",
                                          "ACCEL",
                                          {0, kIdAccelerometer, can::kStandardIdMax, false},
@@ -76,7 +77,8 @@ TEST_F(SurroundingsTest, AreUnknownAtFirst) {
   EXPECT_TRUE(std::isnan(s.temperature_c));
   EXPECT_TRUE(std::isnan(s.acceleration_g[2]));
   EXPECT_EQ(surroundings_.wheels(at_ms(0)), fusion::Wheels::kUnknown);
-  const auto all = static_cast<std::uint8_t>(model::kNeedsTemperature | model::kNeedsAcceleration);
+  EXPECT_TRUE(std::isnan(s.supply_v));
+  const auto all = static_cast<std::uint8_t>((1U << model::kNeedCount) - 1U);
   EXPECT_EQ(surroundings_.missing(0, all), all);
   EXPECT_EQ(surroundings_.missing(0, model::kNeedsNothing), 0U);
 }
@@ -86,6 +88,37 @@ TEST_F(SurroundingsTest, TakeTheNewestAcceleration) {
   EXPECT_TRUE(accelerate(10, 0.3F, 0.2F, 0.5F));
   EXPECT_FLOAT_EQ(static_cast<float>(surroundings_.at(1, at_ms(10)).acceleration_g[0]), 0.3F);
   EXPECT_EQ(surroundings_.missing(1, model::kNeedsAcceleration), 0U);
+}
+
+// Whoever tells an input: when all have spoken none is missing, and every kind that depends on any
+// adds something. A new input is tried here without being named.
+TEST_F(SurroundingsTest, LackNothingOnceAllHaveSpoken) {
+  const auto all = static_cast<std::uint8_t>((1U << model::kNeedCount) - 1U);
+  surroundings_.begin(at_ms(0));
+  GyroInput input(plan_.gyros[0]);
+  for (std::int64_t at = 0; at < 10'000; at += 10) {
+    const auto warm = static_cast<std::uint8_t>(at / 1000);
+    const can::Frame frame = rig::frame_of(rig::kIdA, {0, 0, 0, 0, 0, warm, 0x88, 0x13});
+    ASSERT_FALSE(input.decode(frame).reject);
+    surroundings_.hear_gyro(0, at_ms(at), input, all);
+    ASSERT_TRUE(accelerate(at, 0.1F, 0.2F, at % 20 == 0 ? 1.0F : 0.5F));
+  }
+  EXPECT_EQ(surroundings_.missing(0, all), 0U);
+  const model::Surroundings s = surroundings_.at(0, at_ms(10'000));
+  EXPECT_DOUBLE_EQ(s.supply_v, 5.0);
+  for (const model::KindInfo& row : model::catalogue()) {
+    if (row.added == nullptr || row.needs == model::kNeedsNothing) continue;
+    const double added_dps = row.added({1.0, 1.0}, 10.0, s);
+    EXPECT_TRUE(std::isfinite(added_dps) && added_dps != 0.0) << row.name << " " << added_dps;
+  }
+}
+
+TEST_F(SurroundingsTest, HoldTheSupplyVoltage) {
+  surroundings_.add_supply(0, 4.8);
+  surroundings_.add_supply(0, std::nan(""));
+  EXPECT_DOUBLE_EQ(surroundings_.at(0, at_ms(1000)).supply_v, 4.8);
+  EXPECT_TRUE(std::isnan(surroundings_.at(1, at_ms(1000)).supply_v));
+  EXPECT_EQ(surroundings_.missing(1, model::kNeedsSupply), model::kNeedsSupply);
 }
 
 // One frame with a hole in it must not become part of every rate from then on.
@@ -253,6 +286,53 @@ TEST(SurroundingsInThePipeline, TellWhatTheModelWaitsFor) {
   pipeline.receive(0, accelerometer_frame(0, 0, 1), at_ms(1), sink);
   EXPECT_EQ(pipeline.status().gyros[0].waits_for, model::kNeedsNothing);
   EXPECT_EQ(pipeline.status().gyros[1].waits_for, model::kNeedsNothing);
+}
+
+struct WorstError final : RateObserver {
+  void on_rate(TimePoint /*t*/, const std::array<double, 2>& raw_dps, double rate_dps) override {
+    if (std::isnan(rate_dps)) return;
+    ++valid;
+    worst_dps = std::max(worst_dps, std::abs(rate_dps - kTrue_dps));
+    worst_raw_dps = std::max(worst_raw_dps, std::abs(raw_dps[0] - kTrue_dps));
+  }
+  static constexpr double kTrue_dps = 0.0;
+  std::size_t valid = 0;
+  double worst_dps = 0.0;
+  double worst_raw_dps = 0.0;
+};
+
+// A bias that follows the supply is gone from the first sample after a step on, within the wire's
+// resolution.
+TEST(SurroundingsInThePipeline, ASupplyThatStepsMovesNoRate) {
+  constexpr double kCoefficient_dps_v = 0.4;
+  const auto supply_v = [](double t_s) { return t_s < 2.0 ? 5.0 : t_s < 4.0 ? 4.7 : 5.4; };
+  for (const bool known : {true, false}) {
+    Plan plan = with_everything();
+    if (known) {
+      plan.model.emplace();
+      plan.model->effects.push_back({.gyro = 0,
+                                     .kind = model::Kind::kSupplyVoltageBias,
+                                     .parameters = {kCoefficient_dps_v, 5.0}});
+    }
+    rig::Recording a = rig::stream_a(
+        ms(0), ms(6000), [&](double t_s) { return kCoefficient_dps_v * (supply_v(t_s) - 5.0); });
+    for (rig::Event& event : a) {
+      const double told_v = supply_v(to_seconds(event.stamp.time_since_epoch()));
+      const auto raw = static_cast<std::uint16_t>(std::lround(told_v / 0.001));
+      event.frame.data[6] = static_cast<std::uint8_t>(raw);
+      event.frame.data[7] = static_cast<std::uint8_t>(raw >> 8U);
+    }
+    Pipeline pipeline(plan);
+    WorstError seen;
+    pipeline.observe(&seen);
+    Quiet sink;
+    rig::play(pipeline, rig::merge({a, rig::stream_b(ms(0), ms(6000), rig::constant(0.0))}), sink);
+    EXPECT_GT(seen.valid, 400U);
+    EXPECT_EQ(seen.worst_dps < rig::kRateStep_dps, known) << seen.worst_dps;
+    EXPECT_EQ(seen.worst_raw_dps < rig::kRateStep_dps, known) << seen.worst_raw_dps;
+    EXPECT_DOUBLE_EQ(pipeline.status().gyros[0].supply_v, 5.4);
+    EXPECT_TRUE(std::isnan(pipeline.status().gyros[1].supply_v));
+  }
 }
 
 // The bias that the model knows is part of what VG_Bias says, wherever it was taken off.

@@ -27,6 +27,13 @@ TEST(Units, TurnEveryRateIntoDegreesPerSecond) {
 }
 
 // Water freezes at 0 degC however the sensor says it.
+TEST(Units, TurnEveryVoltageIntoVolts) {
+  EXPECT_DOUBLE_EQ(converted(Dimension::kVoltage, "V", 5.0), 5.0);
+  EXPECT_DOUBLE_EQ(converted(Dimension::kVoltage, "Volt", 5.0), 5.0);
+  EXPECT_DOUBLE_EQ(converted(Dimension::kVoltage, "mV", 4950.0), 4.95);
+  EXPECT_FALSE(convert_unit(Dimension::kVoltage, "degC"));
+}
+
 TEST(Units, TurnEveryTemperatureIntoCelsius) {
   EXPECT_DOUBLE_EQ(converted(Dimension::kTemperature, "degC", 20.0), 20.0);
   EXPECT_NEAR(converted(Dimension::kTemperature, "K", 273.15), 0.0, 1e-12);
@@ -62,7 +69,8 @@ TEST(Units, RefuseOtherDimensions) {
 // What a message recommends must itself be accepted.
 TEST(Units, RecommendOnlyWhatIsAccepted) {
   for (const Dimension dimension :
-       {Dimension::kRate, Dimension::kTemperature, Dimension::kAcceleration, Dimension::kSpeed}) {
+       {Dimension::kRate, Dimension::kTemperature, Dimension::kAcceleration, Dimension::kSpeed,
+        Dimension::kVoltage}) {
     std::string_view rest = recommended_units(dimension);
     ASSERT_FALSE(rest.empty());
     while (!rest.empty()) {

@@ -15,6 +15,7 @@ Surroundings a_day_in_the_car() {
           .temperature_slope_c_s = 0.02,
           .acceleration_g = {0.1, -0.2, 0.98},
           .vibration_g2 = 0.004,
+          .supply_v = 5.2,
           .angle_rad = 0.7};
 }
 
@@ -40,6 +41,7 @@ TEST(Catalogue, AddsWhatTheTableSays) {
   EXPECT_DOUBLE_EQ(added(Kind::kScaleFactorTemperature, {1e-3, 21.0}, -5.0), -0.05);
   EXPECT_DOUBLE_EQ(added(Kind::kGSensitivity, {1.0, 0.01}, -5.0), -0.002);
   EXPECT_DOUBLE_EQ(added(Kind::kVibrationRectification, {2.0}, -5.0), 0.008);
+  EXPECT_NEAR(added(Kind::kSupplyVoltageBias, {0.03, 5.0}, -5.0), 0.006, 1e-15);
   EXPECT_DOUBLE_EQ(added(Kind::kAngleHarmonic, {4.0, 0.1, 1.0}, -5.0), 0.1 * std::cos(3.8));
   EXPECT_NEAR(added(Kind::kLine, {1.2125, 0.1, 0.3}, -5.0),
               0.1 * std::sin(2.0 * std::numbers::pi * 0.25 + 0.3), 1e-14);
@@ -135,7 +137,8 @@ TEST(Catalogue, KeepsTheNamesOfTheFormat) {
             "dead_band: width_dps\nquantization: step_dps\nwhite_noise: density_dps_rthz\n"
             "rate_random_walk: density_dps_rts\ngauss_markov: sigma_dps tau_s\n"
             "rate_noise: ratio_rthz\nspikes: rate_hz size_dps\nstuck: from_s to_s\n"
-            "dropped_frames: fraction\nclock_skew: ppm\ntimestamp_jitter: sigma_s\n");
+            "dropped_frames: fraction\nclock_skew: ppm\ntimestamp_jitter: sigma_s\n"
+            "supply_voltage_bias: coefficient_dps_v reference_v\n");
 }
 
 }  // namespace

@@ -53,7 +53,7 @@ def keys_of_manual():
     for title, section in sections(page("vgyro.toml.5")).items():
         if title.startswith("["):
             table = title.strip("[]")
-            found[table] = {key for term in terms(section) for key in re.findall(r"\*([a-z_]+)\*", term)}
+            found[table] = {key for term in terms(section) for key in re.findall(r"\*([a-z_0-9]+)\*", term)}
     return found
 
 
@@ -85,13 +85,38 @@ class Manual(unittest.TestCase):
 
     def test_vgyro_toml_5_has_the_keys_of_the_reference(self):
         reference = (SOURCE / "docs/configuration.md").read_text(encoding="utf-8")
-        backticked = set(re.findall(r"`([a-z_]+)`", reference))
+        backticked = set(re.findall(r"`([a-z_0-9]+)`", reference))
         for table, keys in keys_of_manual().items():
             with self.subTest(table=table):
                 self.assertEqual({key for key in keys if key not in backticked and key != "fd"}, set())
         told = set().union(*keys_of_manual().values())
-        rows = set(re.findall(r"`([a-z_]+)`", " ".join(re.findall(r"^\| (`[^|]*) \|", reference, re.MULTILINE))))
+        rows = set(re.findall(r"`([a-z_0-9]+)`", " ".join(re.findall(r"^\| (`[^|]*) \|", reference, re.MULTILINE))))
         self.assertEqual(rows - told, set(), "in docs/configuration.md, not in the manual")
+
+    def test_every_key_that_the_gateway_asks_for_is_told(self):
+        """By what its sources ask the reader for: the program itself lists no keys."""
+        told = set().union(*keys_of_manual().values())
+        asked = set()
+        for name in ("config.cpp", "e2e_config.cpp", "signal_resolver.cpp"):
+            text = (SOURCE / "gateway" / name).read_text(encoding="utf-8")
+            asked |= set(re.findall(r'(?:(?:text|number|integer|boolean|signal)\(|number_within\(reader, )"([a-z_0-9]+)"', text))
+        self.assertLess({"rate", "temperature", "rest_s", "counter", "bus"}, asked, "this test could not fail")
+        self.assertEqual(asked - told, set())
+
+    def test_the_columns_of_a_profile_are_told_everywhere(self):
+        """As the program itself says when the header is wrong."""
+        with tempfile.TemporaryDirectory() as folder:
+            profile, model = Path(folder) / "p.csv", Path(folder) / "m.toml"
+            profile.write_text("0,1\n1,1\n")
+            model.write_text("format = 1\n")
+            done = subprocess.run([BIN / "vgyro", "simulate", "--config", SOURCE / "examples/twin.toml", "--model", model,
+                                   "--profile", profile], capture_output=True, text=True, check=False)
+        form = re.search(r"t_s,rate_dps\S*", done.stderr).group()
+        self.assertIn(form, "".join(help_text("vgyro", "simulate").split()))
+        self.assertIn(f"_{form}_", page("vgyro.1"))
+        columns = set(re.findall(r"\w+", form))
+        rows = re.findall(r"^\| (`[^|]*) \|", (SOURCE / "docs/simulate.md").read_text(encoding="utf-8"), re.MULTILINE)
+        self.assertEqual(columns - set(re.findall(r"`(\w+)`", " ".join(rows))), set(), "not in docs/simulate.md")
 
     def test_the_gateway_knows_every_key_of_vgyro_toml_5(self):
         self.assertIn("unknown key", check(value_for("gyro", "nosuchkey") * 2), "this test could not fail")

@@ -61,6 +61,7 @@ class Equations(unittest.TestCase):
     def test_without_effects_all_say_the_truth(self):
         frames = self.check(rig.rate)
         np.testing.assert_allclose(frames.temperature(), rig.temperature(frames.t), atol=0.51 * rig.TEMPERATURE_STEP_C)
+        np.testing.assert_allclose(frames.supply(), rig.supply(frames.t), atol=0.51 * rig.SUPPLY_STEP_V)
         inside = self.inside(self.table.t)
         np.testing.assert_allclose(self.table.rate()[inside], rig.rate(self.table.t[inside]), atol=CLOSE_DPS)
         t = self.accelerometer.t
@@ -83,6 +84,9 @@ class Equations(unittest.TestCase):
         self.check(plus(lambda t: 0.01 * (rig.temperature(t) - 25.0) ** 2),
                    effect("temperature_bias_quadratic", coefficient_dps_k2=0.01))
         self.check(plus(lambda t: 0.05 * rig.temperature_slope(t)), effect("temperature_rate_bias", coefficient_dps_s_k=0.05))
+        self.check(plus(lambda t: 0.3 * (rig.supply(t) - 4.5)),
+                   effect("supply_voltage_bias", coefficient_dps_v=0.3, reference_v=4.5))
+        self.check(plus(lambda t: -0.3 * (rig.supply(t) - 5.0)), effect("supply_voltage_bias", coefficient_dps_v=-0.3))
         for axis in range(3):
             self.check(plus(lambda t: 0.04 * rig.acceleration(t)[axis]),
                        effect("g_sensitivity", axis="xyz"[axis], coefficient_dps_g=0.04))

@@ -32,6 +32,15 @@ TEST(Profile, ToleratesThatAColumnIsNotThere) {
   ASSERT_TRUE(profile);
   EXPECT_FALSE(profile->temperature_c);
   EXPECT_FALSE(profile->has_acceleration());
+  EXPECT_FALSE(profile->supply_v);
+}
+
+TEST(Profile, ReadsTheSupplyVoltage) {
+  const auto profile = parse_profile("t_s,supply_v,rate_dps\n0,5,1\n1,4.5,1\n", "p.csv");
+  ASSERT_TRUE(profile) << profile.error().message();
+  ASSERT_TRUE(profile->supply_v);
+  EXPECT_NEAR(profile->supply_v->value(1.0), 4.5, 1e-12);
+  EXPECT_NEAR(profile->rate_dps.value(1.0), 1.0, 1e-12);
 }
 
 TEST(Profile, NamesLineCauseAndRemedyOfAMistake) {
@@ -58,6 +67,7 @@ TEST(Profile, NamesLineCauseAndRemedyOfAMistake) {
       {"t_s,rate_dps\n0,1\n1,2x\n", "p.csv:3: ", "\"2x\""},
       {"t_s,rate_dps\n0,1\n1,1e9\n", "p.csv:3: ", "-100000 to 100000"},
       {"t_s,rate_dps,temperature_c\n0,1,25\n1,1,-300\n", "p.csv:3: ", "temperature_c is -300"},
+      {"t_s,rate_dps,supply_v\n0,1,5\n1,1,-5\n", "p.csv:3: ", "supply_v is -5"},
       {"t_s,rate_dps\n0,1\n1,1\n1,1\n", "p.csv:4: ", "not after 1"},
       {"t_s,rate_dps\n0,1\n1,1\n0.5,1\n", "p.csv:4: ", "times must grow"},
   };

@@ -13,6 +13,7 @@ START_S = 1_700_000_000
 RATE_STEP_DPS = 1e-6
 ACCELERATION_STEP_G = 1e-4
 TEMPERATURE_STEP_C = 0.01
+SUPPLY_STEP_V = 0.05
 
 DBC = """\
 VERSION ""
@@ -23,6 +24,7 @@ BO_ 257 GYRO_A: 8 RIG
  SG_ Rate : 0|32@1- (1E-006,0) [-2000|2000] "deg/s" RIG
  SG_ Temperature : 32|16@1- (0.01,0) [-40|125] "degC" RIG
  SG_ Counter : 48|8@1+ (1,0) [0|255] "" RIG
+ SG_ Supply : 56|8@1+ (50,0) [0|12000] "mV" RIG
 
 BO_ 258 GYRO_B: 8 RIG
  SG_ Rate : 0|32@1- (1E-006,0) [-2000|2000] "deg/s" RIG
@@ -45,6 +47,7 @@ dbc = "rig.dbc"
 message = "GYRO_A"
 rate = "Rate"
 temperature = "Temperature"
+supply_voltage = "Supply"
 counter = "Counter"
 
 [[gyro]]
@@ -109,6 +112,10 @@ def temperature_slope(t):
     return 4.0 * 2 * np.pi / 40.0 * np.cos(2 * np.pi * t / 40.0)
 
 
+def supply(t):
+    return 5.0 + 0.4 * np.sin(2 * np.pi * t / 9.0)
+
+
 def acceleration(t):
     x = 0.3 * np.sin(2 * np.pi * 0.2 * t)
     y = 0.2 * np.cos(2 * np.pi * 0.3 * t)
@@ -118,9 +125,9 @@ def acceleration(t):
 
 def profile(seconds, rate_hz=50.0, motion=rate):
     t = np.arange(round(seconds * rate_hz) + 1) / rate_hz
-    columns = np.column_stack([t, motion(t), temperature(t), *acceleration(t)])
+    columns = np.column_stack([t, motion(t), temperature(t), *acceleration(t), supply(t)])
     rows = [",".join(map(repr, row)) for row in columns.tolist()]
-    return "\n".join(["t_s,rate_dps,temperature_c,acc_x_g,acc_y_g,acc_z_g", *rows]) + "\n"
+    return "\n".join(["t_s,rate_dps,temperature_c,acc_x_g,acc_y_g,acc_z_g,supply_v", *rows]) + "\n"
 
 
 def rest(seconds):
@@ -155,6 +162,9 @@ class Frames:
 
     def temperature(self):
         return np.ascontiguousarray(self.bytes[:, 4:6]).view("<i2")[:, 0] * TEMPERATURE_STEP_C
+
+    def supply(self):
+        return self.bytes[:, 7] * SUPPLY_STEP_V
 
     def acceleration(self):
         return np.ascontiguousarray(self.bytes[:, 0:6]).view("<i2").T * ACCELERATION_STEP_G

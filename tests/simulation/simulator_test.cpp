@@ -5,8 +5,10 @@
 #include <functional>
 #include <numbers>
 
+#include <fmt/core.h>
 #include <gtest/gtest.h>
 
+#include "model/catalogue.h"
 #include "simulation/low_pass.h"
 
 namespace vgyro::simulation {
@@ -74,6 +76,29 @@ TEST(Simulator, RefusesMoreLowPassesThanCanBeToldApart) {
   ASSERT_FALSE(result);
   EXPECT_EQ(result.error().where, "m.toml");
   EXPECT_NE(result.error().message().find("at most 3"), std::string::npos);
+}
+
+// A kind whose input is no column, or a column that does not reach the effects, would add nothing.
+// A new kind is tried here without being named.
+TEST(Simulator, EveryKindThatNeedsAnInputIsMovedByIt) {
+  std::string text = "t_s,rate_dps,temperature_c,acc_x_g,acc_y_g,acc_z_g,supply_v\n";
+  for (int i = 0; i < 200; ++i) {
+    const double t_s = i / kRate_hz;
+    text += fmt::format("{},10,{},0.1,0.2,{},{}\n", t_s, 20.0 + t_s, 0.5 + 0.1 * (i % 2),
+                        4.5 + 0.1 * t_s);
+  }
+  const auto profile = parse_profile(text, "p.csv");
+  ASSERT_TRUE(profile) << profile.error().message();
+  for (const model::KindInfo& row : model::catalogue()) {
+    if (row.needs == model::kNeedsNothing) continue;
+    Effect effect{.kind = row.kind, .parameters = {1.0, 1.0}};
+    const auto simulator = Simulator::make({.file = "m.toml", .effects = {effect}}, *profile, {});
+    ASSERT_TRUE(simulator) << row.name << ": " << simulator.error().message();
+    EXPECT_GT(std::abs(simulator->gyro(0)[150].reading_dps - 10.0), 1e-4) << row.name;
+    const auto lacking = Simulator::make({.file = "m.toml", .effects = {effect}},
+                                         sampled([](double) { return 10.0; }, 200), {});
+    EXPECT_FALSE(lacking) << row.name;
+  }
 }
 
 }  // namespace
