@@ -213,7 +213,8 @@ TEST(Kinds, InputsAreReadWhereTheyStand) {
   s.temperature_slope_c_s = 0.5;
   s.acceleration_g = {0.1, 0.2, 0.3};
   s.vibration_g2 = 0.04;
-  const std::array<double, kInputCount> truth{7.0, 20.0, 0.5, 0.1, 0.2, 0.3, 0.04};
+  s.supply_v = 4.9;
+  const std::array<double, kInputCount> truth{7.0, 20.0, 0.5, 0.1, 0.2, 0.3, 0.04, 4.9};
   for (std::size_t i = 0; i < kInputCount; ++i) {
     EXPECT_EQ(inputs()[i].value(7.0, s), truth[i]) << i;
     EXPECT_GT(inputs()[i].least, 0.0) << i;
