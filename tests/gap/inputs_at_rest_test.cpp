@@ -1,9 +1,8 @@
-#include "gap/identifiable.h"
-
 #include <algorithm>
 
 #include <gtest/gtest.h>
 
+#include "gap/identifiable.h"
 #include "gap/kinds.h"
 #include "model/catalogue.h"
 #include "tests/gap/made_recording.h"
