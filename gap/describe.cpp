@@ -107,19 +107,18 @@ constexpr double kMsPerS = 1e3;
 
 Against against_of(const Subject& s) {
   const KindRow& kind = row(s.named.effect.kind);
-  const auto* const axis = std::find_if(std::begin(kAxes), std::end(kAxes),
-                                        [&](const AxisRow& one) { return one.axis == kind.axis; });
-  assert(axis != std::end(kAxes));
+  assert(is_of_instants(kind.axis));
+  const AxisRow& axis = kAxes[static_cast<std::size_t>(*kind.axis)];
   const auto text = [&](std::string_view form) {
     const char letter = kind.by_axis ? "xyz"[static_cast<std::size_t>(s.p()[0])] : '?';
     return fmt::format(fmt::runtime(form), fmt::arg("axis", letter),
                        fmt::arg("reference", s.p()[1]));
   };
-  Against against{text(axis->what), text(axis->x_label), {}, {}};
+  Against against{text(axis.what), text(axis.x_label), {}, {}};
   const std::size_t gyro = s.gyro();
   for (std::size_t i = 0; i < s.data.t_s.size(); ++i) {
     against.x.push_back(
-        axis->x({s.data.t_s[i], s.data.rate[gyro][i], s.data.surroundings[gyro][i], s.p()}));
+        axis.x({s.data.t_s[i], s.data.rate[gyro][i], s.data.surroundings[gyro][i], s.p()}));
   }
   if (kind.axis != Axis::kGrowingLag) return against;
   for (const SampledCurve::Point& rate : s.data.rate[gyro])

@@ -159,7 +159,8 @@ class Comparer {
       const std::vector<Score> scores = scan_.scores(fit, fit.noise);
       if (scores.empty() || scores.front().adjusted() < kBeyondChance) break;
       const Effect& best = scores.front().effect;
-      fit.terms.push_back(row(best.kind).finder == Finder::kStep ? scan_.placed(fit, best) : best);
+      fit.terms.push_back(row(best.kind).finder == Finder::kStep ? placed(regression_, fit, best)
+                                                                 : best);
       refit(fit, drift);
     }
     return fit;
@@ -171,17 +172,9 @@ class Comparer {
 
   // The samples of a gyro scatter so much that only a lag beyond a sample explains it.
   [[nodiscard]] bool may_be_late(std::size_t gyro, const Effects& terms) const {
-    const Eigen::VectorXd residual = regression_.residual(terms);
-    double squares = 0.0;
-    double freedom = 0.0;
-    for (const Block& block : data_.layout.blocks) {
-      if (share_of(block.channel, gyro) == 0.0 || block.count < 2) continue;
-      const auto values = residual.segment(block.first, block.count);
-      squares += (values.array() - values.mean()).square().sum() /
-                 within_variance(block, model_, data_.layout);
-      freedom += block.count - 1.0;
-    }
-    return data_.holds[gyro] && squares >= kLoudByLag * kLoudByLag * freedom;
+    if (!data_.holds[gyro]) return false;
+    const Scatter scatter = scatter_of(data_, gyro, model_, regression_.residual(terms));
+    return scatter.squares.back() >= kLoudByLag * kLoudByLag * scatter.freedom.back();
   }
 
   // Beyond a sample a lag is no longer its rate's slope: it is taken out first, as it is.
@@ -242,20 +235,8 @@ class Comparer {
     difference.against = *row(effect.kind).against;
     difference.nats = std::accumulate(gains.begin(), gains.end(), 0.0);
     difference.text =
-        evidence_text(effect, sigma_of(fit, index), name(effect.gyro), data_.about.seconds);
+        evidence_text(effect, sigmas_of(fit)[index], name(effect.gyro), data_.about.seconds);
     return difference;
-  }
-
-  static model::Parameters sigma_of(const Fit& fit, std::size_t index) {
-    model::Parameters sigma{};
-    Eigen::Index place = 0;
-    for (std::size_t i = 0; i < index; ++i)
-      place += free_count({fit.terms[i]});
-    for (const Free& free : *row(fit.terms[index].kind).free) {
-      sigma[free.parameter] = std::sqrt(std::max(0.0, fit.covariance(place, place)));
-      ++place;
-    }
-    return sigma;
   }
 
   void noise(std::vector<Difference>& list) const {

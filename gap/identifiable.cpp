@@ -6,6 +6,7 @@
 #include <fmt/core.h>
 
 #include "gap/kinds.h"
+#include "model/equation.h"
 
 namespace vgyro::gap {
 
@@ -66,8 +67,8 @@ class Lacks {
       for (const Kind kind : speakers(bit(Input::kRate))) {
         add(kind,
             fmt::format("the platform never turned faster than {:.2g} deg/s", x_.of(Input::kRate)),
-            row(kind).is_timing ? "turn to and fro a few times a second"
-                                : "turn both ways at several rates, some of them fast");
+            model::moves_in_time(kind) ? "turn to and fro a few times a second"
+                                       : "turn both ways at several rates, some of them fast");
       }
     } else if (!with_reference_) {
       add(Kind::kScaleFactor,

@@ -75,6 +75,10 @@ struct Bound {
 
 /// Which part of the random model a kind is.
 enum class Random : std::uint8_t { kNone, kWhite, kRatio, kWalk, kMarkov, kRounding };
+/// It wanders, slower than samples.
+constexpr bool is_drift(Random part) {
+  return part == Random::kWalk || part == Random::kMarkov;
+}
 
 /// What a figure of it is drawn against.
 enum class Axis : std::uint8_t {
@@ -130,7 +134,6 @@ struct KindRow {
   Given<double> penalty;  ///< of its statistic: places that were tried for it
   Given<std::span<const Bound>> bounds;
   Given<bool> forms_differ;  ///< another parameter 0 is another shape, not another start
-  Given<bool> is_timing;     ///< the reading is of another instant
   Given<bool> is_fast;       ///< what a late rate leaves may look like it
   Given<bool> keeps_size;    ///< may be judged by its size in parts of the recording
   Given<std::size_t> most;   ///< more of it on one gyro is something else in pieces; 0: any

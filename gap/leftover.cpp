@@ -46,8 +46,7 @@ bool is_fast_noise(const Found& one) {
 }
 
 bool is_drift(const Found& one) {
-  const Random part = row(one.effect.kind).random;
-  return part == Random::kWalk || part == Random::kMarkov;
+  return is_drift(row(one.effect.kind).random);
 }
 
 bool is_quick_drift(const Found& one) {

@@ -38,6 +38,19 @@ Eigen::Index free_count(const Effects& terms) {
   return count;
 }
 
+std::vector<model::Parameters> sigmas_of(const Fit& fit) {
+  std::vector<model::Parameters> sigmas;
+  Eigen::Index place = 0;
+  for (const Effect& term : fit.terms) {
+    model::Parameters& sigma = sigmas.emplace_back();
+    for (const Free& free : *row(term.kind).free) {
+      sigma[free.parameter] = std::sqrt(std::max(0.0, fit.covariance(place, place)));
+      ++place;
+    }
+  }
+  return sigmas;
+}
+
 Matrix whitened(Matrix columns, Matrix means, const Layout& layout, const PairNoise& noise,
                 Part part) {
   whiten_within(columns, layout, noise, part);
@@ -65,17 +78,19 @@ void Regression::keep_in_bounds(Effect& effect) const {
     effect.parameters[0] = std::max(0.0, effect.parameters[0]);
 }
 
-Eigen::VectorXd Regression::residual(const Effects& terms) const {
+Effects Regression::with_known(const Effects& terms) const {
   Effects all = known_;
   all.insert(all.end(), terms.begin(), terms.end());
-  return data_->residual(all);
+  return all;
+}
+
+Eigen::VectorXd Regression::residual(const Effects& terms) const {
+  return data_->residual(with_known(terms));
 }
 
 Matrix Regression::derivatives(const Effects& terms, std::size_t index) const {
-  Effects others = known_;
-  for (std::size_t i = 0; i < terms.size(); ++i) {
-    if (i != index) others.push_back(terms[i]);
-  }
+  Effects others = with_known(terms);
+  others.erase(others.begin() + static_cast<std::ptrdiff_t>(known_.size() + index));
   const auto free = *row(terms[index].kind).free;
   Matrix columns(data_->size(), static_cast<Eigen::Index>(free.size()));
   for (std::size_t i = 0; i < free.size(); ++i) {

@@ -5,6 +5,7 @@
 // takes none of them for granted in what it is asked about. Never changes.
 
 #include <memory>
+#include <vector>
 
 #include <Eigen/Core>
 
@@ -38,6 +39,8 @@ class Regression {
   [[nodiscard]] const PairNoise& known_noise() const { return known_noise_; }
   [[nodiscard]] Part part() const { return part_; }
 
+  /// The known effects, then the terms.
+  [[nodiscard]] Effects with_known(const Effects& terms) const;
   /// What is observed less what known effects and terms say.
   [[nodiscard]] Eigen::VectorXd residual(const Effects& terms) const;
   /// What the free parameters of one term move, beside all others.
@@ -72,5 +75,8 @@ class Regression {
 
 /// Free parameters of all terms.
 Eigen::Index free_count(const Effects& terms);
+
+/// σ of each term's parameters by the fit's covariance; 0 where nothing was estimated.
+std::vector<model::Parameters> sigmas_of(const Fit& fit);
 
 }  // namespace vgyro::gap

@@ -127,8 +127,7 @@ Scan::Scan(const Regression& regression, const Effects& beside) : regression_(re
   const Observations& data = regression.data();
   for (std::size_t gyro = 0; gyro < 2; ++gyro)
     add_shapes(gyro);
-  Effects others = regression.known();
-  others.insert(others.end(), beside.begin(), beside.end());
+  const Effects others = regression.with_known(beside);
   const Eigen::Index width = shapes_.empty() ? 0 : shapes_.back().first + shapes_.back().width;
   columns_.resize(data.size(), width);
   for (const Shape& shape : shapes_)
@@ -283,21 +282,24 @@ Score Scan::line_at(double frequency_hz, std::size_t gyro, double penalty,
   return score;
 }
 
+namespace {
+
 // By trying: the size is solved anew at each instant.
-Effect Scan::placed(const Fit& null, const Effect& step, double reach_s, double every_s) const {
-  const Observations& data = regression_.data();
+Effect placed(const Regression& regression, const Fit& null, const Effect& step, double reach_s,
+              double every_s) {
+  const Observations& data = regression.data();
   const auto places = static_cast<Eigen::Index>(2.0 * reach_s / every_s) + 1;
   const auto place_s = [&](Eigen::Index i) {
     return std::max(0.0, step.parameters[1] - reach_s + every_s * static_cast<double>(i));
   };
-  Matrix columns = regression_.columns(null.terms, places);
+  Matrix columns = regression.columns(null.terms, places);
   const Eigen::Index at = columns.cols() - places;
   for (Eigen::Index i = 0; i < places; ++i) {
     Effect unit = step;
     unit.parameters = {1.0, place_s(i)};
     columns.col(at + i) = data.contribution(step.gyro, {unit});
   }
-  const Matrix white = regression_.whitened(columns, null.noise);
+  const Matrix white = regression.whitened(columns, null.noise);
   const Eigen::MatrixXd gram = white.transpose() * white;
   Effect best = step;
   double best_gain = -1.0;
@@ -315,8 +317,11 @@ Effect Scan::placed(const Fit& null, const Effect& step, double reach_s, double 
   return best;
 }
 
-Effect Scan::placed(const Fit& null, const Effect& step) const {
-  return placed(null, placed(null, step, kStepReach_s, kStepCoarse_s), kStepCoarse_s, kStepFine_s);
+}  // namespace
+
+Effect placed(const Regression& regression, const Fit& null, const Effect& step) {
+  const Effect coarse = placed(regression, null, step, kStepReach_s, kStepCoarse_s);
+  return placed(regression, null, coarse, kStepCoarse_s, kStepFine_s);
 }
 
 }  // namespace vgyro::gap

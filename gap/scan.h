@@ -21,11 +21,6 @@ class Scan {
   /// that the look has found.
   [[nodiscard]] std::vector<Score> scores(const Fit& null, const PairNoise& noise) const;
 
-  /// A step with the instant and size that fit best beside `null`, to a fiftieth of a second.
-  [[nodiscard]] model::Effect placed(const Fit& null, const model::Effect& step) const;
-  /// How far from its first place.
-  static constexpr double kStepReach_s = 2.0;
-
  private:
   /// Residual and derivatives of what is fitted anyway.
   struct Base {
@@ -43,8 +38,6 @@ class Scan {
   void score_lines(const Base& base, const PairNoise& noise, std::vector<Score>& scores) const;
   [[nodiscard]] Score line_at(double frequency_hz, std::size_t gyro, double penalty,
                               const Eigen::VectorXd& residual, const PairNoise& noise) const;
-  [[nodiscard]] model::Effect placed(const Fit& null, const model::Effect& step, double reach_s,
-                                     double every_s) const;
   [[nodiscard]] double penalty_of(const model::Effect& effect, double penalty) const;
 
   const Regression& regression_;
@@ -58,6 +51,11 @@ class Scan {
   Matrix columns_;
   Matrix means_;
 };
+
+/// A step with the instant and size that fit best beside `null`, to a fiftieth of a second.
+model::Effect placed(const Regression& regression, const Fit& null, const model::Effect& step);
+/// How far from its first place.
+inline constexpr double kStepReach_s = 2.0;
 
 /// Of these times, rising, those at which a step can be told from one at the time before: where
 /// nothing was recorded in between, both are the same.

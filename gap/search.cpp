@@ -2,11 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
 
 #include "gap/noise_search.h"
 #include "gap/steadiness.h"
-#include "model/catalogue.h"
+#include "model/equation.h"
 
 namespace vgyro::gap {
 
@@ -61,7 +60,7 @@ bool is_noise(const Found& found) {
 }
 
 bool is_timing(const Effect& effect) {
-  return row(effect.kind).is_timing;
+  return model::moves_in_time(effect.kind);
 }
 
 bool same_reading(const Reading& a, const Reading& b) {
@@ -90,9 +89,17 @@ void Search::take(std::shared_ptr<const Study> study) {
   regressions_.clear();
   for (const auto& data : study_->observations())
     regressions_.emplace_back(data, known_, Part::kFit);
-  scans_.clear();
+  beside_.clear();
   for (std::size_t place = 0; place < regressions_.size(); ++place)
-    scans_.emplace_back(regressions_[place], terms(place));
+    beside_.push_back(terms(place));
+  scans_.clear();
+  scans_.resize(regressions_.size());
+}
+
+// Its shapes are dear: most studies are left again without a look.
+const Scan& Search::scan(std::size_t place) {
+  if (!scans_[place]) scans_[place].emplace(regressions_[place], beside_[place]);
+  return *scans_[place];
 }
 
 Effects Search::effects() const {
@@ -122,13 +129,9 @@ void Search::keep_noise(std::size_t place, const PairNoise& noise) {
   }
 }
 
-// Without a reference: the rate that the found effects give. What is late changes every shape.
+// The rate that the found effects give, where it is not known. What is late changes every shape.
 void Search::renew_motion() {
-  if (!study_->recording().has_reference) {
-    take(study_->with_motion(effects()));
-  } else {
-    take(study_);
-  }
+  take(study_->with_motion(effects()));
 }
 
 // The fitted noise where the model says nothing, the model's elsewhere. Slow effects raise the
@@ -157,11 +160,12 @@ bool Search::has_grown(std::size_t place, const Fit& null) const {
 
 Found Search::refitted(std::size_t place, const Fit& null, const PairNoise& start,
                        const Score& score) const {
+  const Regression& regression = regressions_[place];
   Effects terms = null.terms;
   terms.push_back(row(score.effect.kind).finder == Finder::kStep
-                      ? scans_[place].placed(null, score.effect)
+                      ? placed(regression, null, score.effect)
                       : score.effect);
-  const Fit with = regressions_[place].fit(std::move(terms), start);
+  const Fit with = regression.fit(std::move(terms), start);
   Found found;
   found.effect = with.terms.back();
   found.statistic = 2.0 * (with.log_likelihood - null.log_likelihood);
@@ -210,13 +214,13 @@ void Search::look(std::size_t place, Round& round) {
   const Regression& regression = regressions_[place];
   const Fit null = regression.fit(terms(place), noise_);
   keep_noise(place, null.noise);
-  std::vector<Score> scores = scans_[place].scores(null, null.noise);
+  std::vector<Score> scores = scan(place).scores(null, null.noise);
   for (const Score& one : scores) {
     if (is_timing(one.effect)) round.timing.push_back(one);
   }
   if (scores.size() > kWordsEach * kRefitsMax) scores.resize(kWordsEach * kRefitsMax);
   const PairNoise modelled = this->modelled(null.noise);
-  const std::vector<Score> more = scans_[place].scores(null, modelled);
+  const std::vector<Score> more = scan(place).scores(null, modelled);
   std::vector<Found> found = refitted(place, null, null.noise, scores, kRefitsMax);
   for (Found& one : refitted(place, null, modelled, more, kRefitsMax))
     found.push_back(std::move(one));
@@ -250,9 +254,7 @@ Fit Search::fit_with_motion(Effects terms) const {
   Fit fitted;
   fitted.terms = std::move(terms);
   for (int turn = 0; turn < kMotionTurns; ++turn) {
-    Effects all = known_;
-    all.insert(all.end(), fitted.terms.begin(), fitted.terms.end());
-    const auto trial = study_->with_motion(all);
+    const auto trial = study_->with_motion(regressions_.front().with_known(fitted.terms));
     const Regression regression(trial->observations().front(), known_, Part::kFit);
     fitted = regression.fit(fitted.terms, noise_);
   }
@@ -321,17 +323,13 @@ void Search::settle(std::size_t place) {
         std::max(all.noise[gyro].walk_dps_rts, model_noise_[gyro].walk_dps_rts);
   }
   regression.improve(all);
+  const std::vector<model::Parameters> sigmas = sigmas_of(all);
   std::size_t term = 0;
-  Eigen::Index free_place = 0;
   for (Found& found : found_) {
     if (is_noise(found) || place_of(found.effect) != place) continue;
-    found.effect = all.terms[term++];
+    found.effect = all.terms[term];
     tidy_phase(found.effect);
-    for (const Free& free : *row(found.effect.kind).free) {
-      const double variance = all.covariance(free_place, free_place);
-      found.sigma[free.parameter] = std::sqrt(std::max(0.0, variance));
-      ++free_place;
-    }
+    found.sigma = sigmas[term++];
   }
 }
 
@@ -342,10 +340,10 @@ void Search::place_again() {
   for (std::size_t i = 0; i < found_.size(); ++i) {
     if (row(found_[i].effect.kind).finder != Finder::kStep) continue;
     const double at_s = found_[i].effect.parameters[1];
-    take(study_->with_used_for_fit({at_s - Scan::kStepReach_s, at_s + Scan::kStepReach_s}));
+    take(study_->with_used_for_fit({at_s - kStepReach_s, at_s + kStepReach_s}));
     const std::size_t place = place_of(found_[i].effect);
     const Fit null{terms(place, i), noise_, 0.0, {}};
-    found_[i].effect = scans_[place].placed(null, found_[i].effect);
+    found_[i].effect = placed(regressions_[place], null, found_[i].effect);
     any = true;
   }
   if (any) settle();
@@ -362,7 +360,7 @@ void Search::replace(std::size_t index) {
   const std::size_t place = place_of(mine.effect);
   const Regression& regression = regressions_[place];
   const Fit null = regression.fit(terms(place, index), noise_);
-  const std::vector<Score> scores = scans_[place].scores(null, noise_);
+  const std::vector<Score> scores = scan(place).scores(null, noise_);
   Effects with = null.terms;
   with.push_back(mine.effect);
   mine.statistic =
@@ -451,9 +449,7 @@ void Search::noise_rounds() {
 double Search::drift_statistic(std::size_t gyro) const {
   double sum = 0.0;
   for (const Found& one : found_) {
-    const Random part = row(one.effect.kind).random;
-    if (one.effect.gyro == gyro && (part == Random::kWalk || part == Random::kMarkov))
-      sum += one.statistic;
+    if (one.effect.gyro == gyro && is_drift(row(one.effect.kind).random)) sum += one.statistic;
   }
   return sum;
 }

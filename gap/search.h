@@ -9,6 +9,7 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string_view>
 #include <vector>
 
@@ -50,6 +51,7 @@ class Search {
   /// Another study, and all that hangs on it.
   void take(std::shared_ptr<const Study> study);
   void renew_motion();
+  const Scan& scan(std::size_t place);
   [[nodiscard]] Effects terms(std::size_t place, std::size_t left_out = Regression::kNone) const;
   [[nodiscard]] std::size_t place_of(const model::Effect& effect) const;
   void keep_noise(std::size_t place, const PairNoise& noise);
@@ -82,7 +84,8 @@ class Search {
 
   std::shared_ptr<const Study> study_;
   std::vector<Regression> regressions_;
-  std::vector<Scan> scans_;
+  std::vector<Effects> beside_;  ///< what was found when the study was taken: its shapes see it
+  std::vector<std::optional<Scan>> scans_;  ///< of the regressions, once asked for
   Effects known_;
   std::vector<Found> found_;
   std::vector<Found> rejected_;

@@ -10,6 +10,7 @@
 
 #include "gap/evidence.h"
 #include "model/catalogue.h"
+#include "model/equation.h"
 #include "tests/gap/made_study.h"
 
 namespace vgyro::gap {
@@ -151,11 +152,11 @@ TEST(Kinds, EachIsLookedForBySomebody) {
       case Nature::kOffset:
       case Nature::kResponse:
         EXPECT_TRUE(is_scanned(info.kind)) << info.name;
-        EXPECT_FALSE(*its.is_timing) << info.name;
+        EXPECT_FALSE(model::moves_in_time(its.kind)) << info.name;
         break;
       case Nature::kLag:
         EXPECT_TRUE(is_scanned(info.kind)) << info.name;
-        EXPECT_TRUE(*its.is_timing) << info.name;
+        EXPECT_TRUE(model::moves_in_time(its.kind)) << info.name;
         break;
       case Nature::kNoise:
         EXPECT_EQ(*its.finder, Finder::kNoise) << info.name;

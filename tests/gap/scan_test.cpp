@@ -308,7 +308,7 @@ TEST_F(ScanTest, PlacesAStepAsWellAsTheNoiseLets) {
     const std::vector<Score> scores = scan.scores(null, null.noise);
     ASSERT_FALSE(scores.empty());
     ASSERT_EQ(scores.front().effect.kind, Kind::kBiasStep) << text_of(scores);
-    const Effect step = scan.placed(null, scores.front().effect);
+    const Effect step = placed(regression, null, scores.front().effect);
     EXPECT_NEAR(step.parameters[1], at_s, 60.0 * scale_s + kResolution_s);
     // By the seconds that the drift leaves of both sides: some N/K.
     const double reach_s = std::min(at_s, white / making().walk_dps_rts[kGyro]);
