@@ -12,8 +12,8 @@
 #include <benchmark/benchmark.h>
 
 #include "base/time.h"
-#include "can/candump.h"
-#include "can/log_source.h"
+#include "canlog/candump.h"
+#include "canlog/log_source.h"
 #include "gateway/config.h"
 #include "gateway/pipeline.h"
 
@@ -29,23 +29,23 @@ constexpr const char* kConfig = VGYRO_EXAMPLES "/twin.toml";
 }
 
 struct Recording {
-  std::vector<can::LogRecord> records;
+  std::vector<canlog::LogRecord> records;
   std::vector<std::string> interfaces;
   std::string text;
 };
 
 Recording load_recording() {
-  auto source = can::open_log(kLog);
+  auto source = canlog::open_source(kLog);
   if (!source) give_up(source.error().message());
-  can::LogReader reader(std::move(*source));
+  canlog::CandumpReader reader(std::move(*source));
   Recording out;
-  can::LogRecord record;
-  char line[can::kLineBytesMax];
+  canlog::LogRecord record;
+  char line[canlog::kLineBytesMax];
   while (reader.next(record)) {
     out.records.push_back(record);
     const std::size_t size =
-        can::format_line(line, record.stamp, reader.interfaces().name(record.bus), record.frame,
-                         record.fraction_digits);
+        canlog::format_line(line, record.stamp, reader.interfaces().name(record.bus), record.frame,
+                            record.fraction_digits);
     out.text.append(line, size);
   }
   if (reader.error()) give_up(reader.error()->message());
@@ -68,9 +68,9 @@ void parse_log(benchmark::State& state) {
   std::int64_t frames = 0;
   for (auto _ : state) {
     state.PauseTiming();
-    can::LogReader reader(can::log_from_text(recording().text));
+    canlog::CandumpReader reader(canlog::log_from_text(recording().text));
     state.ResumeTiming();
-    can::LogRecord record;
+    canlog::LogRecord record;
     while (reader.next(record)) {
       benchmark::DoNotOptimize(record.frame.data[0]);
       ++frames;
@@ -82,11 +82,11 @@ BENCHMARK(parse_log)->Unit(benchmark::kMillisecond);
 
 void format_log(benchmark::State& state) {
   const auto& [records, interfaces, text] = recording();
-  char line[can::kLineBytesMax];
+  char line[canlog::kLineBytesMax];
   for (auto _ : state) {
-    for (const can::LogRecord& r : records)
+    for (const canlog::LogRecord& r : records)
       benchmark::DoNotOptimize(
-          can::format_line(line, r.stamp, interfaces[r.bus], r.frame, r.fraction_digits));
+          canlog::format_line(line, r.stamp, interfaces[r.bus], r.frame, r.fraction_digits));
   }
   state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(records.size()));
 }
@@ -98,7 +98,7 @@ void decode_rate(benchmark::State& state) {
   const auto& codec = plan.gyros.at(static_cast<std::size_t>(state.range(0))).rate.codec;
   const auto& records = recording().records;
   for (auto _ : state) {
-    for (const can::LogRecord& r : records)
+    for (const canlog::LogRecord& r : records)
       benchmark::DoNotOptimize(codec.decode(r.frame.payload()).value);
   }
   state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(records.size()));
@@ -128,7 +128,7 @@ void pipeline_frame(benchmark::State& state) {
     state.PauseTiming();
     gateway::Pipeline pipeline(plan);
     state.ResumeTiming();
-    for (const can::LogRecord& r : records) {
+    for (const canlog::LogRecord& r : records) {
       pipeline.advance(r.stamp, sink);
       pipeline.receive(plan_bus[r.bus], r.frame, r.stamp, sink);
     }

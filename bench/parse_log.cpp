@@ -3,21 +3,21 @@
 #include <cstdio>
 #include <utility>
 
-#include "can/candump.h"
-#include "can/log_source.h"
+#include "canlog/candump.h"
+#include "canlog/log_source.h"
 
 int main(int argc, char** argv) {
   if (argc != 2) {
     std::fputs("usage: vgyro_parse_log LOG\n", stderr);
     return 2;
   }
-  auto source = vgyro::can::open_log(argv[1]);
+  auto source = vgyro::canlog::open_source(argv[1]);
   if (!source) {
     std::fprintf(stderr, "%s\n", source.error().message().c_str());
     return 1;
   }
-  vgyro::can::LogReader reader(std::move(*source));
-  vgyro::can::LogRecord record;
+  vgyro::canlog::CandumpReader reader(std::move(*source));
+  vgyro::canlog::LogRecord record;
   unsigned long long id_sum = 0;  // printed, so that nothing of the parsing can be left out
   while (reader.next(record))
     id_sum += record.frame.id + record.frame.data[0];

@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/printable.h"
-#include "can/candump.h"
+#include "canlog/reader.h"
 #include "cli/commands.h"
 #include "cli/exit_code.h"
 #include "cli/output/errors.h"
@@ -92,7 +92,7 @@ void put_number(Text& out, const dbc::Signal& signal, double value, std::string_
   }
 }
 
-void put_json(Text& out, const can::LogRecord& record, std::string_view bus,
+void put_json(Text& out, const canlog::LogRecord& record, std::string_view bus,
               const KnownMessage& message) {
   auto to = std::back_inserter(out);
   const std::int64_t ns = to_ns(record.stamp);
@@ -123,7 +123,7 @@ void put_json(Text& out, const can::LogRecord& record, std::string_view bus,
   fmt::format_to(to, "}}}}\n");
 }
 
-void put_text(Text& out, const can::LogRecord& record, std::string_view bus,
+void put_text(Text& out, const canlog::LogRecord& record, std::string_view bus,
               const KnownMessage& message) {
   auto to = std::back_inserter(out);
   const std::int64_t ns = to_ns(record.stamp);
@@ -166,14 +166,13 @@ Expected<Decoder> load_decoder(const std::vector<std::string>& files) {
 int run_decode(const DecodeOptions& options) {
   auto decoder = load_decoder(options.dbc_files);
   if (!decoder) return report(decoder.error());
-  auto source = can::open_log(options.log);
-  if (!source) return report(source.error());
+  const auto opened = canlog::open_log(options.log);
+  if (!opened) return report(opened.error());
   auto output = OutputFile::open("-");
   if (!output) return report(output.error());
-  can::LogSource* bytes = source->get();
-  bytes->before_wait([&] { output->flush(); });
-  can::LogReader reader(std::move(*source));
-  can::LogRecord record;
+  canlog::LogReader& reader = **opened;
+  reader.before_wait([&] { output->flush(); });
+  canlog::LogRecord record;
   Text line;
   std::uint64_t decoded = 0;
   while (reader.next(record)) {
@@ -196,8 +195,8 @@ int run_decode(const DecodeOptions& options) {
     ++decoded;
   }
   if (const auto closed = output->close(); !closed) return report(closed.error());
-  const can::LogCounts& counts = reader.counts();
-  for (const can::MalformedLine& bad : counts.first_malformed) {
+  const canlog::LogCounts& counts = reader.counts();
+  for (const canlog::MalformedLine& bad : counts.first_malformed) {
     warn({fmt::format("{}:{}", options.log, bad.line), bad.why, {}});
   }
   tell("{} of {} frames decoded, {} lines not understood\n", decoded, counts.frames,

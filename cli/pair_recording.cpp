@@ -23,7 +23,7 @@ class Gatherer {
                 gateway::GyroIntake(1, gateway::GyroInput(plan.gyros[1]))} {}
 
   Expected<void> read(const std::string& log) {
-    return frames_.read(log, "allan", [this](std::uint8_t roles, const can::LogRecord& record) {
+    return frames_.read(log, "allan", [this](std::uint8_t roles, const canlog::LogRecord& record) {
       if ((roles & gateway::kGyro1) != 0) take_gyro(0, record);
       if ((roles & gateway::kGyro2) != 0) take_gyro(1, record);
     });
@@ -55,7 +55,7 @@ class Gatherer {
   }
 
  private:
-  void take_gyro(std::size_t gyro, const can::LogRecord& record) {
+  void take_gyro(std::size_t gyro, const canlog::LogRecord& record) {
     const gateway::GyroIntake::Result taken =
         inputs_[gyro].take(record.frame, record.stamp, guard_);
     if (taken.reject) return;

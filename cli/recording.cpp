@@ -49,7 +49,7 @@ class Recorder {
     recording_.rest_rate_dps = plan.calibration.rate_dps;
   }
 
-  void take(std::uint8_t roles, const can::LogRecord& record) {
+  void take(std::uint8_t roles, const canlog::LogRecord& record) {
     if ((roles & gateway::kGyro1) != 0) take_gyro(0, record);
     if ((roles & gateway::kGyro2) != 0) take_gyro(1, record);
     if ((roles & gateway::kReference) != 0) take_reference(record);
@@ -87,7 +87,7 @@ class Recorder {
     return t_s;
   }
 
-  void take_gyro(std::size_t i, const can::LogRecord& record) {
+  void take_gyro(std::size_t i, const canlog::LogRecord& record) {
     const gateway::GyroIntake::Result taken = inputs_[i].take(record.frame, record.stamp, guard_);
     // A frame whose counter moved is a new one, whatever its stamp.
     const auto& counter = plan_.gyros[i].e2e.counter;
@@ -103,14 +103,14 @@ class Recorder {
     if (plan_.gyros[i].supply_voltage) series.supply_v.push_back(inputs_[i].input().supply_v());
   }
 
-  void take_reference(const can::LogRecord& record) {
+  void take_reference(const canlog::LogRecord& record) {
     const auto taken = reference_->take(record.frame, record.stamp, guard_);
     if (taken.reject) return;
     recording_.reference_dps.t_s.push_back(reach(taken.stamp.t));
     recording_.reference_dps.value.push_back(taken.value[0]);
   }
 
-  void take_acceleration(const can::LogRecord& record) {
+  void take_acceleration(const canlog::LogRecord& record) {
     const auto taken = accelerometer_->take(record.frame, record.stamp, guard_);
     if (taken.reject) return;
     recording_.acceleration.t_s.push_back(reach(taken.stamp.t));
@@ -119,7 +119,7 @@ class Recorder {
   }
 
   // Nothing asks for the speed; its frames lengthen the recording.
-  void take_speed(const can::LogRecord& record) {
+  void take_speed(const canlog::LogRecord& record) {
     const auto stamp = gateway::judge_stamp(gateway::kSpeedStream, record.stamp, guard_);
     if (stamp.believed()) reach(stamp.t);
   }
@@ -163,9 +163,9 @@ Expected<gap::Recording> read_recording(const std::string& log, const gateway::P
                                         const std::string& doing) {
   RoleFrames frames(plan);
   Recorder recorder(plan);
-  const auto done = frames.read(log, doing, [&](std::uint8_t roles, const can::LogRecord& record) {
-    recorder.take(roles, record);
-  });
+  const auto done = frames.read(
+      log, doing,
+      [&](std::uint8_t roles, const canlog::LogRecord& record) { recorder.take(roles, record); });
   if (!done) return tl::unexpected(done.error());
   if (const auto missing = frames.missing_gyro(log, recorder.used())) {
     return tl::unexpected(*missing);

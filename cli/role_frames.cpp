@@ -4,7 +4,7 @@
 
 #include <fmt/core.h>
 
-#include "can/log_source.h"
+#include "canlog/reader.h"
 #include "cli/output/progress.h"
 
 namespace vgyro::cli {
@@ -15,12 +15,11 @@ constexpr std::uint64_t kFramesPerProgress = 1U << 16U;
 
 Expected<void> RoleFrames::read(const std::string& log, const std::string& doing,
                                 const Take& take) {
-  auto source = can::open_log(log);
-  if (!source) return tl::unexpected(source.error());
-  const can::LogSource* bytes = source->get();
-  can::LogReader reader(std::move(*source));
+  const auto opened = canlog::open_log(log);
+  if (!opened) return tl::unexpected(opened.error());
+  canlog::LogReader& reader = **opened;
   Progress progress(doing + " " + log);
-  can::LogRecord record;
+  canlog::LogRecord record;
   std::uint64_t until_progress = kFramesPerProgress;
   while (reader.next(record)) {
     if (record.is_xl) continue;
@@ -29,15 +28,15 @@ Expected<void> RoleFrames::read(const std::string& log, const std::string& doing
     }
     if (--until_progress > 0) continue;
     until_progress = kFramesPerProgress;
-    progress.update(bytes->bytes_read(), bytes->bytes_total(), reader.counts().frames);
+    progress.update(reader.bytes_read(), reader.bytes_total(), reader.counts().frames);
   }
   if (reader.error()) return tl::unexpected(*reader.error());
   interfaces_ = reader.interfaces().names();
   return {};
 }
 
-std::uint8_t RoleFrames::roles(const can::LogRecord& record,
-                               const can::InterfaceTable& interfaces) {
+std::uint8_t RoleFrames::roles(const canlog::LogRecord& record,
+                               const canlog::InterfaceTable& interfaces) {
   while (buses_.size() <= record.bus) {
     const std::string& name = interfaces.name(static_cast<can::BusIndex>(buses_.size()));
     const auto found = std::find(plan_.buses.begin(), plan_.buses.end(), name);

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "base/error.h"
-#include "can/candump.h"
+#include "canlog/record.h"
 #include "gateway/plan.h"
 #include "gateway/router.h"
 
@@ -20,7 +20,7 @@ namespace vgyro::cli {
 class RoleFrames {
  public:
   /// `roles`: a mask of gateway::Role.
-  using Take = std::function<void(std::uint8_t roles, const can::LogRecord& record)>;
+  using Take = std::function<void(std::uint8_t roles, const canlog::LogRecord& record)>;
 
   explicit RoleFrames(const gateway::Plan& plan) : plan_(plan), router_(plan) {}
 
@@ -32,8 +32,8 @@ class RoleFrames {
                                                   const std::array<std::uint64_t, 2>& used) const;
 
  private:
-  [[nodiscard]] std::uint8_t roles(const can::LogRecord& record,
-                                   const can::InterfaceTable& interfaces);
+  [[nodiscard]] std::uint8_t roles(const canlog::LogRecord& record,
+                                   const canlog::InterfaceTable& interfaces);
 
   const gateway::Plan& plan_;
   gateway::Router router_;

@@ -9,7 +9,7 @@
 
 #include <fmt/core.h>
 
-#include "can/candump.h"
+#include "canlog/candump.h"
 #include "cli/commands.h"
 #include "cli/exit_code.h"
 #include "cli/output/errors.h"
@@ -270,7 +270,7 @@ can::Frame Recording::frame(const SimulatedMessage& message) {
 }
 
 void Recording::write(OutputFile& output, double start_s) {
-  std::vector<can::LineFormatter> formatters;
+  std::vector<canlog::LineFormatter> formatters;
   formatters.reserve(plan_.buses.size());
   for (const std::string& bus : plan_.buses)
     formatters.emplace_back(bus);
@@ -288,7 +288,7 @@ void Recording::write(OutputFile& output, double start_s) {
     // A log's last digit is the microsecond.
     const auto since_ns = static_cast<std::int64_t>(std::llround(message.stamp_s * kMicro)) * 1000;
     output.commit(formatters[message.match->bus].format(
-        output.room(can::kLineBytesMax), time_from_ns(start_ns + since_ns), frame(message), 6));
+        output.room(canlog::kLineBytesMax), time_from_ns(start_ns + since_ns), frame(message), 6));
     progress.update(static_cast<std::uint64_t>(message.stamp_s * 1e3),
                     static_cast<std::uint64_t>(simulator_.profile().length_s * 1e3), ++frames_);
     message.next += message.page != nullptr ? kPageEvery : 1;

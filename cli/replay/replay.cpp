@@ -8,7 +8,8 @@
 
 #include "base/file.h"
 #include "base/spelling.h"
-#include "can/candump.h"
+#include "canlog/candump.h"
+#include "canlog/reader.h"
 #include "cli/commands.h"
 #include "cli/exit_code.h"
 #include "cli/output/errors.h"
@@ -37,7 +38,7 @@ class LineSink final : public gateway::FrameSink {
  public:
   LineSink(OutputFile& file, std::string interface) : file_(file), lines_(std::move(interface)) {}
   void put(const can::Frame& frame, TimePoint stamp) override {
-    char* room = file_.room(can::kLineBytesMax);
+    char* room = file_.room(canlog::kLineBytesMax);
     file_.commit(lines_.format(room, stamp, frame, fraction_digits));
     ++frames;
   }
@@ -46,7 +47,7 @@ class LineSink final : public gateway::FrameSink {
 
  private:
   OutputFile& file_;
-  can::LineFormatter lines_;
+  canlog::LineFormatter lines_;
 };
 
 class Totals final : public gateway::RateObserver {
@@ -108,7 +109,7 @@ class BusMap {
     can::BusIndex plan = kForeignBus;  ///< index in the plan
     can::BusIndex all = 0;             ///< index in interfaces(), over all logs
   };
-  Buses look_up(can::BusIndex log_bus, const can::InterfaceTable& of_log) {
+  Buses look_up(can::BusIndex log_bus, const canlog::InterfaceTable& of_log) {
     while (known_.size() <= log_bus) {
       const std::string& name = of_log.name(static_cast<can::BusIndex>(known_.size()));
       known_.push_back({plan_index(name), interfaces_.index_of(name).value_or(0)});
@@ -133,7 +134,7 @@ class BusMap {
   const gateway::Plan* plan_;
   std::vector<std::pair<std::string, std::string>> entries_;
   std::vector<Buses> known_;  ///< by the present log's own index
-  can::InterfaceTable interfaces_;
+  canlog::InterfaceTable interfaces_;
 };
 
 class Replay {
@@ -152,12 +153,11 @@ class Replay {
   Expected<void> take_up(const gateway::SavedState& state) { return pipeline_.resume(state); }
 
   Expected<void> run_log(const std::string& path) {
-    auto source = can::open_log(path);
-    if (!source) return tl::unexpected(source.error());
-    can::LogSource* bytes = source->get();
-    if (path == "-") bytes->before_wait([this] { output_.flush(); });
-    can::LogReader reader(std::move(*source));
-    run_records(path, reader, *bytes);
+    const auto opened = canlog::open_log(path);
+    if (!opened) return tl::unexpected(opened.error());
+    canlog::LogReader& reader = **opened;
+    if (path == "-") reader.before_wait([this] { output_.flush(); });
+    run_records(path, reader);
     summary_.logs.push_back({path, reader.counts()});
     summary_.interfaces = buses_.interfaces();
     if (reader.error()) return tl::unexpected(*reader.error());
@@ -181,10 +181,10 @@ class Replay {
   const ReplayPlot& plot() const { return plot_; }
 
  private:
-  void run_records(const std::string& path, can::LogReader& reader, const can::LogSource& bytes) {
+  void run_records(const std::string& path, canlog::LogReader& reader) {
     Progress progress("replay " + path);
     buses_.new_log();
-    can::LogRecord record;
+    canlog::LogRecord record;
     std::uint64_t until_progress = kFramesPerProgress;
     std::uint64_t biases = 0;
     while (reader.next(record)) {
@@ -198,7 +198,7 @@ class Replay {
       pipeline_.receive(buses.plan, record.frame, record.stamp, sink_);
       if (--until_progress == 0) {
         until_progress = kFramesPerProgress;
-        progress.update(bytes.bytes_read(), bytes.bytes_total(), reader.counts().frames);
+        progress.update(reader.bytes_read(), reader.bytes_total(), reader.counts().frames);
       }
       if (!options_.plot.empty()) follow_drift(record.stamp, biases);
     }
@@ -297,7 +297,7 @@ Expected<void> check_files(const ReplayOptions& options, std::vector<std::string
     if (log == "-") continue;
     if (::stat(log.c_str(), &input) != 0) return fail(log, "cannot be opened: " + system_reason());
     if (!S_ISREG(input.st_mode)) continue;
-    if (const auto opened = can::open_log(log); !opened) return tl::unexpected(opened.error());
+    if (const auto opened = canlog::open_log(log); !opened) return tl::unexpected(opened.error());
   }
   inputs.insert(inputs.end(), options.logs.begin(), options.logs.end());
   inputs.push_back(options.state);

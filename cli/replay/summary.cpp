@@ -28,7 +28,7 @@ double mean_of(double sum, std::uint64_t count) {
 
 Json log_json(const LogSummary& log) {
   Json malformed = Json::array();
-  for (const can::MalformedLine& bad : log.counts.first_malformed) {
+  for (const canlog::MalformedLine& bad : log.counts.first_malformed) {
     malformed.push_back({{"line", bad.line}, {"why", bad.why}});
   }
   return {{"lines", log.counts.lines},
@@ -295,7 +295,7 @@ void put_log(fmt::memory_buffer& text, const LogSummary& log) {
     fmt::format_to(to, "; the log ends inside line {}, which was not used", log.counts.lines + 1);
   }
   fmt::format_to(to, "\n");
-  for (const can::MalformedLine& bad : log.counts.first_malformed)
+  for (const canlog::MalformedLine& bad : log.counts.first_malformed)
     fmt::format_to(to, "  line {}: {}\n", bad.line, bad.why);
 }
 

@@ -11,7 +11,7 @@
 
 #include <nlohmann/json_fwd.hpp>
 
-#include "can/candump.h"
+#include "canlog/record.h"
 #include "gateway/plan.h"
 #include "gateway/status.h"
 
@@ -50,7 +50,7 @@ class IdCounts {
 
 struct LogSummary {
   std::string path;
-  can::LogCounts counts;
+  canlog::LogCounts counts;
 };
 
 struct Gap {

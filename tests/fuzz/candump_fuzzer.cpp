@@ -11,17 +11,17 @@
 #include <string>
 #include <vector>
 
-#include "can/candump.h"
-#include "tests/can/log_text.h"
+#include "canlog/candump.h"
+#include "tests/canlog/log_text.h"
 
 namespace {
 
 using vgyro::can::Frame;
-using vgyro::can::ReadLog;
-using vgyro::can::ReadRecord;
+using vgyro::canlog::ReadLog;
+using vgyro::canlog::ReadRecord;
 
 /// Hands the text out in pieces whose sizes the fuzzer chooses.
-class PiecesSource final : public vgyro::can::LogSource {
+class PiecesSource final : public vgyro::canlog::LogSource {
  public:
   PiecesSource(std::string text, std::vector<std::uint8_t> sizes)
       : text_(std::move(text)), sizes_(std::move(sizes)) {}
@@ -57,7 +57,7 @@ std::string written(const ReadRecord& record) {
     return format_xl_line(stamp, record.interface, record.xl[0], digits, record.direction);
   }
   // A buffer of exactly this size lets the sanitizer see a write past its end.
-  std::vector<char> line(vgyro::can::kLineBytesMax);
+  std::vector<char> line(vgyro::canlog::kLineBytesMax);
   const std::size_t length =
       format_line(line.data(), stamp, record.interface, record.frame, digits, record.direction);
   return {line.data(), length};
@@ -70,10 +70,10 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   if (size < kSizes) return 0;
   const std::vector<std::uint8_t> sizes(data, data + kSizes);
   const std::string text(reinterpret_cast<const char*>(data) + kSizes, size - kSizes);
-  if (text.size() >= vgyro::can::LogSource::kBufferBytes) return 0;  // lines of any length fit
+  if (text.size() >= vgyro::canlog::LogSource::kBufferBytes) return 0;  // lines of any length fit
 
-  const ReadLog quick = vgyro::can::read_all(std::make_unique<PiecesSource>(text, sizes));
-  const ReadLog slow = vgyro::can::read_by_parse_line(text);
+  const ReadLog quick = vgyro::canlog::read_all(std::make_unique<PiecesSource>(text, sizes));
+  const ReadLog slow = vgyro::canlog::read_by_parse_line(text);
   require(told(quick.counts) == told(slow.counts), "the counts differ");
   require(quick.interfaces == slow.interfaces, "the interfaces differ");
   require(quick.records == slow.records, "the records differ");
@@ -81,6 +81,6 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   std::string again;
   for (const ReadRecord& record : quick.records)
     again += written(record);
-  require(vgyro::can::read_text(again).records == quick.records, "written otherwise than read");
+  require(vgyro::canlog::read_text(again).records == quick.records, "written otherwise than read");
   return 0;
 }

@@ -13,6 +13,7 @@ from pathlib import Path
 ARROWS = {
     "base": {"base"},
     "can": {"base", "can"},
+    "canlog": {"base", "can", "canlog"},
     "dbc": {"base", "dbc"},
     "model": {"base", "model"},
     "simulation": {"base", "model", "simulation"},
@@ -21,7 +22,7 @@ ARROWS = {
     "gap": {"base", "model", "gap"},
     "gateway": {"base", "can", "dbc", "model", "fusion", "gateway"},
     "daemon": {"base", "can", "dbc", "gateway", "daemon"},
-    "cli": {"base", "can", "dbc", "model", "simulation", "fusion", "analysis", "gap", "gateway", "cli"},
+    "cli": {"base", "can", "canlog", "dbc", "model", "simulation", "fusion", "analysis", "gap", "gateway", "cli"},
 }
 
 # The gap workflow is as much as all other layers together, so it has arrows of its own: file → the files of its folder

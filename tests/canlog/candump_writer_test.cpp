@@ -3,22 +3,22 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
-#include "can/candump.h"
-#include "tests/can/log_text.h"
+#include "canlog/candump.h"
+#include "tests/canlog/log_text.h"
 
-namespace vgyro::can {
+namespace vgyro::canlog {
 namespace {
 
 constexpr std::uint64_t kSeed = 20'240'603;
 
-std::string line_of(TimePoint stamp, std::string_view interface, const Frame& frame,
+std::string line_of(TimePoint stamp, std::string_view interface, const can::Frame& frame,
                     unsigned digits = 6, Direction direction = Direction::kUnknown) {
   char buffer[kLineBytesMax];
   return {buffer, format_line(buffer, stamp, interface, frame, digits, direction)};
 }
 
-Frame frame_with(std::uint32_t id, unsigned flags, std::vector<std::uint8_t> bytes = {}) {
-  Frame frame;
+can::Frame frame_with(std::uint32_t id, unsigned flags, std::vector<std::uint8_t> bytes = {}) {
+  can::Frame frame;
   frame.id = id;
   frame.flags = static_cast<std::uint8_t>(flags);
   frame.length = static_cast<std::uint8_t>(bytes.size());
@@ -32,14 +32,14 @@ constexpr TimePoint kStamp = time_from_ns(1'700'000'000'123'456'789);
 TEST(CandumpWriter, WritesWhatCandumpWrites) {
   EXPECT_EQ(line_of(kStamp, "can0", frame_with(0x12, 0, {0xDE, 0xAD, 0x0F})),
             "(1700000000.123456) can0 012#DEAD0F\n");
-  EXPECT_EQ(line_of(kStamp, "vcan0", frame_with(0x12, kExtended, {1, 2, 3, 4, 5, 6, 7, 0xA8})),
+  EXPECT_EQ(line_of(kStamp, "vcan0", frame_with(0x12, can::kExtended, {1, 2, 3, 4, 5, 6, 7, 0xA8})),
             "(1700000000.123456) vcan0 00000012#01020304050607A8\n");
-  EXPECT_EQ(line_of(kStamp, "can0", frame_with(0x80, kError, std::vector<std::uint8_t>(8)), 9),
+  EXPECT_EQ(line_of(kStamp, "can0", frame_with(0x80, can::kError, std::vector<std::uint8_t>(8)), 9),
             "(1700000000.123456789) can0 20000080#0000000000000000\n");
-  EXPECT_EQ(line_of(kStamp, "can0", frame_with(0x123, kFd | kBitRateSwitch, {0xAA}), 6,
+  EXPECT_EQ(line_of(kStamp, "can0", frame_with(0x123, can::kFd | can::kBitRateSwitch, {0xAA}), 6,
                     Direction::kReceived),
             "(1700000000.123456) can0 123##1AA R\n");
-  Frame remote = frame_with(0x123, kRemote);
+  can::Frame remote = frame_with(0x123, can::kRemote);
   EXPECT_EQ(line_of(kStamp, "can0", remote, 6, Direction::kTransmitted),
             "(1700000000.123456) can0 123#R T\n");
   remote.length = 8;
@@ -49,7 +49,7 @@ TEST(CandumpWriter, WritesWhatCandumpWrites) {
 
 // Stamps have their place in every second: no digit is lost or carried wrongly.
 TEST(CandumpWriter, WritesStampsAtTheBoundariesOfSeconds) {
-  const Frame frame = frame_with(0x123, 0);
+  const can::Frame frame = frame_with(0x123, 0);
   EXPECT_EQ(line_of(time_from_ns(0), "c", frame), "(0000000000.000000) c 123#\n");
   EXPECT_EQ(line_of(time_from_ns(999), "c", frame), "(0000000000.000000) c 123#\n");
   EXPECT_EQ(line_of(time_from_ns(999'999'999), "c", frame), "(0000000000.999999) c 123#\n");
@@ -112,7 +112,7 @@ TEST(CandumpWriter, WritesManyLinesAsItWritesEachAlone) {
   for (int i = 0; i < 20'000; ++i)
     stamps_ns.push_back(ns += steps_ns[random() % std::size(steps_ns)]);
   for (const std::int64_t stamp_ns : stamps_ns) {
-    const Frame frame = random_frame(random);
+    const can::Frame frame = random_frame(random);
     const unsigned digits = random() % 2 == 0 ? 6 : 9;
     char buffer[kLineBytesMax];
     const std::size_t length = formatter.format(buffer, time_from_ns(stamp_ns), frame, digits);
@@ -123,8 +123,9 @@ TEST(CandumpWriter, WritesManyLinesAsItWritesEachAlone) {
 // The longest line that there can be fits into the room that callers are told to have.
 TEST(CandumpWriter, FitsTheLongestLineIntoItsBuffer) {
   const std::string name(40, 'n');
-  const Frame frame = frame_with(kExtendedIdMax, kExtended | kFd | kBitRateSwitch,
-                                 std::vector<std::uint8_t>(64, 0xFF));
+  const can::Frame frame =
+      frame_with(can::kExtendedIdMax, can::kExtended | can::kFd | can::kBitRateSwitch,
+                 std::vector<std::uint8_t>(64, 0xFF));
   std::vector<char> buffer(kLineBytesMax);
   const std::size_t length = format_line(buffer.data(), time_from_ns(8'999'999'999'999'999'999),
                                          name, frame, 9, Direction::kTransmitted);
@@ -137,13 +138,13 @@ TEST(CandumpWriter, FitsTheLongestLineIntoItsBuffer) {
 
 // A frame whose length lies, as a bug elsewhere could make one, writes no byte that is not its own.
 TEST(CandumpWriter, WritesNoMoreThanAFrameHolds) {
-  Frame frame = frame_with(0x123, 0);
+  can::Frame frame = frame_with(0x123, 0);
   frame.length = 200;
   EXPECT_EQ(line_of(kStamp, "can0", frame), "(1700000000.123456) can0 123#0000000000000000\n");
-  frame.flags = kFd;
+  frame.flags = can::kFd;
   EXPECT_EQ(line_of(kStamp, "can0", frame),
             "(1700000000.123456) can0 123##0" + std::string(128, '0') + "\n");
 }
 
 }  // namespace
-}  // namespace vgyro::can
+}  // namespace vgyro::canlog

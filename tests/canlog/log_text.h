@@ -7,9 +7,9 @@
 #include <string>
 #include <vector>
 
-#include "can/candump.h"
+#include "canlog/candump.h"
 
-namespace vgyro::can {
+namespace vgyro::canlog {
 
 /// A record with the name of its interface, and the XL frame where it is one.
 struct ReadRecord {
@@ -17,7 +17,7 @@ struct ReadRecord {
   std::string interface;
   int fraction_digits = 0;
   Direction direction = Direction::kUnknown;
-  Frame frame;
+  can::Frame frame;
   std::vector<XlFrame> xl;  ///< one where the record is an XL frame, else none: it is large
 
   friend bool operator==(const ReadRecord& a, const ReadRecord& b);
@@ -44,7 +44,7 @@ std::vector<std::string> malformed(const LogCounts& counts);
 std::string told(const LogCounts& counts);
 
 /// A frame of any form that the writer knows.
-Frame random_frame(std::mt19937_64& random);
+can::Frame random_frame(std::mt19937_64& random);
 XlFrame random_xl_frame(std::mt19937_64& random);
 
-}  // namespace vgyro::can
+}  // namespace vgyro::canlog

@@ -3,10 +3,10 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
-#include "can/candump.h"
-#include "tests/can/log_text.h"
+#include "canlog/candump.h"
+#include "tests/canlog/log_text.h"
 
-namespace vgyro::can {
+namespace vgyro::canlog {
 namespace {
 
 constexpr std::uint64_t kSeed = 20'240'602;
@@ -110,7 +110,7 @@ class LineMaker {
 };
 
 // An empty log is no error here; that nothing was in it is for the caller to say.
-TEST(LogReader, ReadsAnEmptyLog) {
+TEST(CandumpReader, ReadsAnEmptyLog) {
   const ReadLog log = read_text("");
   EXPECT_TRUE(log.records.empty());
   EXPECT_EQ(told(log.counts), "0 lines, 0 frames, 0 XL, 0 other, 0 malformed, 0 cut off; ");
@@ -118,7 +118,7 @@ TEST(LogReader, ReadsAnEmptyLog) {
 }
 
 // A damaged line costs itself: its neighbours are read, and its number leads the user to it.
-TEST(LogReader, LosesNothingAroundAMalformedLine) {
+TEST(CandumpReader, LosesNothingAroundAMalformedLine) {
   const ReadLog log = read_text(
       "(1.000000) can0 101#11\n"
       "(1.000001) can0 102#1\n"
@@ -137,7 +137,7 @@ TEST(LogReader, LosesNothingAroundAMalformedLine) {
 }
 
 // A damaged line among thousands of usual ones, which take the quick path.
-TEST(LogReader, LosesNothingAroundAMalformedLineInTheMiddleOfALongLog) {
+TEST(CandumpReader, LosesNothingAroundAMalformedLineInTheMiddleOfALongLog) {
   const ReadLog log = read_text(numbered_lines(0, 5000) + "(1700000000.00500 can0 123#11\n" +
                                 numbered_lines(5000, 9000));
   ASSERT_EQ(log.records.size(), 9000U);
@@ -147,7 +147,7 @@ TEST(LogReader, LosesNothingAroundAMalformedLineInTheMiddleOfALongLog) {
 }
 
 // A garbage file must not fill the memory with complaints.
-TEST(LogReader, KeepsTheFirstFiveMalformedLinesAndCountsAll) {
+TEST(CandumpReader, KeepsTheFirstFiveMalformedLinesAndCountsAll) {
   std::string text;
   for (int i = 0; i < 100; ++i)
     text += i % 2 == 0 ? "(\n" : "(1.000000) can0 123#\n";
@@ -161,7 +161,7 @@ TEST(LogReader, KeepsTheFirstFiveMalformedLinesAndCountsAll) {
 
 // The last line of a log that is still written, or was cut, may lack half of its payload and still
 // look like a frame.
-TEST(LogReader, DoesNotUseACutOffLastLine) {
+TEST(CandumpReader, DoesNotUseACutOffLastLine) {
   const ReadLog log = read_text(numbered_lines(0, 3) + "(1700000000.000003) can0 123#1122");
   EXPECT_EQ(ids(log), (std::vector<std::uint32_t>{0, 1, 2}));
   EXPECT_EQ(told(log.counts), "3 lines, 3 frames, 0 XL, 0 other, 0 malformed, 1 cut off; ");
@@ -169,7 +169,7 @@ TEST(LogReader, DoesNotUseACutOffLastLine) {
 }
 
 // The buffer ends somewhere; a line that does not fit can be no frame, and the next ones are read.
-TEST(LogReader, CountsALineLongerThanTheBufferAndGoesOn) {
+TEST(CandumpReader, CountsALineLongerThanTheBufferAndGoesOn) {
   for (const std::size_t length : {LogSource::kBufferBytes - 1, LogSource::kBufferBytes,
                                    LogSource::kBufferBytes + 1, 3 * LogSource::kBufferBytes}) {
     const std::string before = numbered_lines(0, 2);
@@ -184,7 +184,7 @@ TEST(LogReader, CountsALineLongerThanTheBufferAndGoesOn) {
 }
 
 // The same at the end of the log, where no newline will ever come.
-TEST(LogReader, CountsAnOverlongLastLineOnce) {
+TEST(CandumpReader, CountsAnOverlongLastLineOnce) {
   const ReadLog log = read_text(
       fmt::format("{}({}", numbered_lines(0, 2), std::string(2 * LogSource::kBufferBytes, '1')));
   EXPECT_EQ(ids(log), (std::vector<std::uint32_t>{0, 1}));
@@ -192,7 +192,7 @@ TEST(LogReader, CountsAnOverlongLastLineOnce) {
 }
 
 // Interfaces are numbered in order of appearance, however long and similar their names are.
-TEST(LogReader, TellsInterfacesApart) {
+TEST(CandumpReader, TellsInterfacesApart) {
   std::vector<std::string> names = {"a_long_interface", "can0",    "can", "can00", "CAN0", "vcan0",
                                     "sevenxx",          "eightxxx"};
   std::string text;
@@ -208,7 +208,7 @@ TEST(LogReader, TellsInterfacesApart) {
 }
 
 // The table is bounded: frames of a 65th interface are counted, those of the first 64 still read.
-TEST(LogReader, RefusesMoreThan64Interfaces) {
+TEST(CandumpReader, RefusesMoreThan64Interfaces) {
   std::string text;
   for (int round = 0; round < 2; ++round) {
     for (int i = 0; i < 66; ++i)
@@ -222,7 +222,7 @@ TEST(LogReader, RefusesMoreThan64Interfaces) {
 }
 
 // Order is the log's: whether time may go back is for the pipeline to judge.
-TEST(LogReader, PassesOnStampsThatGoBack) {
+TEST(CandumpReader, PassesOnStampsThatGoBack) {
   const ReadLog log = read_text(
       "(1700000000.999999) can0 101#\n(1700000001.000000) can0 102#\n(1700000000.999998) can0 "
       "103#\n(0.000000) can0 104#\n(1700000001.000001) can0 105#\n" +
@@ -236,7 +236,7 @@ TEST(LogReader, PassesOnStampsThatGoBack) {
 }
 
 // Reading must not depend on where read() happened to stop.
-TEST(LogReader, ReadsTheSameInChunksOfAnySize) {
+TEST(CandumpReader, ReadsTheSameInChunksOfAnySize) {
   SCOPED_TRACE(::testing::Message() << "seed " << kSeed);
   LineMaker lines(kSeed);
   std::string text;
@@ -255,7 +255,7 @@ TEST(LogReader, ReadsTheSameInChunksOfAnySize) {
 }
 
 // The quick path judges usual lines by other means than parse_line(); they may never disagree.
-TEST(LogReader, AgreesWithParseLineOnRandomAndDamagedLines) {
+TEST(CandumpReader, AgreesWithParseLineOnRandomAndDamagedLines) {
   for (std::uint64_t seed = kSeed; seed < kSeed + 10; ++seed) {
     SCOPED_TRACE(::testing::Message() << "seed " << seed);
     LineMaker lines(seed);
@@ -272,7 +272,7 @@ TEST(LogReader, AgreesWithParseLineOnRandomAndDamagedLines) {
 
 // Every single changed byte of a usual line, between lines that have taught the reader its second
 // and its interface.
-TEST(LogReader, AgreesWithParseLineOnEveryChangeOfOneByte) {
+TEST(CandumpReader, AgreesWithParseLineOnEveryChangeOfOneByte) {
   for (const std::string line : {"(1700000000.123456) can0 1A3#0123456789ABCDEF\n",
                                  "(1700000000.123456) can0 1ABCDEF3#0123456789abcdef\n",
                                  "(1700000000.123456) can0 123#\n"}) {
@@ -289,7 +289,7 @@ TEST(LogReader, AgreesWithParseLineOnEveryChangeOfOneByte) {
 }
 
 // Before any second was read, ten NUL bytes must not pass for a second that is already known.
-TEST(LogReader, TakesNulBytesForNoSecond) {
+TEST(CandumpReader, TakesNulBytesForNoSecond) {
   // Blank lines behind it: the quick path only looks where there is room to look.
   const ReadLog log = read_text(fmt::format("(1.5) can0 123#\n({}.123456) can0 123#11\n{}",
                                             std::string(10, '\0'), std::string(200, '\n')));
@@ -298,4 +298,4 @@ TEST(LogReader, TakesNulBytesForNoSecond) {
 }
 
 }  // namespace
-}  // namespace vgyro::can
+}  // namespace vgyro::canlog

@@ -1,4 +1,4 @@
-#include "can/log_source.h"
+#include "canlog/log_source.h"
 
 #include <filesystem>
 #include <fstream>
@@ -8,9 +8,9 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
-#include "tests/can/log_text.h"
+#include "tests/canlog/log_text.h"
 
-namespace vgyro::can {
+namespace vgyro::canlog {
 namespace {
 
 /// Payloads that pack badly, so that the packed file has many parts to damage.
@@ -18,8 +18,8 @@ std::string log_text(unsigned lines) {
   std::mt19937_64 random(20'240'604);
   std::string text;
   for (unsigned i = 0; i < lines; ++i) {
-    text +=
-        fmt::format("(1700000000.{:06}) can0 {:03X}#{:016X}\n", i, i & kStandardIdMax, random());
+    text += fmt::format("(1700000000.{:06}) can0 {:03X}#{:016X}\n", i, i & can::kStandardIdMax,
+                        random());
   }
   return text;
 }
@@ -50,7 +50,7 @@ class OpenLog : public ::testing::Test {
   }
 
   static ReadLog read(const std::string& path) {
-    auto source = open_log(path);
+    auto source = open_source(path);
     EXPECT_TRUE(source) << source.error().message();
     return source ? read_all(std::move(*source)) : ReadLog{};
   }
@@ -73,7 +73,7 @@ TEST_F(OpenLog, ReadsAFileToItsEnd) {
   const ReadLog log = read(file_with("a.log", text));
   EXPECT_EQ(log.records, read_by_parse_line(text).records);
   EXPECT_EQ(log.error, "");
-  auto source = open_log(folder_ + "/a.log");
+  auto source = open_source(folder_ + "/a.log");
   ASSERT_TRUE(source);
   EXPECT_EQ((*source)->bytes_total(), text.size());
   EXPECT_EQ((*source)->bytes_read(), 0U);
@@ -107,11 +107,11 @@ TEST_F(OpenLog, HandsOutWholeLines) {
 
 // Who mistyped a path must see the path and why.
 TEST_F(OpenLog, NamesTheFileThatItCannotOpen) {
-  const auto missing = open_log(folder_ + "/missing.log");
+  const auto missing = open_source(folder_ + "/missing.log");
   ASSERT_FALSE(missing);
   EXPECT_EQ(missing.error().message(),
             folder_ + "/missing.log: cannot be opened: No such file or directory");
-  const auto directory = open_log(folder_);
+  const auto directory = open_source(folder_);
   ASSERT_FALSE(directory);
   EXPECT_EQ(directory.error().message(), folder_ + ": is a directory, not a log");
 }
@@ -135,7 +135,7 @@ TEST_F(OpenLog, UnpacksXz) {
   const ReadLog log = read(file_with("a.log.xz", xz));
   EXPECT_EQ(log.records, read_by_parse_line(text).records);
   EXPECT_EQ(log.error, "");
-  const auto source = open_log(folder_ + "/a.log.xz");
+  const auto source = open_source(folder_ + "/a.log.xz");
   ASSERT_TRUE(source);
   EXPECT_EQ((*source)->bytes_total(), xz.size()) << "progress is counted in packed bytes";
 }
@@ -227,4 +227,4 @@ TEST_F(OpenLog, TellsAFileThatIsNoXz) {
 }
 
 }  // namespace
-}  // namespace vgyro::can
+}  // namespace vgyro::canlog

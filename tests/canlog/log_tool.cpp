@@ -10,14 +10,14 @@
 
 #include <nlohmann/json.hpp>
 
-#include "can/candump.h"
+#include "canlog/candump.h"
 
 namespace {
 
 using nlohmann::json;
-using vgyro::can::Direction;
 using vgyro::can::Frame;
 using vgyro::can::FrameFlag;
+using vgyro::canlog::Direction;
 
 constexpr std::pair<const char*, FrameFlag> kFlags[] = {
     {"extended", vgyro::can::kExtended}, {"remote", vgyro::can::kRemote},
@@ -26,7 +26,7 @@ constexpr std::pair<const char*, FrameFlag> kFlags[] = {
 };
 constexpr const char* kDirections[] = {"", "R", "T"};
 
-json told(const vgyro::can::LogRecord& record, const std::string& interface) {
+json told(const vgyro::canlog::LogRecord& record, const std::string& interface) {
   const Frame& frame = record.frame;
   json object = {{"ns", to_ns(record.stamp)},
                  {"interface", interface},
@@ -43,13 +43,13 @@ json told(const vgyro::can::LogRecord& record, const std::string& interface) {
 }
 
 int read(const char* path) {
-  auto source = vgyro::can::open_log(path);
-  if (!source) {
-    std::cerr << source.error().message() << '\n';
+  const auto opened = vgyro::canlog::open_log(path);
+  if (!opened) {
+    std::cerr << opened.error().message() << '\n';
     return 1;
   }
-  vgyro::can::LogReader reader(std::move(*source));
-  vgyro::can::LogRecord record;
+  vgyro::canlog::LogReader& reader = **opened;
+  vgyro::canlog::LogRecord record;
   while (reader.next(record)) {
     if (!record.is_xl) {
       std::cout << told(record, reader.interfaces().name(record.bus)).dump() << '\n';
@@ -79,13 +79,13 @@ int write() {
     for (const std::uint8_t byte : object["data"])
       frame.data.at(at++) = byte;
     const std::string direction = object["direction"];
-    char text[vgyro::can::kLineBytesMax];
+    char text[vgyro::canlog::kLineBytesMax];
     const std::size_t length =
-        vgyro::can::format_line(text, vgyro::time_from_ns(object["ns"]),
-                                std::string(object["interface"]), frame, object["digits"],
-                                direction.empty()  ? Direction::kUnknown
-                                : direction == "R" ? Direction::kReceived
-                                                   : Direction::kTransmitted);
+        vgyro::canlog::format_line(text, vgyro::time_from_ns(object["ns"]),
+                                   std::string(object["interface"]), frame, object["digits"],
+                                   direction.empty()  ? Direction::kUnknown
+                                   : direction == "R" ? Direction::kReceived
+                                                      : Direction::kTransmitted);
     std::cout.write(text, static_cast<std::streamsize>(length));
   }
   return 0;

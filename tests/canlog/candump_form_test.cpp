@@ -3,10 +3,10 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
-#include "can/candump.h"
-#include "tests/can/log_text.h"
+#include "canlog/candump.h"
+#include "tests/canlog/log_text.h"
 
-namespace vgyro::can {
+namespace vgyro::canlog {
 namespace {
 
 struct ParsedLine {
@@ -28,14 +28,14 @@ ParsedLine parse(std::string_view line) {
 }
 
 /// The frame of "ID#..." alone; the line must be in order.
-Frame frame_in(const std::string& text) {
+can::Frame frame_in(const std::string& text) {
   const ParsedLine parsed = parse("(1700000000.123456) can0 " + text);
   EXPECT_EQ(parsed.kind, LineKind::kFrame) << text << ": " << parsed.why;
   return parsed.record.frame;
 }
 
-Frame expected_frame(std::uint32_t id, unsigned flags, std::vector<std::uint8_t> bytes = {}) {
-  Frame frame;
+can::Frame expected_frame(std::uint32_t id, unsigned flags, std::vector<std::uint8_t> bytes = {}) {
+  can::Frame frame;
   frame.id = id;
   frame.flags = static_cast<std::uint8_t>(flags);
   frame.length = static_cast<std::uint8_t>(bytes.size());
@@ -43,8 +43,9 @@ Frame expected_frame(std::uint32_t id, unsigned flags, std::vector<std::uint8_t>
   return frame;
 }
 
-Frame remote_frame(std::uint32_t id, unsigned flags, std::uint8_t length, std::uint8_t raw_dlc) {
-  Frame frame = expected_frame(id, flags | kRemote);
+can::Frame remote_frame(std::uint32_t id, unsigned flags, std::uint8_t length,
+                        std::uint8_t raw_dlc) {
+  can::Frame frame = expected_frame(id, flags | can::kRemote);
   frame.length = length;
   frame.raw_dlc = raw_dlc;
   return frame;
@@ -66,23 +67,24 @@ TEST(CandumpForm, ReadsStandardAndExtendedFrames) {
   EXPECT_EQ(frame_in("123#DEADBEEF"), expected_frame(0x123, 0, {0xDE, 0xAD, 0xBE, 0xEF}));
   EXPECT_EQ(frame_in("000#"), expected_frame(0, 0));
   EXPECT_EQ(frame_in("7FF#0102030405060708"), expected_frame(0x7FF, 0, {1, 2, 3, 4, 5, 6, 7, 8}));
-  EXPECT_EQ(frame_in("00000123#11"), expected_frame(0x123, kExtended, {0x11}));
-  EXPECT_EQ(frame_in("1FFFFFFF#"), expected_frame(0x1FFFFFFF, kExtended));
+  EXPECT_EQ(frame_in("00000123#11"), expected_frame(0x123, can::kExtended, {0x11}));
+  EXPECT_EQ(frame_in("1FFFFFFF#"), expected_frame(0x1FFFFFFF, can::kExtended));
 }
 
 // can-utils' players read small letters and dots between bytes, so logs contain them.
 TEST(CandumpForm, ReadsSmallLettersAndDotsBetweenBytes) {
   EXPECT_EQ(frame_in("12a#deadbeef"), expected_frame(0x12A, 0, {0xDE, 0xAD, 0xBE, 0xEF}));
   EXPECT_EQ(frame_in("12A#DE.AD.BEEF"), expected_frame(0x12A, 0, {0xDE, 0xAD, 0xBE, 0xEF}));
-  EXPECT_EQ(frame_in("12A##1de.ad"), expected_frame(0x12A, kFd | kBitRateSwitch, {0xDE, 0xAD}));
+  EXPECT_EQ(frame_in("12A##1de.ad"),
+            expected_frame(0x12A, can::kFd | can::kBitRateSwitch, {0xDE, 0xAD}));
 }
 
 // Error frames have the error bit in eight digits; their identifier holds the error class.
 TEST(CandumpForm, ReadsErrorFrames) {
   EXPECT_EQ(frame_in("20000080#0000000000000000"),
-            expected_frame(0x80, kError, {0, 0, 0, 0, 0, 0, 0, 0}));
+            expected_frame(0x80, can::kError, {0, 0, 0, 0, 0, 0, 0, 0}));
   EXPECT_EQ(frame_in("20000004#0004000000000000"),
-            expected_frame(0x4, kError, {0, 4, 0, 0, 0, 0, 0, 0}));
+            expected_frame(0x4, can::kError, {0, 4, 0, 0, 0, 0, 0, 0}));
 }
 
 // Remote frames say how much they ask for, where the log's writer knew it.
@@ -91,7 +93,7 @@ TEST(CandumpForm, ReadsRemoteFrames) {
   EXPECT_EQ(frame_in("123#r"), remote_frame(0x123, 0, 0, 0));
   EXPECT_EQ(frame_in("123#R0"), remote_frame(0x123, 0, 0, 0));
   EXPECT_EQ(frame_in("123#R5"), remote_frame(0x123, 0, 5, 0));
-  EXPECT_EQ(frame_in("00000123#R8"), remote_frame(0x123, kExtended, 8, 0));
+  EXPECT_EQ(frame_in("00000123#R8"), remote_frame(0x123, can::kExtended, 8, 0));
   EXPECT_EQ(frame_in("123#R8_9"), remote_frame(0x123, 0, 8, 9));
   EXPECT_EQ(frame_in("123#R8_F"), remote_frame(0x123, 0, 8, 15));
 }
@@ -99,7 +101,7 @@ TEST(CandumpForm, ReadsRemoteFrames) {
 // A classic frame may claim 9 to 15 in its DLC and still carries 8 bytes.
 TEST(CandumpForm, ReadsRawDlcAboveEight) {
   for (unsigned dlc = 9; dlc <= 15; ++dlc) {
-    Frame frame = expected_frame(0x123, 0, {0x11, 0x22, 0x33, 0x44, 0x55, 0x66, 0x77, 0x88});
+    can::Frame frame = expected_frame(0x123, 0, {0x11, 0x22, 0x33, 0x44, 0x55, 0x66, 0x77, 0x88});
     frame.raw_dlc = static_cast<std::uint8_t>(dlc);
     EXPECT_EQ(frame_in(fmt::format("123#1122334455667788_{:X}", dlc)), frame);
     EXPECT_EQ(frame_in(fmt::format("123#1122334455667788_{:x}", dlc)), frame);
@@ -109,21 +111,22 @@ TEST(CandumpForm, ReadsRawDlcAboveEight) {
 // Nibble 1 is the bit-rate switch and 2 the error state; 4 says FD once more, or not in old logs.
 TEST(CandumpForm, ReadsFdFlagsWithAndWithoutTheFdfBit) {
   for (unsigned nibble = 0; nibble < 16; ++nibble) {
-    unsigned flags = kFd;
-    if ((nibble & 1U) != 0) flags |= kBitRateSwitch;
-    if ((nibble & 2U) != 0) flags |= kErrorStateIndicator;
+    unsigned flags = can::kFd;
+    if ((nibble & 1U) != 0) flags |= can::kBitRateSwitch;
+    if ((nibble & 2U) != 0) flags |= can::kErrorStateIndicator;
     EXPECT_EQ(frame_in(fmt::format("123##{:X}AABB", nibble)),
               expected_frame(0x123, flags, {0xAA, 0xBB}));
   }
-  EXPECT_EQ(frame_in("12345678##5"), expected_frame(0x12345678, kExtended | kFd | kBitRateSwitch));
+  EXPECT_EQ(frame_in("12345678##5"),
+            expected_frame(0x12345678, can::kExtended | can::kFd | can::kBitRateSwitch));
 }
 
 // An FD frame holds up to 64 bytes; every length up to there is taken, none is padded.
 TEST(CandumpForm, ReadsFdPayloadsOfEveryLength) {
   std::string text = "123##0";
   std::vector<std::uint8_t> bytes;
-  for (unsigned i = 0; i <= kFdBytesMax; ++i) {
-    EXPECT_EQ(frame_in(text), expected_frame(0x123, kFd, bytes)) << i;
+  for (unsigned i = 0; i <= can::kFdBytesMax; ++i) {
+    EXPECT_EQ(frame_in(text), expected_frame(0x123, can::kFd, bytes)) << i;
     bytes.push_back(static_cast<std::uint8_t>(0xC0 + i));
     text += fmt::format("{:02X}", bytes.back());
   }
@@ -143,7 +146,7 @@ TEST(CandumpForm, ReadsXlFrames) {
   xl.length = 5;
   xl.data = {0x11, 0x22, 0x33, 0x44, 0xAA};
   EXPECT_EQ(parsed.xl, xl);
-  EXPECT_EQ(parsed.record.frame, Frame{});
+  EXPECT_EQ(parsed.record.frame, can::Frame{});
   EXPECT_EQ(parse("(1.0) can0 007FF#FF:EE:FFFFFFFF#").xl.sdt, 0xEE);
 }
 
@@ -308,4 +311,4 @@ TEST(CandumpForm, TakesNulBytesForDamage) {
 }
 
 }  // namespace
-}  // namespace vgyro::can
+}  // namespace vgyro::canlog

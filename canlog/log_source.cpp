@@ -1,4 +1,4 @@
-#include "can/log_source.h"
+#include "canlog/log_source.h"
 
 #include <algorithm>
 #include <cerrno>
@@ -10,7 +10,7 @@
 
 #include <fmt/core.h>
 
-namespace vgyro::can {
+namespace vgyro::canlog {
 
 LogSource::LogSource() : buffer_(std::make_unique<char[]>(kBufferBytes)) {}
 
@@ -177,7 +177,7 @@ class TextSource : public LogSource {
 
 }  // namespace
 
-Expected<std::unique_ptr<LogSource>> open_log(const std::string& path) {
+Expected<std::unique_ptr<LogSource>> open_source(const std::string& path) {
   if (path == "-") {
     // Fewer turns between the writer and this process; a file or a terminal has no such size.
     ::fcntl(STDIN_FILENO, F_SETPIPE_SZ, static_cast<int>(LogSource::kBufferBytes));
@@ -204,4 +204,4 @@ std::unique_ptr<LogSource> log_from_text(std::string text, std::size_t chunk) {
   return std::make_unique<TextSource>(std::move(text), chunk);
 }
 
-}  // namespace vgyro::can
+}  // namespace vgyro::canlog

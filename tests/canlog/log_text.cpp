@@ -1,4 +1,4 @@
-#include "tests/can/log_text.h"
+#include "tests/canlog/log_text.h"
 
 #include <algorithm>
 #include <tuple>
@@ -6,7 +6,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-namespace vgyro::can {
+namespace vgyro::canlog {
 
 bool operator==(const XlFrame& a, const XlFrame& b) {
   return std::tie(a.priority, a.vcid, a.flags, a.sdt, a.acceptance, a.length) ==
@@ -21,7 +21,7 @@ bool operator==(const ReadRecord& a, const ReadRecord& b) {
 }
 
 std::ostream& operator<<(std::ostream& out, const ReadRecord& record) {
-  const Frame& frame = record.frame;
+  const can::Frame& frame = record.frame;
   const bool is_xl = !record.xl.empty();
   const auto* data = is_xl ? record.xl[0].data.data() : frame.data.data();
   const std::size_t length = is_xl ? record.xl[0].length : frame.length;
@@ -38,7 +38,7 @@ ReadRecord with_name(const LogRecord& record, const InterfaceTable& interfaces, 
           interfaces.name(record.bus),
           record.fraction_digits,
           record.direction,
-          record.is_xl ? Frame{} : record.frame,
+          record.is_xl ? can::Frame{} : record.frame,
           record.is_xl ? std::vector<XlFrame>{xl} : std::vector<XlFrame>{}};
 }
 
@@ -46,7 +46,7 @@ ReadRecord with_name(const LogRecord& record, const InterfaceTable& interfaces, 
 
 ReadLog read_all(std::unique_ptr<LogSource> source) {
   ReadLog log;
-  LogReader reader(std::move(source));
+  CandumpReader reader(std::move(source));
   LogRecord record;
   while (reader.next(record))
     log.records.push_back(with_name(record, reader.interfaces(), reader.xl()));
@@ -104,36 +104,37 @@ std::string told(const LogCounts& counts) {
                      fmt::join(malformed(counts), "; "));
 }
 
-Frame random_frame(std::mt19937_64& random) {
-  Frame frame;
+can::Frame random_frame(std::mt19937_64& random) {
+  can::Frame frame;
   const auto below = [&random](std::size_t n) { return static_cast<unsigned>(random() % n); };
   const unsigned kind = below(8);
   const bool extended = below(2) == 1;
-  frame.id = static_cast<std::uint32_t>(random()) & (extended ? kExtendedIdMax : kStandardIdMax);
-  frame.flags = extended ? kExtended : 0;
+  frame.id =
+      static_cast<std::uint32_t>(random()) & (extended ? can::kExtendedIdMax : can::kStandardIdMax);
+  frame.flags = extended ? can::kExtended : 0;
   frame.length = static_cast<std::uint8_t>(below(3) == 0 ? below(9) : 8);
-  if (kind == 0) frame.flags |= kRemote;
+  if (kind == 0) frame.flags |= can::kRemote;
   if (kind == 1) {
-    frame.id = static_cast<std::uint32_t>(random()) & kExtendedIdMax;
-    frame.flags = kError;
+    frame.id = static_cast<std::uint32_t>(random()) & can::kExtendedIdMax;
+    frame.flags = can::kError;
   }
   if (kind == 2 || kind == 3) {
-    frame.flags |= kFd;
-    if (below(2) == 1) frame.flags |= kBitRateSwitch;
-    if (below(2) == 1) frame.flags |= kErrorStateIndicator;
-    frame.length = static_cast<std::uint8_t>(fd_padded_length(below(65)));
+    frame.flags |= can::kFd;
+    if (below(2) == 1) frame.flags |= can::kBitRateSwitch;
+    if (below(2) == 1) frame.flags |= can::kErrorStateIndicator;
+    frame.length = static_cast<std::uint8_t>(can::fd_padded_length(below(65)));
   }
   if ((kind < 2 || kind == 4) && frame.length == 8 && below(2) == 1) {
     frame.raw_dlc = static_cast<std::uint8_t>(9 + below(7));
   }
-  for (std::size_t i = 0; i < frame.length && !frame.has(kRemote); ++i)
+  for (std::size_t i = 0; i < frame.length && !frame.has(can::kRemote); ++i)
     frame.data[i] = static_cast<std::uint8_t>(random());
   return frame;
 }
 
 XlFrame random_xl_frame(std::mt19937_64& random) {
   XlFrame xl;
-  xl.priority = random() & kStandardIdMax;
+  xl.priority = random() & can::kStandardIdMax;
   xl.vcid = static_cast<std::uint8_t>(random());
   xl.flags = static_cast<std::uint8_t>(random());
   xl.sdt = static_cast<std::uint8_t>(random());
@@ -144,4 +145,4 @@ XlFrame random_xl_frame(std::mt19937_64& random) {
   return xl;
 }
 
-}  // namespace vgyro::can
+}  // namespace vgyro::canlog

@@ -1,4 +1,4 @@
-#include "can/candump.h"
+#include "canlog/candump.h"
 
 #include <algorithm>
 #include <bit>
@@ -10,7 +10,7 @@
 
 #include <fmt/format.h>
 
-namespace vgyro::can {
+namespace vgyro::canlog {
 
 namespace {
 
@@ -182,18 +182,18 @@ const char* parse_stamp(Cursor& at, LogRecord& record) {
   return nullptr;
 }
 
-const char* set_id(std::string_view digits, Frame& frame) {
+const char* set_id(std::string_view digits, can::Frame& frame) {
   const std::uint32_t value = hex_number(digits);
   if (digits.size() == 3) {
-    if (value > kStandardIdMax) return "identifier: above 7FF needs 8 digits";
+    if (value > can::kStandardIdMax) return "identifier: above 7FF needs 8 digits";
     frame.id = value;
     return nullptr;
   }
   if (digits.size() != 8) return "identifier: neither 3 nor 8 hex digits";
   constexpr std::uint32_t kErrorBit = 0x20000000U;
-  if ((value & ~(kErrorBit | kExtendedIdMax)) != 0) return "identifier: above 1FFFFFFF";
-  frame.id = value & kExtendedIdMax;
-  frame.flags = (value & kErrorBit) != 0 ? kError : kExtended;
+  if ((value & ~(kErrorBit | can::kExtendedIdMax)) != 0) return "identifier: above 1FFFFFFF";
+  frame.id = value & can::kExtendedIdMax;
+  frame.flags = (value & kErrorBit) != 0 ? can::kError : can::kExtended;
   return nullptr;
 }
 
@@ -213,18 +213,18 @@ const char* parse_bytes(Cursor& at, std::uint8_t* out, std::size_t bytes_max, st
   }
 }
 
-const char* parse_raw_dlc(Cursor& at, Frame& frame) {
+const char* parse_raw_dlc(Cursor& at, can::Frame& frame) {
   if (!at.skip('_')) return nullptr;
   const int dlc = hex_value(at.peek());
   if (at.at_end() || dlc < 9) return "raw DLC: \"_\" needs 9 to F behind it";
   at.skip(at.peek());
-  if (frame.length != kClassicBytesMax) return "raw DLC: only with 8 bytes";
+  if (frame.length != can::kClassicBytesMax) return "raw DLC: only with 8 bytes";
   frame.raw_dlc = static_cast<std::uint8_t>(dlc);
   return nullptr;
 }
 
-const char* parse_remote(Cursor& at, Frame& frame) {
-  frame.flags |= kRemote;
+const char* parse_remote(Cursor& at, can::Frame& frame) {
+  frame.flags |= can::kRemote;
   if (is_digit(at.peek())) {
     if (at.peek() > '8') return "remote frame: length above 8";
     frame.length = static_cast<std::uint8_t>(at.peek() - '0');
@@ -233,25 +233,25 @@ const char* parse_remote(Cursor& at, Frame& frame) {
   return parse_raw_dlc(at, frame);
 }
 
-const char* parse_classic(Cursor& at, Frame& frame) {
+const char* parse_classic(Cursor& at, can::Frame& frame) {
   if (at.skip('R') || at.skip('r')) return parse_remote(at, frame);
   std::size_t count = 0;
-  const char* why = parse_bytes(at, frame.data.data(), kClassicBytesMax, count);
+  const char* why = parse_bytes(at, frame.data.data(), can::kClassicBytesMax, count);
   frame.length = static_cast<std::uint8_t>(count);
   return why != nullptr ? why : parse_raw_dlc(at, frame);
 }
 
-const char* parse_fd(Cursor& at, Frame& frame) {
+const char* parse_fd(Cursor& at, can::Frame& frame) {
   constexpr int kBrsNibble = 1;
   constexpr int kEsiNibble = 2;
   const int nibble = hex_value(at.peek());
   if (at.at_end() || nibble < 0) return "FD frame: no flags behind \"##\"";
   at.skip(at.peek());
-  frame.flags |= kFd;
-  if ((nibble & kBrsNibble) != 0) frame.flags |= kBitRateSwitch;
-  if ((nibble & kEsiNibble) != 0) frame.flags |= kErrorStateIndicator;
+  frame.flags |= can::kFd;
+  if ((nibble & kBrsNibble) != 0) frame.flags |= can::kBitRateSwitch;
+  if ((nibble & kEsiNibble) != 0) frame.flags |= can::kErrorStateIndicator;
   std::size_t count = 0;
-  const char* why = parse_bytes(at, frame.data.data(), kFdBytesMax, count);
+  const char* why = parse_bytes(at, frame.data.data(), can::kFdBytesMax, count);
   frame.length = static_cast<std::uint8_t>(count);
   return why;
 }
@@ -267,7 +267,7 @@ const char* parse_xl(std::string_view id, Cursor& at, XlFrame& xl) {
     return "XL frame: not VVPPP#FF:SS:AAAAAAAA#";
   xl.vcid = static_cast<std::uint8_t>(hex_number(id.substr(0, 2)));
   xl.priority = static_cast<std::uint16_t>(hex_number(id.substr(2)));
-  if (xl.priority > kStandardIdMax) return "XL frame: priority above 7FF";
+  if (xl.priority > can::kStandardIdMax) return "XL frame: priority above 7FF";
   xl.flags = static_cast<std::uint8_t>(hex_number(flags));
   xl.sdt = static_cast<std::uint8_t>(hex_number(sdt));
   xl.acceptance = hex_number(acceptance);
@@ -278,7 +278,7 @@ const char* parse_xl(std::string_view id, Cursor& at, XlFrame& xl) {
 }
 
 const char* parse_frame_text(Cursor& at, LogRecord& record, XlFrame& xl) {
-  Frame& frame = record.frame;
+  can::Frame& frame = record.frame;
   frame.flags = 0;
   frame.length = 0;
   frame.raw_dlc = 0;
@@ -307,12 +307,12 @@ const char* parse_direction(Cursor& at, LogRecord& record) {
 
 }  // namespace
 
-std::optional<BusIndex> InterfaceTable::index_of(std::string_view name) {
+std::optional<can::BusIndex> InterfaceTable::index_of(std::string_view name) {
   const auto found = std::find(names_.begin(), names_.end(), name);
-  if (found != names_.end()) return static_cast<BusIndex>(found - names_.begin());
+  if (found != names_.end()) return static_cast<can::BusIndex>(found - names_.begin());
   if (names_.size() == kMax) return std::nullopt;
   names_.emplace_back(name);
-  return static_cast<BusIndex>(names_.size() - 1);
+  return static_cast<can::BusIndex>(names_.size() - 1);
 }
 
 LineResult parse_line(std::string_view line, InterfaceTable& interfaces, LogRecord& record,
@@ -337,17 +337,23 @@ LineResult parse_line(std::string_view line, InterfaceTable& interfaces, LogReco
   return {record.is_xl ? LineKind::kXl : LineKind::kFrame, ""};
 }
 
-LogReader::LogReader(std::unique_ptr<LogSource> source)
-    : source_(std::move(source)), xl_(std::make_unique<XlFrame>()) {}
+CandumpReader::CandumpReader(std::unique_ptr<LogSource> source)
+    : source_(std::move(source)),
+      xl_(std::make_unique<XlFrame>()),
+      bytes_total_(source_->bytes_total()) {}
 
-const LogReader::KnownInterface* LogReader::known_interface(std::uint64_t word) const {
+void CandumpReader::before_wait(std::function<void()> callback) {
+  if (source_ != nullptr) source_->before_wait(std::move(callback));
+}
+
+const CandumpReader::KnownInterface* CandumpReader::known_interface(std::uint64_t word) const {
   for (std::size_t i = 0; i < known_count_; ++i) {
     if ((word & known_[i].mask) == known_[i].word) return &known_[i];
   }
   return nullptr;
 }
 
-void LogReader::remember_interface(BusIndex bus) {
+void CandumpReader::remember_interface(can::BusIndex bus) {
   const std::string& name = interfaces_.name(bus);
   // Only the first few names of up to seven characters take the quick way.
   if (known_count_ == known_.size() || name.size() > 7) return;
@@ -364,7 +370,7 @@ void LogReader::remember_interface(BusIndex bus) {
 // "(SSSSSSSSSS.FFFFFF) IFACE ID#HEX\n" as candump writes it nearly always. Returns the start of
 // the next line, or null where the line is of another form, which is for parse_line() to judge.
 // Precondition: kLookaheadBytes are readable at `p`.
-const char* LogReader::parse_usual(const char* p, LogRecord& record) {
+const char* CandumpReader::parse_usual(const char* p, LogRecord& record) {
   if constexpr (std::endian::native != std::endian::little) return nullptr;
   if (p[0] != '(' || p[11] != '.' || p[18] != ')' || p[19] != ' ') return nullptr;
   const std::uint64_t high = load_word(p + 1);
@@ -382,7 +388,7 @@ const char* LogReader::parse_usual(const char* p, LogRecord& record) {
   const KnownInterface* known = known_interface(load_word(p + 20));
   if (!all_digits(fraction) || known == nullptr) return nullptr;
 
-  Frame& frame = record.frame;
+  can::Frame& frame = record.frame;
   p += 20 + known->length;
   if (p[3] == '#') {
     const int a = hex_value(p[0]);
@@ -398,7 +404,7 @@ const char* LogReader::parse_usual(const char* p, LogRecord& record) {
     frame.id = static_cast<std::uint32_t>(bytes[0]) << 24U |
                static_cast<std::uint32_t>(bytes[1]) << 16U |
                static_cast<std::uint32_t>(bytes[2]) << 8U | bytes[3];
-    frame.flags = kExtended;
+    frame.flags = can::kExtended;
     p += 9;
   } else {
     return nullptr;
@@ -416,17 +422,18 @@ const char* LogReader::parse_usual(const char* p, LogRecord& record) {
   return p + digits + 1;
 }
 
-void LogReader::count_malformed(const char* why) {
+void CandumpReader::count_malformed(const char* why) {
   ++counts_.malformed_lines;
   if (counts_.first_malformed.size() < LogCounts::kFirstMalformedMax) {
     counts_.first_malformed.push_back({counts_.lines, why});
   }
 }
 
-bool LogReader::refill() {
+bool CandumpReader::refill() {
   while (at_ == end_) {
     if (source_ == nullptr) return false;
     const auto block = source_->next();
+    bytes_read_ = source_->bytes_read();
     if (!block) {
       error_ = block.error();
       source_.reset();
@@ -448,7 +455,7 @@ bool LogReader::refill() {
   return true;
 }
 
-bool LogReader::next(LogRecord& record) {
+bool CandumpReader::next(LogRecord& record) {
   while (true) {
     if (at_ == end_ && !refill()) return false;
     ++counts_.lines;
@@ -466,7 +473,7 @@ bool LogReader::next(LogRecord& record) {
     const std::size_t interfaces_before = interfaces_.names().size();
     const LineResult result = parse_line(line, interfaces_, record, *xl_);
     if (interfaces_.names().size() > interfaces_before) {
-      remember_interface(static_cast<BusIndex>(interfaces_before));
+      remember_interface(static_cast<can::BusIndex>(interfaces_before));
     }
     switch (result.kind) {
       case LineKind::kFrame:
@@ -567,36 +574,36 @@ char* put_direction(char* out, Direction direction) {
   return out;
 }
 
-char* put_frame(char* out, const Frame& frame) {
+char* put_frame(char* out, const can::Frame& frame) {
   constexpr std::uint32_t kErrorBit = 0x20000000U;
-  if (frame.has(kError)) {
+  if (frame.has(can::kError)) {
     out = put_hex(out, frame.id | kErrorBit, 8);
   } else {
-    out = put_hex(out, frame.id, frame.has(kExtended) ? 8 : 3);
+    out = put_hex(out, frame.id, frame.has(can::kExtended) ? 8 : 3);
   }
   *out++ = '#';
-  if (frame.has(kFd)) {
+  if (frame.has(can::kFd)) {
     *out++ = '#';
-    const unsigned nibble =
-        (frame.has(kBitRateSwitch) ? 1U : 0U) | (frame.has(kErrorStateIndicator) ? 2U : 0U);
+    const unsigned nibble = (frame.has(can::kBitRateSwitch) ? 1U : 0U) |
+                            (frame.has(can::kErrorStateIndicator) ? 2U : 0U);
     out = put_hex(out, nibble, 1);
-    return put_bytes(out, frame.data.data(), std::min<std::size_t>(frame.length, kFdBytesMax));
+    return put_bytes(out, frame.data.data(), std::min<std::size_t>(frame.length, can::kFdBytesMax));
   }
-  const std::size_t length = std::min<std::size_t>(frame.length, kClassicBytesMax);
-  if (length == kClassicBytesMax && (frame.flags & kRemote) == 0 && frame.raw_dlc == 0) {
+  const std::size_t length = std::min<std::size_t>(frame.length, can::kClassicBytesMax);
+  if (length == can::kClassicBytesMax && (frame.flags & can::kRemote) == 0 && frame.raw_dlc == 0) {
 #if defined(__SSE2__)
     return put_bytes8(out, frame.data.data());
 #else
-    return put_bytes(out, frame.data.data(), kClassicBytesMax);
+    return put_bytes(out, frame.data.data(), can::kClassicBytesMax);
 #endif
   }
-  if (frame.has(kRemote)) {
+  if (frame.has(can::kRemote)) {
     *out++ = 'R';
     if (length > 0) *out++ = static_cast<char>('0' + length);
   } else {
     out = put_bytes(out, frame.data.data(), length);
   }
-  if (frame.raw_dlc > 8 && length == kClassicBytesMax) {
+  if (frame.raw_dlc > 8 && length == can::kClassicBytesMax) {
     *out++ = '_';
     out = put_hex(out, frame.raw_dlc, 1);
   }
@@ -605,15 +612,15 @@ char* put_frame(char* out, const Frame& frame) {
 
 }  // namespace
 
-std::size_t format_line(char* out, TimePoint stamp, std::string_view interface, const Frame& frame,
-                        unsigned fraction_digits, Direction direction) {
+std::size_t format_line(char* out, TimePoint stamp, std::string_view interface,
+                        const can::Frame& frame, unsigned fraction_digits, Direction direction) {
   char* at = put_prefix(out, stamp, interface, fraction_digits);
   at = put_frame(at, frame);
   at = put_direction(at, direction);
   return static_cast<std::size_t>(at - out);
 }
 
-std::size_t LineFormatter::format(char* out, TimePoint stamp, const Frame& frame,
+std::size_t LineFormatter::format(char* out, TimePoint stamp, const can::Frame& frame,
                                   unsigned fraction_digits) {
   const std::int64_t ns = std::max<std::int64_t>(to_ns(stamp), 0);
   if (second_ns_ < 0 || ns < second_ns_ || ns - second_ns_ >= kSecond_ns) {
@@ -640,4 +647,4 @@ std::string format_xl_line(TimePoint stamp, std::string_view interface, const Xl
   return text;
 }
 
-}  // namespace vgyro::can
+}  // namespace vgyro::canlog

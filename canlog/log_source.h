@@ -11,7 +11,7 @@
 
 #include "base/error.h"
 
-namespace vgyro::can {
+namespace vgyro::canlog {
 
 struct LogBlock {
   std::string_view text;  ///< whole lines, each with its newline; valid until the next call
@@ -48,9 +48,9 @@ class LogSource {
 };
 
 /// "-" is standard input; a name ending in ".xz" is unpacked.
-Expected<std::unique_ptr<LogSource>> open_log(const std::string& path);
+Expected<std::unique_ptr<LogSource>> open_source(const std::string& path);
 
 /// Text in memory, for tests; `chunk` bytes at a time.
 std::unique_ptr<LogSource> log_from_text(std::string text, std::size_t chunk = SIZE_MAX);
 
-}  // namespace vgyro::can
+}  // namespace vgyro::canlog

@@ -1,0 +1,42 @@
+#pragma once
+
+// A log of any form → its records, one after the other. What cannot be read is counted with its
+// cause and place, and never stops the reading.
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "base/error.h"
+#include "canlog/record.h"
+
+namespace vgyro::canlog {
+
+class LogReader {
+ public:
+  LogReader() = default;
+  LogReader(const LogReader&) = delete;
+  LogReader& operator=(const LogReader&) = delete;
+  virtual ~LogReader() = default;
+
+  /// False at the end of the log, or where it can be read no further: see error().
+  virtual bool next(LogRecord& record) = 0;
+
+  [[nodiscard]] virtual const LogCounts& counts() const = 0;
+  [[nodiscard]] virtual const InterfaceTable& interfaces() const = 0;
+  [[nodiscard]] virtual const std::optional<Error>& error() const = 0;
+
+  /// Bytes taken in so far and in total, of the packed file where it is packed; 0 when unknown.
+  [[nodiscard]] virtual std::uint64_t bytes_read() const = 0;
+  [[nodiscard]] virtual std::uint64_t bytes_total() const = 0;
+
+  /// Called before bytes are fetched, which may wait for a live source: the moment to flush output.
+  virtual void before_wait(std::function<void()> callback) = 0;
+};
+
+/// By the log's content, not by its name; "-" is standard input.
+Expected<std::unique_ptr<LogReader>> open_log(const std::string& path);
+
+}  // namespace vgyro::canlog

@@ -1,0 +1,71 @@
+#pragma once
+
+// What every form of log is read into: a frame, when it was on which bus, and what was counted on
+// the way.
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "base/time.h"
+#include "can/frame.h"
+
+namespace vgyro::canlog {
+
+inline constexpr std::size_t kXlBytesMax = 2048;
+
+/// CAN XL: read and written so that no log loses lines; nothing in the product uses it.
+struct XlFrame {
+  std::uint16_t priority = 0;  ///< 11 bits
+  std::uint8_t vcid = 0;
+  std::uint8_t flags = 0;
+  std::uint8_t sdt = 0;
+  std::uint32_t acceptance = 0;
+  std::uint16_t length = 0;
+  std::array<std::uint8_t, kXlBytesMax> data{};
+};
+
+enum class Direction : std::uint8_t { kUnknown, kReceived, kTransmitted };
+
+struct LogRecord {
+  TimePoint stamp;
+  can::BusIndex bus = 0;             ///< into InterfaceTable
+  std::uint8_t fraction_digits = 6;  ///< as the log had them: 6 or 9 as a rule
+  Direction direction = Direction::kUnknown;
+  bool is_xl = false;  ///< then `frame` is empty and CandumpReader::xl() holds the frame
+  can::Frame frame;
+};
+
+/// The interface names of a log, in order of appearance. Bounded.
+class InterfaceTable {
+ public:
+  static constexpr std::size_t kMax = 64;
+  /// Adds the name when new; nothing when the table is full.
+  std::optional<can::BusIndex> index_of(std::string_view name);
+  [[nodiscard]] const std::string& name(can::BusIndex bus) const { return names_[bus]; }
+  [[nodiscard]] const std::vector<std::string>& names() const { return names_; }
+
+ private:
+  std::vector<std::string> names_;
+};
+
+struct MalformedLine {
+  std::uint64_t line = 0;  ///< 1-based
+  std::string why;
+};
+
+struct LogCounts {
+  std::uint64_t lines = 0;
+  std::uint64_t frames = 0;
+  std::uint64_t xl_frames = 0;
+  std::uint64_t other_lines = 0;
+  std::uint64_t malformed_lines = 0;
+  std::uint64_t cut_off_lines = 0;  ///< the log ends inside a line: its frame is not used
+  std::vector<MalformedLine> first_malformed;  ///< at most kFirstMalformedMax
+  static constexpr std::size_t kFirstMalformedMax = 5;
+};
+
+}  // namespace vgyro::canlog
