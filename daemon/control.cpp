@@ -150,6 +150,7 @@ int append_counters(sd_bus_message* reply, const Snapshot& now) {
       {"stops_open", status.stops_open},
       {"estimate_restarts", status.estimate_restarts},
       {"disagreements", status.disagreements},
+      {"contradictions", status.contradictions},
       {"calibration_restarts", status.calibration_restarts},
       {"clock_steps", status.clock_steps},
       {"reference_rejected", status.reference_rejected},
@@ -232,6 +233,16 @@ constexpr Property kProperties[] = {
      }},
     {"Disagree",
      [](sd_bus_message* m, const Snapshot& now) { return append_flag(m, now.status.disagree); }},
+    {"Contradiction",
+     [](sd_bus_message* m, const Snapshot& now) {
+       return append_text(m, gateway::to_string(now.status.pair.contradiction));
+     }},
+    {"ContradictionText",
+     [](sd_bus_message* m, const Snapshot& now) {
+       return append_text(
+           m, gateway::contradiction_text(now.status.pair,
+                                          {now.plan->gyros[0].name, now.plan->gyros[1].name}));
+     }},
     {"Ambiguous",
      [](sd_bus_message* m, const Snapshot& now) { return append_flag(m, now.status.ambiguous); }},
     {"RatesTooFarApart",
@@ -271,6 +282,8 @@ const sd_bus_vtable Control::kInterface[] = {
     SD_BUS_PROPERTY("Restored", "s", on_get, 0, SD_BUS_VTABLE_PROPERTY_EMITS_CHANGE),
     SD_BUS_PROPERTY("Valid", "b", on_get, 0, SD_BUS_VTABLE_PROPERTY_EMITS_CHANGE),
     SD_BUS_PROPERTY("Disagree", "b", on_get, 0, SD_BUS_VTABLE_PROPERTY_EMITS_CHANGE),
+    SD_BUS_PROPERTY("Contradiction", "s", on_get, 0, SD_BUS_VTABLE_PROPERTY_EMITS_CHANGE),
+    SD_BUS_PROPERTY("ContradictionText", "s", on_get, 0, SD_BUS_VTABLE_PROPERTY_EMITS_CHANGE),
     SD_BUS_PROPERTY("Ambiguous", "b", on_get, 0, SD_BUS_VTABLE_PROPERTY_EMITS_CHANGE),
     SD_BUS_PROPERTY("RatesTooFarApart", "b", on_get, 0, SD_BUS_VTABLE_PROPERTY_EMITS_CHANGE),
     SD_BUS_PROPERTY("Hypotheses", "a{sd}", on_get, 0, SD_BUS_VTABLE_PROPERTY_EMITS_CHANGE),
@@ -357,10 +370,10 @@ void Control::second_passed() {
 void Control::tell_changes() {
   std::uint64_t queued = 0;
   if (sd_bus_get_n_queued_write(bus_, &queued) < 0 || queued > kQueuedMost) return;
-  sd_bus_emit_properties_changed(bus_, kPath, kName, "State", "Quality", "Restored", "Valid",
-                                 "Disagree", "Ambiguous", "RatesTooFarApart", "Hypotheses",
-                                 "RateDps", "SigmaDps", "BiasSigmaDps", "CalibratedS",
-                                 "ConfigRefused", "Gyros", "Buses", "Counters", nullptr);
+  sd_bus_emit_properties_changed(
+      bus_, kPath, kName, "State", "Quality", "Restored", "Valid", "Disagree", "Contradiction",
+      "ContradictionText", "Ambiguous", "RatesTooFarApart", "Hypotheses", "RateDps", "SigmaDps",
+      "BiasSigmaDps", "CalibratedS", "ConfigRefused", "Gyros", "Buses", "Counters", nullptr);
 }
 
 int Control::on_get(sd_bus*, const char*, const char*, const char* property, sd_bus_message* reply,

@@ -79,6 +79,13 @@ void add_rate(Text& text, const Snapshot& now) {
   text.sample({}, status.bias_sigma_dps);
   text.family("vgyro_gyros_disagree", "gauge", "1 while the gyros contradict each other.");
   text.sample({}, status.disagree);
+  text.family("vgyro_pair_contradicted", "gauge",
+              "1 while the gyros cannot be of one platform, by why; no rate is valid then.");
+  for (std::size_t i = 1; i < fusion::kContradictions; ++i) {
+    const auto contradiction = static_cast<fusion::Contradiction>(i);
+    text.sample({{"why", gateway::to_string(contradiction)}},
+                status.pair.contradiction == contradiction);
+  }
   text.family("vgyro_ambiguous", "gauge",
               "1 while the data can be read in two ways; sigma spans both.");
   text.sample({}, status.ambiguous);

@@ -147,6 +147,18 @@ void Reporter::fault_changed(std::size_t gyro, const gateway::Status& status) {
   }
 }
 
+void Reporter::contradiction_changed(const gateway::Status& status) {
+  contradiction_ = status.pair.contradiction;
+  disagree_ = status.disagree;  // it is of one piece with this
+  if (!health_lines_.take()) return;
+  if (contradiction_ == fusion::Contradiction::kNone) {
+    log_.notice("the gyros move together again as two of one platform do");
+    return;
+  }
+  log_.tell(Severity::kError, {.cause = gateway::to_string(contradiction_)}, "{}; {}",
+            gateway::contradiction_text(status.pair, names_), gateway::contradiction_advice());
+}
+
 void Reporter::disagreement_changed(const gateway::Status& status) {
   disagree_ = status.disagree;
   if (!health_lines_.take()) return;
@@ -196,6 +208,10 @@ std::string Reporter::second_passed(const gateway::Status& status, const Traffic
   }
   if (status.restored == gateway::Restored::kTakenUp) {
     doing += fmt::format(", on biases of {} before the start", age_text(status.restored_age_s));
+  }
+  if (const std::string contradiction = gateway::contradiction_text(status.pair, names_);
+      !contradiction.empty()) {
+    doing += ": " + contradiction;
   }
   if (status.ambiguous) {
     const std::string seems = gateway::hypotheses_text(status.probability, names_);

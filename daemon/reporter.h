@@ -45,6 +45,7 @@ class Reporter {
     if (status.state != state_) state_changed(status);
     if (status.gyros[0].fault != faults_[0]) fault_changed(0, status);
     if (status.gyros[1].fault != faults_[1]) fault_changed(1, status);
+    if (status.pair.contradiction != contradiction_) contradiction_changed(status);
     if (status.disagree != disagree_) disagreement_changed(status);
     if (status.ambiguous != ambiguous_) ambiguity_changed(status);
   }
@@ -75,6 +76,7 @@ class Reporter {
 
   void state_changed(const gateway::Status& status);
   void fault_changed(std::size_t gyro, const gateway::Status& status);
+  void contradiction_changed(const gateway::Status& status);
   void disagreement_changed(const gateway::Status& status);
   void ambiguity_changed(const gateway::Status& status);
   std::uint64_t news(Told& told, std::uint64_t count) const;
@@ -94,6 +96,7 @@ class Reporter {
   gateway::State state_ = gateway::State::kWaiting;
   LineBudget state_lines_;
   std::array<std::optional<gateway::Fault>, 2> faults_;
+  fusion::Contradiction contradiction_ = fusion::Contradiction::kNone;
   bool disagree_ = false;
   bool ambiguous_ = false;
   LineBudget health_lines_;

@@ -439,7 +439,9 @@ void PairRelation::decide() {
     if (erratic_blocks_[gyro] < (stands ? 1.0 : kErraticBlocks)) continue;
     now = {Contradiction::kErratic, log_odds_to_probability(kFound), kNone, kNone, 0.0, gyro};
   }
-  verdict_ = now;
+  const bool pair = evidence_ <= kEvidenceLeast;
+  if (pair || now.contradiction != Contradiction::kNone) earlier_ = {};
+  verdict_ = now.contradiction != Contradiction::kNone ? now : earlier_;
   if (contradicts() && !before) ++times_;
 }
 

@@ -63,6 +63,10 @@ class PairRelation {
     newest_s_ = t_s;
   }
 
+  /// Before the first pair: what was found in an earlier run. It stands until some blocks show a
+  /// pair, or something else is found.
+  void resume(const PairVerdict& verdict) { verdict_ = earlier_ = verdict; }
+
   [[nodiscard]] const PairVerdict& verdict() const { return verdict_; }
   [[nodiscard]] bool contradicts() const { return verdict_.contradiction != Contradiction::kNone; }
   /// Times that a contradiction began.
@@ -178,6 +182,7 @@ class PairRelation {
   std::array<double, 2> alone_{};  ///< log odds above the prior: this gyro moves by itself
   bool unrelated_ = false;         ///< both do, as it was found
   std::array<double, 2> erratic_blocks_{};
+  PairVerdict earlier_;  ///< of an earlier run, while it stands
   PairVerdict verdict_;
   std::uint64_t times_ = 0;
 };

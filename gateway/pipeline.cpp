@@ -260,7 +260,10 @@ void Pipeline::Impl::take_sample(std::size_t gyro, TimePoint t, double rate_dps)
 void Pipeline::Impl::take_pair(const fusion::AlignedPair& pair) {
   if (!estimator.begun()) estimator.begin(pair.t, pair.t - guard.offset());
   ++status.pairs;
-  if (attendance.hear_pair()) enter_state();
+  estimator.compare(pair);
+  const bool contradicted = estimator.contradicted();
+  if (attendance.hear_pair() || contradicted != (status.state == State::kContradicted))
+    enter_state();
   tell_estimator(pair.t);
   if (!estimator.calibrated()) {
     estimator.calibrate(pair);
@@ -269,7 +272,7 @@ void Pipeline::Impl::take_pair(const fusion::AlignedPair& pair) {
   // While one gyro was missing the other spoke alone, perhaps for later instants than this.
   if (pair.t <= newest) return;
   newest = pair.t;
-  const bool valid = estimator.calibrated();
+  const bool valid = estimator.calibrated() && !contradicted;
   fusion::VirtualRate rate;
   if (valid) {
     rate = estimator.update(pair);
@@ -282,8 +285,8 @@ void Pipeline::Impl::take_pair(const fusion::AlignedPair& pair) {
   // A silence came before the choice of who paces: what waited for it is no rate of now.
   const Duration age = pair.complete - pair.t;
   // What is known to come late does.
-  const bool too_late =
-      valid && age - known_effects.lag_most() > attendance.time_out(aligner.pacing_gyro());
+  const bool too_late = estimator.calibrated() &&
+                        age - known_effects.lag_most() > attendance.time_out(aligner.pacing_gyro());
   if (!too_late) publish(rate, valid, pair.t, age);
 }
 
@@ -291,7 +294,7 @@ void Pipeline::Impl::take_single(std::size_t gyro, TimePoint t, double rate_dps,
   if (t <= newest) return;
   newest = t;
   attendance.hear_alone(gyro);
-  bool valid = estimator.knows_gyros();
+  bool valid = estimator.knows_gyros() && !estimator.contradicted();
   fusion::VirtualRate rate;
   if (valid) {
     tell_estimator(t);
@@ -333,6 +336,7 @@ void Pipeline::Impl::note_condition(TimePoint t) {
 // --- states --------------------------------------------------------------------------------------
 
 State Pipeline::Impl::present_state() const {
+  if (attendance.pairing() && estimator.contradicted()) return State::kContradicted;
   if (!estimator.calibrated()) return attendance.pairing() ? State::kCalibrating : State::kWaiting;
   if (attendance.pairing()) return State::kRunning;
   if (!estimator.begun()) return State::kWaiting;

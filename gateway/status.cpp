@@ -5,8 +5,8 @@
 namespace vgyro::gateway {
 
 std::string_view to_string(State state) {
-  constexpr std::array<std::string_view, 5> kNames{"waiting", "calibrating", "running", "degraded",
-                                                   "lost"};
+  constexpr std::array<std::string_view, kStateCount> kNames{
+      "waiting", "calibrating", "running", "degraded", "lost", "contradicted"};
   return kNames[static_cast<std::size_t>(state)];
 }
 
@@ -50,6 +50,12 @@ std::string_view to_string(Fault fault) {
       "silent", "flagged_invalid", "unreadable", "counter_stuck", "saturated",
       "stuck",  "dead_band",       "noisy",      "blind"};
   return kNames[static_cast<std::size_t>(fault)];
+}
+
+std::string_view to_string(fusion::Contradiction contradiction) {
+  constexpr std::array<std::string_view, fusion::kContradictions> kNames{
+      "none", "sign", "scale", "lag", "unrelated", "erratic"};
+  return kNames[static_cast<std::size_t>(contradiction)];
 }
 
 std::string_view to_string(fusion::Hypothesis hypothesis) {

@@ -10,6 +10,7 @@
 
 #include "base/time.h"
 #include "fusion/corrector.h"
+#include "fusion/pair_relation.h"
 
 namespace vgyro::gateway {
 
@@ -19,9 +20,10 @@ enum class State : std::uint8_t {
   kCalibrating = 1,  ///< both heard, initial calibration not complete
   kRunning = 2,      ///< both gyros in use
   kDegraded = 3,     ///< one gyro in use, the other timed out or was set aside
-  kLost = 4          ///< calibrated, but no gyro is in use
+  kLost = 4,         ///< calibrated, but no gyro is in use
+  kContradicted = 5  ///< both gyros in use, but not of one platform, as they are configured
 };
-inline constexpr int kStateCount = 5;
+inline constexpr int kStateCount = 6;
 std::string_view to_string(State state);
 
 /// VG_Quality on the wire.
@@ -84,6 +86,9 @@ enum class Fault : std::uint8_t {
 inline constexpr std::size_t kFaultCount = 9;
 std::string_view to_string(Fault fault);
 
+/// "none", "sign", "scale", "lag", "unrelated", "erratic".
+std::string_view to_string(fusion::Contradiction contradiction);
+
 /// For people: "standing", "turning", …
 std::string_view to_string(fusion::Hypothesis hypothesis);
 
@@ -139,6 +144,8 @@ struct Status {
   double restored_bias_sigma_dps = 0.0;  ///< of what was taken off the rate at first
   bool disagree = false;                 ///< the gyros contradict each other
   std::uint64_t disagreements = 0;       ///< times that this began
+  fusion::PairVerdict pair;              ///< whether the gyros can be of one platform
+  std::uint64_t contradictions = 0;      ///< times that this was found not to be so
   std::uint64_t stops = 0;               ///< stops learned from
   std::uint64_t stops_refused = 0;       ///< steady, but a turn was likelier
   std::uint64_t stops_open = 0;          ///< steady, and it could not be told which

@@ -351,6 +351,24 @@ void warn_of_data(const ReplaySummary& summary, const gateway::Plan& plan) {
     warn({"estimate", gateway::restarts_text(status.estimate_restarts), ""});
 }
 
+// A pair that cannot be one is a mistake of the configuration: an error while it stands.
+std::optional<Error> explain_contradiction(const ReplaySummary& summary,
+                                           const gateway::Plan& plan) {
+  const gateway::Status& status = summary.status;
+  if (status.pair.contradiction != fusion::Contradiction::kNone) {
+    return Error{"gyros",
+                 gateway::contradiction_text(status.pair, {plan.gyros[0].name, plan.gyros[1].name}),
+                 gateway::contradiction_advice()};
+  }
+  if (status.contradictions > 0) {
+    warn({"gyros",
+          "for a while they did not move together as two gyros of one platform do, and no rate was "
+          "valid",
+          "--plot shows when"});
+  }
+  return std::nullopt;
+}
+
 // Two senders of one identifier: whoever reads VG_Rate would get both.
 void warn_of_other_senders(const ReplaySummary& summary, const gateway::Plan& plan) {
   const gateway::OutputPlan& output = plan.output;
@@ -437,6 +455,7 @@ int run_replay(const ReplayOptions& options) {
   warn_of_doubts(summary, plan);
   warn_of_data(summary, plan);
   warn_of_other_senders(summary, plan);
+  if (!trouble) trouble = explain_contradiction(summary, plan);
   if (trouble) return report(*trouble);
   return written;
 }

@@ -118,6 +118,18 @@ Json hypotheses_json(const gateway::Status& status) {
   return hypotheses;
 }
 
+// As the recording ended; `contradiction` is "none" where the two can be of one platform.
+Json pair_json(const gateway::Status& status) {
+  const fusion::PairVerdict& pair = status.pair;
+  const bool any = pair.contradiction != fusion::Contradiction::kNone;
+  return {{"contradiction", gateway::to_string(pair.contradiction)},
+          {"contradictions", status.contradictions},
+          {"probability", any ? number(pair.probability) : Json(nullptr)},
+          {"slope", any ? number(pair.slope) : Json(nullptr)},
+          {"slope_sigma", any ? number(pair.slope_sigma) : Json(nullptr)},
+          {"lag_s", any ? number(pair.lag_s) : Json(nullptr)}};
+}
+
 const gateway::GyroPlan* gyro_of(const gateway::Plan& plan, const std::string& interface,
                                  const IdCounts::Row& row) {
   for (const gateway::GyroPlan& gyro : plan.gyros) {
@@ -214,6 +226,7 @@ Json to_json(const ReplaySummary& summary, const gateway::Plan& plan) {
       {"estimate_restarts", status.estimate_restarts},
       {"rates_too_far_apart", status.rates_too_far_apart},
       {"disagreements", status.disagreements},
+      {"pair", pair_json(status)},
       {"calibration",
        {{"covered_s", status.calibrated_s},
         {"restarts", status.calibration_restarts},
@@ -272,6 +285,7 @@ void put_opinion(fmt::memory_buffer& text, const ReplaySummary& summary,
   const auto line = [&](const char* title, const std::string& words) {
     if (!words.empty()) fmt::format_to(to, "\n{:<13} {}", title, words);
   };
+  line("pair", gateway::contradiction_text(status.pair, names));
   line("stops", gateway::stretches_text(gateway::steady_stretches(status)));
   line("at the end", status.ambiguous ? gateway::ambiguity_text(status.probability, names)
                                       : gateway::hypotheses_text(status.probability, names));

@@ -133,7 +133,7 @@ std::vector<Cell> header(std::initializer_list<const char*> names) {
 
 Mood mood_of_state(const std::string& state) {
   if (state == "running") return Mood::kGood;
-  return state == "lost" ? Mood::kBad : Mood::kDoubtful;
+  return state == "lost" || state == "contradicted" ? Mood::kBad : Mood::kDoubtful;
 }
 
 std::string gyros_table(const Json& status, const Paint& paint) {
@@ -288,7 +288,11 @@ std::string head(const Json& status, const ViewOptions& options, const Paint& pa
   };
   remark(text_of(status, "restored") == "taken_up", Mood::kDoubtful,
          "on biases of an earlier run, which no stop has confirmed");
-  remark(flag_of(status, "disagree"), Mood::kBad,
+  const std::string contradiction = text_of(status, "contradiction_text");
+  const bool contradicted = !contradiction.empty() && contradiction != kNothing;
+  remark(contradicted, Mood::kBad,
+         (contradiction + "; " + gateway::contradiction_advice()).c_str());
+  remark(!contradicted && flag_of(status, "disagree"), Mood::kBad,
          "the gyros disagree; which one is wrong cannot be told");
   text += troubles(status, paint);
   remark(flag_of(status, "config_refused"), Mood::kBad,
