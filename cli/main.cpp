@@ -247,8 +247,8 @@ int run(int argc, char** argv) {
   // Frames are the main result; they give way only to a summary or a table that wants the same
   // place.
   const bool output_given = replay->count("--output") > 0;
-  const bool output_wanted = options.replay.json == "-" || options.replay.csv == "-";
-  if (!output_given && !output_wanted) options.replay.output = "-";
+  const bool stdout_taken = options.replay.json == "-" || options.replay.csv == "-";
+  if (!output_given && !stdout_taken) options.replay.output = "-";
   return run_replay(options.replay);
 }
 

@@ -3,6 +3,7 @@
 // A configuration after everything in it has been resolved: which bits of which frame on which bus
 // are which quantity. Built by gateway/config.h from files, or by tests by hand.
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <optional>
@@ -45,6 +46,10 @@ struct Quantity {
   double maximum = 0.0;
   std::string layout;  ///< for people: "32 bits from bit 0, Intel, signed, x 1e-06"
   double step = 0.0;   ///< between neighbouring values, in the product's unit; 0 for floats
+
+  /// The least and the greatest accepted value that the bits can hold, in the DBC's unit.
+  [[nodiscard]] double lowest() const { return std::max(minimum, codec.representable_min()); }
+  [[nodiscard]] double highest() const { return std::min(maximum, codec.representable_max()); }
 
   friend bool operator==(const Quantity&, const Quantity&) = default;
 };

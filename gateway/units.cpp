@@ -1,7 +1,11 @@
 #include "gateway/units.h"
 
+#include <algorithm>
 #include <cctype>
+#include <iterator>
 #include <numbers>
+
+#include <fmt/format.h>
 
 namespace vgyro::gateway {
 
@@ -99,22 +103,25 @@ std::string normalised(std::string_view unit) {
   return text;
 }
 
+std::optional<double> degrees_of(std::string_view angle) {
+  for (const Word& prefix : kPrefixes) {
+    if (!angle.starts_with(prefix.word)) continue;
+    const std::string_view word = angle.substr(prefix.word.size());
+    const auto* const found = std::find_if(std::begin(kAngles), std::end(kAngles),
+                                           [&](const Word& one) { return one.word == word; });
+    if (found != std::end(kAngles)) return prefix.size * found->size;
+  }
+  return std::nullopt;
+}
+
 // An angle by a time, in deg/s.
 std::optional<double> rate_unit(std::string_view unit) {
-  for (const Word& prefix : kPrefixes) {
-    for (const Word& angle : kAngles) {
-      for (const Word& time : kTimes) {
-        for (const Quotient& quotient : kQuotients) {
-          std::string_view rest = unit;
-          bool fits = true;
-          for (const std::string_view part :
-               {prefix.word, angle.word, quotient.between, time.word, quotient.behind}) {
-            fits = fits && rest.starts_with(part);
-            if (fits) rest.remove_prefix(part.size());
-          }
-          if (fits && rest.empty()) return prefix.size * angle.size / time.size;
-        }
-      }
+  for (const Quotient& quotient : kQuotients) {
+    for (const Word& time : kTimes) {
+      const std::string tail = fmt::format("{}{}{}", quotient.between, time.word, quotient.behind);
+      if (!unit.ends_with(tail)) continue;
+      const auto degrees = degrees_of(unit.substr(0, unit.size() - tail.size()));
+      if (degrees) return *degrees / time.size;
     }
   }
   return std::nullopt;
