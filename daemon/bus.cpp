@@ -146,8 +146,9 @@ void Bus::lose_interface() {
 void Bus::close_dead(const std::string& what_now) {
   tell(Severity::kWarning, "interface_lost", "{}: {}", name_, what_now);
   lost_before_ += socket_->drops();
-  // The batch lives in the socket.
+  // The batch lives in the socket, and nothing more can come from it.
   batch_ = {};
+  more_ = false;
   socket_.reset();
 }
 
