@@ -105,11 +105,12 @@ SignalResolver::SignalResolver(TomlReader& reader, DatabaseCache& cache,
   bus_ = required_bus(reader);
   const std::string dbc = reader.required_text("dbc", "bench.dbc");
   const std::string message = reader.required_text("message", "GYRO_A");
+  const auto codes = read_code_rules();
   if (bus_.empty() || dbc.empty() || message.empty()) return;
   bus_index_ = bus_index(buses, bus_);
   dbc_path_ = (std::filesystem::path(config_folder) / dbc).lexically_normal().string();
   find_message(message, cache);
-  read_code_rules();
+  if (message_ != nullptr) rules_ = codes.value_or(message_->codes);
 }
 
 void SignalResolver::find_message(std::string_view name, DatabaseCache& cache) {
@@ -123,18 +124,15 @@ void SignalResolver::find_message(std::string_view name, DatabaseCache& cache) {
   }
 }
 
-// What the DBC file says of its protocol, or the configuration.
-void SignalResolver::read_code_rules() {
-  if (message_ != nullptr) rules_ = message_->codes;
+std::optional<dbc::CodeRules> SignalResolver::read_code_rules() {
   const auto name = reader_.text("codes");
-  if (!name) return;
+  if (!name) return std::nullopt;
   const auto rules = dbc::code_rules_from(*name);
-  if (rules) {
-    rules_ = *rules;
-    return;
+  if (!rules) {
+    reader_.complain(reader_.where("codes"), fmt::format("codes is \"{}\"", *name),
+                     suggest_name(*name, {"j1939", "nmea2000", "none"}));
   }
-  reader_.complain(reader_.where("codes"), fmt::format("codes is \"{}\"", *name),
-                   suggest_name(*name, {"j1939", "nmea2000", "none"}));
+  return rules;
 }
 
 FrameMatch SignalResolver::match() const {
