@@ -58,7 +58,8 @@ GyroHealth::GyroHealth(const GyroPlan& plan) : watch_(limits_of(plan)) {}
 
 bool GyroHealth::tells_of_sensor(Reject cause) {
   return cause == Reject::kFlaggedInvalid || cause == Reject::kNotFinite ||
-         cause == Reject::kOutOfRange || cause == Reject::kCounterRepeated;
+         cause == Reject::kOutOfRange || cause == Reject::kNoMeasurement ||
+         cause == Reject::kCounterRepeated;
 }
 
 std::optional<Fault> GyroHealth::fault_in(fusion::SensorWatch::Finding finding,
