@@ -71,6 +71,7 @@ class Reporter {
   struct BusTold {
     std::array<Told, can::kErrorCauseCount> errors;
     Told lost;
+    Told restamped;
     Told foreign;
   };
 

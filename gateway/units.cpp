@@ -1,7 +1,11 @@
 #include "gateway/units.h"
 
+#include <algorithm>
 #include <cctype>
+#include <iterator>
 #include <numbers>
+
+#include <fmt/format.h>
 
 namespace vgyro::gateway {
 
@@ -18,35 +22,22 @@ constexpr double kStandardGravity = 9.80665;  // m/s², CGPM 1901
 constexpr double kMetrePerMile = 1609.344;
 
 constexpr Spelling kSpellings[] = {
-    {Dimension::kRate, "deg/s", {1.0}},
-    {Dimension::kRate, "°/s", {1.0}},
     {Dimension::kRate, "dps", {1.0}},
-    {Dimension::kRate, "deg/sec", {1.0}},
-    {Dimension::kRate, "°/sec", {1.0}},
-    {Dimension::kRate, "degree/s", {1.0}},
-    {Dimension::kRate, "degrees/s", {1.0}},
-    {Dimension::kRate, "degree/sec", {1.0}},
-    {Dimension::kRate, "degrees/sec", {1.0}},
-    {Dimension::kRate, "degree/second", {1.0}},
-    {Dimension::kRate, "degrees/second", {1.0}},
-    {Dimension::kRate, "grad/s", {1.0}},  // German "Grad" is a degree
-    {Dimension::kRate, "mdeg/s", {1e-3}},
     {Dimension::kRate, "mdps", {1e-3}},
-    {Dimension::kRate, "deg/h", {1.0 / 3600.0}},
-    {Dimension::kRate, "°/h", {1.0 / 3600.0}},
-    {Dimension::kRate, "deg/hr", {1.0 / 3600.0}},
-    {Dimension::kRate, "deg/hour", {1.0 / 3600.0}},
-    {Dimension::kRate, "rad/s", {kDegPerRad}},
-    {Dimension::kRate, "rad/sec", {kDegPerRad}},
-    {Dimension::kRate, "rad/second", {kDegPerRad}},
-    {Dimension::kRate, "radians/s", {kDegPerRad}},
-    {Dimension::kRate, "radians/sec", {kDegPerRad}},
-    {Dimension::kRate, "mrad/s", {kDegPerRad * 1e-3}},
     {Dimension::kRate, "rpm", {6.0}},
     {Dimension::kTemperature, "degc", {1.0}},
     {Dimension::kTemperature, "°c", {1.0}},
     {Dimension::kTemperature, "c", {1.0}},
     {Dimension::kTemperature, "celsius", {1.0}},
+    {Dimension::kTemperature, "degcelsius", {1.0}},
+    {Dimension::kTemperature, "degreec", {1.0}},
+    {Dimension::kTemperature, "degreesc", {1.0}},
+    {Dimension::kTemperature, "degreecelsius", {1.0}},
+    {Dimension::kTemperature, "degreescelsius", {1.0}},
+    {Dimension::kTemperature, "degrecelsi", {1.0}},  // of "Unit_DegreCelsi"
+    {Dimension::kTemperature, "gradc", {1.0}},
+    {Dimension::kTemperature, "gradcelsius", {1.0}},
+    {Dimension::kTemperature, "degk", {1.0, -273.15}},
     {Dimension::kTemperature, "k", {1.0, -273.15}},
     {Dimension::kTemperature, "kelvin", {1.0, -273.15}},
     {Dimension::kTemperature, "degf", {5.0 / 9.0, -160.0 / 9.0}},
@@ -57,8 +48,20 @@ constexpr Spelling kSpellings[] = {
     {Dimension::kAcceleration, "m/s2", {1.0 / kStandardGravity}},
     {Dimension::kAcceleration, "m/s²", {1.0 / kStandardGravity}},
     {Dimension::kAcceleration, "m/s/s", {1.0 / kStandardGravity}},
+    {Dimension::kAcceleration, "m/s**2", {1.0 / kStandardGravity}},
+    {Dimension::kAcceleration, "m/ss", {1.0 / kStandardGravity}},
+    {Dimension::kAcceleration, "m/sec^2", {1.0 / kStandardGravity}},
+    {Dimension::kAcceleration, "m/sec2", {1.0 / kStandardGravity}},
+    {Dimension::kAcceleration, "meterperseconsquar", {1.0 / kStandardGravity}},
+    {Dimension::kAcceleration, "meterpersecondsquared", {1.0 / kStandardGravity}},
     {Dimension::kSpeed, "m/s", {1.0}},
+    {Dimension::kSpeed, "m/sec", {1.0}},
+    {Dimension::kSpeed, "meterpersecon", {1.0}},
+    {Dimension::kSpeed, "meterpersecond", {1.0}},
     {Dimension::kSpeed, "km/h", {1.0 / 3.6}},
+    {Dimension::kSpeed, "km/hr", {1.0 / 3.6}},
+    {Dimension::kSpeed, "kmph", {1.0 / 3.6}},
+    {Dimension::kSpeed, "kilometerperhour", {1.0 / 3.6}},
     {Dimension::kSpeed, "kph", {1.0 / 3.6}},
     {Dimension::kSpeed, "kmh", {1.0 / 3.6}},
     {Dimension::kSpeed, "mph", {kMetrePerMile / 3600.0}},
@@ -69,12 +72,90 @@ constexpr Spelling kSpellings[] = {
     {Dimension::kVoltage, "mv", {1e-3}},
 };
 
+// An angle or a time as people write it, in degrees or seconds.
+struct Word {
+  std::string_view word;
+  double size;
+};
+// German "Grad" is a degree, not a gon. Exports of some tools spell units out, and DBC names end
+// after 32 characters: "Unit_DegreOfArcPerSecon".
+constexpr Word kAngles[] = {{"deg", 1.0},
+                            {"degree", 1.0},
+                            {"degrees", 1.0},
+                            {"degreeofarc", 1.0},
+                            {"degofarc", 1.0},
+                            {"degreofarc", 1.0},
+                            {"degreesofarc", 1.0},
+                            {"°", 1.0},
+                            {"grad", 1.0},
+                            {"rad", kDegPerRad},
+                            {"rads", kDegPerRad},
+                            {"radian", kDegPerRad},
+                            {"radians", kDegPerRad},
+                            {"radiant", kDegPerRad}};
+constexpr double kMinute_s = 60.0;
+constexpr double kHour_s = 3600.0;
+constexpr Word kTimes[] = {
+    {"s", 1.0},      {"sec", 1.0},      {"secon", 1.0},     {"second", 1.0},       {"seconds", 1.0},
+    {"sek", 1.0},    {"sekunde", 1.0},  {"min", kMinute_s}, {"minute", kMinute_s}, {"h", kHour_s},
+    {"hr", kHour_s}, {"hour", kHour_s}, {"std", kHour_s},   {"stunde", kHour_s}};
+constexpr Word kPrefixes[] = {{"milli", 1e-3}, {"m", 1e-3}, {"", 1.0}};
+// What stands between angle and time, and behind the time.
+struct Quotient {
+  std::string_view between;
+  std::string_view behind;
+};
+constexpr Quotient kQuotients[] = {{"/", ""},    {"per", ""},  {"pro", ""},  {"", "^-1"},
+                                   {"*", "^-1"}, {"·", "^-1"}, {".", "^-1"}, {"", "-1"},
+                                   {"*", "-1"},  {"·", "-1"},  {".", "-1"},  {"", "⁻¹"},
+                                   {"*", "⁻¹"},  {"·", "⁻¹"},  {".", "⁻¹"}};
+
+// Signs that are typed or shown for the degree sign: the ordinal indicator, the ring, UTF-8 that
+// was taken for cp1252 and written as UTF-8 once more; and letters that hold it.
+struct Sign {
+  std::string_view typed;
+  std::string_view meant;
+};
+constexpr Sign kSigns[] = {{"Â°", "°"}, {"Âº", "°"}, {"º", "°"},
+                           {"˚", "°"},  {"℃", "°c"}, {"℉", "°f"}};
+
 std::string normalised(std::string_view unit) {
   std::string text;
   for (const char c : unit) {
-    if (c != ' ') text += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+    if (c != ' ' && c != '_')
+      text += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
   }
+  for (const Sign& sign : kSigns) {
+    for (std::size_t at = text.find(sign.typed); at != text.npos; at = text.find(sign.typed, at))
+      text.replace(at, sign.typed.size(), sign.meant);
+  }
+  constexpr std::string_view kPrefix = "unit";
+  if (text.starts_with(kPrefix)) text.erase(0, kPrefix.size());
   return text;
+}
+
+std::optional<double> degrees_of(std::string_view angle) {
+  for (const Word& prefix : kPrefixes) {
+    if (!angle.starts_with(prefix.word)) continue;
+    const std::string_view word = angle.substr(prefix.word.size());
+    const auto* const found = std::find_if(std::begin(kAngles), std::end(kAngles),
+                                           [&](const Word& one) { return one.word == word; });
+    if (found != std::end(kAngles)) return prefix.size * found->size;
+  }
+  return std::nullopt;
+}
+
+// An angle by a time, in deg/s.
+std::optional<double> rate_unit(std::string_view unit) {
+  for (const Quotient& quotient : kQuotients) {
+    for (const Word& time : kTimes) {
+      const std::string tail = fmt::format("{}{}{}", quotient.between, time.word, quotient.behind);
+      if (!unit.ends_with(tail)) continue;
+      const auto degrees = degrees_of(unit.substr(0, unit.size() - tail.size()));
+      if (degrees) return *degrees / time.size;
+    }
+  }
+  return std::nullopt;
 }
 
 }  // namespace
@@ -84,7 +165,9 @@ std::optional<Conversion> convert_unit(Dimension dimension, std::string_view uni
   for (const Spelling& spelling : kSpellings) {
     if (spelling.dimension == dimension && spelling.unit == wanted) return spelling.conversion;
   }
-  return std::nullopt;
+  if (dimension != Dimension::kRate) return std::nullopt;
+  const auto scale = rate_unit(wanted);
+  return scale ? std::optional(Conversion{*scale}) : std::nullopt;
 }
 
 std::string_view recommended_units(Dimension dimension) {

@@ -26,6 +26,32 @@ TEST(Units, TurnEveryRateIntoDegreesPerSecond) {
   EXPECT_DOUBLE_EQ(converted(Dimension::kRate, "rpm", 1.0), 6.0);
 }
 
+// As public DBC files write it.
+TEST(Units, ReadRatesAsPeopleWriteThem) {
+  constexpr double kRad = std::numbers::pi / 180.0;
+  for (const std::string_view unit :
+       {"Grad/sec", "deg/sek", "Unit_DegreePerSecond", "Unit_DegreOfArcPerSecon", "º/s", "º/sec",
+        "deg per s", "DegPerSec", "degrees per second", "Grad/Sekunde", "deg*s^-1", "°·s⁻¹",
+        "deg/second", "degree/sec", "deg s-1"}) {
+    EXPECT_DOUBLE_EQ(converted(Dimension::kRate, unit, 6.0), 6.0) << unit;
+  }
+  for (const std::string_view unit : {"radians/second", "radian/s", "Unit_RadianPerSecond",
+                                      "rads/s", "rad*s^-1", "rad per sec"}) {
+    EXPECT_DOUBLE_EQ(converted(Dimension::kRate, unit, 6.0 * kRad), 6.0) << unit;
+  }
+  for (const std::string_view unit : {"mdeg/s", "m°/s", "millidegrees/second", "mdeg per sec"})
+    EXPECT_DOUBLE_EQ(converted(Dimension::kRate, unit, 6000.0), 6.0) << unit;
+  for (const std::string_view unit : {"deg/min", "°/minute"})
+    EXPECT_DOUBLE_EQ(converted(Dimension::kRate, unit, 360.0), 6.0) << unit;
+  for (const std::string_view unit : {"deg/hr", "°/hour", "Grad/Std"})
+    EXPECT_DOUBLE_EQ(converted(Dimension::kRate, unit, 21600.0), 6.0) << unit;
+  for (const std::string_view unit :
+       {"m/sec", "s", "/s", "per s", "degs", "deg/", "deg/s/s", "deg/s^-1^-1", "m", "Unit_None",
+        "min/s", "deg/m", "unit", "mm/s", "gradient/s"}) {
+    EXPECT_FALSE(convert_unit(Dimension::kRate, unit)) << unit;
+  }
+}
+
 // Water freezes at 0 degC however the sensor says it.
 TEST(Units, TurnEveryVoltageIntoVolts) {
   EXPECT_DOUBLE_EQ(converted(Dimension::kVoltage, "V", 5.0), 5.0);
@@ -54,6 +80,19 @@ TEST(Units, IgnoreLetterCaseAndBlanks) {
   EXPECT_DOUBLE_EQ(converted(Dimension::kRate, " Deg / S ", 1.0), 1.0);
   EXPECT_DOUBLE_EQ(converted(Dimension::kRate, "RAD/S", std::numbers::pi), 180.0);
   EXPECT_DOUBLE_EQ(converted(Dimension::kSpeed, "Km/H", 3.6), 1.0);
+}
+
+// Of temperature, acceleration and speed too; "Â°" is UTF-8 that was taken for cp1252.
+TEST(Units, AreKnownAsPublicFilesWriteThem) {
+  for (const std::string_view unit : {"ºC", "˚C", "℃", "Â°C", "deg C", "degrees C",
+                                      "Degree Celsius", "Grad C", "Unit_DegreCelsi"})
+    EXPECT_DOUBLE_EQ(converted(Dimension::kTemperature, unit, 20.0), 20.0) << unit;
+  for (const std::string_view unit : {"m/s**2", "m/sec^2", "m/ss", "Unit_MeterPerSeconSquar"})
+    EXPECT_DOUBLE_EQ(converted(Dimension::kAcceleration, unit, 9.80665), 1.0) << unit;
+  for (const std::string_view unit : {"km/hr", "KPH", "kmph", "Unit_KiloMeterPerHour"})
+    EXPECT_DOUBLE_EQ(converted(Dimension::kSpeed, unit, 36.0), 10.0) << unit;
+  for (const std::string_view unit : {"º/s", "˚/s", "Â°/s", "°/Sek", "Grad/sec"})
+    EXPECT_DOUBLE_EQ(converted(Dimension::kRate, unit, 6.0), 6.0) << unit;
 }
 
 // A unit of another dimension is not a rate with a strange scale: m/s must not pass as deg/s.
