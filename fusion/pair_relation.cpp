@@ -19,6 +19,10 @@ constexpr double kMoved = 4.0;
 constexpr double kMovedMin_dps = 0.2;
 // … and by so much where the other one has to follow.
 constexpr double kMovedMuch_dps = 1.0;
+// … and to and fro by so much, deg, within the memory: vibration beyond half the sampling rate
+// looks like slow motion, which the two gyros may even see with opposite signs, but turns nothing
+// about.
+constexpr double kSwung_deg = 3.0;
 // What moves less than a bias may drift, deg/s within a second, is judged less its trend.
 constexpr double kDrift_dps_s = 0.1;
 
@@ -52,6 +56,9 @@ constexpr double kRemembered = 32.0;
 constexpr double kLagBlocks = 6.0;
 constexpr double kLagLeaves = 0.2;
 constexpr double kLagBetter = 5.0;
+// … in so large a share of the blocks this many times: in periodic motion one odd block would do.
+constexpr double kLagShare = 0.6;
+constexpr double kLagBlockBetter = 3.0;
 // … and is believed until it does no more than this.
 constexpr double kLagStillBetter = 2.0;
 constexpr double kNamingBlocks = 3.0;
@@ -73,14 +80,27 @@ constexpr double kSmallShare = 0.2;
 // What a long block tells of it: four of either gyro are needed.
 constexpr double kAloneTells = 3.5;
 
-// No gyro's samples scatter so much, deg/s rms, while the other one says that nothing moves; nor
-// has one such a bias against the other.
-constexpr double kErratic_dps = 10.0;
-constexpr double kErraticRatio = 20.0;
+// No gyro's samples scatter so much from one to the next, deg/s rms, while the other one's do not;
+// nor has one such a bias against the other, from the start on.
+constexpr double kErratic_dps = 30.0;
+constexpr double kErraticRatio = 10.0;
+// … in all cells of a block but one.
+constexpr double kErraticCell_dps = 10.0;
 constexpr double kBiasMost_dps = 100.0;
 constexpr double kErraticBlocks = 8.0;
-// Jumps are as large from cell to cell as over the whole block; motion grows.
-constexpr double kErraticWhite = 0.5;
+// After so many blocks with less than this it was a gyro.
+constexpr std::size_t kCalmBlocks = 5;
+constexpr double kCalm_dps = 3.0;
+// No gyro leaps so far from one sample to the next, and stays there, while the other one moves, so
+// many times as far as that one does within a sample, or about that time. Leaps both ways are
+// needed; they are remembered over a hundred blocks of motion.
+constexpr double kLeap_dps = 30.0;
+constexpr double kLeapRatio = 5.0;
+constexpr double kLeapRange = 2.0;
+constexpr double kLeapStays = 0.6;
+constexpr double kLeaps = 1.5;
+constexpr double kLeapsStill = 0.5;
+constexpr double kLeapKept = 0.99;
 
 double log_odds_to_probability(double log_odds) {
   return 1.0 / (1.0 + std::exp(-log_odds));
@@ -113,13 +133,17 @@ void PairRelation::close_cell(double t_s, double step_s) {
   for (std::size_t gyro = 0; gyro < 2; ++gyro) {
     const double away_dps = sum_[gyro] / n;
     closed.mean_dps[gyro] = origin_[gyro] + away_dps;
+    closed.leap[gyro] = step_most_[gyro];
     if (samples_ > 1) {
+      closed.rough[gyro] = 0.5 * step_square_[gyro] / (n - 1.0);
       closed.scatter[gyro] = std::max(square_[gyro] - n * away_dps * away_dps, 0.0) / (n - 1.0);
     }
   }
   samples_ = 0;
   sum_ = {};
   square_ = {};
+  step_square_ = {};
+  step_most_ = {};
   constexpr double kGapCells = 4.0;
   const bool gap = step_s > kGap_s && step_s > kGapCells * length_s_;
   if (gap) {
@@ -151,12 +175,12 @@ PairRelation::Stretch PairRelation::stretch(std::size_t gyro, std::size_t from,
   for (std::size_t i = 0; i < length; ++i) {
     const RelationCell& one = cell(from + i);
     out.mean_dps += one.mean_dps[gyro];
-    out.scatter += one.scatter[gyro];
+    out.rough += one.rough[gyro];
     within += one.scatter[gyro] / one.samples;
   }
   const auto n = static_cast<double>(length);
   out.mean_dps /= n;
-  out.scatter /= n;
+  out.rough /= n;
   // White noise makes second differences of six times its variance; smooth motion makes none.
   double bends = 0.0;
   for (std::size_t i = 0; i < length; ++i) {
@@ -166,7 +190,8 @@ PairRelation::Stretch PairRelation::stretch(std::size_t gyro, std::size_t from,
     bends += squared(value - 2.0 * cell(from + i - 1).mean_dps[gyro] +
                      cell(from + i - 2).mean_dps[gyro]);
   }
-  out.noise = std::max(within / n, bends / (6.0 * (n - 2.0)));
+  out.bends = bends / (6.0 * (n - 2.0));
+  out.noise = std::max(within / n, out.bends);
   return out;
 }
 
@@ -174,8 +199,25 @@ bool PairRelation::moves(const Stretch& stretch, std::size_t length) {
   return stretch.squares > squared(kMoved) * static_cast<double>(length) * stretch.noise;
 }
 
+double PairRelation::swing_deg(std::size_t gyro) const {
+  double mean_dps = 0.0;
+  for (std::size_t i = 0; i < count_; ++i)
+    mean_dps += cell(i).mean_dps[gyro];
+  mean_dps /= static_cast<double>(count_);
+  double angle_deg = 0.0;
+  double least_deg = 0.0;
+  double most_deg = 0.0;
+  for (std::size_t i = 0; i < count_; ++i) {
+    angle_deg += (cell(i).mean_dps[gyro] - mean_dps) * cell(i).length_s;
+    least_deg = std::min(least_deg, angle_deg);
+    most_deg = std::max(most_deg, angle_deg);
+  }
+  return most_deg - least_deg;
+}
+
 PairRelation::Products PairRelation::products(std::size_t from, std::size_t lagged_from,
-                                              std::size_t length, bool trends_off) const {
+                                              std::size_t length, bool trends_off,
+                                              bool halfway) const {
   const double first_origin = cell(from).mean_dps[0];
   const double second_origin = cell(lagged_from).mean_dps[1];
   const auto n = static_cast<double>(length);
@@ -185,7 +227,8 @@ PairRelation::Products PairRelation::products(std::size_t from, std::size_t lagg
   Products out;
   for (std::size_t i = 0; i < length; ++i) {
     const double first = cell(from + i).mean_dps[0] - first_origin;
-    const double second = cell(lagged_from + i).mean_dps[1] - second_origin;
+    const double after = cell(lagged_from + i + (halfway ? 1 : 0)).mean_dps[1];
+    const double second = 0.5 * (cell(lagged_from + i).mean_dps[1] + after) - second_origin;
     const double place = static_cast<double>(i) - middle;
     sum[0] += first;
     sum[1] += second;
@@ -224,9 +267,10 @@ void PairRelation::judge_block() {
   since_block_ = 0;
   const std::size_t from = count_ - lags - kBlock;
   const std::array<Stretch, 2> both{stretch(0, from, kBlock), stretch(1, from, kBlock)};
-  judge_values(both);
+  judge_values(from, both);
   const double most = std::max(both[0].squares, both[1].squares);
-  const bool enough = most > squared(kMovedMin_dps) * static_cast<double>(kBlock);
+  const bool enough = most > squared(kMovedMin_dps) * static_cast<double>(kBlock) &&
+                      std::max(swing_deg(0), swing_deg(1)) > kSwung_deg;
   if (enough && moves(both[0], kBlock) && moves(both[1], kBlock)) {
     Fit contrary;
     const double tells = block_tells(from, lags, both, contrary);
@@ -256,6 +300,12 @@ double PairRelation::block_tells(std::size_t from, std::size_t lags,
     if (may_be_drift && lagged == from && !clear_of_noise(sums, both)) return 0.0;
     const Fit with = fit(sums, 1.0 / kSlopeMost, kSlopeMost);
     if (with.left < healthy.left) healthy = with;
+    if (lagged < from + lags) {
+      // A lag of half a cell must not be what a pair lacks where the motion is fast.
+      const Products between = products(from, lagged, kBlock, may_be_drift, true);
+      const Fit halfway = fit(between, 1.0 / kSlopeMost, kSlopeMost);
+      if (halfway.left < healthy.left) healthy = halfway;
+    }
     const Fit less = fit(sums, -kAny, 1.0 / kContrarySlope);
     if (less.left < contrary.left) contrary = less;
     const Fit more = fit(sums, kContrarySlope, kAny);
@@ -285,23 +335,103 @@ void PairRelation::hear(double tells, const Fit& contrary) {
   if (evidence_ <= 0.0) slopes_ = {};
 }
 
-// Values that are no gyro's, however the platform moves.
-void PairRelation::judge_values(const std::array<Stretch, 2>& both) {
+// Nearly every value of the block does, and not a few that are far off.
+bool PairRelation::jumps(std::size_t gyro, std::size_t from, const std::array<Stretch, 2>& both,
+                         bool moving) const {
+  const Stretch& own = both[gyro];
+  const Stretch& other = both[1 - gyro];
+  const bool several = own.rough > 0.0;  // samples in a cell
+  const double scatter = several ? own.rough : own.bends;
+  double of_the_other = several ? other.rough : other.bends;
+  if (!moving || !several) of_the_other += other.squares / static_cast<double>(kBlock);
+  if (scatter < squared(kErratic_dps) || scatter < squared(kErraticRatio) * of_the_other)
+    return false;
+  std::size_t cells = 0;
+  for (std::size_t i = 2; i < kBlock; ++i) {
+    const RelationCell& one = cell(from + i);
+    const double bend = one.mean_dps[gyro] - 2.0 * cell(from + i - 1).mean_dps[gyro] +
+                        cell(from + i - 2).mean_dps[gyro];
+    const double square = several ? one.rough[gyro] : squared(bend);
+    if (square > squared(kErraticCell_dps)) ++cells;
+  }
+  return cells + 1 >= kBlock - 2;
+}
+
+// From one sample to the next, for good, many times as far as the other one has come: where a sign
+// bit is taken for a value, or a value wraps. A gyro that the other one does not follow because
+// that is blind makes none, nor does an outlier.
+void PairRelation::look_for_leaps(std::size_t gyro, std::size_t from, bool moving) {
+  if (!moving) return;
+  const std::size_t lags = near_lags(kLags);
+  double least = kAny;
+  double most = -kAny;
+  double other_leap = 0.0;
+  for (std::size_t i = from - lags; i < from + kBlock + lags; ++i) {
+    least = std::min(least, cell(i).mean_dps[1 - gyro]);
+    most = std::max(most, cell(i).mean_dps[1 - gyro]);
+    other_leap = std::max(other_leap, std::abs(cell(i).leap[1 - gyro]));
+  }
+  const double enough = std::max({kLeap_dps, kLeapRatio * other_leap, kLeapRange * (most - least)});
+  std::array<double, 2>& leaps = values_[gyro].leaps;
+  std::array<bool, 2> any{};
+  for (std::size_t i = std::max<std::size_t>(from, 2); i < from + kBlock && i + 2 < count_; ++i) {
+    const double leap = cell(i).leap[gyro];
+    if (std::abs(leap) < enough) continue;
+    double stays = kAny;
+    for (const std::size_t before : {i - 2, i - 1}) {
+      for (const std::size_t after : {i + 1, i + 2}) {
+        const double far_dps = cell(after).mean_dps[gyro] - cell(before).mean_dps[gyro];
+        stays = std::min(stays, far_dps / leap);
+      }
+    }
+    if (stays > kLeapStays) any[leap > 0.0 ? 1 : 0] = true;
+  }
+  for (std::size_t way = 0; way < 2; ++way)
+    leaps[way] = kLeapKept * leaps[way] + (any[way] ? 1.0 : 0.0);
+}
+
+// Values that are no gyro's, however the platform moves, from the start on: a gyro that was one,
+// at rest or in motion, and no longer is, is sick, and not mistaken for another.
+void PairRelation::judge_values(std::size_t from, const std::array<Stretch, 2>& both) {
   const auto n = static_cast<double>(kBlock);
-  const bool apart = std::abs(both[0].mean_dps - both[1].mean_dps) > kBiasMost_dps;
+  const double apart_dps = std::abs(both[0].mean_dps - both[1].mean_dps);
+  were_near_ = were_near_ || apart_dps < 0.5 * kBiasMost_dps;
   for (std::size_t gyro = 0; gyro < 2; ++gyro) {
     const Stretch& own = both[gyro];
     const Stretch& other = both[1 - gyro];
-    const double scatter = std::max(own.scatter, own.noise);
-    const double of_the_other = other.scatter + other.squares / n;
-    const bool white = own.noise * n > kErraticWhite * own.squares;
-    const bool jumps =
-        white && scatter > squared(kErratic_dps) && scatter > squared(kErraticRatio) * of_the_other;
-    const bool far =
-        apart && std::abs(own.mean_dps) > std::abs(other.mean_dps) && !moves(own, kBlock);
-    const double blocks = erratic_blocks_[gyro] + (jumps || far ? 1.0 : -1.0);
-    erratic_blocks_[gyro] = std::clamp(blocks, 0.0, 2.0 * kErraticBlocks);
+    const bool moving = moves(other, kBlock) && other.squares > n * squared(kMovedMin_dps);
+    const std::size_t which = moving ? 1 : 0;
+    Values& values = values_[gyro];
+    const double scatter = own.rough > 0.0 ? own.rough : own.bends;
+    const bool calm = scatter < squared(kCalm_dps);
+    if (calm) values.calm[which] = std::min(values.calm[which] + 1, kCalmBlocks);
+    const bool far = !were_near_ && apart_dps > kBiasMost_dps &&
+                     std::abs(own.mean_dps) > kSlopeMost * std::abs(other.mean_dps) &&
+                     !moves(own, kBlock);
+    const bool jumping = jumps(gyro, from, both, moving);
+    const bool sick = jumping && values.calm[which] == kCalmBlocks;
+    const auto count = [&](std::size_t circumstance, double more) {
+      double& blocks = values.erratic[circumstance];
+      blocks = std::clamp(blocks + more, 0.0, 2.0 * kErraticBlocks);
+    };
+    if (sick) {
+      count(1 - which, -2.0);
+    } else if (far || jumping) {
+      count(which, 1.0);
+    } else if (calm) {
+      count(which, -1.0);
+    }
+    look_for_leaps(gyro, from, moving);
   }
+}
+
+// As long as it was found, and stands, less is enough.
+bool PairRelation::erratic(std::size_t gyro) const {
+  const Values& values = values_[gyro];
+  const bool stands = verdict_.contradiction == Contradiction::kErratic && verdict_.gyro == gyro;
+  const double blocks = std::max(values.erratic[0], values.erratic[1]);
+  const double leaps = std::min(values.leaps[0], values.leaps[1]);
+  return stands ? blocks >= 1.0 || leaps > kLeapsStill : blocks >= kErraticBlocks || leaps > kLeaps;
 }
 
 // --- over all lags: late, or nothing in common ---------------------------------------------------
@@ -322,6 +452,7 @@ void PairRelation::judge_long_block() {
   const std::array<Stretch, 2> both{stretch(0, from, kLongBlock), stretch(1, from, kLongBlock)};
   const auto n = static_cast<double>(kLongBlock);
   const bool count = std::max(both[0].squares, both[1].squares) > n * squared(kMovedMin_dps) &&
+                     std::max(swing_deg(0), swing_deg(1)) > kSwung_deg &&
                      moves(both[0], kLongBlock) && moves(both[1], kLongBlock);
   constexpr double kKept = 1.0 - 1.0 / kRemembered;
   const bool strong = count &&
@@ -343,6 +474,7 @@ void PairRelation::judge_long_block() {
     }
     if (!count) continue;
     AtLag& at = lags_[lag];
+    at.now = with.left;
     at.left = kKept * at.left + std::min(with.left, 1.0);
     at.any_left = kKept * at.any_left + any.left;
     if (strong) at.strong_left = kKept * at.strong_left + std::min(with.left, 1.0);
@@ -350,7 +482,11 @@ void PairRelation::judge_long_block() {
     if (lag == lags) own_ = kKept * own_ + any.own;
   }
   judge_following(both, most_alike, least_left);
-  if (count) weigh_lags();
+  if (count) {
+    for (AtLag& at : lags_)
+      at.blocks = kKept * at.blocks + (kLagBlockBetter * at.now < least_left ? 1.0 : 0.0);
+    weigh_lags();
+  }
   decide();
 }
 
@@ -361,6 +497,7 @@ void PairRelation::judge_following(const std::array<Stretch, 2>& both, double mo
   for (std::size_t gyro = 0; gyro < 2; ++gyro) {
     const Stretch& own = both[gyro];
     if (own.squares < n * squared(kMovedMuch_dps) || !moves(own, kLongBlock)) continue;
+    if (swing_deg(gyro) < kSwung_deg) continue;
     const bool small = both[1 - gyro].squares < squared(kSmallShare) * own.squares;
     double tells = 0.0;
     if (small || most_alike < kFollowsNot) tells = kAloneTells;
@@ -404,6 +541,7 @@ void PairRelation::weigh_lags() {
   late_ = {};
   if (long_blocks_ < kLagBlocks || !inside || left > kLagLeaves) return;
   if (better < (before ? kLagStillBetter : kLagBetter)) return;
+  if (!before && lags_[best].blocks < kLagShare * long_blocks_) return;
   late_.contradiction = Contradiction::kLag;
   late_.slope = lags_[best].both / own_;
   late_.slope_sigma = kNone;
@@ -435,8 +573,7 @@ void PairRelation::decide() {
   const bool named =
       now.contradiction != Contradiction::kNone && now.contradiction != Contradiction::kUnrelated;
   for (std::size_t gyro = 0; gyro < 2 && !named; ++gyro) {
-    const bool stands = verdict_.contradiction == Contradiction::kErratic && verdict_.gyro == gyro;
-    if (erratic_blocks_[gyro] < (stands ? 1.0 : kErraticBlocks)) continue;
+    if (!erratic(gyro)) continue;
     now = {Contradiction::kErratic, log_odds_to_probability(kFound), kNone, kNone, 0.0, gyro};
   }
   const bool pair = evidence_ <= kEvidenceLeast;

@@ -13,8 +13,11 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
+
+#include "fusion/quadratic.h"
 
 namespace vgyro::fusion {
 
@@ -58,7 +61,11 @@ class PairRelation {
       const double away_dps = rate_dps[gyro] - origin_[gyro];
       sum_[gyro] += away_dps;
       square_[gyro] += away_dps * away_dps;
+      const double step_dps = rate_dps[gyro] - newest_dps_[gyro];
+      if (samples_ > 0) step_square_[gyro] += squared(step_dps);
+      if (std::abs(step_dps) > std::abs(step_most_[gyro])) step_most_[gyro] = step_dps;
     }
+    newest_dps_ = rate_dps;
     ++samples_;
     newest_s_ = t_s;
   }
@@ -84,6 +91,8 @@ class PairRelation {
   struct RelationCell {
     std::array<double, 2> mean_dps{};
     std::array<double, 2> scatter{};  ///< variance of the samples about it; 0 of one sample
+    std::array<double, 2> leap{};     ///< its largest step from one sample to the next
+    std::array<double, 2> rough{};    ///< … as it were if they were white: from their steps
     double samples = 0.0;
     double length_s = 0.0;
   };
@@ -91,8 +100,9 @@ class PairRelation {
   struct Stretch {
     double mean_dps = 0.0;
     double squares = 0.0;  ///< about the mean
+    double bends = 0.0;    ///< variance of a cell's mean, from its bends
     double noise = 0.0;    ///< variance of a cell's mean that is not smooth motion
-    double scatter = 0.0;  ///< variance of a sample within its cell
+    double rough = 0.0;    ///< variance of a sample within its cell, from steps between samples
   };
   /// Sums of a stretch of gyro 1 and one of gyro 2, about their means.
   struct Products {
@@ -109,7 +119,9 @@ class PairRelation {
   };
   /// What the long blocks have shown at one lag, older ones fading.
   struct AtLag {
-    double left = 0.0;         ///< Σ of the share that a healthy slope leaves
+    double now = 0.0;          ///< share that a healthy slope leaves of the newest
+    double left = 0.0;         ///< Σ of that share
+    double blocks = 0.0;       ///< those that speak for this lag, against all healthy ones
     double any_left = 0.0;     ///< Σ of the share that the slope leaves which fits best
     double strong_left = 0.0;  ///< as `left`, of blocks in which both have moved far
     double both = 0.0;         ///< Σ of the products
@@ -131,12 +143,14 @@ class PairRelation {
     return cells_[(head_ + i) % kCells];
   }
   [[nodiscard]] Stretch stretch(std::size_t gyro, std::size_t from, std::size_t length) const;
-  /// Less their trends too, where these may be drift.
+  /// Less their trends too, where these may be drift; of gyro 2 half a cell later, if halfway.
   [[nodiscard]] Products products(std::size_t from, std::size_t lagged_from, std::size_t length,
-                                  bool trends_off) const;
+                                  bool trends_off, bool halfway = false) const;
   /// With a slope between these limits.
   [[nodiscard]] static Fit fit(const Products& sums, double slope_least, double slope_most);
   [[nodiscard]] static bool moves(const Stretch& stretch, std::size_t length);
+  /// How far it has turned to and fro within the memory, deg.
+  [[nodiscard]] double swing_deg(std::size_t gyro) const;
 
   void judge_block();
   [[nodiscard]] double block_tells(std::size_t from, std::size_t lags,
@@ -144,7 +158,11 @@ class PairRelation {
   [[nodiscard]] static bool clear_of_noise(const Products& sums,
                                            const std::array<Stretch, 2>& both);
   void hear(double tells, const Fit& contrary);
-  void judge_values(const std::array<Stretch, 2>& both);
+  void judge_values(std::size_t from, const std::array<Stretch, 2>& both);
+  [[nodiscard]] bool jumps(std::size_t gyro, std::size_t from, const std::array<Stretch, 2>& both,
+                           bool moving) const;
+  void look_for_leaps(std::size_t gyro, std::size_t from, bool moving);
+  [[nodiscard]] bool erratic(std::size_t gyro) const;
   void judge_long_block();
   void judge_following(const std::array<Stretch, 2>& both, double most_alike, double left);
   void weigh_lags();
@@ -159,6 +177,9 @@ class PairRelation {
   std::array<double, 2> origin_{};
   std::array<double, 2> sum_{};
   std::array<double, 2> square_{};
+  std::array<double, 2> step_square_{};
+  std::array<double, 2> step_most_{};
+  std::array<double, 2> newest_dps_{};
 
   std::array<RelationCell, kCells> cells_;
   std::size_t head_ = 0;
@@ -181,8 +202,16 @@ class PairRelation {
   double best_any_left_ = 0.0;     ///< of any slope, at a healthy lag
   std::array<double, 2> alone_{};  ///< log odds above the prior: this gyro moves by itself
   bool unrelated_ = false;         ///< both do, as it was found
-  std::array<double, 2> erratic_blocks_{};
-  PairVerdict earlier_;  ///< of an earlier run, while it stands
+  /// What the values of a gyro are like.
+  struct Values {
+    // While the other one stood still, and while it moved:
+    std::array<double, 2> erratic{};    ///< blocks in which they were no gyro's, less calm ones
+    std::array<std::size_t, 2> calm{};  ///< blocks in which they were
+    std::array<double, 2> leaps{};      ///< down, up; those of long ago fade
+  };
+  std::array<Values, 2> values_;
+  bool were_near_ = false;  ///< the two have been nearer to each other than any bias is large
+  PairVerdict earlier_;     ///< of an earlier run, while it stands
   PairVerdict verdict_;
   std::uint64_t times_ = 0;
 };
