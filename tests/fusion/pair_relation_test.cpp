@@ -444,9 +444,9 @@ void expect_wrong_bytes_found(const char* name, const std::function<double(doubl
 TEST(PairRelation, FindsWrongBytes) {
   for (const double step_dps : {0.005, 0.01}) {
     expect_wrong_bytes_found("unsigned",
-                             misread(step_dps, [](std::uint16_t raw) { return double{raw}; }));
+                             misread(step_dps, [](std::uint16_t raw) { return static_cast<double>(raw); }));
     expect_wrong_bytes_found("swapped", misread(step_dps, [](std::uint16_t raw) {
-                               return double{static_cast<std::int16_t>(raw << 8U | raw >> 8U)};
+                               return static_cast<double>(static_cast<std::int16_t>(raw << 8U | raw >> 8U));
                              }));
   }
 }
