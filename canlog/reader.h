@@ -10,6 +10,7 @@
 #include <string>
 
 #include "base/error.h"
+#include "canlog/byte_source.h"
 #include "canlog/record.h"
 
 namespace vgyro::canlog {
@@ -34,9 +35,16 @@ class LogReader {
 
   /// Called before bytes are fetched, which may wait for a live source: the moment to flush output.
   virtual void before_wait(std::function<void()> callback) = 0;
+
+  /// The frame of the record read last, where that is_xl; null for forms that know no such frames.
+  [[nodiscard]] virtual const XlFrame* xl_frame() const { return nullptr; }
 };
 
-/// By the log's content, not by its name; "-" is standard input.
+/// By the log's content, not by its name; "-" is standard input. Error where it cannot be read, or
+/// is of no form that is known (canlog/forms.h): then with the way out.
 Expected<std::unique_ptr<LogReader>> open_log(const std::string& path);
+
+/// Likewise from bytes that are unpacked already.
+Expected<std::unique_ptr<LogReader>> open_log(std::unique_ptr<ByteSource> bytes);
 
 }  // namespace vgyro::canlog
