@@ -3,8 +3,12 @@
 #include <array>
 #include <cstring>
 
+#include "canlog/asc.h"
 #include "canlog/candump.h"
+#include "canlog/candump_screen.h"
+#include "canlog/csv.h"
 #include "canlog/text_line.h"
+#include "canlog/trc.h"
 
 namespace vgyro::canlog {
 
@@ -16,7 +20,10 @@ using Opened = Expected<std::unique_ptr<LogReader>>;
 
 template <class Reader>
 Opened open_lines(std::unique_ptr<ByteSource> bytes) {
-  return std::make_unique<Reader>(std::make_unique<LogSource>(std::move(bytes)));
+  return std::make_unique<Reader>(std::move(bytes));
+}
+Opened open_candump(std::unique_ptr<ByteSource> bytes) {
+  return std::make_unique<CandumpReader>(std::make_unique<LogSource>(std::move(bytes)));
 }
 
 // "(1700000000.123456) can0 123#…", whatever is wrong with the rest.
@@ -32,7 +39,13 @@ bool is_candump_line(std::string_view line) {
 }
 
 constexpr std::array kForms{
-    Form{"candump log", nullptr, is_candump_line, open_lines<CandumpReader>},
+    Form{"candump log", nullptr, is_candump_line, open_candump},
+    Form{"candump's screen text with stamps", nullptr, is_candump_screen_line, open_candump_screen},
+    Form{"Vector ASC", nullptr, is_asc_line, open_lines<AscReader>},
+    Form{"PEAK TRC", nullptr, is_trc_line, open_lines<TrcReader>},
+    Form{"python-can's CSV", nullptr, is_python_can_csv_line, open_lines<PythonCanCsvReader>},
+    Form{"SavvyCAN's CSV", nullptr, is_savvycan_csv_line, open_lines<SavvyCanCsvReader>},
+    Form{"", nullptr, is_stampless_screen_line, refuse_stampless_screen},
 };
 
 bool starts(std::string_view head, std::string_view magic, std::size_t at = 0) {

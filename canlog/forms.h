@@ -15,7 +15,7 @@ namespace vgyro::canlog {
 /// A form is known by its first bytes, or by one whole line that no other form would have. Exactly
 /// one of `begins` and `has_line` is set.
 struct Form {
-  std::string_view name;  ///< for people, as in "a Vector BLF file"
+  std::string_view name;  ///< for people; empty where the form is only refused
   /// Of a binary form. Called with every longer beginning of the log until somebody says true;
   /// false while there are too few bytes.
   bool (*begins)(std::string_view head);

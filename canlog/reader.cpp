@@ -47,8 +47,9 @@ bool is_text(std::string_view head) {
 
 std::string known_forms() {
   std::string names;
-  for (const Form& form : forms())
-    names += (names.empty() ? "" : ", ") + std::string(form.name);
+  for (const Form& form : forms()) {
+    if (!form.name.empty()) names += (names.empty() ? "" : ", ") + std::string(form.name);
+  }
   return names;
 }
 

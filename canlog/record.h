@@ -69,6 +69,12 @@ struct LogCounts {
   std::uint64_t skipped_bytes = 0;  ///< that belong to no line, as NUL bytes after a power cut
   std::vector<MalformedLine> first_malformed;  ///< at most kFirstMalformedMax
   static constexpr std::size_t kFirstMalformedMax = 5;
+
+  /// Of the item that `lines` counted last.
+  void add_malformed(const char* why) {
+    ++malformed_lines;
+    if (first_malformed.size() < kFirstMalformedMax) first_malformed.push_back({lines, why});
+  }
 };
 
 }  // namespace vgyro::canlog

@@ -1,13 +1,6 @@
 #include "canlog/text_line.h"
 
-#include <chrono>
-
 namespace vgyro::canlog {
-
-namespace {
-// A stamp beyond this would not fit 64 bits in nanoseconds.
-constexpr std::int64_t kStampMax_ns = 9'000'000'000'000'000'000;
-}  // namespace
 
 std::optional<DecimalTime> decimal_time(std::string_view text, std::int64_t unit_ns) {
   const std::size_t point = text.find('.');
@@ -25,14 +18,6 @@ std::optional<DecimalTime> decimal_time(std::string_view text, std::int64_t unit
   }
   time.digits = static_cast<unsigned>(fraction.size());
   return time;
-}
-
-std::int64_t epoch_seconds(int year, unsigned month, unsigned day, unsigned hour, unsigned minute,
-                           unsigned second) {
-  const std::chrono::sys_days date =
-      std::chrono::year(year) / std::chrono::month(month) / std::chrono::day(day);
-  return std::int64_t{date.time_since_epoch().count()} * 86'400 + hour * 3600 + minute * 60 +
-         second;
 }
 
 }  // namespace vgyro::canlog

@@ -74,6 +74,9 @@ std::optional<T> number_of(std::string_view text, int base = 10) {
   return value;
 }
 
+/// A stamp beyond this (the year 2255) would not fit 64 bits in nanoseconds.
+inline constexpr std::int64_t kStampMax_ns = 9'000'000'000'000'000'000;
+
 /// "12.345678" in units of `unit_ns` → nanoseconds, exact to the last digit that nanoseconds have;
 /// `digits` counts those behind the point. Neither sign nor exponent.
 struct DecimalTime {
@@ -81,9 +84,5 @@ struct DecimalTime {
   unsigned digits = 0;
 };
 std::optional<DecimalTime> decimal_time(std::string_view text, std::int64_t unit_ns);
-
-/// Seconds since the epoch of a date in the proleptic Gregorian calendar, in UTC.
-std::int64_t epoch_seconds(int year, unsigned month, unsigned day, unsigned hour, unsigned minute,
-                           unsigned second);
 
 }  // namespace vgyro::canlog
