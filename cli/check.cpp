@@ -40,8 +40,11 @@ void print_e2e(const gateway::E2ePlan& e2e) {
 
 void print_gyro(const gateway::GyroPlan& gyro) {
   print_row("gyro " + gyro.name, gyro.bus, gyro.match, gyro.message, gyro.rate);
+  // What the bits cannot hold never comes.
   detail("accepted",
-         fmt::format("{:g} to {:g} {}{}", gyro.rate.minimum, gyro.rate.maximum,
+         fmt::format("{:g} to {:g} {}{}",
+                     std::max(gyro.rate.minimum, gyro.rate.codec.representable_min()),
+                     std::min(gyro.rate.maximum, gyro.rate.codec.representable_max()),
                      printable(gyro.rate.unit), gyro.rate.scale < 0 ? ", sign flipped" : ""));
   if (gyro.sign) detail("sign", "from a signal of its own: 1 is negative");
   if (gyro.temperature) {

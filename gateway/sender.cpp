@@ -25,7 +25,7 @@ Sender::Turn::Turn(Sender& sender, FrameSink& sink, TimePoint stamp) : sender_(s
 
 Sender::Sender(const OutputPlan& plan) : encoder_(plan), rate_dps_(kNone), sigma_dps_(kNone) {}
 
-void Sender::send_rate(const RateOutput& output) {
+bool Sender::send_rate(const RateOutput& output) {
   assert(sink_ != nullptr);
   const bool in_range = encoder_.can_carry(output.rate_dps);
   RateOutput carried = output;
@@ -37,6 +37,7 @@ void Sender::send_rate(const RateOutput& output) {
   sigma_dps_ = carried.valid ? output.sigma_dps : kNone;
   quality_ = carried.valid ? output.quality : Quality::kUnusable;
   sink_->put(encoder_.rate(carried), stamp_);
+  return carried.valid;
 }
 
 void Sender::send_bias(const BiasOutput& bias, const ModelOutput& model) {

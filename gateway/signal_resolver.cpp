@@ -176,10 +176,12 @@ std::optional<Quantity> SignalResolver::quantity(const dbc::Signal& signal, std:
                     dimension == Dimension::kRate && !unit
                         ? "; where the DBC file is wrong, set unit = \"deg/s\" here"
                         : "");
-    reader_.complain(reader_.where(unit ? "unit" : key),
-                     fmt::format("{} ({}) has the unit \"{}\", which this quantity cannot have",
-                                 signal.name, signal_place(signal), spelling),
-                     remedy);
+    reader_.complain(
+        reader_.where(unit ? "unit" : key),
+        unit ? fmt::format("unit = \"{}\" is none that {} can have", spelling, signal.name)
+             : fmt::format("{} ({}) has the unit \"{}\", which this quantity cannot have",
+                           signal.name, signal_place(signal), spelling),
+        remedy);
   }
   if (!bits || !presence || !conversion) return std::nullopt;
   Quantity quantity{
@@ -195,8 +197,9 @@ std::optional<Quantity> SignalResolver::quantity(const dbc::Signal& signal, std:
   return quantity;
 }
 
-// The DBC's range is believed only where the signal can reach it: files in the wild carry ranges
-// that contradict their own scale, and believing those would throw good samples away.
+// The DBC's range is believed only where the signal can reach it, and only with both directions of
+// a rate: files in the wild carry ranges that contradict their own scale, and believing those would
+// throw good samples away.
 void SignalResolver::set_limits(Quantity& quantity, const dbc::Signal& signal,
                                 Dimension dimension) {
   const double widest = widest_of(dimension) / quantity.scale;
@@ -208,16 +211,23 @@ void SignalResolver::set_limits(Quantity& quantity, const dbc::Signal& signal,
   const double slack = std::abs(signal.factor);
   const bool plausible = signal.minimum < signal.maximum && signal.minimum >= lowest - slack &&
                          signal.maximum <= highest + slack;
-  if (plausible) {
+  // A gyro turns both ways: [0|100] is what its author thought of, no limit of the sensor.
+  const bool one_direction = dimension == Dimension::kRate && lowest < 0.0 && highest > 0.0 &&
+                             (signal.minimum >= 0.0 || signal.maximum <= 0.0);
+  if (plausible && !one_direction) {
     quantity.minimum = std::max(-widest, signal.minimum);
     quantity.maximum = std::min(widest, signal.maximum);
     return;
   }
   warnings_.push_back(
       {signal_place(signal),
-       fmt::format("the range [{:g}|{:g}] of {} does not fit its scale, which gives "
-                   "{:g} to {:g}: not used as a limit",
-                   signal.minimum, signal.maximum, signal.name, lowest, highest),
+       plausible
+           ? fmt::format("the range [{:g}|{:g}] of {} leaves out one direction of a rate that goes "
+                         "from {:g} to {:g}: not used as a limit",
+                         signal.minimum, signal.maximum, signal.name, lowest, highest)
+           : fmt::format("the range [{:g}|{:g}] of {} does not fit its scale, which gives "
+                         "{:g} to {:g}: not used as a limit",
+                         signal.minimum, signal.maximum, signal.name, lowest, highest),
        {}});
 }
 

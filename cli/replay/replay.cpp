@@ -19,7 +19,9 @@
 #include "cli/output/overwrite.h"
 #include "cli/output/progress.h"
 #include "cli/output/terminal.h"
+#include "cli/output/unfinished.h"
 #include "cli/replay/plot.h"
+#include "cli/replay/rate_table.h"
 #include "cli/replay/summary.h"
 #include "gateway/condition_text.h"
 #include "gateway/config.h"
@@ -149,6 +151,8 @@ class Replay {
     pipeline_.observe(&totals_);
   }
 
+  /// Before the first log.
+  void write_table(RateTable& table) { pipeline_.observe_output(&table); }
   /// Before the first log.
   Expected<void> take_up(const gateway::SavedState& state) { return pipeline_.resume(state); }
 
@@ -301,7 +305,7 @@ Expected<void> check_files(const ReplayOptions& options, std::vector<std::string
   }
   inputs.insert(inputs.end(), options.logs.begin(), options.logs.end());
   inputs.push_back(options.state);
-  return check_outputs(inputs, {options.output, options.json, options.plot});
+  return check_outputs(inputs, {options.output, options.json, options.csv, options.plot});
 }
 
 void warn_of_doubts(const ReplaySummary& summary, const gateway::Plan& plan) {
@@ -398,6 +402,14 @@ Expected<std::optional<gateway::SavedState>> read_state(const std::string& path,
   return std::move(*state);
 }
 
+// Nothing where none is wanted.
+Expected<std::optional<RateTable>> open_table(const std::string& path) {
+  if (path.empty()) return std::nullopt;
+  auto table = RateTable::open(path);
+  if (!table) return tl::unexpected(table.error());
+  return std::move(*table);
+}
+
 }  // namespace
 
 int run_replay(const ReplayOptions& options) {
@@ -418,11 +430,16 @@ int run_replay(const ReplayOptions& options) {
   if (!state) return report(state.error());
   auto output = OutputFile::open(options.output);
   if (!output) return report(output.error());
+  auto table = open_table(options.csv);
+  if (!table) return report(table.error());
 
+  // What is read from a pipe ends with its writer.
+  const FinishOnInterrupt finish(std::count(options.logs.begin(), options.logs.end(), "-") > 0);
   Replay replay(options, plan, *output, std::move(*buses));
   if (*state) {
     if (const auto taken = replay.take_up(**state); !taken) return report(taken.error());
   }
+  if (*table) replay.write_table(**table);
   std::optional<Error> trouble;
   for (const std::string& log : options.logs) {
     if (const auto ran = replay.run_log(log); !ran) {
@@ -432,6 +449,9 @@ int run_replay(const ReplayOptions& options) {
   }
   const ReplaySummary& summary = replay.finish();
   if (const auto closed = output->close(); !closed) return report(closed.error());
+  if (*table) {
+    if (const auto closed = (*table)->close(); !closed) return report(closed.error());
+  }
   if (!trouble) trouble = explain_silence(summary, plan, options.logs.front());
   const int written = write_results(options, plan, summary, replay.plot());
   warn_of_doubts(summary, plan);

@@ -384,6 +384,29 @@ TEST_F(Config, IgnoresAnImplausibleRangeWithAWarning) {
   EXPECT_DOUBLE_EQ(loaded->plan.gyros[1].rate.maximum, 1e5);
 }
 
+// A gyro turns both ways: public files say [0|100] or [0|1] of a signed rate, and half of its noise
+// would be thrown away. An unsigned magnitude beside a sign, and other quantities, keep theirs.
+TEST_F(Config, IgnoresARangeThatLeavesOutOneDirectionOfARate) {
+  for (const char* range : {"[0|1]", "[0|100]", "[-255|0]", "[5|2000]"}) {
+    const std::string dbc = replaced(kBench, "[-2000|2000]", range);
+    write("bench.dbc", dbc);
+    const auto loaded = load(kGood);
+    ASSERT_TRUE(loaded) << loaded.error().front().message();
+    ASSERT_EQ(loaded->warnings.size(), 1U) << range;
+    const std::string warning = loaded->warnings[0].message();
+    EXPECT_NE(warning.find(range), std::string::npos) << warning;
+    EXPECT_NE(warning.find("leaves out one direction"), std::string::npos) << warning;
+    EXPECT_LT(loaded->plan.gyros[0].rate.minimum, -2000.0);
+    EXPECT_GT(loaded->plan.gyros[0].rate.maximum, 2000.0);
+    EXPECT_DOUBLE_EQ(loaded->plan.speed->speed.maximum, 300.0);
+  }
+  write("bench.dbc", replaced(kBench, "[-2000|2000]", "[-75|100]"));
+  const auto both = load(kGood);
+  ASSERT_TRUE(both);
+  EXPECT_TRUE(both->warnings.empty());
+  EXPECT_DOUBLE_EQ(both->plan.gyros[0].rate.minimum, -75.0);
+}
+
 // --- what is wrong -------------------------------------------------------------------------------
 
 // A mistyped key in any table: the nearest name that the table knows.
