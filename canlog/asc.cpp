@@ -70,33 +70,33 @@ const char* read_id(std::string_view word, int base, can::Frame& frame) {
 }
 
 // "123 Rx d 8 11 22 …", "123 Rx r 5"; behind it "Length = …" and more may stand.
-LineResult read_classic(Words words, int base, LogRecord& record) {
+Parsed read_classic(Words words, int base, LogRecord& record) {
   const std::string_view id = words.next();
   if (same(id, "errorframe")) {
     set_error_frame(record.frame);
-    return {LineKind::kFrame, ""};
+    return {Verdict::kFrame, ""};
   }
   const auto direction = direction_of(words.next());
   // Statistics, J1939 parameter groups, requests to send ("TxRq"), chip states …
-  if (!direction) return {LineKind::kOther, ""};
+  if (!direction) return {Verdict::kOther, ""};
   record.direction = *direction;
   const std::string_view kind = words.next();
   const bool remote = same(kind, "r");
-  if (!remote && !same(kind, "d")) return {LineKind::kOther, ""};
-  if (const char* why = read_id(id, base, record.frame)) return {LineKind::kMalformed, why};
+  if (!remote && !same(kind, "d")) return {Verdict::kOther, ""};
+  if (const char* why = read_id(id, base, record.frame)) return {Verdict::kMalformed, why};
   const auto dlc = number_of<unsigned>(words.next(), base);
   if (remote) {
     record.frame.flags |= can::kRemote;
     // Tools before version 8.5 of Vector's write none.
-    if (!dlc) return {LineKind::kFrame, ""};
+    if (!dlc) return {Verdict::kFrame, ""};
   }
-  if (!dlc) return {LineKind::kMalformed, "length code: no number"};
-  if (const char* why = set_dlc(*dlc, record.frame)) return {LineKind::kMalformed, why};
-  if (remote) return {LineKind::kFrame, ""};
+  if (!dlc) return {Verdict::kMalformed, "length code: no number"};
+  if (const char* why = set_dlc(*dlc, record.frame)) return {Verdict::kMalformed, why};
+  if (remote) return {Verdict::kFrame, ""};
   if (const char* why = read_payload(words, record.frame, base)) {
-    return {LineKind::kMalformed, why};
+    return {Verdict::kMalformed, why};
   }
-  return {LineKind::kFrame, ""};
+  return {Verdict::kFrame, ""};
 }
 
 /// Bits of the flags of a CANFD line.
@@ -121,39 +121,39 @@ bool is_bit(std::string_view word) {
 }
 
 // "1 Rx 123 [name] 1 0 9 12 11 22 … duration length flags …"
-LineResult read_fd(Words words, int base, LogRecord& record, unsigned& channel) {
+Parsed read_fd(Words words, int base, LogRecord& record, unsigned& channel) {
   const auto number = number_of<unsigned>(words.next());
   const auto direction = direction_of(words.next());
-  if (!number || *number < 1 || *number > kChannelMax || !direction) return {LineKind::kOther, ""};
+  if (!number || *number < 1 || *number > kChannelMax || !direction) return {Verdict::kOther, ""};
   channel = *number;
   record.direction = *direction;
   const std::string_view id = words.next();
   if (same(id, "errorframe")) {
     set_error_frame(record.frame);
-    return {LineKind::kFrame, ""};
+    return {Verdict::kFrame, ""};
   }
   can::Frame& frame = record.frame;
   frame.flags = can::kFd;
-  if (const char* why = read_id(id, base, frame)) return {LineKind::kMalformed, why};
+  if (const char* why = read_id(id, base, frame)) return {Verdict::kMalformed, why};
   std::string_view rate_switch = words.next();
   if (!is_bit(rate_switch)) rate_switch = words.next();  // a name stood there
   const std::string_view state = words.next();
   if (!is_bit(rate_switch) || !is_bit(state)) {
-    return {LineKind::kMalformed, "BRS and ESI: neither 0 nor 1"};
+    return {Verdict::kMalformed, "BRS and ESI: neither 0 nor 1"};
   }
   if (rate_switch == "1") frame.flags |= can::kBitRateSwitch;
   if (state == "1") frame.flags |= can::kErrorStateIndicator;
   const auto dlc = number_of<unsigned>(words.next(), 16);
   const auto bytes = number_of<unsigned>(words.next());
-  if (!dlc || !bytes) return {LineKind::kMalformed, "length: no number"};
-  if (const char* why = set_length(*bytes, frame)) return {LineKind::kMalformed, why};
-  if (const char* why = read_payload(words, frame, base)) return {LineKind::kMalformed, why};
+  if (!dlc || !bytes) return {Verdict::kMalformed, "length: no number"};
+  if (const char* why = set_length(*bytes, frame)) return {Verdict::kMalformed, why};
+  if (const char* why = read_payload(words, frame, base)) return {Verdict::kMalformed, why};
   apply_flags(words, frame);
   // A remote frame has a length and no bytes.
   if (frame.has(can::kRemote) && frame.length == 0) {
-    if (const char* why = set_dlc(*dlc, frame)) return {LineKind::kMalformed, why};
+    if (const char* why = set_dlc(*dlc, frame)) return {Verdict::kMalformed, why};
   }
-  return {LineKind::kFrame, ""};
+  return {Verdict::kFrame, ""};
 }
 
 // "base hex timestamps absolute"
@@ -170,6 +170,12 @@ bool begins_block(Words words) {
   return same(words.next(), "begin") && same(words.next(), "triggerblock");
 }
 
+// "End TriggerBlock", "internal events logged", "no internal events logged"
+bool is_closing(std::string_view line) {
+  return same(line, "end triggerblock") || same(line, "internal events logged") ||
+         same(line, "no internal events logged");
+}
+
 }  // namespace
 
 bool is_asc_line(std::string_view line) {
@@ -183,27 +189,27 @@ bool is_asc_line(std::string_view line) {
   LogRecord record;
   unsigned channel = 0;
   // Without the head it may be decimal: bytes of either base are bytes of hexadecimal digits.
-  const LineResult result = opening->event == Event::kFd ? read_fd(words, 16, record, channel)
-                                                         : read_classic(words, 16, record);
-  return result.kind == LineKind::kFrame;
+  const Parsed result = opening->event == Event::kFd ? read_fd(words, 16, record, channel)
+                                                     : read_classic(words, 16, record);
+  return result.verdict == Verdict::kFrame;
 }
 
-LineResult AscReader::parse(std::string_view line, LogRecord& record) {
+Parsed AscReader::parse(std::string_view line, LogRecord& record) {
   line = trimmed(line);
-  if (line.empty()) return other();
+  if (line.empty() || line.starts_with("//")) return head();
   return is_decimal(line.front()) ? parse_event(line, record) : parse_head(line);
 }
 
-LineResult AscReader::parse_head(std::string_view line) {
+Parsed AscReader::parse_head(std::string_view line) {
   Words words(line);
-  if (read_base(words, base_, relative_)) return other();
+  if (read_base(words, base_, relative_)) return head();
   const bool is_block = begins_block(words);
-  if (!is_block && !same(words.next(), "date")) return other();
+  if (!is_block && !same(words.next(), "date")) return is_closing(line) ? head() : other();
   if (is_block) {
     words = Words(line);
     words.next();
     words.next();
-    if (words.at_end()) return other();
+    if (words.at_end()) return head();
   }
   const auto wall = vector_date(words.rest());
   const auto date_ns = wall ? local_to_epoch_ns(*wall) : std::nullopt;
@@ -213,7 +219,7 @@ LineResult AscReader::parse_head(std::string_view line) {
   } else {
     date_ns_ = zero_ns_ = *date_ns;
   }
-  return other();
+  return head();
 }
 
 // A block that begins with the measurement says when that was, with more digits than the file's
@@ -224,7 +230,7 @@ void AscReader::settle_zero(std::int64_t stamp_ns) {
   block_ns_.reset();
 }
 
-LineResult AscReader::parse_event(std::string_view line, LogRecord& record) {
+Parsed AscReader::parse_event(std::string_view line, LogRecord& record) {
   Words words(line);
   const auto opening = read_opening(words);
   if (!opening) return other();
@@ -232,11 +238,13 @@ LineResult AscReader::parse_event(std::string_view line, LogRecord& record) {
   if (opening->stamp.ns > kStampMax_ns - from_ns) return malformed("stamp: beyond the year 2255");
   if (block_ns_) settle_zero(opening->stamp.ns);
   now_ns_ = from_ns + opening->stamp.ns;
-  if (opening->event == Event::kOther) return other();
+  if (opening->event == Event::kOther) {
+    return same(words.rest(), "start of measurement") ? head() : other();
+  }
   unsigned channel = opening->channel;
-  const LineResult result = opening->event == Event::kFd ? read_fd(words, base_, record, channel)
-                                                         : read_classic(words, base_, record);
-  if (result.kind != LineKind::kFrame) return result;
+  const Parsed result = opening->event == Event::kFd ? read_fd(words, base_, record, channel)
+                                                     : read_classic(words, base_, record);
+  if (result.verdict != Verdict::kFrame) return result;
   if (!set_channel(channel, record)) return malformed(kTooManyBuses);
   if (now_ns_ > kStampMax_ns - zero_ns_) return malformed("stamp: beyond the year 2255");
   record.stamp = time_from_ns(zero_ns_ + now_ns_);

@@ -18,9 +18,9 @@ class AscReader final : public LineReader {
   explicit AscReader(std::unique_ptr<ByteSource> bytes) : LineReader(std::move(bytes)) {}
 
  private:
-  LineResult parse(std::string_view line, LogRecord& record) override;
-  LineResult parse_head(std::string_view line);
-  LineResult parse_event(std::string_view line, LogRecord& record);
+  Parsed parse(std::string_view line, LogRecord& record) override;
+  Parsed parse_head(std::string_view line);
+  Parsed parse_event(std::string_view line, LogRecord& record);
   /// Where the stamps of the file, or of a block of it, count from.
   void settle_zero(std::int64_t stamp_ns);
 

@@ -148,13 +148,14 @@ class ScreenReader final : public LineReader {
       : LineReader(std::move(bytes)), deltas_(deltas) {}
 
  private:
-  LineResult parse(std::string_view line, LogRecord& record) override {
+  Parsed parse(std::string_view line, LogRecord& record) override {
     std::string plain;
     if (line.find('\x1B') != line.npos) {
       plain = without_colours(line);
       line = plain;
     }
     line = trimmed(line);
+    if (line.empty()) return head();
     if (!line.starts_with('(')) return other();
     const auto stamp = take_stamp(line);
     if (!stamp) return malformed("stamp: neither seconds nor a date");

@@ -103,38 +103,38 @@ std::optional<DecimalTime> python_seconds(std::string_view text) {
 constexpr std::string_view kPythonCanHead =
     "timestamp,arbitration_id,extended,remote,error,dlc,data";
 
-LineResult read_python_can(const Fields& fields, LogRecord& record) {
+Parsed read_python_can(const Fields& fields, LogRecord& record) {
   constexpr std::size_t kFields = 7;
-  if (fields.count != kFields) return {LineKind::kMalformed, "not seven columns"};
+  if (fields.count != kFields) return {Verdict::kMalformed, "not seven columns"};
   const auto stamp = python_seconds(fields.at(0));
-  if (!stamp) return {LineKind::kMalformed, "stamp: no number of seconds"};
+  if (!stamp) return {Verdict::kMalformed, "stamp: no number of seconds"};
   record.stamp = time_from_ns(stamp->ns);
   record.fraction_digits = stamp->digits > 6 ? 9 : 6;
   can::Frame& frame = record.frame;
   if (!is_truth(fields.at(2)) || !is_truth(fields.at(3)) || !is_truth(fields.at(4))) {
-    return {LineKind::kMalformed, "extended, remote, error: neither 0 nor 1"};
+    return {Verdict::kMalformed, "extended, remote, error: neither 0 nor 1"};
   }
   if (is_true(fields.at(4))) {
     set_error_frame(frame);
-    return {LineKind::kFrame, ""};
+    return {Verdict::kFrame, ""};
   }
   if (const char* why = set_id(hex_id(fields.at(1)), is_true(fields.at(2)), frame)) {
-    return {LineKind::kMalformed, why};
+    return {Verdict::kMalformed, why};
   }
   const auto length = number_of<unsigned>(fields.at(5));
-  if (!length) return {LineKind::kMalformed, "length: no number"};
+  if (!length) return {Verdict::kMalformed, "length: no number"};
   if (*length > can::kClassicBytesMax) frame.flags |= can::kFd;
-  if (const char* why = set_length(*length, frame)) return {LineKind::kMalformed, why};
+  if (const char* why = set_length(*length, frame)) return {Verdict::kMalformed, why};
   if (is_true(fields.at(3))) {
     frame.flags |= can::kRemote;
-    return {LineKind::kFrame, ""};
+    return {Verdict::kFrame, ""};
   }
   std::size_t count = 0;
-  if (const char* why = read_base64(fields.at(6), frame, count)) return {LineKind::kMalformed, why};
+  if (const char* why = read_base64(fields.at(6), frame, count)) return {Verdict::kMalformed, why};
   if (count != frame.length) {
-    return {LineKind::kMalformed, "payload: not as many bytes as the length says"};
+    return {Verdict::kMalformed, "payload: not as many bytes as the length says"};
   }
-  return {LineKind::kFrame, ""};
+  return {Verdict::kFrame, ""};
 }
 
 bool names_savvycan_columns(std::string_view line) {
@@ -148,13 +148,14 @@ bool is_python_can_csv_line(std::string_view line) {
   // A log that was added to, or cut, has no head.
   LogRecord record;
   const Fields fields(line);
-  return fields.at(1).starts_with("0x") && read_python_can(fields, record).kind == LineKind::kFrame;
+  return fields.at(1).starts_with("0x") &&
+         read_python_can(fields, record).verdict == Verdict::kFrame;
 }
 
-LineResult PythonCanCsvReader::parse(std::string_view line, LogRecord& record) {
-  if (trimmed(line).empty() || trimmed(line) == kPythonCanHead) return other();
-  const LineResult result = read_python_can(Fields(line), record);
-  if (result.kind == LineKind::kFrame && !set_channel(1, record)) return malformed(kTooManyBuses);
+Parsed PythonCanCsvReader::parse(std::string_view line, LogRecord& record) {
+  if (trimmed(line).empty() || trimmed(line) == kPythonCanHead) return head();
+  const Parsed result = read_python_can(Fields(line), record);
+  if (result.verdict == Verdict::kFrame && !set_channel(1, record)) return malformed(kTooManyBuses);
   return result;
 }
 
@@ -162,9 +163,9 @@ bool is_savvycan_csv_line(std::string_view line) {
   return names_savvycan_columns(trimmed(line));
 }
 
-LineResult SavvyCanCsvReader::parse(std::string_view line, LogRecord& record) {
+Parsed SavvyCanCsvReader::parse(std::string_view line, LogRecord& record) {
   line = trimmed(line);
-  if (line.empty()) return other();
+  if (line.empty()) return head();
   const Fields fields(line);
   if (names_savvycan_columns(line)) {
     const auto place = [&](std::string_view name) {
@@ -179,7 +180,7 @@ LineResult SavvyCanCsvReader::parse(std::string_view line, LogRecord& record) {
     bus_ = place("Bus");
     length_ = place("LEN");
     data_ = place("D1");
-    return other();
+    return head();
   }
   if (length_ == kNone || data_ == kNone) return malformed("the first line names no LEN and D1");
   const auto stamp = decimal_time(fields.at(time_), kMicro_ns);

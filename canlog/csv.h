@@ -19,7 +19,7 @@ class PythonCanCsvReader final : public LineReader {
   explicit PythonCanCsvReader(std::unique_ptr<ByteSource> bytes) : LineReader(std::move(bytes)) {}
 
  private:
-  LineResult parse(std::string_view line, LogRecord& record) override;
+  Parsed parse(std::string_view line, LogRecord& record) override;
 };
 
 bool is_savvycan_csv_line(std::string_view line);
@@ -30,7 +30,7 @@ class SavvyCanCsvReader final : public LineReader {
   explicit SavvyCanCsvReader(std::unique_ptr<ByteSource> bytes) : LineReader(std::move(bytes)) {}
 
  private:
-  LineResult parse(std::string_view line, LogRecord& record) override;
+  Parsed parse(std::string_view line, LogRecord& record) override;
   static constexpr int kNone = -1;
   int time_ = kNone;  ///< places of the columns
   int id_ = kNone;

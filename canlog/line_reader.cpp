@@ -45,16 +45,13 @@ bool LineReader::next(LogRecord& record) {
     const std::string_view line = clean_line(block_.substr(0, end), counts_.skipped_bytes);
     block_.remove_prefix(end + 1);
     record = {};
-    const LineResult result = parse(line, record);
-    if (result.kind == LineKind::kFrame) {
+    const Parsed result = parse(line, record);
+    if (result.verdict == Verdict::kFrame) {
       ++counts_.frames;
       return true;
     }
-    if (result.kind == LineKind::kMalformed) {
-      counts_.add_malformed(result.why);
-    } else {
-      ++counts_.other_lines;
-    }
+    if (result.verdict == Verdict::kMalformed) counts_.add_malformed(result.why);
+    if (result.verdict == Verdict::kOther) ++counts_.other_lines;
   }
   return false;
 }

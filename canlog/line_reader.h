@@ -7,12 +7,22 @@
 #include <optional>
 #include <string_view>
 
-#include "canlog/candump.h"
 #include "canlog/log_source.h"
 #include "canlog/reader.h"
 #include "canlog/text_line.h"
 
 namespace vgyro::canlog {
+
+enum class Verdict : std::uint8_t {
+  kFrame,
+  kHead,   ///< no frame, and understood: a date, a comment, a blank line; it is not counted apart
+  kOther,  ///< no frame, but something else: counted, as people may miss it
+  kMalformed  ///< looks like a frame and is none
+};
+struct Parsed {
+  Verdict verdict = Verdict::kOther;
+  const char* why = "";  ///< of a malformed line
+};
 
 class LineReader : public LogReader {
  public:
@@ -28,12 +38,13 @@ class LineReader : public LogReader {
   explicit LineReader(std::unique_ptr<ByteSource> bytes);
 
   /// `line` has neither its end nor noise. `record` begins as default; for kFrame the callee has
-  /// filled it in. kXl is not for these forms.
-  virtual LineResult parse(std::string_view line, LogRecord& record) = 0;
+  /// filled it in.
+  virtual Parsed parse(std::string_view line, LogRecord& record) = 0;
 
-  static LineResult frame() { return {LineKind::kFrame, ""}; }
-  static LineResult other() { return {LineKind::kOther, ""}; }
-  static LineResult malformed(const char* why) { return {LineKind::kMalformed, why}; }
+  static Parsed frame() { return {Verdict::kFrame, ""}; }
+  static Parsed head() { return {Verdict::kHead, ""}; }
+  static Parsed other() { return {Verdict::kOther, ""}; }
+  static Parsed malformed(const char* why) { return {Verdict::kMalformed, why}; }
   /// The record's bus by name; false when there are too many, which malformed(kTooManyBuses) tells.
   bool set_bus(std::string_view name, LogRecord& record);
   /// By the channel's number, from 1 on (canlog/writer.h).

@@ -8,6 +8,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "base/error.h"
 #include "canlog/byte_source.h"
@@ -26,6 +27,8 @@ class LogReader {
   virtual bool next(LogRecord& record) = 0;
 
   [[nodiscard]] virtual const LogCounts& counts() const = 0;
+  /// Of each log, where this reads several (canlog/merged_reader.h), in the order of the arguments.
+  [[nodiscard]] virtual std::vector<const LogCounts*> parts() const { return {&counts()}; }
   [[nodiscard]] virtual const InterfaceTable& interfaces() const = 0;
   [[nodiscard]] virtual const std::optional<Error>& error() const = 0;
 

@@ -167,27 +167,27 @@ Type type_of_first(const Columns& columns, can::Frame& /*frame*/) {
   return columns.id == kNoIdentifier ? Type::kOther : Type::kFrame;
 }
 
-LineResult read_columns(const Columns& columns, unsigned version, LogRecord& record) {
+Parsed read_columns(const Columns& columns, unsigned version, LogRecord& record) {
   can::Frame& frame = record.frame;
   const bool first = version < 200;
   const std::string_view direction = first ? columns.type : columns.direction;
   if (direction == "Rx") record.direction = Direction::kReceived;
   if (direction == "Tx") record.direction = Direction::kTransmitted;
   const Type type = first ? type_of_first(columns, frame) : type_of(columns.type, frame);
-  if (type == Type::kOther) return {LineKind::kOther, ""};
+  if (type == Type::kOther) return {Verdict::kOther, ""};
   if (type == Type::kError) {
     set_error_frame(frame);
-    return {LineKind::kFrame, ""};
+    return {Verdict::kFrame, ""};
   }
-  if (const char* why = read_id(columns.id, frame)) return {LineKind::kMalformed, why};
-  if (const char* why = read_length(columns, frame)) return {LineKind::kMalformed, why};
+  if (const char* why = read_id(columns.id, frame)) return {Verdict::kMalformed, why};
+  if (const char* why = read_length(columns, frame)) return {Verdict::kMalformed, why};
   if (type == Type::kRemote || columns.data.starts_with("RTR")) {
     frame.flags |= can::kRemote;
-    return {LineKind::kFrame, ""};
+    return {Verdict::kFrame, ""};
   }
   Words bytes(columns.data);
-  if (const char* why = read_payload(bytes, frame, 16)) return {LineKind::kMalformed, why};
-  return {LineKind::kFrame, ""};
+  if (const char* why = read_payload(bytes, frame, 16)) return {Verdict::kMalformed, why};
+  return {Verdict::kFrame, ""};
 }
 
 }  // namespace
@@ -206,10 +206,10 @@ bool is_trc_line(std::string_view line) {
   LogRecord record;
   const Columns columns = split(line, kColumns10);
   return decimal_time(columns.time, kMilli_ns) &&
-         read_columns(columns, 100, record).kind == LineKind::kFrame;
+         read_columns(columns, 100, record).verdict == Verdict::kFrame;
 }
 
-LineResult TrcReader::parse_head(std::string_view line) {
+Parsed TrcReader::parse_head(std::string_view line) {
   const auto value_of = [&](std::string_view key) {
     return line.starts_with(key) ? std::optional(trimmed(line.substr(key.size()))) : std::nullopt;
   };
@@ -234,12 +234,12 @@ LineResult TrcReader::parse_head(std::string_view line) {
   } else if (const std::size_t at = line.find("Start time:"); at != line.npos && version_ == 100) {
     zero_ns_ = start_line_ns(line.substr(at + 11)).value_or(0);
   }
-  return other();
+  return head();
 }
 
-LineResult TrcReader::parse(std::string_view line, LogRecord& record) {
+Parsed TrcReader::parse(std::string_view line, LogRecord& record) {
   line = trimmed(line);
-  if (line.empty()) return other();
+  if (line.empty()) return head();
   if (line.front() == ';') return parse_head(line);
   const std::string_view letters =
       version_ >= 200 ? std::string_view(columns_.data()) : columns_of(version_);
@@ -247,8 +247,8 @@ LineResult TrcReader::parse(std::string_view line, LogRecord& record) {
   const Columns columns = split(line, letters);
   const auto time = decimal_time(columns.time, kMilli_ns);
   if (!time) return malformed("stamp: no number");
-  const LineResult result = read_columns(columns, version_, record);
-  if (result.kind != LineKind::kFrame) return result;
+  const Parsed result = read_columns(columns, version_, record);
+  if (result.verdict != Verdict::kFrame) return result;
   const auto channel = columns.bus.empty() || columns.bus == "-" ? std::optional(1U)
                                                                  : number_of<unsigned>(columns.bus);
   if (!channel || *channel < 1 || *channel > kChannelMax) return malformed("bus: no number");

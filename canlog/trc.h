@@ -30,8 +30,8 @@ class TrcReader final : public LineReader {
   };
 
  private:
-  LineResult parse(std::string_view line, LogRecord& record) override;
-  LineResult parse_head(std::string_view line);
+  Parsed parse(std::string_view line, LogRecord& record) override;
+  Parsed parse_head(std::string_view line);
 
   unsigned version_ = 100;  ///< 100 · major + minor
   static constexpr std::size_t kColumnsMax = 16;

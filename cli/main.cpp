@@ -35,6 +35,16 @@ void add_overrides(CLI::App& command, std::string& method, std::optional<std::st
   command.add_option("--model", model, "model file instead of the configured one");
 }
 
+constexpr const char* kLogHelp = "log of any known form, packed or not; - is standard input";
+
+void add_logs(CLI::App& command, std::vector<std::string>& logs) {
+  command
+      .add_option("LOG", logs,
+                  "logs of any known form, packed or not; several are merged by stamp;\n"
+                  "- is standard input")
+      ->required();
+}
+
 CLI::App* add_check(CLI::App& app, CheckOptions& options, std::string& method) {
   CLI::App* command = app.add_subcommand(
       "check", "Explain a configuration before it is trusted: which bits are used");
@@ -50,7 +60,7 @@ CLI::App* add_decode(CLI::App& app, DecodeOptions& options) {
       ->required()
       ->allow_extra_args(false);
   command->add_flag("--text", options.text, "lines for people instead of JSON");
-  command->add_option("LOG", options.log, "candump log, .xz too; - is standard input")->required();
+  add_logs(*command, options.logs);
   command->footer("Live monitor: candump -L can0 | vgyro decode --dbc vgyro.dbc --text -");
   return command;
 }
@@ -74,8 +84,12 @@ CLI::App* add_replay(CLI::App& app, ReplayOptions& options, std::string& method)
                    "may be given several times")
       ->allow_extra_args(false);
   command->add_flag("-q,--quiet", options.quiet, "no summary on stderr");
-  command->add_option("LOG", options.logs, "candump logs, .xz too; - is standard input")
-      ->required();
+  command
+      ->add_option("--digits", options.digits,
+                   "digits of a stamp's fraction, 6 or 9; default: as the log has them.\n"
+                   "canplayer wants 6")
+      ->check(CLI::IsMember({6, 9}));
+  add_logs(*command, options.logs);
   command->footer(
       "The same input gives the same bytes out, on every run.\n"
       "Example: vgyro replay --config vgyro.toml -o out.log --plot drift.svg drive.log.xz");
@@ -126,7 +140,7 @@ CLI::App* add_allan(CLI::App& app, AllanOptions& options) {
   command->add_option("--config", options.config, "configuration, e.g. vgyro.toml")->required();
   command->add_option("--json", options.json, "figures as JSON; - is standard output");
   command->add_option("--plot", options.plot, "picture of the curves: .svg, .png or .pdf");
-  command->add_option("LOG", options.log, "candump log, .xz too; - is standard input")->required();
+  add_logs(*command, options.logs);
   command->footer(
       "Best on an hour or more at rest; what the figures mean is in docs/allan.md.\n"
       "Example: vgyro allan --config vgyro.toml --plot allan.svg rest.log.xz");
@@ -135,8 +149,7 @@ CLI::App* add_allan(CLI::App& app, AllanOptions& options) {
 
 void add_recording(CLI::App& command, std::string& config, std::string& measured) {
   command.add_option("--config", config, "configuration, e.g. vgyro.toml")->required();
-  command.add_option("--measured", measured, "candump log, .xz too; - is standard input")
-      ->required();
+  command.add_option("--measured", measured, kLogHelp)->required();
 }
 
 CLI::App* add_compare(CLI::App& app, CompareOptions& options) {

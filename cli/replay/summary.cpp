@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "cli/log_notes.h"
 #include "gateway/condition_text.h"
 #include "gateway/config.h"
 #include "gateway/model_plan.h"
@@ -36,6 +37,7 @@ Json log_json(const LogSummary& log) {
           {"xl_frames", log.counts.xl_frames},
           {"other_lines", log.counts.other_lines},
           {"malformed_lines", log.counts.malformed_lines},
+          {"skipped_bytes", log.counts.skipped_bytes},
           {"cut_off_lines", log.counts.cut_off_lines},
           {"first_malformed", malformed}};
 }
@@ -289,14 +291,17 @@ void put_log(fmt::memory_buffer& text, const LogSummary& log) {
   fmt::format_to(to, "{}: {} frames", log.path, log.counts.frames);
   if (log.counts.xl_frames > 0)
     fmt::format_to(to, ", {} CAN XL frames passed over", log.counts.xl_frames);
-  if (log.counts.malformed_lines > 0)
-    fmt::format_to(to, ", {} lines not understood", log.counts.malformed_lines);
+  if (log.counts.malformed_lines > 0) {
+    fmt::format_to(to, ", {} {}s not understood", log.counts.malformed_lines, log.counts.item);
+  }
+  fmt::format_to(to, "{}", passed_over_text(log.counts));
   if (log.counts.cut_off_lines > 0) {
-    fmt::format_to(to, "; the log ends inside line {}, which was not used", log.counts.lines + 1);
+    fmt::format_to(to, "; the log ends inside {} {}, which was not used", log.counts.item,
+                   log.counts.lines + 1);
   }
   fmt::format_to(to, "\n");
   for (const canlog::MalformedLine& bad : log.counts.first_malformed)
-    fmt::format_to(to, "  line {}: {}\n", bad.line, bad.why);
+    fmt::format_to(to, "  {} {}: {}\n", log.counts.item, bad.line, bad.why);
 }
 
 void put_gyro(fmt::memory_buffer& text, const ReplaySummary& summary, const gateway::Plan& plan,
