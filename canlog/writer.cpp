@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 
+#include "canlog/asc_writer.h"
 #include "canlog/candump.h"
 #include "canlog/text_line.h"
 
@@ -73,10 +74,15 @@ std::unique_ptr<LogWriter> make(ByteSink& sink, const WriterOptions& options) {
 }
 
 constexpr std::array kWrittenForms{
-    WrittenForm{".log", "candump log", true, make<CandumpWriter>},
+    WrittenForm{".log", "candump log", true, false, make<CandumpWriter>},
+    WrittenForm{".asc", "Vector ASC", true, false, make<AscWriter>},
 };
 
 }  // namespace
+
+std::span<const WrittenForm> written_forms() {
+  return kWrittenForms;
+}
 
 const WrittenForm* written_form(std::string_view path) {
   const auto found =

@@ -4,7 +4,7 @@
 
 #include <cstdint>
 #include <memory>
-#include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -23,6 +23,23 @@ class ByteSink {
   /// where can_rewrite().
   virtual void rewrite(std::uint64_t offset, std::string_view bytes) = 0;
   [[nodiscard]] virtual bool can_rewrite() const = 0;
+};
+
+/// Interface names ↔ the channel numbers (from 1 on) of forms that have no names. Read, channel N
+/// is "canN-1", as can-utils' asc2log and python-can have it. Written, "canN-1" has channel N;
+/// other names, and those whose number is taken, get the lowest free one in order of appearance.
+std::string channel_name(unsigned channel);
+class ChannelNumbers {
+ public:
+  unsigned channel_of(std::string_view name);
+  struct Entry {
+    std::string name;
+    unsigned channel = 0;
+  };
+  [[nodiscard]] const std::vector<Entry>& entries() const { return entries_; }
+
+ private:
+  std::vector<Entry> entries_;
 };
 
 struct WriterOptions {
@@ -48,6 +65,8 @@ class LogWriter {
     std::uint64_t frames = 0;
   };
   [[nodiscard]] const std::vector<Omission>& omissions() const { return omissions_; }
+  /// Which channel each interface became, of forms that have no names; else null.
+  [[nodiscard]] virtual const ChannelNumbers* channels() const { return nullptr; }
 
  protected:
   void omit(std::string_view what);
@@ -56,30 +75,16 @@ class LogWriter {
   std::vector<Omission> omissions_;
 };
 
-/// Interface names ↔ the channel numbers (from 1 on) of forms that have no names. Read, channel N
-/// is "canN-1", as can-utils' asc2log and python-can have it. Written, "canN-1" has channel N;
-/// other names, and those whose number is taken, get the lowest free one in order of appearance.
-std::string channel_name(unsigned channel);
-class ChannelNumbers {
- public:
-  unsigned channel_of(std::string_view name);
-  struct Entry {
-    std::string name;
-    unsigned channel = 0;
-  };
-  [[nodiscard]] const std::vector<Entry>& entries() const { return entries_; }
-
- private:
-  std::vector<Entry> entries_;
-};
-
 /// A form that is written, by the ending of the output's name.
 struct WrittenForm {
   std::string_view ending;  ///< ".blf"
   std::string_view name;
-  bool is_text;  ///< may be packed on the way
+  bool is_text;   ///< may be packed on the way
+  bool rewrites;  ///< wants a sink that can
   std::unique_ptr<LogWriter> (*writer)(ByteSink& sink, const WriterOptions& options);
 };
+std::span<const WrittenForm> written_forms();
+/// By the name of the output; null where it says none.
 const WrittenForm* written_form(std::string_view path);
 
 }  // namespace vgyro::canlog

@@ -26,6 +26,14 @@ struct DecodeOptions {
 };
 int run_decode(const DecodeOptions& options);
 
+struct ConvertOptions {
+  std::vector<std::string> logs;
+  std::string output;   ///< "-": a candump log on standard output
+  unsigned digits = 0;  ///< of a stamp's fraction, 6 or 9; 0: as the logs have them
+  bool quiet = false;
+};
+int run_convert(const ConvertOptions& options);
+
 struct ReplayOptions {
   std::string config;
   std::optional<gateway::Method> method;

@@ -2,7 +2,9 @@
 
 // What is said of logs: their names in messages, and what in them was no frame.
 
+#include <cstdint>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "canlog/record.h"
@@ -17,6 +19,10 @@ std::string count_of(std::uint64_t count, std::string_view item);
 
 /// ", 3 other lines, 4096 stray bytes" of what was passed over; empty where nothing was.
 std::string passed_over_text(const canlog::LogCounts& counts);
+
+/// "a.log: 12 frames, 1 line not understood …" and the first of these lines, each on a line of its
+/// own. `xl_used`: whether CAN XL frames are of use here.
+std::string log_text(const std::string& path, const canlog::LogCounts& counts, bool xl_used);
 
 /// Why a log without a frame is of no use, and what is.
 inline constexpr const char* kNoFrame = "holds no CAN frame";

@@ -20,6 +20,7 @@ using namespace vgyro::cli;
 struct Options {
   CheckOptions check;
   DecodeOptions decode;
+  ConvertOptions convert;
   ReplayOptions replay;
   AllanOptions allan;
   CompareOptions compare;
@@ -45,6 +46,14 @@ void add_logs(CLI::App& command, std::vector<std::string>& logs) {
       ->required();
 }
 
+void add_digits(CLI::App& command, unsigned& digits) {
+  command
+      .add_option("--digits", digits,
+                  "digits of a stamp's fraction, 6 or 9; default: as the log has them.\n"
+                  "canplayer wants 6")
+      ->check(CLI::IsMember({6, 9}));
+}
+
 CLI::App* add_check(CLI::App& app, CheckOptions& options, std::string& method) {
   CLI::App* command = app.add_subcommand(
       "check", "Explain a configuration before it is trusted: which bits are used");
@@ -62,6 +71,23 @@ CLI::App* add_decode(CLI::App& app, DecodeOptions& options) {
   command->add_flag("--text", options.text, "lines for people instead of JSON");
   add_logs(*command, options.logs);
   command->footer("Live monitor: candump -L can0 | vgyro decode --dbc vgyro.dbc --text -");
+  return command;
+}
+
+CLI::App* add_convert(CLI::App& app, ConvertOptions& options) {
+  CLI::App* command = app.add_subcommand(
+      "convert", "Read logs of any known form and write one that other tools read");
+  command
+      ->add_option("-o,--output", options.output,
+                   "the ending says the form: .log (candump), .asc (Vector); text also\n"
+                   "packed: .log.gz, .log.xz, .log.zst; - is a candump log on standard output")
+      ->required();
+  add_digits(*command, options.digits);
+  command->add_flag("-q,--quiet", options.quiet, "no summary on stderr");
+  add_logs(*command, options.logs);
+  command->footer(
+      "Which tool reads what is in docs/log-format.md.\n"
+      "Example: vgyro convert -o drive.log.xz drive.asc");
   return command;
 }
 
@@ -84,11 +110,7 @@ CLI::App* add_replay(CLI::App& app, ReplayOptions& options, std::string& method)
                    "may be given several times")
       ->allow_extra_args(false);
   command->add_flag("-q,--quiet", options.quiet, "no summary on stderr");
-  command
-      ->add_option("--digits", options.digits,
-                   "digits of a stamp's fraction, 6 or 9; default: as the log has them.\n"
-                   "canplayer wants 6")
-      ->check(CLI::IsMember({6, 9}));
+  add_digits(*command, options.digits);
   add_logs(*command, options.logs);
   command->footer(
       "The same input gives the same bytes out, on every run.\n"
@@ -223,6 +245,7 @@ int run(int argc, char** argv) {
   Options options;
   CLI::App* check = add_check(app, options.check, options.method);
   CLI::App* decode = add_decode(app, options.decode);
+  CLI::App* convert = add_convert(app, options.convert);
   CLI::App* replay = add_replay(app, options.replay, options.method);
   CLI::App* model = add_model(app);
   CLI::App* allan = add_allan(app, options.allan);
@@ -250,6 +273,7 @@ int run(int argc, char** argv) {
   options.replay.method = method;
   if (check->parsed()) return run_check(options.check);
   if (decode->parsed()) return run_decode(options.decode);
+  if (convert->parsed()) return run_convert(options.convert);
   if (model->parsed()) return run_model_list();
   if (allan->parsed()) return run_allan(options.allan);
   if (compare->parsed()) return run_compare(options.compare);
