@@ -28,6 +28,7 @@ Opened open_candump(std::unique_ptr<ByteSource> bytes) {
 
 // "(1700000000.123456) can0 123#…", whatever is wrong with the rest.
 bool is_candump_line(std::string_view line) {
+  if (line.starts_with("DROPCOUNT:")) return true;
   if (!line.starts_with('(')) return false;
   Words words(line.substr(1));
   std::string_view stamp = words.next();
@@ -39,7 +40,8 @@ bool is_candump_line(std::string_view line) {
 }
 
 constexpr std::array kForms{
-    Form{"candump log", nullptr, is_candump_line, open_candump},
+    Form{"what `candump -L` prints and `candump -l` writes", nullptr, is_candump_line,
+         open_candump},
     Form{"candump's screen text with stamps", nullptr, is_candump_screen_line, open_candump_screen},
     Form{"Vector ASC", nullptr, is_asc_line, open_lines<AscReader>},
     Form{"PEAK TRC", nullptr, is_trc_line, open_lines<TrcReader>},
@@ -50,6 +52,13 @@ constexpr std::array kForms{
 
 bool starts(std::string_view head, std::string_view magic, std::size_t at = 0) {
   return head.size() >= at + magic.size() && head.substr(at, magic.size()) == magic;
+}
+
+// Its mark comes late: a line of a log before it would have been believed already, or not, by the
+// pieces in which the log arrives.
+bool is_tar(std::string_view head) {
+  constexpr std::size_t kMarkAt = 257;
+  return starts(head, "ustar", kMarkAt) && head.find('\n') > kMarkAt;
 }
 
 constexpr auto kUnpackOutside = "unpack it, and name the logs in it"sv;
@@ -79,8 +88,7 @@ constexpr std::array kForeign{
                 kUnpackOutside},
     ForeignForm{"is a RAR archive", [](std::string_view h) { return starts(h, "Rar!\x1A\x07"sv); },
                 kUnpackOutside},
-    ForeignForm{"is a tar archive", [](std::string_view h) { return starts(h, "ustar", 257); },
-                "`tar -xOf FILE NAME | vgyro … -` reads one log of it"},
+    ForeignForm{"is a tar archive", is_tar, "`tar -xOf FILE NAME | vgyro … -` reads one log of it"},
     ForeignForm{"is a Parquet table", [](std::string_view h) { return starts(h, "PAR1"); },
                 "a table holds decoded values; the log of frames that it came from is needed"},
     ForeignForm{"is a PDF document", [](std::string_view h) { return starts(h, "%PDF-"); },

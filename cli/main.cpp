@@ -80,7 +80,7 @@ CLI::App* add_convert(CLI::App& app, ConvertOptions& options) {
   command
       ->add_option("-o,--output", options.output,
                    "the ending says the form: .log (candump), .asc (Vector); text also\n"
-                   "packed: .log.gz, .log.xz, .log.zst; - is a candump log on standard output")
+                   "packed: .log.gz, .log.xz, .log.zst; - is a candump log on\nstandard output")
       ->required();
   add_digits(*command, options.digits);
   command->add_flag("-q,--quiet", options.quiet, "no summary on stderr");
