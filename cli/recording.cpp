@@ -170,7 +170,7 @@ Expected<gap::Recording> read_recording(const std::string& log, const gateway::P
   RoleFrames frames(plan);
   Recorder recorder(plan);
   const auto done = frames.read(
-      log, doing,
+      {log}, doing,
       [&](std::uint8_t roles, const canlog::LogRecord& record) { recorder.take(roles, record); });
   if (!done) return tl::unexpected(done.error());
   if (const auto missing = frames.missing_gyro(log, recorder.used())) {

@@ -93,6 +93,25 @@ void OutputFile::write(std::string_view text) {
   }
 }
 
+bool OutputFile::can_rewrite() const {
+  struct stat info {};
+  return owned_ && ::fstat(fd_, &info) == 0 && S_ISREG(info.st_mode);
+}
+
+void OutputFile::rewrite(std::uint64_t offset, std::string_view text) {
+  flush();
+  while (!text.empty() && !error_) {
+    const ssize_t put = ::pwrite(fd_, text.data(), text.size(), static_cast<off_t>(offset));
+    if (put < 0 && errno == EINTR) continue;
+    if (put < 0) {
+      error_ = Error{name_, "cannot be written: " + system_reason(), {}};
+      return;
+    }
+    offset += static_cast<std::uint64_t>(put);
+    text.remove_prefix(static_cast<std::size_t>(put));
+  }
+}
+
 Expected<void> OutputFile::close() {
   flush();
   if (owned_ && ::close(std::exchange(fd_, kDiscard)) != 0 && !error_) {

@@ -234,7 +234,8 @@ TEST(CandumpForm, TellsWhatIsWrongWithAnInterface) {
   EXPECT_EQ(why_malformed("(1.5)"), "no interface name");
   EXPECT_EQ(why_malformed("(1.5) "), "no interface name");
   EXPECT_EQ(why_malformed("(1.5) 123#11"), "no interface name");
-  EXPECT_EQ(why_malformed("(1.5) " + std::string(32, 'c') + " 123#11"), "no interface name");
+  EXPECT_EQ(why_malformed("(1.5) " + std::string(32, 'c') + " 123#11"),
+            "the interface name is longer than 31 characters");
   EXPECT_EQ(parse("(1.5) " + std::string(31, 'c') + " 123#11").interface, std::string(31, 'c'));
 }
 

@@ -2,6 +2,7 @@
 """`vgyro replay`: what comes out, what the summary counts, and what is said of bad input."""
 
 import collections
+import gzip
 import json
 import lzma
 import math
@@ -90,6 +91,39 @@ class Output(Replay):
         self.write("first.log", "".join(self.lines[:301]))
         self.write("second.log", "".join(self.lines[301:]))
         self.assertEqual(self.replay("first.log", "second.log").stdout, whole)
+
+    def test_logs_of_the_same_time_are_merged(self):
+        # One `candump -l` per bus is what people have. One more begins later, one comes packed from a pipe.
+        whole = self.replay("in.log").stdout
+        for bus in ("can0", "can1"):
+            self.write(f"{bus}.log", "".join(line for line in self.lines if f" {bus} " in line))
+        self.assertEqual(self.replay("can0.log", "can1.log").stdout, whole)
+        self.assertEqual(self.replay("can1.log", "can0.log").stdout, whole)
+        packed = gzip.compress((self.folder / "can1.log").read_bytes())
+        self.assertEqual(self.replay("can0.log", "-", stdin=packed).stdout, whole)
+        found = self.summary("can0.log", "can1.log")
+        self.assertEqual([log["frames"] for log in found["logs"]], [len(self.lines) // 2] * 2)
+
+    def test_logs_that_cannot_belong_together_are_refused(self):
+        self.write("relative.log", bench.line_b(3_000_000, 0.3))
+        self.assertIn("nobody can tell what was at the same time", self.refuse("in.log", "relative.log"))
+        self.assertIn("is named twice", self.refuse("in.log", "in.log"))
+
+    def test_stamps_have_as_many_digits_as_asked_for(self):
+        # canplayer stops at nine.
+        nine = [line.replace(") ", "000) ", 1) for line in self.lines]
+        self.write("nine.log", "".join(nine))
+        self.assertEqual(self.replay("--digits", "6", "nine.log").stdout, self.replay("in.log").stdout)
+        self.assertEqual(self.replay("--digits", "9", "in.log").stdout, self.replay("nine.log").stdout)
+
+    def test_what_was_passed_over_is_told(self):
+        # A byte-order mark costs nothing; NUL bytes of a power cut, and other lines, are counted.
+        text = b"\xef\xbb\xbf" + "".join(self.lines[:400]).encode() + b"a remark\n" + bytes(4096)
+        (self.folder / "odd.log").write_bytes(text + "".join(self.lines[400:]).encode())
+        done = self.replay("odd.log")
+        self.assertEqual(done.stdout, self.replay("in.log").stdout)
+        self.assertIn("1 other line, 4096 stray bytes passed over", done.stderr.decode())
+        self.assertEqual(self.summary("odd.log")["logs"][0]["skipped_bytes"], 4096)
 
     def test_method_may_be_chosen_on_the_command_line(self):
         # The plain mean keeps the gyros' own biases: 0.5 and -0.3 deg/s.
@@ -445,6 +479,28 @@ class Thoughts(Replay):
         said = self.replay("-o", "out.log", "in.log").stderr.decode()
         self.assertRegex(said, r"can be read in two ways, and σ spans both: gyro left has stepped \d+ %; gyro right has stepped \d+ %")
 
+    def test_no_curve_and_no_stop_goes_on_across_a_hole(self):
+        lines = stops_and_turns(4)
+        begin = float(lines[0].split(")")[0][1:])
+        keep = [line for line in lines if not 0.3 < (float(line.split(")")[0][1:]) - begin) / (len(lines) / 200) < 0.7]
+        self.assertLess(len(keep), 0.7 * len(lines))
+        self.write("in.log", "".join(keep))
+        self.replay("-o", "x.log", "--plot", "x.svg", "in.log")
+        picture = self.read("x.svg")
+        curves = 0
+        for path in re.findall(r"<path stroke='rgb\([^']*\)'\s+d='([^']*)'", picture):
+            points = [(kind, float(x)) for kind, x in re.findall(r"([ML])([0-9.]+),", path)]
+            if len(points) < 400:
+                continue  # the grid, the legend, the line at zero
+            curves += 1
+            drawn = [to - before for (_, before), (kind, to) in zip(points, points[1:]) if kind == "L"]
+            width = max(x for _, x in points[2:]) - min(x for _, x in points[2:])
+            self.assertLess(max(drawn[1:]), 0.05 * width)
+        self.assertEqual(curves, 9, "of the rates, of what is off the virtual gyro, and of the two drifts")
+        shades = [float(to) - float(begin) for begin, to in re.findall(r"<polygon fill = '[^']*' points = '([0-9.]+),[^ ]* ([0-9.]+),", picture)]
+        self.assertGreater(len(shades), 8, "four pictures, each with its stops")
+        self.assertLess(max(shades), 0.2 * width)
+
     def test_picture_without_stretches_has_no_legend_of_them(self):
         self.write("in.log", "".join(self.lines))
         self.replay("-q", "-o", "out.log", "--method", "mutual", "--plot", "a.svg", "in.log")
@@ -468,9 +524,10 @@ class BadInput(Replay):
         # A log of nothing is no success.
         self.write("empty.log", "")
         self.write("prose.log", "Dear diary,\nno frames today.\n")
-        for log in ("empty.log", "prose.log", "/dev/null"):
+        for log, what in (("empty.log", "holds no CAN frame"), ("/dev/null", "holds no CAN frame"),
+                          ("prose.log", "is text, but no log of CAN frames that is known")):
             said = self.refuse("-q", log)
-            self.assertIn("holds no CAN frame", said)
+            self.assertIn(what, said)
             self.assertIn("candump -L", said)
 
     def test_directory(self):
@@ -481,9 +538,17 @@ class BadInput(Replay):
         # What came before the damage is not lost, but the end is told.
         packed = lzma.compress("".join(self.lines).encode())
         (self.folder / "cut.log.xz").write_bytes(packed[: len(packed) // 2])
-        (self.folder / "text.log.xz").write_bytes(b"hello, I am text" * 9)
         self.assertIn("cut.log.xz: ends in the middle", self.refuse("-q", "cut.log.xz"))
-        self.assertIn("text.log.xz: is not an .xz file", self.refuse("-q", "text.log.xz"))
+
+    def test_the_content_of_a_log_counts_and_not_its_name(self):
+        # People rename files, and some programs unpack them on the way.
+        self.write("plain.log.xz", "".join(self.lines))
+        (self.folder / "packed.log").write_bytes(gzip.compress("".join(self.lines).encode()))
+        expected = self.replay("in.log").stdout
+        self.assertEqual(self.replay("plain.log.xz").stdout, expected)
+        self.assertEqual(self.replay("packed.log").stdout, expected)
+        self.write("drive.bag", "#ROSBAG V2.0\n")
+        self.assertIn("is a ROS 1 bag", self.refuse("-q", "drive.bag"))
 
     def test_one_gyro_missing_lists_the_interfaces_of_the_log(self):
         # Nine times out of ten it is the name of the interface.
