@@ -254,6 +254,12 @@ PairRelation::Fit PairRelation::fit(const Products& sums, double slope_least, do
   return out;
 }
 
+// A lag of half a cell must not be what a healthy pair lacks where the motion is fast.
+PairRelation::Fit PairRelation::halfway_fit(std::size_t from, std::size_t lagged_from,
+                                            std::size_t length, bool trends_off) const {
+  return fit(products(from, lagged_from, length, trends_off, true), 1.0 / kSlopeMost, kSlopeMost);
+}
+
 // --- block by block: sign and unit ---------------------------------------------------------------
 
 std::size_t PairRelation::near_lags(std::size_t most) const {
@@ -301,10 +307,8 @@ double PairRelation::block_tells(std::size_t from, std::size_t lags,
     const Fit with = fit(sums, 1.0 / kSlopeMost, kSlopeMost);
     if (with.left < healthy.left) healthy = with;
     if (lagged < from + lags) {
-      // A lag of half a cell must not be what a pair lacks where the motion is fast.
-      const Products between = products(from, lagged, kBlock, may_be_drift, true);
-      const Fit halfway = fit(between, 1.0 / kSlopeMost, kSlopeMost);
-      if (halfway.left < healthy.left) healthy = halfway;
+      const Fit between = halfway_fit(from, lagged, kBlock, may_be_drift);
+      if (between.left < healthy.left) healthy = between;
     }
     const Fit less = fit(sums, -kAny, 1.0 / kContrarySlope);
     if (less.left < contrary.left) contrary = less;
@@ -464,10 +468,13 @@ void PairRelation::judge_long_block() {
   double most_alike = -1.0;
   double least_left = 1.0;
   for (std::size_t lag = 0; lag <= 2 * lags; ++lag) {
-    const Products sums = products(from, from - lags + lag, kLongBlock, false);
-    const Fit with = fit(sums, 1.0 / kSlopeMost, kSlopeMost);
+    const std::size_t lagged = from - lags + lag;
+    const Products sums = products(from, lagged, kLongBlock, false);
+    Fit with = fit(sums, 1.0 / kSlopeMost, kSlopeMost);
     const Fit any = fit(sums, -kAny, kAny);
     if (lag + near >= lags && lag <= lags + near) {
+      const Fit between = halfway_fit(from, lagged, kLongBlock, false);
+      if (between.left < with.left) with = between;
       const double alike = std::sqrt(std::clamp(1.0 - any.left, 0.0, 1.0));
       most_alike = std::max(most_alike, std::copysign(alike, any.both));
       least_left = std::min(least_left, with.left);

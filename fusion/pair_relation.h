@@ -148,6 +148,9 @@ class PairRelation {
                                   bool trends_off, bool halfway = false) const;
   /// With a slope between these limits.
   [[nodiscard]] static Fit fit(const Products& sums, double slope_least, double slope_most);
+  /// … with a healthy one, half a cell later.
+  [[nodiscard]] Fit halfway_fit(std::size_t from, std::size_t lagged_from, std::size_t length,
+                                bool trends_off) const;
   [[nodiscard]] static bool moves(const Stretch& stretch, std::size_t length);
   /// How far it has turned to and fro within the memory, deg.
   [[nodiscard]] double swing_deg(std::size_t gyro) const;
