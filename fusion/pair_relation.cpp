@@ -501,6 +501,7 @@ void PairRelation::judge_long_block() {
 void PairRelation::judge_following(const std::array<Stretch, 2>& both, double most_alike,
                                    double left) {
   const auto n = static_cast<double>(kLongBlock);
+  bool follows = false;
   for (std::size_t gyro = 0; gyro < 2; ++gyro) {
     const Stretch& own = both[gyro];
     if (own.squares < n * squared(kMovedMuch_dps) || !moves(own, kLongBlock)) continue;
@@ -510,7 +511,10 @@ void PairRelation::judge_following(const std::array<Stretch, 2>& both, double mo
     if (small || most_alike < kFollowsNot) tells = kAloneTells;
     if (!small && most_alike > kFollows && left < kExplained) tells = -kBlockTells;
     alone_[gyro] = std::clamp(alone_[gyro] + tells, kEvidenceLeast, kEvidenceMost);
+    follows = follows || (tells < 0.0 && left < 0.5 * kExplained);
   }
+  // Much motion says more of sign and unit than little does.
+  if (follows) hear(-kBlockTells, {});
   const double least = std::min(alone_[0], alone_[1]);
   unrelated_ = kPrior + least > kFound || (unrelated_ && least > 0.0);
 }
