@@ -45,6 +45,9 @@ struct SampleGateway {
     now.status.stops_refused = 5;
     now.status.stops_open = 1;
     now.status.estimate_restarts = 3;
+    now.status.pair.contradiction = fusion::Contradiction::kSign;
+    now.status.pair.slope = -1.0;
+    now.status.contradictions = 6;
     now.status.rates_too_far_apart = true;
     gateway::GyroStatus& left = now.status.gyros[0];
     left.heard = true;
