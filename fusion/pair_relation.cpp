@@ -98,6 +98,7 @@ constexpr double kLeap_dps = 30.0;
 constexpr double kLeapRatio = 5.0;
 constexpr double kLeapRange = 2.0;
 constexpr double kLeapStays = 0.6;
+constexpr std::size_t kLeapCells = 3;  // before it and after it
 constexpr double kLeaps = 1.5;
 constexpr double kLeapsStill = 0.5;
 constexpr double kLeapKept = 0.99;
@@ -140,18 +141,13 @@ void PairRelation::close_cell(double t_s, double step_s) {
     }
   }
   samples_ = 0;
-  sum_ = {};
-  square_ = {};
-  step_square_ = {};
-  step_most_ = {};
+  sum_ = square_ = step_square_ = step_most_ = {};
   constexpr double kGapCells = 4.0;
   const bool gap = step_s > kGap_s && step_s > kGapCells * length_s_;
   if (gap) {
     // A stream of long intervals begins like one with a gap.
     length_s_ = count_ == 0 ? closed.length_s : 0.0;
-    count_ = 0;
-    since_block_ = 0;
-    since_long_block_ = 0;
+    break_off();
     return;
   }
   if (count_ == kCells) {
@@ -378,17 +374,17 @@ void PairRelation::look_for_leaps(std::size_t gyro, std::size_t from, bool movin
   const double enough = std::max({kLeap_dps, kLeapRatio * other_leap, kLeapRange * (most - least)});
   std::array<double, 2>& leaps = values_[gyro].leaps;
   std::array<bool, 2> any{};
-  for (std::size_t i = std::max<std::size_t>(from, 2); i < from + kBlock && i + 2 < count_; ++i) {
+  for (std::size_t i = std::max(from, kLeapCells); i < from + kBlock && i + kLeapCells < count_;
+       ++i) {
     const double leap = cell(i).leap[gyro];
     if (std::abs(leap) < enough) continue;
-    double stays = kAny;
-    for (const std::size_t before : {i - 2, i - 1}) {
-      for (const std::size_t after : {i + 1, i + 2}) {
-        const double far_dps = cell(after).mean_dps[gyro] - cell(before).mean_dps[gyro];
-        stays = std::min(stays, far_dps / leap);
-      }
+    double before = -kAny;  // the farthest in its direction
+    double after = kAny;    // the nearest
+    for (std::size_t away = 1; away <= kLeapCells; ++away) {
+      before = std::max(before, cell(i - away).mean_dps[gyro] / leap);
+      after = std::min(after, cell(i + away).mean_dps[gyro] / leap);
     }
-    if (stays > kLeapStays) any[leap > 0.0 ? 1 : 0] = true;
+    if (after - before > kLeapStays) any[leap > 0.0 ? 1 : 0] = true;
   }
   for (std::size_t way = 0; way < 2; ++way)
     leaps[way] = kLeapKept * leaps[way] + (any[way] ? 1.0 : 0.0);

@@ -70,6 +70,14 @@ class PairRelation {
     newest_s_ = t_s;
   }
 
+  /// One of them is found to be sick: what it said shortly before is no news of the pair.
+  void break_off() {
+    samples_ = 0;
+    sum_ = square_ = step_square_ = step_most_ = {};
+    count_ = 0;
+    since_block_ = since_long_block_ = 0;
+  }
+
   /// Before the first pair: what was found in an earlier run. It stands until some blocks show a
   /// pair, or something else is found.
   void resume(const PairVerdict& verdict) { verdict_ = earlier_ = verdict; }

@@ -57,6 +57,8 @@ class Estimator {
 
   /// Every pair, calibrated or not: can the two be of one platform?
   void compare(const fusion::AlignedPair& pair) { relation_.add(seconds(pair.t), pair.rate_dps); }
+  /// One of them is set aside.
+  void break_off_comparison() { relation_.break_off(); }
   /// They cannot: nothing says which one is wrong, so no rate is valid, and nothing is learned.
   [[nodiscard]] bool contradicted() const { return relation_.contradicts(); }
 

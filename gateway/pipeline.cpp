@@ -207,6 +207,7 @@ void Pipeline::Impl::refuse(std::size_t gyro, Reject cause, TimePoint t) {
 // waited for this one. Beyond an interval it does not look back: VG_Age could not tell how old that
 // is.
 void Pipeline::Impl::carry_on_without(std::size_t gyro, TimePoint t) {
+  estimator.break_off_comparison();
   enter_state();
   const std::size_t other = 1 - gyro;
   if (!attendance.in_use(other) || !estimator.begun()) return;
@@ -263,8 +264,10 @@ void Pipeline::Impl::take_pair(const fusion::AlignedPair& pair) {
   ++status.pairs;
   estimator.compare(pair);
   const bool contradicted = estimator.contradicted();
-  if (attendance.hear_pair() || contradicted != (status.state == State::kContradicted))
-    enter_state();
+  const bool changed = contradicted != (status.state == State::kContradicted);
+  // What the corrector thought of either gyro was of a pair that is none.
+  if (changed && contradicted) attendance.set_opinion(pair.t, {});
+  if (attendance.hear_pair() || changed) enter_state();
   tell_estimator(pair.t);
   if (!estimator.calibrated()) {
     estimator.calibrate(pair);

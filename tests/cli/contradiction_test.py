@@ -52,7 +52,7 @@ EFFECTS = {
     "scale error": 'kind = "scale_factor"\nerror = 0.3',
     "asymmetry": 'kind = "scale_factor_asymmetry"\nerror = 0.05',
     "much noise": 'kind = "white_noise"\ndensity_dps_rthz = 0.3',
-    "delay": 'kind = "delay"\nseconds = 0.3',
+    "delay": 'kind = "delay"\nseconds = 0.25',
     "bandwidth": 'kind = "bandwidth"\ncutoff_hz = 1.0',
     "skew": 'kind = "clock_skew"\nppm = 2300.0',
     "jitter": 'kind = "timestamp_jitter"\nsigma_s = 0.02',
