@@ -35,6 +35,8 @@ constexpr double kContrarySlope = 5.0;
 constexpr double kTolerance = 0.03;
 // A contradiction is heard only where its own slope leaves no more than this …
 constexpr double kExplained = 0.2;
+// … or than this and noise, for a unit: what is clipped at a small part of the motion leaves 0.19.
+constexpr double kScaleExplained = 0.1;
 // … and as the same one only where the slope is the same within this much of its logarithm.
 constexpr double kSameSlope = 0.4;
 // A block of smooth motion is worth so many independent values; what it tells is bounded, or one
@@ -316,7 +318,8 @@ double PairRelation::block_tells(std::size_t from, std::size_t lags,
   const double least = kTolerance + noise;
   const double tells =
       kHalfValues * std::log(std::max(healthy.left, least) / std::max(contrary.left, least));
-  if (tells > 0.0 && contrary.left > kExplained) return 0.0;
+  const double explained = contrary.slope < 0.0 ? kExplained : kScaleExplained + noise;
+  if (tells > 0.0 && contrary.left > explained) return 0.0;
   if (tells < 0.0 && healthy.left > kExplained) return 0.0;
   return std::clamp(tells, -kBlockTells, kBlockTells);
 }
@@ -575,7 +578,9 @@ void PairRelation::decide() {
            .slope_sigma = slopes_.sigma()};
   } else if (by_blocks_ || unrelated_ || pooled_) {
     const double most = std::max(log_odds, kPrior + std::min(alone_[0], alone_[1]));
-    now = {Contradiction::kUnrelated, log_odds_to_probability(most), kNone, kNone};
+    const double pooled = pooled_ ? pooled_probability_ : 0.0;
+    now = {Contradiction::kUnrelated, std::max(log_odds_to_probability(most), pooled), kNone,
+           kNone};
   }
   const bool named =
       now.contradiction != Contradiction::kNone && now.contradiction != Contradiction::kUnrelated;

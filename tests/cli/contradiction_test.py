@@ -58,7 +58,7 @@ EFFECTS = {
     "jitter": 'kind = "timestamp_jitter"\nsigma_s = 0.02',
     "vibration": 'kind = "line"\nfrequency_hz = 23.4\namplitude_dps = 3.0\nphase_rad = 0.3',
     "vibration beyond the band": 'kind = "line"\nfrequency_hz = 100.3\namplitude_dps = 1.0\nphase_rad = 0.3',
-    "saturation": 'kind = "saturation"\nlimit_dps = 9.0',
+    "saturation": 'kind = "saturation"\nlimit_dps = 40.0',
     "dead band": 'kind = "dead_band"\nwidth_dps = 0.5',
     "coarse steps": 'kind = "quantization"\nstep_dps = 0.25',
     "outliers": 'kind = "spikes"\nrate_hz = 0.5\nsize_dps = 60.0',

@@ -404,7 +404,7 @@ TEST(PairRelation, FindsWhatHasNothingInCommon) {
         const Motion other(kind, 900 + seed++, 240.0);
         return Own([other](double t_s) { return other.at(t_s); });
       },
-      0, 1);
+      1, 1);
 }
 
 TEST(PairRelation, FindsTheWrongAxis) {
