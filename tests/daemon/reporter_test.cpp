@@ -104,7 +104,7 @@ TEST_F(ReporterTest, TellsEachChangeOfHealthOnceWithItsCause) {
 
 TEST_F(ReporterTest, TellsOnceHowThePairContradictsItself) {
   status.state = State::kRunning;
-  reporter.check_state(status);
+  said_during([&] { reporter.check_state(status); });
   status.state = State::kContradicted;
   status.disagree = true;
   status.pair.contradiction = fusion::Contradiction::kSign;
