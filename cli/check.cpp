@@ -70,6 +70,55 @@ void print_model(const gateway::Plan& plan) {
   }
 }
 
+// "0xFFFF, not available", or what it says although it has no code.
+std::string said_of_none(const gateway::OutputField& field) {
+  return field.has_code ? field.code : fmt::format("raw {:#x}", field.none_raw);
+}
+
+std::string range_text(const gateway::OutputField& field) {
+  return fmt::format("{:g} to {:g} {} in steps of {:g} deg/s", field.minimum, field.maximum,
+                     printable(field.unit), field.step);
+}
+
+void print_layout_rate(const gateway::OutputLayout& layout) {
+  const gateway::OutputField& rate = layout.rate;
+  detail("carries", range_text(rate) + (rate.scale < 0 ? ", sign flipped" : ""));
+  if (layout.sign) detail("sign", "in a signal of its own: 1 is negative");
+  if (layout.valid) {
+    detail("valid", fmt::format("{}: {:#x}, and {:#x} when no rate is valid", layout.valid->text,
+                                layout.valid->valid_raw, layout.valid->invalid_raw));
+  }
+  if (!layout.can_say_invalid()) {
+    detail("not valid",
+           "silence: neither the rate nor another signal can say it; `valid` or "
+           "`rate_not_available` may name one");
+    return;
+  }
+  detail("not valid", said_of_none(rate));
+  if (rate.beyond_raw != rate.none_raw)
+    detail("beyond", fmt::format("{:#x}, out of range", rate.beyond_raw));
+}
+
+void print_layout(const gateway::Plan& plan, const gateway::OutputLayout& layout) {
+  const gateway::OutputField& rate = layout.rate;
+  const std::string id =
+      layout.extended ? fmt::format("{:08X}", layout.id) : fmt::format("{:03X}", layout.id);
+  say("  {:<14}{:<8}{:<10}{:<26}{:<8}{}\n", "layout", plan.buses[layout.bus], id,
+      layout.message + "." + rate.name, printable(rate.unit), rate.layout);
+  detail("frame",
+         fmt::format("{} bytes{}, {}", layout.bytes, layout.fd ? ", CAN FD" : "",
+                     layout.every ? fmt::format("every {:g} ms", to_seconds(*layout.every) * 1e3)
+                                  : "with every rate"));
+  print_layout_rate(layout);
+  if (layout.sigma) {
+    detail("sigma", fmt::format("{}, {}; unknown or beyond: {}", layout.sigma->name,
+                                range_text(*layout.sigma), said_of_none(*layout.sigma)));
+  }
+  print_e2e(layout.e2e);
+  for (const gateway::RestingSignal& signal : layout.resting)
+    detail("nobody's", fmt::format("{}: {}", signal.name, signal.says));
+}
+
 void print_plan(const gateway::Plan& plan) {
   say("  {:<14}{:<8}{:<10}{:<26}{:<8}{}\n", "", "bus", "id", "signal", "unit", "bits");
   for (const gateway::GyroPlan& gyro : plan.gyros)
@@ -107,9 +156,13 @@ void print_plan(const gateway::Plan& plan) {
   }
   say("\n");
   print_model(plan);
-  say("  {:<14}{:<8}VG_Rate {:03X}, VG_Bias {:03X}, VG_Model {:03X}, {}\n", "output",
-      plan.buses[plan.output.bus], plan.output.rate_id, plan.output.bias_id, plan.output.model_id,
-      plan.output.fd ? "VG_Rate as CAN FD" : "classic CAN");
+  if (plan.output.vgyro_frames) {
+    say("  {:<14}{:<8}VG_Rate {:03X}, VG_Bias {:03X}, VG_Model {:03X}, {}\n", "output",
+        plan.buses[plan.output.bus], plan.output.rate_id, plan.output.bias_id, plan.output.model_id,
+        plan.output.fd ? "VG_Rate as CAN FD" : "classic CAN");
+  }
+  for (const gateway::OutputLayout& layout : plan.output.layouts)
+    print_layout(plan, layout);
 }
 
 }  // namespace

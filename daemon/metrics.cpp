@@ -129,6 +129,29 @@ void add_counters(Text& text, const Snapshot& now) {
   text.sample({}, now.service_messages_lost);
 }
 
+void add_layouts(Text& text, const Snapshot& now) {
+  const std::vector<gateway::OutputLayout>& layouts = now.plan->output.layouts;
+  if (layouts.empty()) return;
+  const auto each = [&](const auto& add) {
+    for (std::size_t i = 0; i < layouts.size(); ++i)
+      add(std::string_view(layouts[i].message), now.status.layouts_out[i]);
+  };
+  using Name = std::string_view;
+  using Counts = const gateway::LayoutCounts&;
+  text.family("vgyro_layout_frames_total", "counter",
+              "Frames of each [[output.layout]] made, by whether their rate was valid.");
+  each([&](Name name, Counts counts) {
+    text.sample({{"message", name}, {"valid", "yes"}}, counts.valid);
+    text.sample({{"message", name}, {"valid", "no"}}, counts.frames - counts.valid);
+  });
+  text.family("vgyro_layout_out_of_range_total", "counter",
+              "Rates beyond what the layout's signal can carry.");
+  each([&](Name name, Counts counts) { text.sample({{"message", name}}, counts.out_of_range); });
+  text.family("vgyro_layout_withheld_total", "counter",
+              "Frames not sent because the layout cannot say that no rate is valid.");
+  each([&](Name name, Counts counts) { text.sample({{"message", name}}, counts.withheld); });
+}
+
 void add_gyros(Text& text, const Snapshot& now) {
   const auto each = [&](const auto& add) {
     for (std::size_t k = 0; k < now.status.gyros.size(); ++k)
@@ -239,6 +262,7 @@ std::string metrics_text(const Snapshot& now) {
   Text text;
   add_rate(text, now);
   add_counters(text, now);
+  add_layouts(text, now);
   add_gyros(text, now);
   add_supply(text, now);
   add_buses(text, now);

@@ -41,6 +41,7 @@ class Assembly {
   void multiplex();
   void simple_multiplex();
   void frame_formats();
+  void start_values();
   void check_layouts();
 
   std::optional<std::size_t> message_index(const Reference& at);
@@ -62,6 +63,7 @@ Database Assembly::run(std::string path) {
   floats();
   labels();
   frame_formats();
+  start_values();
   simple_multiplex();  // last: it may take signals out, which the index does not follow
   check_layouts();
   return {std::move(path), std::move(contents_.messages), contents_.diagnostics.take()};
@@ -242,6 +244,24 @@ void Assembly::frame_formats() {
     if (!index) continue;
     Message& message = contents_.messages[*index];
     message.is_j1939 = message.extended && is_j1939_format(statement.value);
+  }
+}
+
+void Assembly::start_values() {
+  if (contents_.start_value_default) {
+    for (Message& message : contents_.messages) {
+      for (Signal& signal : message.signals)
+        signal.start_raw = contents_.start_value_default;
+    }
+  }
+  for (const StartValueStatement& statement : contents_.start_values) {
+    // Many files have such values of signals that were taken out; nobody misses them.
+    const SplitId id = split_id(statement.at.id);
+    const auto message = message_index_.find({id.extended, id.id});
+    if (message == message_index_.end()) continue;
+    const auto found = signal_index_.find({message->second, statement.at.signal});
+    if (found == signal_index_.end()) continue;
+    contents_.messages[message->second].signals[found->second].start_raw = statement.raw;
   }
 }
 

@@ -17,6 +17,9 @@ namespace vgyro::dbc {
 enum class ByteOrder : std::uint8_t { kIntel, kMotorola };
 enum class ValueType : std::uint8_t { kUnsigned, kSigned, kFloat32, kFloat64 };
 
+/// Whose rules say which raw values are no measurement.
+enum class CodeRules : std::uint8_t { kNone, kJ1939, kNmea2000 };
+
 struct ValueLabel {
   std::int64_t raw = 0;
   std::string text;
@@ -43,6 +46,7 @@ struct Signal {
   bool is_multiplexor = false;
   std::optional<MultiplexCondition> condition;
   std::vector<ValueLabel> labels;
+  std::optional<double> start_raw;  ///< GenSigStartValue: the raw value before anybody knows better
   unsigned line = 0;
 
   [[nodiscard]] const std::string* label(std::int64_t raw) const;

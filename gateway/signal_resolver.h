@@ -33,9 +33,10 @@ class DatabaseCache {
 /// One message of one table of the configuration.
 class SignalResolver {
  public:
-  /// Reads the keys bus, dbc, message of the table.
+  /// Reads the keys bus, dbc, message of the table. With a `default_bus` the first may be missing.
   SignalResolver(TomlReader& reader, DatabaseCache& cache, const std::string& config_folder,
-                 std::vector<std::string>& buses, std::vector<Error>& warnings);
+                 std::vector<std::string>& buses, std::vector<Error>& warnings,
+                 const std::string& default_bus = {});
 
   [[nodiscard]] bool usable() const { return message_ != nullptr; }
   [[nodiscard]] const std::string& bus() const { return bus_; }
