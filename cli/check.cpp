@@ -72,12 +72,14 @@ void print_model(const gateway::Plan& plan) {
 
 // "0xFFFF, not available", or what it says although it has no code.
 std::string said_of_none(const gateway::OutputField& field) {
-  return field.has_code ? field.code : fmt::format("raw {:#x}", field.none_raw);
+  return field.has_code ? field.code : fmt::format("0x{:X}", field.none_raw);
 }
 
 std::string range_text(const gateway::OutputField& field) {
-  return fmt::format("{:g} to {:g} {} in steps of {:g} deg/s", field.minimum, field.maximum,
-                     printable(field.unit), field.step);
+  std::string text =
+      fmt::format("{:g} to {:g} {}", field.minimum, field.maximum, printable(field.unit));
+  if (field.step > 0.0) text += fmt::format(" in steps of {:g} deg/s", field.step);
+  return text;
 }
 
 void print_layout_rate(const gateway::OutputLayout& layout) {
@@ -85,7 +87,7 @@ void print_layout_rate(const gateway::OutputLayout& layout) {
   detail("carries", range_text(rate) + (rate.scale < 0 ? ", sign flipped" : ""));
   if (layout.sign) detail("sign", "in a signal of its own: 1 is negative");
   if (layout.valid) {
-    detail("valid", fmt::format("{}: {:#x}, and {:#x} when no rate is valid", layout.valid->text,
+    detail("valid", fmt::format("{}: 0x{:X}, and 0x{:X} when no rate is valid", layout.valid->text,
                                 layout.valid->valid_raw, layout.valid->invalid_raw));
   }
   if (!layout.can_say_invalid()) {
@@ -94,9 +96,9 @@ void print_layout_rate(const gateway::OutputLayout& layout) {
            "`rate_not_available` may name one");
     return;
   }
-  detail("not valid", said_of_none(rate));
+  detail("not valid", said_of_none(rate) + (rate.has_code ? "" : ", no rotation, and flagged"));
   if (rate.beyond_raw != rate.none_raw)
-    detail("beyond", fmt::format("{:#x}, out of range", rate.beyond_raw));
+    detail("beyond", fmt::format("0x{:X}, out of range", rate.beyond_raw));
 }
 
 void print_layout(const gateway::Plan& plan, const gateway::OutputLayout& layout) {

@@ -67,6 +67,26 @@ std::string hex(const dbc::Signal& signal, std::uint64_t raw) {
   return fmt::format("0x{:0{}X}", raw, (signal.length_bits + 3) / 4);
 }
 
+// The bit pattern that the configuration names as a code, which is then no value of the range.
+Expected<std::uint64_t> code_in(const dbc::Signal& signal, std::int64_t raw,
+                                const std::string& unit, RawRange& range) {
+  const RawRange all = type_range(signal);
+  // People write the bit pattern of a negative number, too.
+  const std::int64_t patterns = all.high - all.low + 1;
+  const std::int64_t code = raw > all.high && raw < patterns ? raw - patterns : raw;
+  if (code < all.low || code > all.high)
+    return fail({}, fmt::format("{} has no raw value {:#x}", signal.name, raw));
+  if (code > range.low && code < range.high) {
+    return fail({},
+                fmt::format("raw value {:#x} of {} is {:g} {}: it would be read as a measurement",
+                            raw, signal.name, physical(signal, code), unit),
+                "a raw value at an end of the signal's range, or outside of it");
+  }
+  if (code == range.high) --range.high;
+  if (code == range.low) ++range.low;
+  return bits_of(signal, code);
+}
+
 // NMEA 2000 has a code of its own for "out of range".
 std::uint64_t beyond_of(const dbc::Signal& signal, dbc::CodeRules rules, std::uint64_t none_raw) {
   const dbc::Codes codes = dbc::codes_of(signal, rules);
@@ -75,14 +95,18 @@ std::uint64_t beyond_of(const dbc::Signal& signal, dbc::CodeRules rules, std::ui
   return has_own ? codes.last - 1 : none_raw;
 }
 
-Expected<OutputField> float_field(const Quantity& quantity, OutputField field) {
-  field.minimum = std::max(quantity.minimum, quantity.codec.representable_min());
-  field.maximum = std::min(quantity.maximum, quantity.codec.representable_max());
-  // NaN would poison a receiver that does not expect it: 0 it is, and the flag says the rest.
+// What stands in a signal without codes while another one says that it is not valid. NaN would
+// poison a receiver that does not expect it.
+std::uint64_t raw_of_zero(const OutputField& field) {
   std::array<std::uint8_t, can::kFdBytesMax> scratch{};
   field.codec.encode(-field.shift / field.scale, scratch);
-  field.none_raw = static_cast<std::uint64_t>(field.codec.decode(scratch).raw);
-  field.beyond_raw = field.none_raw;
+  return static_cast<std::uint64_t>(field.codec.decode(scratch).raw);
+}
+
+OutputField float_field(const Quantity& quantity, OutputField field) {
+  field.minimum = std::max(quantity.minimum, quantity.codec.representable_min());
+  field.maximum = std::min(quantity.maximum, quantity.codec.representable_max());
+  field.none_raw = field.beyond_raw = raw_of_zero(field);
   return field;
 }
 
@@ -109,30 +133,18 @@ Expected<OutputField> output_field(const dbc::Signal& signal, const Quantity& qu
   }
   RawRange range = without_codes(signal, rules, inside(signal, quantity, type_range(signal)));
   if (none_raw) {
-    const RawRange all = type_range(signal);
-    // People write the bit pattern of a negative number, too.
-    std::int64_t code = *none_raw;
-    if (code > all.high && all.low < 0) code -= 2 * (all.high + 1);
-    if (code == range.high) --range.high;
-    if (code == range.low) ++range.low;
-    const bool is_value = code >= range.low && code <= range.high;
-    if (code < all.low || code > all.high || is_value) {
-      return fail({},
-                  is_value
-                      ? fmt::format("raw value {:#x} of {} is {:g} {}: it would be read "
-                                    "as a measurement",
-                                    *none_raw, signal.name, physical(signal, code), quantity.unit)
-                      : fmt::format("{} has no raw value {:#x}", signal.name, *none_raw),
-                  "a raw value at an end of the signal's range, or outside of it");
-    }
-    field.none_raw = field.beyond_raw = bits_of(signal, code);
+    const auto code = code_in(signal, *none_raw, quantity.unit, range);
+    if (!code) return tl::unexpected(code.error());
+    field.none_raw = field.beyond_raw = *code;
     field.has_code = true;
-    field.code = fmt::format("{}, as configured", hex(signal, field.none_raw));
+    field.code = fmt::format("{}, as configured", hex(signal, *code));
   } else if (const auto code = not_available(signal, rules)) {
     field.none_raw = code->raw;
     field.beyond_raw = beyond_of(signal, rules, code->raw);
     field.has_code = true;
     field.code = code->text;
+  } else {
+    field.none_raw = field.beyond_raw = raw_of_zero(field);
   }
   if (range.low > range.high) return fail({}, signal.name + " can say no value");
   field.minimum = physical(signal, range.low);

@@ -472,5 +472,24 @@ TEST(DbcLoad, RefusesFilesWithoutMessages) {
   EXPECT_EQ(empty.error().where, path + ":2");
 }
 
+// The value before anybody knows better: the signal's own, or the default of the file. Values of
+// signals that were taken out of the file are nothing odd.
+TEST(DbcParser, ReadsStartValues) {
+  const std::string defined =
+      "BA_DEF_ SG_ \"GenSigStartValue\" FLOAT -1E9 1E9;\n"
+      "BA_DEF_DEF_ \"GenSigStartValue\" 7;\n";
+  const Database database = parse_clean(kGyro + defined +
+                                        "BA_ \"GenSigStartValue\" SG_ 291 Rate -32768;\n"
+                                        "BA_ \"GenSigStartValue\" SG_ 291 Gone 3;\n"
+                                        "BA_ \"GenSigStartValue\" SG_ 999 Rate 3;\n");
+  EXPECT_EQ(signal_in(database, "GYRO", "Rate").start_raw, -32768.0);
+  EXPECT_EQ(signal_in(database, "GYRO", "Status").start_raw, 7.0);
+  const Database without = parse_clean(kGyro + "BA_ \"GenSigStartValue\" SG_ 291 Status \"3\";\n");
+  EXPECT_EQ(signal_in(without, "GYRO", "Rate").start_raw, std::nullopt);
+  EXPECT_EQ(signal_in(without, "GYRO", "Status").start_raw, 3.0);
+  const Database words = parse_clean(kGyro + "BA_ \"GenSigStartValue\" SG_ 291 Status none;\n");
+  EXPECT_EQ(signal_in(words, "GYRO", "Status").start_raw, std::nullopt);
+}
+
 }  // namespace
 }  // namespace vgyro::dbc
