@@ -33,6 +33,7 @@ struct ReplayOptions {
   std::string state;                 ///< file of biases to start with; empty: none
   std::string output;                ///< "-": standard output; empty: nowhere
   std::string json;                  ///< likewise
+  std::string csv;                   ///< likewise
   std::string plot;                  ///< empty: none
   std::vector<std::string> bus_map;  ///< "LOGNAME=CONFIGNAME"
   std::vector<std::string> logs;

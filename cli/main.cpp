@@ -10,6 +10,7 @@
 #include "cli/number_option.h"
 #include "cli/output/errors.h"
 #include "cli/output/terminal.h"
+#include "cli/output/unfinished.h"
 #include "gateway/config.h"
 
 namespace {
@@ -64,6 +65,8 @@ CLI::App* add_replay(CLI::App& app, ReplayOptions& options, std::string& method)
   command->add_option("-o,--output", options.output,
                       "output frames as candump lines; default: standard output");
   command->add_option("--json", options.json, "summary as JSON; - is standard output");
+  command->add_option("--csv", options.csv,
+                      "rates, sigmas, biases and heading as a table; - is standard output");
   command->add_option("--plot", options.plot, "picture of rates and drifts: .svg, .png or .pdf");
   command
       ->add_option("--map", options.bus_map,
@@ -241,9 +244,11 @@ int run(int argc, char** argv) {
   if (simulate->parsed()) return run_simulate(options.simulate);
   if (status->parsed()) return run_status(options.status);
   if (recalibrate->parsed()) return run_recalibrate();
-  // Frames are the main result; they give way only to a summary that wants the same place.
+  // Frames are the main result; they give way only to a summary or a table that wants the same
+  // place.
   const bool output_given = replay->count("--output") > 0;
-  if (!output_given && options.replay.json != "-") options.replay.output = "-";
+  const bool output_wanted = options.replay.json == "-" || options.replay.csv == "-";
+  if (!output_given && !output_wanted) options.replay.output = "-";
   return run_replay(options.replay);
 }
 
@@ -251,6 +256,7 @@ int run(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   keep_standard_streams();
+  guard_unfinished();
   const int code = run(argc, argv);
   const auto finished = finish_output();
   if (!finished) report(finished.error());

@@ -48,6 +48,14 @@ bool is_letter(char c) {
   return (c >= 'a' && c <= 'z') || static_cast<unsigned char>(c) >= 0x80;
 }
 
+bool is_digit(char c) {
+  return c >= '0' && c <= '9';
+}
+
+bool is_word(char c) {
+  return is_letter(c) || is_digit(c);
+}
+
 bool begins_word(char before, char c) {
   return c >= 'A' && c <= 'Z' && before >= 'a' && before <= 'z';
 }
@@ -57,29 +65,38 @@ void replace_all(std::string& text, std::string_view from, std::string_view to) 
     text.replace(at, from.size(), to);
 }
 
-/// Words in lower case, umlauts written out; numbers are left out. "n/a" and "n.a." are "na".
-std::vector<std::string> words_of(std::string_view label) {
+/// In lower case, a blank before each word of "NotAvailable" (not inside "0xFFFF"), umlauts written
+/// out, "n/a" and "n.a." as "na".
+std::string plain_text(std::string_view label) {
   std::string text;
+  bool in_number = false;
   for (std::size_t i = 0; i < label.size(); ++i) {
-    if (i > 0 && begins_word(label[i - 1], label[i])) text += ' ';
-    const bool upper = label[i] >= 'A' && label[i] <= 'Z';
-    text += upper ? static_cast<char>(label[i] - 'A' + 'a') : label[i];
+    const char c = label[i];
+    const bool upper = c >= 'A' && c <= 'Z';
+    const char lower = upper ? static_cast<char>(c - 'A' + 'a') : c;
+    const bool in_word = i > 0 && text.back() != ' ' && is_word(text.back());
+    if (!in_word) in_number = is_digit(c);
+    if (i > 0 && !in_number && begins_word(label[i - 1], c)) text += ' ';
+    text += lower;
   }
   constexpr std::array<std::pair<std::string_view, std::string_view>, 5> kSpelled{
       {{"ü", "ue"}, {"Ü", "ue"}, {"n/a", "na"}, {"n.a.", "na"}, {"n.v.", "nv"}}};
   for (const auto& [from, to] : kSpelled)
     replace_all(text, from, to);
+  return text;
+}
+
+/// Numbers are left out.
+std::vector<std::string> words_of(std::string_view label) {
   std::vector<std::string> words;
   std::string word;
-  for (const char c : text + ' ') {
-    if (is_letter(c)) {
+  for (const char c : plain_text(label) + ' ') {
+    if (is_word(c)) {
       word += c;
-    } else if (c >= '0' && c <= '9') {
-      word += c;
-    } else if (!word.empty()) {
-      if (!(word[0] >= '0' && word[0] <= '9')) words.push_back(word);
-      word.clear();
+      continue;
     }
+    if (!word.empty() && !is_digit(word[0])) words.push_back(word);
+    word.clear();
   }
   return words;
 }
@@ -178,7 +195,7 @@ bool names_nmea2000(std::string_view protocol) {
   std::string name;
   for (const char c : protocol) {
     const char lower = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-    if (is_letter(lower) || (c >= '0' && c <= '9')) name += lower;
+    if (is_word(lower)) name += lower;
   }
   return name == "nmea2000" || name == "n2k";
 }

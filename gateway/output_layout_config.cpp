@@ -122,7 +122,7 @@ std::optional<OutputLayout> LayoutReader::read() {
                        fmt::format("{} has {} bytes", message.name, message.size_bytes),
                        "a message of one frame, of at most 64 bytes");
     }
-    rules_ = dbc::code_rules_of(message.id, message.is_j1939, {});
+    rules_ = resolver_.rules();
     read_rate(*rate_);
   }
   if (layout_ && context_.errors.size() == errors_before) {

@@ -84,6 +84,7 @@ struct Pipeline::Impl {
   Estimator estimator;
   Sender sender;
   RateObserver* observer = nullptr;
+  OutputObserver* output_observer = nullptr;
   Status status;
 
   TimePoint newest = kNever;  ///< newest instant given to the output
@@ -383,7 +384,7 @@ void Pipeline::Impl::advance(TimePoint now, FrameSink& sink) {
 // VG_Rate, and VG_Bias where its time has come with it.
 void Pipeline::Impl::publish(const fusion::VirtualRate& rate, bool valid, TimePoint t,
                              Duration age) {
-  sender.send_rate({.valid = valid,
+  RateOutput output{.valid = valid,
                     .rate_dps = rate.rate_dps,
                     .sigma_dps = rate.sigma_dps,
                     .corrected_dps = rate.corrected_dps,
@@ -391,7 +392,9 @@ void Pipeline::Impl::publish(const fusion::VirtualRate& rate, bool valid, TimePo
                     .quality = estimator.quality(attendance.pairing()),
                     .health = health(),
                     .age = age,
-                    .instant = t - guard.offset()});
+                    .instant = t - guard.offset()};
+  output.valid = sender.send_rate(output);
+  if (output_observer != nullptr) output_observer->on_output(output, present_drift().bias_dps);
   if (sender.reach_grid(t + known_effects.lag_most())) send_bias();
 }
 
@@ -500,6 +503,10 @@ void Pipeline::take_over(Pipeline&& before) {
 
 void Pipeline::observe(RateObserver* observer) {
   impl_->observer = observer;
+}
+
+void Pipeline::observe_output(OutputObserver* observer) {
+  impl_->output_observer = observer;
 }
 
 }  // namespace vgyro::gateway

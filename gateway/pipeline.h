@@ -17,6 +17,7 @@
 #include "base/time.h"
 #include "can/frame.h"
 #include "gateway/frame_sink.h"
+#include "gateway/output_frames.h"
 #include "gateway/plan.h"
 #include "gateway/saved_state.h"
 #include "gateway/status.h"
@@ -36,6 +37,14 @@ class RateObserver {
   virtual void on_rate(TimePoint t, const std::array<double, 2>& raw_dps, double virtual_dps) = 0;
   /// What the corrector thinks of its data, at every rate once it is calibrated; before on_rate().
   virtual void on_condition(TimePoint /*t*/, const fusion::Condition& /*condition*/) {}
+};
+
+/// For those who write down what goes out: every VG_Rate as it was sent.
+class OutputObserver {
+ public:
+  virtual ~OutputObserver() = default;
+  /// `bias_dps` as VG_Bias would say it at this moment; NaN where it is not known.
+  virtual void on_output(const RateOutput& output, const std::array<double, 2>& bias_dps) = 0;
 };
 
 class Pipeline {
@@ -84,6 +93,7 @@ class Pipeline {
 
   /// Null to take it off again.
   void observe(RateObserver* observer);
+  void observe_output(OutputObserver* observer);
 
  private:
   struct Impl;

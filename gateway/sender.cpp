@@ -34,7 +34,7 @@ Sender::Sender(const OutputPlan& plan)
   assert(layouts_.size() <= kOutputLayoutsMost);
 }
 
-void Sender::send_rate(const RateOutput& output) {
+bool Sender::send_rate(const RateOutput& output) {
   assert(sink_ != nullptr);
   const bool in_range = !vgyro_frames_ || encoder_.can_carry(output.rate_dps);
   RateOutput carried = output;
@@ -47,6 +47,7 @@ void Sender::send_rate(const RateOutput& output) {
   quality_ = carried.valid ? output.quality : Quality::kUnusable;
   if (vgyro_frames_) sink_->put(encoder_.rate(carried), stamp_);
   send_layouts(output);
+  return carried.valid;
 }
 
 void Sender::send_layouts(const RateOutput& output) {

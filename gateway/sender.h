@@ -41,8 +41,9 @@ class Sender {
     Sender& sender_;
   };
 
-  /// Precondition of both: a Turn. A rate that the frame cannot carry goes out as invalid.
-  void send_rate(const RateOutput& output);
+  /// Precondition of both: a Turn. A rate that the frame cannot carry goes out as invalid: false
+  /// then, and where it was not valid before.
+  bool send_rate(const RateOutput& output);
   /// At once, whatever the grid says.
   void send_bias(const BiasOutput& bias, const ModelOutput& model);
 

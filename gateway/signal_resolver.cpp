@@ -86,6 +86,11 @@ const dbc::Database* DatabaseCache::get(const std::string& path, TomlReader& rea
   return (files_[path] = std::make_unique<dbc::Database>(std::move(*loaded))).get();
 }
 
+const dbc::Database* DatabaseCache::loaded(const std::string& path) const {
+  const auto found = files_.find(path);
+  return found == files_.end() ? nullptr : found->second.get();
+}
+
 std::vector<std::string> DatabaseCache::paths() const {
   std::vector<std::string> paths;
   for (const auto& [path, database] : files_)
@@ -106,23 +111,44 @@ SignalResolver::SignalResolver(TomlReader& reader, DatabaseCache& cache,
   bus_index_ = bus_index(buses, bus_);
   dbc_path_ = (std::filesystem::path(config_folder) / dbc).lexically_normal().string();
   find_message(message, cache);
+  read_code_rules();
 }
 
 void SignalResolver::find_message(std::string_view name, DatabaseCache& cache) {
-  const dbc::Database* database = cache.get(dbc_path_, reader_);
-  if (database == nullptr) return;
-  message_ = database->find_message(name);
+  database_ = cache.get(dbc_path_, reader_);
+  if (database_ == nullptr) return;
+  message_ = database_->find_message(name);
   if (message_ == nullptr) {
     reader_.complain(reader_.where("message"),
                      fmt::format("{} has no message \"{}\"", dbc_path_, name),
-                     suggest_name(name, database->message_names()));
+                     suggest_name(name, database_->message_names()));
   }
+}
+
+// What the DBC file says of its protocol, or the configuration.
+void SignalResolver::read_code_rules() {
+  if (message_ != nullptr) rules_ = message_->codes;
+  const auto name = reader_.text("codes");
+  if (!name) return;
+  const auto rules = dbc::code_rules_from(*name);
+  if (rules) {
+    rules_ = *rules;
+    return;
+  }
+  reader_.complain(reader_.where("codes"), fmt::format("codes is \"{}\"", *name),
+                   suggest_name(*name, {"j1939", "nmea2000", "none"}));
 }
 
 FrameMatch SignalResolver::match() const {
   const auto bytes = std::min<std::size_t>(message_->size_bytes, can::kFdBytesMax);
-  return {bus_index_, message_->id, message_->id_mask(), message_->extended,
-          static_cast<std::uint8_t>(bytes)};
+  FrameMatch match{bus_index_, message_->id, message_->id_mask(), message_->extended,
+                   static_cast<std::uint8_t>(bytes)};
+  if (!message_->is_j1939) return match;
+  for (const dbc::Message& other : database_->messages) {
+    const bool same_group = other.matches(message_->id, true) && message_->matches(other.id, true);
+    if (same_group && !dbc::same_sender(other.id, message_->id)) match.others.push_back(other.id);
+  }
+  return match;
 }
 
 const dbc::Signal* SignalResolver::signal(std::string_view key, bool required) {
@@ -162,14 +188,18 @@ std::optional<dbc::SignalCodec> SignalResolver::codec(const dbc::Signal& signal)
   return std::nullopt;
 }
 
+std::optional<dbc::Presence> SignalResolver::presence(const dbc::Signal& signal) {
+  auto made = dbc::Presence::make(*message_, signal, signal_place(signal));
+  if (made) return *made;
+  reader_.complain(made.error().where, made.error().what, made.error().remedy);
+  return std::nullopt;
+}
+
 std::optional<Quantity> SignalResolver::quantity(const dbc::Signal& signal, std::string_view key,
                                                  Dimension dimension,
                                                  const std::optional<std::string>& unit) {
   auto bits = codec(signal);
-  auto presence = dbc::Presence::make(*message_, signal, signal_place(signal));
-  if (!presence) {
-    reader_.complain(presence.error().where, presence.error().what, presence.error().remedy);
-  }
+  auto pages = presence(signal);
   const std::string& spelling = unit ? *unit : signal.unit;
   const auto conversion = convert_unit(dimension, spelling);
   if (!conversion) {
@@ -178,27 +208,41 @@ std::optional<Quantity> SignalResolver::quantity(const dbc::Signal& signal, std:
                     dimension == Dimension::kRate && !unit
                         ? "; where the DBC file is wrong, set unit = \"deg/s\" here"
                         : "");
-    reader_.complain(reader_.where(unit ? "unit" : key),
-                     fmt::format("{} ({}) has the unit \"{}\", which this quantity cannot have",
-                                 signal.name, signal_place(signal), spelling),
-                     remedy);
+    reader_.complain(
+        reader_.where(unit ? "unit" : key),
+        unit ? fmt::format("unit = \"{}\" is none that {} can have", spelling, signal.name)
+             : fmt::format("{} ({}) has the unit \"{}\", which this quantity cannot have",
+                           signal.name, signal_place(signal), spelling),
+        remedy);
   }
-  if (!bits || !presence || !conversion) return std::nullopt;
+  if (!bits || !pages || !conversion) return std::nullopt;
   Quantity quantity{
       .name = signal.name,
       .unit = spelling,
       .codec = *bits,
-      .presence = *presence,
+      .presence = *pages,
       .scale = conversion->scale,
       .shift = conversion->shift,
       .layout = layout_of(signal),
       .step = signal.is_integer() ? std::abs(signal.factor) * conversion->scale : 0.0};
   set_limits(quantity, signal, dimension);
+  exclude_codes(quantity, signal);
   return quantity;
 }
 
-// The DBC's range is believed only where the signal can reach it: files in the wild carry ranges
-// that contradict their own scale, and believing those would throw good samples away.
+// Whatever range the file gives. Where that leaves the codes out already, they are out of range.
+void SignalResolver::exclude_codes(Quantity& quantity, const dbc::Signal& signal) const {
+  quantity.codes = dbc::codes_of(signal, rules_);
+  if (quantity.codes.empty()) return;
+  const double first = quantity.codec.value_of(static_cast<std::int64_t>(quantity.codes.first));
+  quantity.codes_in_range = first >= quantity.minimum && first <= quantity.maximum;
+  quantity.minimum = std::max(quantity.minimum, quantity.lowest());
+  quantity.maximum = std::min(quantity.maximum, quantity.highest());
+}
+
+// The DBC's range is believed only where the signal can reach it, and only with both directions of
+// a rate: files in the wild carry ranges that contradict their own scale, and believing those would
+// throw good samples away.
 void SignalResolver::set_limits(Quantity& quantity, const dbc::Signal& signal,
                                 Dimension dimension) {
   const double widest = widest_of(dimension) / quantity.scale;
@@ -210,16 +254,23 @@ void SignalResolver::set_limits(Quantity& quantity, const dbc::Signal& signal,
   const double slack = std::abs(signal.factor);
   const bool plausible = signal.minimum < signal.maximum && signal.minimum >= lowest - slack &&
                          signal.maximum <= highest + slack;
-  if (plausible) {
+  // A gyro turns both ways: [0|100] is what its author thought of, no limit of the sensor.
+  const bool one_direction = dimension == Dimension::kRate && lowest < 0.0 && highest > 0.0 &&
+                             (signal.minimum >= 0.0 || signal.maximum <= 0.0);
+  if (plausible && !one_direction) {
     quantity.minimum = std::max(-widest, signal.minimum);
     quantity.maximum = std::min(widest, signal.maximum);
     return;
   }
   warnings_.push_back(
       {signal_place(signal),
-       fmt::format("the range [{:g}|{:g}] of {} does not fit its scale, which gives "
-                   "{:g} to {:g}: not used as a limit",
-                   signal.minimum, signal.maximum, signal.name, lowest, highest),
+       plausible
+           ? fmt::format("the range [{:g}|{:g}] of {} leaves out one direction of a rate that goes "
+                         "from {:g} to {:g}: not used as a limit",
+                         signal.minimum, signal.maximum, signal.name, lowest, highest)
+           : fmt::format("the range [{:g}|{:g}] of {} does not fit its scale, which gives "
+                         "{:g} to {:g}: not used as a limit",
+                         signal.minimum, signal.maximum, signal.name, lowest, highest),
        {}});
 }
 

@@ -23,6 +23,8 @@ class DatabaseCache {
   explicit DatabaseCache(std::vector<Error>& warnings) : warnings_(warnings) {}
   /// Null after a complaint.
   const dbc::Database* get(const std::string& path, TomlReader& reader);
+  /// Null when it was never asked for, or after a complaint.
+  [[nodiscard]] const dbc::Database* loaded(const std::string& path) const;
   [[nodiscard]] std::vector<std::string> paths() const;
 
  private:
@@ -33,7 +35,8 @@ class DatabaseCache {
 /// One message of one table of the configuration.
 class SignalResolver {
  public:
-  /// Reads the keys bus, dbc, message of the table. With a `default_bus` the first may be missing.
+  /// Reads the keys bus, dbc, message, codes of the table. With a `default_bus` the first may be
+  /// missing.
   SignalResolver(TomlReader& reader, DatabaseCache& cache, const std::string& config_folder,
                  std::vector<std::string>& buses, std::vector<Error>& warnings,
                  const std::string& default_bus = {});
@@ -42,6 +45,8 @@ class SignalResolver {
   [[nodiscard]] const std::string& bus() const { return bus_; }
   [[nodiscard]] const dbc::Message& message() const { return *message_; }
   [[nodiscard]] FrameMatch match() const;
+  /// Whose codes the message has, by its DBC file or the configuration.
+  [[nodiscard]] dbc::CodeRules rules() const { return rules_; }
   [[nodiscard]] const std::string& dbc_path() const { return dbc_path_; }
 
   /// The signal that `key` names; null after a complaint, or when the key is not there.
@@ -55,11 +60,15 @@ class SignalResolver {
                                    Dimension dimension,
                                    const std::optional<std::string>& unit = {});
   std::optional<dbc::SignalCodec> codec(const dbc::Signal& signal);
+  /// The pages that carry the signal; nothing after a complaint.
+  std::optional<dbc::Presence> presence(const dbc::Signal& signal);
 
  private:
   [[nodiscard]] std::string signal_place(const dbc::Signal& signal) const;
   void set_limits(Quantity& quantity, const dbc::Signal& signal, Dimension dimension);
+  void exclude_codes(Quantity& quantity, const dbc::Signal& signal) const;
   void find_message(std::string_view name, DatabaseCache& cache);
+  void read_code_rules();
 
   TomlReader& reader_;
   std::vector<Error>& warnings_;
@@ -67,6 +76,8 @@ class SignalResolver {
   can::BusIndex bus_index_ = 0;
   std::string dbc_path_;
   const dbc::Message* message_ = nullptr;
+  const dbc::Database* database_ = nullptr;
+  dbc::CodeRules rules_ = dbc::CodeRules::kNone;
 };
 
 /// The key "bus" of any table, after a complaint where it cannot be an interface.

@@ -17,7 +17,8 @@ struct Conversion {
   double shift = 0.0;
 };
 
-/// Letter case and blanks do not matter. Nothing for a unit of another dimension or none at all.
+/// Letter case, blanks and underscores do not matter; a rate is any angle by any time, as English
+/// and German files write them. Nothing for a unit of another dimension or none at all.
 std::optional<Conversion> convert_unit(Dimension dimension, std::string_view unit);
 
 /// The spellings to recommend, e.g. "deg/s, rad/s, deg/h".

@@ -4,13 +4,30 @@
 #include <cerrno>
 #include <cstring>
 #include <fcntl.h>
+#include <filesystem>
+#include <sys/stat.h>
 #include <unistd.h>
 
 namespace vgyro::cli {
 
 namespace {
 constexpr int kDiscard = -1;
+
+namespace fs = std::filesystem;
+
+// What a file of this name is, or will be: through symbolic links. Empty for what is no file and
+// for what only names an open one, such as /dev/stdout: that is written to as it is.
+std::string place_of_file(const std::string& path) {
+  std::error_code code;
+  const fs::path place = fs::weakly_canonical(path, code);
+  if (code || !place.has_filename()) return {};
+  const std::string folder = fs::weakly_canonical(fs::path(path).parent_path(), code).string();
+  if (folder == "/dev" || folder.starts_with("/proc/")) return {};
+  struct stat info {};
+  if (::stat(place.c_str(), &info) != 0) return errno == ENOENT ? place.string() : std::string();
+  return S_ISREG(info.st_mode) ? place.string() : std::string();
 }
+}  // namespace
 
 OutputFile::OutputFile(int fd, std::string name, bool owned)
     : fd_(fd),
@@ -18,22 +35,36 @@ OutputFile::OutputFile(int fd, std::string name, bool owned)
       owned_(owned),
       buffer_(std::make_unique<char[]>(kBufferBytes)) {}
 
+OutputFile::OutputFile(Unfinished unfinished, std::string name)
+    : OutputFile(unfinished.descriptor(), std::move(name), true) {
+  unfinished_.emplace(std::move(unfinished));
+}
+
 OutputFile::OutputFile(OutputFile&& other) noexcept
     : fd_(std::exchange(other.fd_, kDiscard)),
       name_(std::move(other.name_)),
       owned_(std::exchange(other.owned_, false)),
       buffer_(std::move(other.buffer_)),
       used_(std::exchange(other.used_, 0)),
-      error_(std::move(other.error_)) {}
+      error_(std::move(other.error_)),
+      unfinished_(std::move(other.unfinished_)) {
+  other.unfinished_.reset();
+}
 
 OutputFile::~OutputFile() {
-  if (buffer_ != nullptr) flush();
+  if (buffer_ != nullptr && !unfinished_) flush();
   if (owned_) ::close(fd_);
 }
 
 Expected<OutputFile> OutputFile::open(const std::string& path) {
   if (path.empty()) return OutputFile(kDiscard, "", false);
   if (path == "-") return OutputFile(STDOUT_FILENO, "standard output", false);
+  if (const std::string place = place_of_file(path); !place.empty()) {
+    // A file that may not be written to is not replaced either.
+    const bool free = ::access(place.c_str(), F_OK) != 0 || ::access(place.c_str(), W_OK) == 0;
+    auto unfinished = free ? Unfinished::beside(place, path) : fail(path, "");
+    if (unfinished) return OutputFile(std::move(*unfinished), path);
+  }
   const int fd = ::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
   if (fd < 0) return fail(path, "cannot be written: " + system_reason());
   return OutputFile(fd, path, true);
@@ -70,6 +101,10 @@ Expected<void> OutputFile::close() {
     error_ = Error{name_, "cannot be written: " + system_reason(), {}};
   }
   owned_ = false;
+  if (!error_ && unfinished_) {
+    if (const auto kept = unfinished_->keep(); !kept) error_ = kept.error();
+  }
+  unfinished_.reset();
   if (error_) return tl::unexpected(*error_);
   return {};
 }

@@ -1,7 +1,9 @@
 #pragma once
 
 // Bytes to a file or to standard output through one buffer. The first failure is kept and told at
-// the end; later writes are dropped.
+// the end; later writes are dropped. A named file is there whole or not at all: it takes its name
+// when it is closed without a failure (cli/output/unfinished). What is no file, a device or a pipe,
+// is written to as it is, and so is a file in a folder that takes no new one.
 
 #include <cstddef>
 #include <memory>
@@ -10,6 +12,7 @@
 #include <string_view>
 
 #include "base/error.h"
+#include "cli/output/unfinished.h"
 
 namespace vgyro::cli {
 
@@ -19,6 +22,7 @@ class OutputFile {
   static Expected<OutputFile> open(const std::string& path);
   OutputFile(OutputFile&& other) noexcept;
   OutputFile& operator=(OutputFile&&) = delete;
+  /// Without close() nothing is kept.
   ~OutputFile();
 
   /// Room for at least `size` bytes; commit() what was used of it. size ≤ kRoomMax.
@@ -30,11 +34,12 @@ class OutputFile {
   void commit(std::size_t size) { used_ += size; }
   void write(std::string_view text);
   void flush();
-  /// Flushes and closes; the error names the file and the reason.
+  /// Flushes, closes, and gives the file its name; the error names the file and the reason.
   Expected<void> close();
 
  private:
   OutputFile(int fd, std::string name, bool owned);
+  OutputFile(Unfinished unfinished, std::string name);
   static constexpr std::size_t kBufferBytes = 131'072;
   int fd_;
   std::string name_;
@@ -42,6 +47,7 @@ class OutputFile {
   std::unique_ptr<char[]> buffer_;
   std::size_t used_ = 0;
   std::optional<Error> error_;
+  std::optional<Unfinished> unfinished_;
 };
 
 }  // namespace vgyro::cli

@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "cli/output/output_file.h"
+#include "cli/output/unfinished.h"
 
 namespace vgyro::cli {
 
@@ -110,6 +111,7 @@ Expected<void> write_result_folder(const std::string& folder,
     names.push_back(file.name);
   if (auto free = check_result_folder(folder, names); !free) return free;
   const fs::path path = real_path(folder);
+  const HoldSignals whole;
   auto fresh = Temporary::beside(folder, path);
   if (!fresh) return tl::unexpected(fresh.error());
   for (const ResultFile& file : files) {

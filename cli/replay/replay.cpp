@@ -12,6 +12,7 @@
 #include "canlog/reader.h"
 #include "cli/commands.h"
 #include "cli/exit_code.h"
+#include "cli/other_senders.h"
 #include "cli/output/errors.h"
 #include "cli/output/gnuplot.h"
 #include "cli/output/json_text.h"
@@ -19,7 +20,9 @@
 #include "cli/output/overwrite.h"
 #include "cli/output/progress.h"
 #include "cli/output/terminal.h"
+#include "cli/output/unfinished.h"
 #include "cli/replay/plot.h"
+#include "cli/replay/rate_table.h"
 #include "cli/replay/summary.h"
 #include "gateway/condition_text.h"
 #include "gateway/config.h"
@@ -158,6 +161,8 @@ class Replay {
     pipeline_.observe(&totals_);
   }
 
+  /// Before the first log.
+  void write_table(RateTable& table) { pipeline_.observe_output(&table); }
   /// Before the first log.
   Expected<void> take_up(const gateway::SavedState& state) { return pipeline_.resume(state); }
 
@@ -310,7 +315,7 @@ Expected<void> check_files(const ReplayOptions& options, std::vector<std::string
   }
   inputs.insert(inputs.end(), options.logs.begin(), options.logs.end());
   inputs.push_back(options.state);
-  return check_outputs(inputs, {options.output, options.json, options.plot});
+  return check_outputs(inputs, {options.output, options.json, options.csv, options.plot});
 }
 
 void warn_of_doubts(const ReplaySummary& summary, const gateway::Plan& plan) {
@@ -358,6 +363,27 @@ void warn_of_data(const ReplaySummary& summary, const gateway::Plan& plan) {
     warn({"sample rates", gateway::rates_too_far_apart_text(), ""});
   if (status.estimate_restarts > 0)
     warn({"estimate", gateway::restarts_text(status.estimate_restarts), ""});
+}
+
+// An input of which nothing came, while its J1939 parameter group came from other senders.
+void warn_of_senders_missed(const ReplaySummary& summary, const gateway::Plan& plan) {
+  const auto look = [&](const std::string& title, const std::string& message,
+                        const gateway::FrameMatch& match) {
+    if (!match.extended) return;
+    OtherSenders others;
+    for (const IdCounts::Row& row : summary.ids.rows()) {
+      if (!row.extended || summary.interfaces[row.bus] != plan.buses[match.bus]) continue;
+      if (match.carries(row.id, true)) return;
+      others.add(match.id, row.id);
+    }
+    if (!others.empty()) warn({title, others.text(message, match.id), others.remedy(match.mask)});
+  };
+  for (const gateway::GyroPlan& gyro : plan.gyros)
+    look("gyro " + gyro.name, gyro.message, gyro.match);
+  if (plan.reference) look("reference", plan.reference->message, plan.reference->match);
+  if (plan.accelerometer)
+    look("accelerometer", plan.accelerometer->message, plan.accelerometer->match);
+  if (plan.speed) look("speed", plan.speed->message, plan.speed->match);
 }
 
 // Two senders of one identifier: whoever reads VG_Rate would get both.
@@ -409,6 +435,14 @@ Expected<std::optional<gateway::SavedState>> read_state(const std::string& path,
   return std::move(*state);
 }
 
+// Nothing where none is wanted.
+Expected<std::optional<RateTable>> open_table(const std::string& path) {
+  if (path.empty()) return std::nullopt;
+  auto table = RateTable::open(path);
+  if (!table) return tl::unexpected(table.error());
+  return std::move(*table);
+}
+
 }  // namespace
 
 int run_replay(const ReplayOptions& options) {
@@ -429,11 +463,16 @@ int run_replay(const ReplayOptions& options) {
   if (!state) return report(state.error());
   auto output = OutputFile::open(options.output);
   if (!output) return report(output.error());
+  auto table = open_table(options.csv);
+  if (!table) return report(table.error());
 
+  // What is read from a pipe ends with its writer.
+  const FinishOnInterrupt finish(std::count(options.logs.begin(), options.logs.end(), "-") > 0);
   Replay replay(options, plan, *output, std::move(*buses));
   if (*state) {
     if (const auto taken = replay.take_up(**state); !taken) return report(taken.error());
   }
+  if (*table) replay.write_table(**table);
   std::optional<Error> trouble;
   for (const std::string& log : options.logs) {
     if (const auto ran = replay.run_log(log); !ran) {
@@ -443,10 +482,14 @@ int run_replay(const ReplayOptions& options) {
   }
   const ReplaySummary& summary = replay.finish();
   if (const auto closed = output->close(); !closed) return report(closed.error());
+  if (*table) {
+    if (const auto closed = (*table)->close(); !closed) return report(closed.error());
+  }
   if (!trouble) trouble = explain_silence(summary, plan, options.logs.front());
   const int written = write_results(options, plan, summary, replay.plot());
   warn_of_doubts(summary, plan);
   warn_of_data(summary, plan);
+  warn_of_senders_missed(summary, plan);
   warn_of_other_senders(summary, plan);
   if (trouble) return report(*trouble);
   return written;

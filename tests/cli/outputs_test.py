@@ -7,6 +7,7 @@ import os
 import resource
 import signal
 import subprocess
+import time
 import unittest
 from pathlib import Path
 
@@ -44,7 +45,7 @@ class Outputs(bench.Bench):
         replay = ("replay", "-q", *config, "--model", "model.toml")
         return (
             (*replay, "-o", output, "in.log"), (*replay, "--json", output, "-o", "x.log", "in.log"),
-            (*replay, "--plot", output, "-o", "x.log", "in.log"),
+            (*replay, "--plot", output, "-o", "x.log", "in.log"), (*replay, "--csv", output, "-o", "x.log", "in.log"),
             ("allan", *config, "--json", output, "in.log"), ("allan", *config, "--plot", output, "in.log"),
             ("compare", "-q", *config, "--model", "model.toml", "--measured", "in.log", "--json", output),
             ("simulate", "-q", *config, "--model", "model.toml", "--profile", "profile.csv", "-o", output),
@@ -171,6 +172,84 @@ class Outputs(bench.Bench):
                 self.assertRegex(self.limited(*call), "(cannot be written|no script for gnuplot): File too large")
         self.assertFalse((self.folder / "found").exists())
         self.assertEqual([path for path in self.folder.iterdir() if path.name.startswith(".")], [])
+
+    def hidden(self):
+        return [path.name for path in self.folder.iterdir() if path.name.startswith(".")]
+
+    def test_a_failure_leaves_the_earlier_file(self):
+        for call in self.calls("x.svg"):
+            if "compare" in call:
+                continue
+            with self.subTest(call):
+                self.write("x.svg", "earlier")
+                self.limited(*call)
+                self.assertEqual(self.read("x.svg"), "earlier")
+        self.assertEqual(self.hidden(), [])
+
+    def test_a_file_keeps_its_permissions_and_its_links(self):
+        self.write("real.log", "earlier")
+        (self.folder / "real.log").chmod(0o640)
+        (self.folder / "link.log").symlink_to("real.log")
+        self.good("replay", "-q", "--config", "vgyro.toml", "-o", "link.log", "in.log")
+        self.assertTrue((self.folder / "link.log").is_symlink())
+        self.assertIn("610#", self.read("real.log"))
+        self.assertEqual((self.folder / "real.log").stat().st_mode & 0o7777, 0o640)
+        before = os.umask(0o027)
+        self.addCleanup(os.umask, before)
+        self.good("replay", "-q", "--config", "vgyro.toml", "-o", "new.log", "in.log")
+        self.assertEqual((self.folder / "new.log").stat().st_mode & 0o7777, 0o640)
+
+    def test_an_open_file_by_another_name_is_written_to_as_it_is(self):
+        self.write("out.log", "first\n")
+        with open(self.folder / "out.log", "ab") as out:
+            self.run_vgyro("replay", "-q", "--config", "vgyro.toml", "-o", "/dev/stdout", "in.log", stdout=out)
+            self.assertEqual(os.fstat(out.fileno()).st_ino, (self.folder / "out.log").stat().st_ino)
+
+    def start_replay(self, log):
+        """A replay that has read `log` from a pipe whose writer goes on; its lines are on the way to x.log."""
+        self.write("x.log", "earlier")
+        running = subprocess.Popen([bench.VGYRO, "replay", "--config", "vgyro.toml", "-o", "x.log", "-"], stdin=subprocess.PIPE,
+                                   stderr=subprocess.PIPE, cwd=self.folder)
+        self.addCleanup(running.stderr.close)
+        running.stdin.write(log)
+        running.stdin.flush()
+        # It flushes before it waits for more.
+        for _ in range(6000):
+            if any((self.folder / name).stat().st_size > 0 for name in self.hidden()):
+                return running
+            time.sleep(0.01)
+        self.fail("nothing was written")
+
+    def test_a_signal_leaves_the_earlier_file_and_says_so(self):
+        log = (self.folder / "in.log").read_bytes()
+        for number in (signal.SIGTERM, signal.SIGHUP):
+            with self.subTest(number):
+                running = self.start_replay(log)
+                running.send_signal(number)
+                said = running.communicate()[1].decode()
+                self.assertEqual(running.returncode, -number)
+                self.assertIn("interrupted: x.log was not written\n", said)
+                self.assertEqual((self.read("x.log"), self.hidden()), ("earlier", []))
+
+    def test_an_interrupted_pipe_is_finished_and_a_second_interrupt_ends_at_once(self):
+        log = (self.folder / "in.log").read_bytes()
+        whole = self.good("replay", "-q", "--config", "vgyro.toml", "in.log").stdout.decode()
+        running = self.start_replay(log)
+        running.send_signal(signal.SIGINT)
+        said = running.communicate()[1].decode()
+        self.assertEqual(running.returncode, 0, said)
+        self.assertIn("interrupted: finishing with what has arrived", said)
+        self.assertEqual(self.read("x.log"), whole)
+
+        running = self.start_replay(log)
+        running.send_signal(signal.SIGINT)
+        running.stderr.readline()
+        self.assertIn(b"finishing", running.stderr.readline())
+        running.send_signal(signal.SIGINT)
+        said = running.communicate()[1].decode()
+        self.assertEqual(running.returncode, -signal.SIGINT)
+        self.assertIn("interrupted: x.log was not written", said)
+        self.assertEqual((self.read("x.log"), self.hidden()), ("earlier", []))
 
     def test_a_closed_standard_output_is_no_place_for_a_file(self):
         # The next file to be opened would get its number, and texts would go there.

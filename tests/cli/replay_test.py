@@ -146,6 +146,73 @@ class Output(Replay):
         self.assertEqual(self.replay("-q", "-o", "out.log", "in.log").stderr, b"")
 
 
+class Table(Replay):
+    """--csv against the frames that went out beside it, read by the DBC file's own numbers."""
+    HEADER = "t_s,rate_dps,sigma_dps,valid,state,bias1_dps,bias2_dps,heading_deg"
+
+    def rows(self, lines, method):
+        self.write("in.log", "".join(lines))
+        self.replay("--method", method, "-o", "x.log", "--csv", "x.csv", "in.log")
+        rates = [(float(line.split(")")[0][1:]), int.from_bytes(bytes.fromhex(line.split("#")[1]), "little"))
+                 for line in self.read("x.log").splitlines() if " 610#" in line]
+        header, *rows = self.read("x.csv").splitlines()
+        self.assertEqual(header, self.HEADER)
+        self.assertEqual(len(rows), len(rates))
+        self.assertGreater(len(rows), 300)
+        return [(row.split(","), stamp, word) for row, (stamp, word) in zip(rows, rates)]
+
+    def test_a_row_says_what_its_frame_says(self):
+        states = ("waiting", "calibrating", "running", "degraded", "lost")
+        for method in ("optimal", "mutual", "mean"):
+            with self.subTest(method):
+                valid_rows = 0
+                for row, stamp, word in self.rows(bench.two_gyros(6, turn_dps=3.0), method):
+                    valid = word >> 55 & 1
+                    self.assertEqual(row[3], str(valid))
+                    self.assertEqual(row[4], states[word >> 52 & 7])
+                    # VG_Age counts in halves of a millisecond; the first pairs are older than it can say.
+                    if word >> 60 < 15:
+                        self.assertAlmostEqual(float(row[0]), stamp - (word >> 60) * 0.0005, delta=0.000251)
+                    self.assertRegex(row[0], r"^\d+\.\d{6}$")
+                    if not valid:
+                        self.assertEqual((row[1], row[2], row[7]), ("", "", ""))
+                        continue
+                    valid_rows += 1
+                    raw = word >> 16 & 0xFFFFFF
+                    rate_dps = (raw - (raw >> 23 << 24)) * 5e-5
+                    self.assertAlmostEqual(float(row[1]), rate_dps, delta=2.6e-5)
+                    if word >> 40 & 0xFFF != 0xFFF:
+                        self.assertAlmostEqual(float(row[2]), (word >> 40 & 0xFFF) * 2e-5, delta=2.1e-5)
+                self.assertGreater(valid_rows, 300)
+
+    def test_heading_is_the_sum_of_the_rates_across_holes_too(self):
+        lines = bench.two_gyros(8, turn_dps=3.0)
+        del lines[800:1000]  # a second of nothing
+        expected_deg, last = 0.0, None
+        for row, _, _ in self.rows(lines, "mutual"):
+            if row[3] == "0":
+                continue
+            now = float(row[0]), float(row[1])
+            if last is not None:
+                expected_deg += (now[0] - last[0]) * (now[1] + last[1]) / 2
+            last = now
+            # Each of some 700 rates is rounded to 1e-7 deg/s, each instant to 1e-6 s.
+            self.assertAlmostEqual(float(row[7]), expected_deg, delta=1e-5)
+        # 1.2 s at rest before, of which the first is the calibration.
+        self.assertAlmostEqual(expected_deg, 3.0 * 6.8, delta=0.05)
+
+    def test_biases_are_those_of_the_drifts(self):
+        row = self.rows(bench.two_gyros(6), "mutual")[-1][0]
+        self.assertAlmostEqual(float(row[5]), 0.5, delta=1e-3)
+        self.assertAlmostEqual(float(row[6]), -0.3, delta=1e-3)
+
+    def test_on_standard_output_it_stands_alone(self):
+        self.write("in.log", "".join(bench.two_gyros(6)))
+        said = self.replay("--csv", "-", "in.log").stdout.decode()
+        self.assertEqual(said.splitlines()[0], self.HEADER)
+        self.assertNotIn("#", said)
+
+
 class Summary(Replay):
     def test_counts_agree_with_a_count_of_the_log(self):
         # Frames by interface and id, counted here by a line of Python.

@@ -26,6 +26,32 @@ TEST(Units, TurnEveryRateIntoDegreesPerSecond) {
   EXPECT_DOUBLE_EQ(converted(Dimension::kRate, "rpm", 1.0), 6.0);
 }
 
+// As public DBC files write it.
+TEST(Units, ReadRatesAsPeopleWriteThem) {
+  constexpr double kRad = std::numbers::pi / 180.0;
+  for (const std::string_view unit :
+       {"Grad/sec", "deg/sek", "Unit_DegreePerSecond", "Unit_DegreOfArcPerSecon", "º/s", "º/sec",
+        "deg per s", "DegPerSec", "degrees per second", "Grad/Sekunde", "deg*s^-1", "°·s⁻¹",
+        "deg/second", "degree/sec", "deg s-1"}) {
+    EXPECT_DOUBLE_EQ(converted(Dimension::kRate, unit, 6.0), 6.0) << unit;
+  }
+  for (const std::string_view unit : {"radians/second", "radian/s", "Unit_RadianPerSecond",
+                                      "rads/s", "rad*s^-1", "rad per sec"}) {
+    EXPECT_DOUBLE_EQ(converted(Dimension::kRate, unit, 6.0 * kRad), 6.0) << unit;
+  }
+  for (const std::string_view unit : {"mdeg/s", "m°/s", "millidegrees/second", "mdeg per sec"})
+    EXPECT_DOUBLE_EQ(converted(Dimension::kRate, unit, 6000.0), 6.0) << unit;
+  for (const std::string_view unit : {"deg/min", "°/minute"})
+    EXPECT_DOUBLE_EQ(converted(Dimension::kRate, unit, 360.0), 6.0) << unit;
+  for (const std::string_view unit : {"deg/hr", "°/hour", "Grad/Std"})
+    EXPECT_DOUBLE_EQ(converted(Dimension::kRate, unit, 21600.0), 6.0) << unit;
+  for (const std::string_view unit :
+       {"m/sec", "s", "/s", "per s", "degs", "deg/", "deg/s/s", "deg/s^-1^-1", "m", "Unit_None",
+        "min/s", "deg/m", "unit", "mm/s", "gradient/s"}) {
+    EXPECT_FALSE(convert_unit(Dimension::kRate, unit)) << unit;
+  }
+}
+
 // Water freezes at 0 degC however the sensor says it.
 TEST(Units, TurnEveryVoltageIntoVolts) {
   EXPECT_DOUBLE_EQ(converted(Dimension::kVoltage, "V", 5.0), 5.0);
