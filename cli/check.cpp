@@ -40,11 +40,9 @@ void print_e2e(const gateway::E2ePlan& e2e) {
 
 void print_gyro(const gateway::GyroPlan& gyro) {
   print_row("gyro " + gyro.name, gyro.bus, gyro.match, gyro.message, gyro.rate);
-  // What the bits cannot hold never comes.
   detail("accepted",
-         fmt::format("{:g} to {:g} {}{}", std::max(gyro.rate.minimum, gyro.rate.lowest()),
-                     std::min(gyro.rate.maximum, gyro.rate.highest()), printable(gyro.rate.unit),
-                     gyro.rate.scale < 0 ? ", sign flipped" : ""));
+         fmt::format("{:g} to {:g} {}{}", gyro.rate.lowest(), gyro.rate.highest(),
+                     printable(gyro.rate.unit), gyro.rate.scale < 0 ? ", sign flipped" : ""));
   if (!gyro.rate.codes.empty()) {
     detail("codes", fmt::format("raw values from 0x{:X} to 0x{:X} are no measurement",
                                 gyro.rate.codes.first, gyro.rate.codes.last));

@@ -8,9 +8,10 @@
 #include <nlohmann/json.hpp>
 
 #include "base/printable.h"
-#include "canlog/reader.h"
+#include "canlog/merged_reader.h"
 #include "cli/commands.h"
 #include "cli/exit_code.h"
+#include "cli/log_notes.h"
 #include "cli/other_senders.h"
 #include "cli/output/errors.h"
 #include "cli/output/output_file.h"
@@ -243,12 +244,29 @@ Expected<Decoder> load_decoder(const std::vector<std::string>& files) {
   return Decoder(std::move(databases));
 }
 
+// What was no frame, of each log, and the sum.
+void tell_counts(const std::vector<std::string>& logs, const canlog::LogReader& reader,
+                 std::uint64_t decoded) {
+  std::uint64_t not_understood = 0;
+  std::string passed_over;
+  const auto parts = reader.parts();
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    const canlog::LogCounts& counts = *parts[i];
+    for (const canlog::MalformedLine& bad : counts.first_malformed)
+      warn({fmt::format("{}:{}", logs[i], bad.line), bad.why, {}});
+    not_understood += counts.malformed_lines + counts.cut_off_lines;
+    passed_over += passed_over_text(counts);
+  }
+  tell("{} of {} frames decoded, {} {}s not understood{}\n", decoded, reader.counts().frames,
+       not_understood, parts.front()->item, passed_over);
+}
+
 }  // namespace
 
 int run_decode(const DecodeOptions& options) {
   auto decoder = load_decoder(options.dbc_files);
   if (!decoder) return report(decoder.error());
-  const auto opened = canlog::open_log(options.log);
+  const auto opened = canlog::open_logs(options.logs);
   if (!opened) return report(opened.error());
   auto output = OutputFile::open("-");
   if (!output) return report(output.error());
@@ -278,17 +296,11 @@ int run_decode(const DecodeOptions& options) {
     ++decoded;
   }
   if (const auto closed = output->close(); !closed) return report(closed.error());
-  const canlog::LogCounts& counts = reader.counts();
-  for (const canlog::MalformedLine& bad : counts.first_malformed) {
-    warn({fmt::format("{}:{}", options.log, bad.line), bad.why, {}});
-  }
-  if (counts.frames > 0) decoder->warn_of_silence();
-  tell("{} of {} frames decoded, {} lines not understood\n", decoded, counts.frames,
-       counts.malformed_lines + counts.cut_off_lines);
+  if (reader.counts().frames > 0) decoder->warn_of_silence();
+  tell_counts(options.logs, reader, decoded);
   if (reader.error()) return report(*reader.error());
-  if (counts.frames + counts.xl_frames == 0) {
-    return report(Error{options.log, "holds no CAN frame",
-                        "a log as `candump -L` prints and `candump -l` writes it is needed"});
+  if (reader.counts().frames + reader.counts().xl_frames == 0) {
+    return report(Error{name_of(options.logs), kNoFrame, kLogsRemedy});
   }
   return kDone;
 }

@@ -20,8 +20,8 @@ constexpr double kLimitMost_dps = 5e4;
 
 double limit_of(const gateway::Quantity& rate) {
   const auto magnitude = [&](double raw) { return std::abs(raw * rate.scale + rate.shift); };
-  const double low = magnitude(std::max(rate.minimum, rate.lowest()));
-  const double high = magnitude(std::min(rate.maximum, rate.highest()));
+  const double low = magnitude(rate.lowest());
+  const double high = magnitude(rate.highest());
   const double limit_dps = std::max(low, high);
   return limit_dps < kLimitMost_dps ? limit_dps : 0.0;
 }
@@ -170,7 +170,7 @@ Expected<gap::Recording> read_recording(const std::string& log, const gateway::P
   RoleFrames frames(plan);
   Recorder recorder(plan);
   const auto done = frames.read(
-      log, doing,
+      {log}, doing,
       [&](std::uint8_t roles, const canlog::LogRecord& record) { recorder.take(roles, record); });
   if (!done) return tl::unexpected(done.error());
   if (const auto missing = frames.missing_gyro(log, recorder.used())) {

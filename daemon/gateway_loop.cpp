@@ -112,7 +112,8 @@ Expected<void> GatewayLoop::check_output(const Setup& setup) {
 }
 
 Expected<void> GatewayLoop::check_fd(const Bus& output, const std::string& wanted) {
-  if (!output.is_open() || output.socket().fd_frames()) return {};
+  // A link that is down may still be given another MTU before it is up.
+  if (!output.is_up() || output.carries_fd()) return {};
   return fail(output.name(), "carries no CAN FD frames, " + wanted,
               "choose another frame or bus (`fd = false` is classic CAN), or enable FD on the link "
               "(`ip link set " +
@@ -377,6 +378,7 @@ void GatewayLoop::second_passed() {
   for (Bus& bus : setup_->buses)
     bus.second_passed();
   reopen_dead_buses();
+  look_whether_output_fits();
   notifier_.status(status_line());
   control_->second_passed();
   if (metrics_ != nullptr && metrics_->second_passed()) metrics_->write(snapshot());
@@ -403,11 +405,15 @@ void GatewayLoop::reopen_dead_buses() {
     Bus& bus = setup_->buses[i];
     if (bus.is_open() || !bus.open() || !bus.is_open() || !poll_bus(i)) continue;
     setup_->outlets[i].begin_anew();
-    if (const Expected<void> fits = check_output(*setup_); !fits) {
-      log_.tell(Severity::kError, {.cause = "no_fd", .bus = bus.name()}, "{}",
-                fits.error().message());
-    }
   }
+}
+
+void GatewayLoop::look_whether_output_fits() {
+  const Expected<void> fits = check_output(*setup_);
+  const bool fitted = std::exchange(output_fits_, fits.has_value());
+  if (fits || !fitted) return;
+  log_.tell(Severity::kError, {.cause = "no_fd", .bus = fits.error().where}, "{}",
+            fits.error().message());
 }
 
 // Not from within the dispatching: the buses are replaced.

@@ -37,8 +37,8 @@ Reject reject_of(Fault fault) {
 fusion::SensorLimits limits_of(const GyroPlan& plan) {
   const Quantity& rate = plan.rate;
   const auto value = [&](double raw) { return raw * rate.scale + rate.shift; };
-  const double low = value(std::max(rate.minimum, rate.lowest()));
-  const double high = value(std::min(rate.maximum, rate.highest()));
+  const double low = value(rate.lowest());
+  const double high = value(rate.highest());
   fusion::SensorLimits limits{.lowest_dps = std::min(low, high),
                               .highest_dps = std::max(low, high),
                               .dead_band_dps = plan.dead_band_dps,

@@ -12,13 +12,13 @@ bool FrameMatch::carries(std::uint32_t frame_id, bool frame_extended) const {
 }
 
 // The codes lie at the top of the raw values; what is below them measures.
-double Quantity::lowest() const {
+double Quantity::sendable_lowest() const {
   if (codes.empty()) return codec.representable_min();
   const double top = codec.value_of(static_cast<std::int64_t>(codes.first - 1));
   return std::min(top, codec.value_of(codec.raw_min()));
 }
 
-double Quantity::highest() const {
+double Quantity::sendable_highest() const {
   if (codes.empty()) return codec.representable_max();
   const double top = codec.value_of(static_cast<std::int64_t>(codes.first - 1));
   return std::max(top, codec.value_of(codec.raw_min()));

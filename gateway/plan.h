@@ -3,6 +3,7 @@
 // A configuration after everything in it has been resolved: which bits of which frame on which bus
 // are which quantity. Built by gateway/config.h from files, or by tests by hand.
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <optional>
@@ -56,9 +57,13 @@ struct Quantity {
   dbc::Codes codes = {};  ///< raw values that are no measurement; outside minimum and maximum
   bool codes_in_range = false;  ///< the DBC file's range does not leave them out
 
-  /// What can be sent and is a measurement, in the DBC's unit.
-  [[nodiscard]] double lowest() const;
-  [[nodiscard]] double highest() const;
+  /// What the bits can hold and is a measurement, in the DBC's unit.
+  [[nodiscard]] double sendable_lowest() const;
+  [[nodiscard]] double sendable_highest() const;
+
+  /// The least and the greatest accepted value that can be sent, in the DBC's unit.
+  [[nodiscard]] double lowest() const { return std::max(minimum, sendable_lowest()); }
+  [[nodiscard]] double highest() const { return std::min(maximum, sendable_highest()); }
 
   friend bool operator==(const Quantity&, const Quantity&) = default;
 };

@@ -107,11 +107,12 @@ SignalResolver::SignalResolver(TomlReader& reader, DatabaseCache& cache,
   if (is_default) reader.forgive({"bus"});
   const std::string dbc = reader.required_text("dbc", "bench.dbc");
   const std::string message = reader.required_text("message", "GYRO_A");
+  const auto codes = read_code_rules();
   if (bus_.empty() || dbc.empty() || message.empty()) return;
   bus_index_ = bus_index(buses, bus_);
   dbc_path_ = (std::filesystem::path(config_folder) / dbc).lexically_normal().string();
   find_message(message, cache);
-  read_code_rules();
+  if (message_ != nullptr) rules_ = codes.value_or(message_->codes);
 }
 
 void SignalResolver::find_message(std::string_view name, DatabaseCache& cache) {
@@ -125,18 +126,15 @@ void SignalResolver::find_message(std::string_view name, DatabaseCache& cache) {
   }
 }
 
-// What the DBC file says of its protocol, or the configuration.
-void SignalResolver::read_code_rules() {
-  if (message_ != nullptr) rules_ = message_->codes;
+std::optional<dbc::CodeRules> SignalResolver::read_code_rules() {
   const auto name = reader_.text("codes");
-  if (!name) return;
+  if (!name) return std::nullopt;
   const auto rules = dbc::code_rules_from(*name);
-  if (rules) {
-    rules_ = *rules;
-    return;
+  if (!rules) {
+    reader_.complain(reader_.where("codes"), fmt::format("codes is \"{}\"", *name),
+                     suggest_name(*name, {"j1939", "nmea2000", "none"}));
   }
-  reader_.complain(reader_.where("codes"), fmt::format("codes is \"{}\"", *name),
-                   suggest_name(*name, {"j1939", "nmea2000", "none"}));
+  return rules;
 }
 
 FrameMatch SignalResolver::match() const {
@@ -236,8 +234,8 @@ void SignalResolver::exclude_codes(Quantity& quantity, const dbc::Signal& signal
   if (quantity.codes.empty()) return;
   const double first = quantity.codec.value_of(static_cast<std::int64_t>(quantity.codes.first));
   quantity.codes_in_range = first >= quantity.minimum && first <= quantity.maximum;
-  quantity.minimum = std::max(quantity.minimum, quantity.lowest());
-  quantity.maximum = std::min(quantity.maximum, quantity.highest());
+  quantity.minimum = std::max(quantity.minimum, quantity.sendable_lowest());
+  quantity.maximum = std::min(quantity.maximum, quantity.sendable_highest());
 }
 
 // The DBC's range is believed only where the signal can reach it, and only with both directions of

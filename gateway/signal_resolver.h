@@ -68,7 +68,7 @@ class SignalResolver {
   void set_limits(Quantity& quantity, const dbc::Signal& signal, Dimension dimension);
   void exclude_codes(Quantity& quantity, const dbc::Signal& signal) const;
   void find_message(std::string_view name, DatabaseCache& cache);
-  void read_code_rules();
+  std::optional<dbc::CodeRules> read_code_rules();
 
   TomlReader& reader_;
   std::vector<Error>& warnings_;
@@ -77,7 +77,7 @@ class SignalResolver {
   std::string dbc_path_;
   const dbc::Message* message_ = nullptr;
   const dbc::Database* database_ = nullptr;
-  dbc::CodeRules rules_ = dbc::CodeRules::kNone;
+  dbc::CodeRules rules_ = dbc::CodeRules::kNone;  ///< of the key "codes", or of the DBC file
 };
 
 /// The key "bus" of any table, after a complaint where it cannot be an interface.
