@@ -107,8 +107,7 @@ void print_layout_rate(const gateway::OutputLayout& layout) {
 
 void print_layout(const gateway::Plan& plan, const gateway::OutputLayout& layout) {
   const gateway::OutputField& rate = layout.rate;
-  const std::string id =
-      layout.extended ? fmt::format("{:08X}", layout.id) : fmt::format("{:03X}", layout.id);
+  const std::string id = gateway::to_string(gateway::FrameId{layout.id, layout.extended});
   say("  {:<14}{:<8}{:<10}{:<26}{:<8}{}\n", "layout", plan.buses[layout.bus], id,
       layout.message + "." + rate.name, printable(rate.unit), rate.layout);
   detail("frame",
@@ -117,12 +116,14 @@ void print_layout(const gateway::Plan& plan, const gateway::OutputLayout& layout
                                   : "with every rate"));
   print_layout_rate(layout);
   if (layout.sigma) {
-    detail("sigma", fmt::format("{}, {}; unknown or beyond: {}", layout.sigma->name,
-                                range_text(*layout.sigma), said_of_none(*layout.sigma)));
+    detail(
+        "sigma",
+        fmt::format("{}, {}; unknown or beyond: {}", layout.sigma->name, range_text(*layout.sigma),
+                    layout.sigma->has_code ? layout.sigma->code : "the rate is not valid"));
   }
   print_e2e(layout.e2e);
   for (const gateway::RestingSignal& signal : layout.resting)
-    detail("nobody's", fmt::format("{}: {}", signal.name, signal.says));
+    detail("unused", fmt::format("{}: {}", signal.name, signal.says));
 }
 
 void print_plan(const gateway::Plan& plan) {

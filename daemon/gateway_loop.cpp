@@ -318,7 +318,9 @@ void GatewayLoop::put(const can::Frame& frame, TimePoint stamp) {
 void GatewayLoop::put_on(can::BusIndex bus, const can::Frame& frame, TimePoint stamp) {
   const gateway::OutputPlan& output = setup_->plan.output;
   // Whatever else goes out goes out with a rate.
-  if (frame.id != output.bias_id && frame.id != output.model_id) patience_.rate_at(stamp);
+  const bool is_own = output.vgyro_frames && bus == output.bus && !frame.has(can::kExtended);
+  const bool is_bias = is_own && (frame.id == output.bias_id || frame.id == output.model_id);
+  if (!is_bias) patience_.rate_at(stamp);
   can::TransmitQueue& queue = setup_->outlets[bus].queue;
   if (!is_timely(stamp) || !queue.send_at_once(frame, setup_->buses[bus])) {
     const Duration left = stamp + kAgeMost - clock_.wall();

@@ -62,6 +62,7 @@ struct Message {
   std::uint32_t id = 0;   ///< without flags
   bool extended = false;
   bool is_j1939 = false;  ///< compare by PGN, any source address
+  bool is_fd = false;     ///< CAN FD, by VFrameFormat or by its length
   CodeRules codes = CodeRules::kNone;
   std::uint16_t size_bytes = 0;
   std::string sender;

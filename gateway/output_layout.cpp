@@ -8,6 +8,14 @@ namespace vgyro::gateway {
 
 namespace {
 
+// Sensors that speak as often as frames are wanted are now and then a little early: arbitration on
+// a bus delays a frame by one or two others, some 0.1 to 2 ms.
+constexpr Duration kEarlyMost = std::chrono::milliseconds(2);
+constexpr Duration::rep kEarlyShare = 4;  // of the period, where that is shorter
+// Frames that came late are made up for, but not in heaps.
+constexpr Duration::rep kCloseShare = 2;
+constexpr double kRoundingSlack_steps = 1e-6;
+
 std::span<std::uint8_t> payload_of(can::Frame& frame) {
   return {frame.data.data(), frame.length};
 }
@@ -17,7 +25,7 @@ double in_unit_of(const OutputField& field, double value) {
 }
 
 // False for NaN too.
-bool can_say(const OutputField& field, double in_unit) {
+bool fits(const OutputField& field, double in_unit) {
   return in_unit >= field.minimum && in_unit <= field.maximum;
 }
 
@@ -46,9 +54,7 @@ void LayoutEncoder::go_on_from(const LayoutEncoder& before) {
 }
 
 const can::Frame* LayoutEncoder::rate(const RateOutput& output, TimePoint stamp) {
-  double in_unit = in_unit_of(plan_.rate, output.rate_dps);
-  if (plan_.sign) in_unit = std::abs(in_unit);
-  const bool in_range = can_say(plan_.rate, in_unit);
+  const bool in_range = can_say(output);
   const bool valid = output.valid && in_range;
   if (output.valid && !in_range) ++counts_.out_of_range;
   if (!valid && !plan_.can_say_invalid()) {
@@ -63,14 +69,23 @@ const can::Frame* LayoutEncoder::rate(const RateOutput& output, TimePoint stamp)
   return &frame_;
 }
 
-// On a grid of time, as VG_Bias is: of samples that are a little faster or slower than the frames
-// that are wanted, each frame has the first at or after its point of the grid.
+bool LayoutEncoder::can_say(const RateOutput& output) const {
+  const double in_unit = in_unit_of(plan_.rate, output.rate_dps);
+  if (!fits(plan_.rate, plan_.sign ? std::abs(in_unit) : in_unit)) return false;
+  return !plan_.sigma || plan_.sigma->has_code ||
+         fits(*plan_.sigma, in_unit_of(*plan_.sigma, output.sigma_dps));
+}
+
+// Each frame a period after the last one was due, so that the average is right whatever the rates'
+// own distance is; and a rate that is a little early need not wait for its successor.
 bool LayoutEncoder::is_due(TimePoint stamp) {
   if (!plan_.every) return true;
-  const std::int64_t period = plan_.every->count();
-  const bool clock_set_back = next_ - stamp > *plan_.every;
-  if (stamp < next_ && !clock_set_back) return false;
-  next_ = TimePoint{Duration{to_ns(stamp) / period * period + period}};
+  const Duration period = *plan_.every;
+  const Duration early = next_ - stamp;
+  // After a silence, or where the clock was set back, it begins anew.
+  const bool begins = early <= -period || early > 2 * period;
+  if (!begins && early > std::min(period / kEarlyShare, kEarlyMost)) return false;
+  next_ = begins ? stamp + period : std::max(next_ + period, stamp + period / kCloseShare);
   return true;
 }
 
@@ -88,20 +103,23 @@ void LayoutEncoder::put_rate(const RateOutput& output, bool valid) {
     const bool negative = valid && in_unit < 0.0 && rate.codec.decode(payload).raw != 0;
     plan_.sign->encode_raw(negative ? 1 : 0, payload);
   }
-  if (plan_.sigma) {
-    const double sigma = in_unit_of(*plan_.sigma, output.sigma_dps);
-    if (valid && can_say(*plan_.sigma, sigma)) {
-      // Rounded to zero it would claim a rate without error.
-      const double step = plan_.sigma->step / std::abs(plan_.sigma->scale);
-      plan_.sigma->codec.encode(std::max(sigma, step), payload);
-    } else {
-      plan_.sigma->codec.encode_raw(plan_.sigma->none_raw, payload);
-    }
-  }
+  if (plan_.sigma) put_sigma(*plan_.sigma, output.sigma_dps, valid);
   if (plan_.valid) {
     plan_.valid->codec.encode_raw(valid ? plan_.valid->valid_raw : plan_.valid->invalid_raw,
                                   payload);
   }
+}
+
+// Rounded up: rounded to zero it would claim a rate without error.
+void LayoutEncoder::put_sigma(const OutputField& field, double sigma_dps, bool valid) {
+  const std::span<std::uint8_t> payload = payload_of(frame_);
+  const double in_unit = in_unit_of(field, sigma_dps);
+  if (!valid || !fits(field, in_unit)) return field.codec.encode_raw(field.none_raw, payload);
+  const double step = field.step / std::abs(field.scale);
+  const double at_least = std::max(in_unit, step);
+  field.codec.encode(at_least, payload);
+  if (field.codec.decode(payload).value < at_least - kRoundingSlack_steps * step)
+    field.codec.encode(at_least + step, payload);
 }
 
 void LayoutEncoder::protect() {

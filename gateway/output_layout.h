@@ -2,10 +2,10 @@
 
 // The virtual rate as a frame of a foreign layout: the gateway takes the place of a sensor that
 // somebody already listens to. Every frame holds what the sensor's DBC file says: the rate to the
-// nearest step, σ, validity, alive counter, check value. A rate that is not valid, or beyond what
-// its signal can carry, goes out as the layout's "not available" or invalid; where the layout has
-// no way to say so nothing goes out, which every receiver takes for a silent sensor. Allocates
-// nothing; reads no clock.
+// nearest step, σ rounded up, validity, alive counter, check value. A rate that is not valid, or
+// beyond what its signal can carry, or whose σ is and would be understated, goes out as the
+// layout's "not available" or invalid; where the layout has no way to say so nothing goes out,
+// which every receiver takes for a silent sensor. Allocates nothing; reads no clock.
 
 #include <cstdint>
 
@@ -33,14 +33,16 @@ class LayoutEncoder {
   [[nodiscard]] can::BusIndex bus() const { return plan_.bus; }
 
  private:
+  [[nodiscard]] bool can_say(const RateOutput& output) const;
   bool is_due(TimePoint stamp);
   void put_rate(const RateOutput& output, bool valid);
+  void put_sigma(const OutputField& field, double sigma_dps, bool valid);
   void protect();
 
   OutputLayout plan_;
   can::Frame frame_;
   std::uint32_t counter_ = 0;
-  TimePoint next_;  ///< no frame before
+  TimePoint next_;  ///< when the next frame is due, give or take what `every` allows
   LayoutCounts counts_;
 };
 

@@ -12,6 +12,7 @@
 #include "base/printable.h"
 #include "dbc/e2e.h"
 #include "dbc/layout.h"
+#include "gateway/config.h"
 #include "gateway/e2e_config.h"
 #include "gateway/gyro_input.h"
 #include "gateway/input_frames.h"
@@ -76,7 +77,8 @@ class LayoutReader {
       : reader_(table, context.file, "[[output.layout]]", context.errors),
         context_(context),
         resolver_(reader_, context.cache, context.folder, plan.buses, context.warnings,
-                  plan.buses[plan.output.bus]) {}
+                  plan.buses[plan.output.bus]),
+        method_(plan.corrector.method) {}
 
   std::optional<OutputLayout> read();
 
@@ -88,6 +90,7 @@ class LayoutReader {
   void read_flag_raw(const NamedCondition& valid);
   void read_protection();
   void check_header(const CheckValue& crc);
+  bool read_fd();
   void read_id();
   void read_source_address();
   void read_every();
@@ -104,6 +107,8 @@ class LayoutReader {
   TomlReader reader_;
   LayoutContext context_;
   SignalResolver resolver_;
+  Method method_;
+  bool fd_ = false;
   dbc::CodeRules rules_ = dbc::CodeRules::kNone;
   const dbc::Signal* rate_ = nullptr;
   std::optional<OutputLayout> layout_;  ///< as soon as the rate is known
@@ -116,12 +121,7 @@ std::optional<OutputLayout> LayoutReader::read() {
   const dbc::Signal* sign = resolver_.signal("sign_signal", false);
   const dbc::Signal* sigma = resolver_.signal("sigma", false);
   if (rate_ != nullptr) {
-    const dbc::Message& message = resolver_.message();
-    if (message.size_bytes > can::kFdBytesMax) {
-      reader_.complain(reader_.where("message"),
-                       fmt::format("{} has {} bytes", message.name, message.size_bytes),
-                       "a message of one frame, of at most 64 bytes");
-    }
+    fd_ = read_fd();
     rules_ = resolver_.rules();
     read_rate(*rate_);
   }
@@ -137,7 +137,7 @@ std::optional<OutputLayout> LayoutReader::read() {
     warn_of_rate();
   } else {
     reader_.forgive({"unit", "sign", "rate_not_available", "id", "source_address", "valid",
-                     "invalid", "every_ms", "fill"});
+                     "invalid", "every_ms", "fd", "fill"});
     forgive_e2e(reader_);
   }
   reader_.finish();
@@ -174,7 +174,7 @@ void LayoutReader::read_rate(const dbc::Signal& signal) {
   layout_.emplace(OutputLayout{
       .bus = resolver_.match().bus,
       .message = message.name,
-      .fd = message.size_bytes > can::kClassicBytesMax,
+      .fd = fd_,
       .bytes = static_cast<std::uint8_t>(can::fd_padded_length(resolver_.match().bytes)),
       .rate = std::move(*field)});
   // What J1939 and NMEA 2000 do not use is all ones.
@@ -205,7 +205,13 @@ void LayoutReader::read_sigma(const dbc::Signal& signal) {
   if (!field) return complain("sigma", field.error());
   field->minimum = std::max(field->minimum, 0.0);
   if (!field->has_code) {
-    // The most that can be said is the least wrong.
+    if (method_ != Method::kOptimal) {
+      reader_.complain(reader_.where("sigma"),
+                       fmt::format("{} states no σ, and {} has no code for \"not available\"",
+                                   to_string(method_), signal.name),
+                       "leave sigma out, or method = \"optimal\"");
+    }
+    // Beside a rate that is not valid: as much as can be said.
     Payload scratch{};
     field->codec.encode(field->maximum, scratch);
     field->none_raw = static_cast<std::uint64_t>(field->codec.decode(scratch).raw);
@@ -330,6 +336,22 @@ void LayoutReader::check_header(const CheckValue& crc) {
   }
 }
 
+bool LayoutReader::read_fd() {
+  const dbc::Message& message = resolver_.message();
+  const bool fd = reader_.boolean("fd").value_or(message.is_fd);
+  const std::size_t most = fd ? can::kFdBytesMax : can::kClassicBytesMax;
+  if (message.size_bytes > most) {
+    const bool in_packets = message.is_j1939 && !fd;
+    reader_.complain(
+        reader_.where(reader_.has("fd") ? "fd" : "message"),
+        fmt::format("{} has {} bytes{}", message.name, message.size_bytes,
+                    in_packets ? ", which J1939 and NMEA 2000 send in several frames" : ""),
+        fmt::format("a message of one frame: {} holds {} bytes",
+                    fd ? "CAN FD" : "without fd = true it", most));
+  }
+  return fd;
+}
+
 void LayoutReader::read_id() {
   const dbc::Message& message = resolver_.message();
   layout_->id = message.id;
@@ -359,8 +381,10 @@ void LayoutReader::read_source_address() {
   }
   if (!is_j1939) return;
   if (address) layout_->id = (layout_->id & ~0xFFU) | static_cast<std::uint32_t>(*address);
+  // A DBC file's receiver is a placeholder, as its sender is; one that the configuration names is
+  // meant.
   const bool to_one = (layout_->id >> 16U & 0xFFU) < kPdu2First;
-  if (to_one) layout_->id |= kGlobalAddress << 8U;
+  if (to_one && !reader_.has("id")) layout_->id |= kGlobalAddress << 8U;
   if ((layout_->id & 0xFFU) >= kNullAddress) {
     reader_.complain(reader_.where("message"),
                      fmt::format("{} is sent from an address, and the DBC file has none",

@@ -264,6 +264,9 @@ struct FrameId {
   friend bool operator==(const FrameId&, const FrameId&) = default;
 };
 
+/// As candump writes it: "174", "0CF02A31".
+std::string to_string(const FrameId& id);
+
 /// Everything that goes out on a bus.
 std::vector<FrameId> output_ids(const OutputPlan& plan, can::BusIndex bus);
 

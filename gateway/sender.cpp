@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cassert>
+#include <cmath>
 #include <limits>
 #include <utility>
 
@@ -36,7 +37,8 @@ Sender::Sender(const OutputPlan& plan)
 
 bool Sender::send_rate(const RateOutput& output) {
   assert(sink_ != nullptr);
-  const bool in_range = !vgyro_frames_ || encoder_.can_carry(output.rate_dps);
+  const bool in_range =
+      vgyro_frames_ ? encoder_.can_carry(output.rate_dps) : std::isfinite(output.rate_dps);
   RateOutput carried = output;
   carried.valid = output.valid && in_range;
   ++rates_;
@@ -88,22 +90,31 @@ TimePoint Sender::grid_missed_at(Duration sample_interval) const {
   return next_bias_ + std::max<Duration>(kBiasGrace, 2 * sample_interval);
 }
 
+// One identifier may go out on several buses: the first of them goes on from the first, and so on.
+const LayoutEncoder* Sender::predecessor(std::size_t index, const Sender& before) const {
+  const LayoutEncoder& layout = layouts_[index];
+  const auto is_same = [&](const LayoutEncoder& other) { return layout.sends_same_frame(other); };
+  auto left = std::count_if(layouts_.begin(), layouts_.begin() + static_cast<std::ptrdiff_t>(index),
+                            is_same);
+  for (const LayoutEncoder& other : before.layouts_) {
+    if (is_same(other) && left-- == 0) return &other;
+  }
+  return nullptr;
+}
+
 void Sender::count_on_from(const Sender& before) {
   encoder_.count_on_from(before.encoder_);
-  for (LayoutEncoder& layout : layouts_) {
-    for (const LayoutEncoder& other : before.layouts_) {
-      if (layout.sends_same_frame(other)) layout.go_on_from(other);
-    }
+  for (std::size_t i = 0; i < layouts_.size(); ++i) {
+    if (const LayoutEncoder* other = predecessor(i, before)) layouts_[i].go_on_from(*other);
   }
 }
 
 void Sender::change_plan(const OutputPlan& plan) {
   Sender changed(plan);
   changed.count_on_from(*this);
-  for (LayoutEncoder& layout : changed.layouts_) {
-    for (const LayoutEncoder& other : layouts_) {
-      if (layout.sends_same_frame(other)) layout.take_books_of(other);
-    }
+  for (std::size_t i = 0; i < changed.layouts_.size(); ++i) {
+    if (const LayoutEncoder* other = changed.predecessor(i, *this))
+      changed.layouts_[i].take_books_of(*other);
   }
   encoder_ = changed.encoder_;
   layouts_ = std::move(changed.layouts_);

@@ -6,6 +6,7 @@
 // told what the frames are to say, and times on the axis of fusion::StampGuard. Reads no clock,
 // allocates nothing.
 
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -69,6 +70,8 @@ class Sender {
 
  private:
   void send_layouts(const RateOutput& output);
+  /// The layout of `before` that the frame of our layout `index` was; null: there was none.
+  [[nodiscard]] const LayoutEncoder* predecessor(std::size_t index, const Sender& before) const;
 
   OutputEncoder encoder_;
   std::vector<LayoutEncoder> layouts_;

@@ -116,9 +116,10 @@ inline constexpr std::size_t kOutputLayoutsMost = 8;
 /// Frames of one [[output.layout]].
 struct LayoutCounts {
   std::uint64_t frames = 0;
-  std::uint64_t valid = 0;         ///< of these, with a valid rate
-  std::uint64_t out_of_range = 0;  ///< rates beyond what the signal can carry
-  std::uint64_t withheld = 0;      ///< not sent: the layout cannot say that no rate is valid
+  std::uint64_t valid = 0;  ///< of these, with a valid rate
+  std::uint64_t out_of_range =
+      0;                       ///< valid rates that the signal cannot carry, or whose σ it cannot
+  std::uint64_t withheld = 0;  ///< not sent: the layout cannot say that no rate is valid
 
   LayoutCounts& operator+=(const LayoutCounts& other);
   friend bool operator==(const LayoutCounts&, const LayoutCounts&) = default;

@@ -395,8 +395,8 @@ void warn_of_other_senders(const ReplaySummary& summary, const gateway::Plan& pl
       if (summary.interfaces[row.bus] != plan.buses[bus]) continue;
       if (std::find(ours.begin(), ours.end(), id) == ours.end()) continue;
       warn({"output",
-            fmt::format("identifier {:03X} is on {} already, in {} frames of the log", row.id,
-                        plan.buses[bus], row.frames),
+            fmt::format("identifier {} is on {} already, in {} frames of the log",
+                        gateway::to_string(id), plan.buses[bus], row.frames),
             "if they are not an earlier run of the gateway, choose other rate_id, bias_id, "
             "model_id; of a layout, another id or bus, or take the sensor off the bus"});
     }

@@ -361,6 +361,28 @@ TEST(DbcParser, KnowsJ1939Groups) {
       << "the file's own labels count more than the usual numbers";
 }
 
+// CAN FD stands in the same attribute, with 11 and with 29 bits.
+TEST(DbcParser, KnowsCanFdFrames) {
+  const std::string messages = "BO_ 2364549858 A: 8 E\nBO_ 5 B: 8 E\nBO_ 6 C: 64 E\n";
+  const std::string format =
+      "BA_DEF_ BO_ \"VFrameFormat\" ENUM "
+      "\"StandardCAN\",\"ExtendedCAN\",\"StandardCAN_FD\",\"ExtendedCAN_FD\";\n";
+  const auto is_fd = [&](const std::string& attributes) {
+    const Database database = parse_clean(messages + attributes);
+    std::string flags;
+    for (const Message& message : database.messages)
+      flags += message.is_fd ? '1' : '0';
+    return flags;
+  };
+  EXPECT_EQ(is_fd(""), "001") << "no classic frame has 64 bytes";
+  EXPECT_EQ(is_fd(format + "BA_ \"VFrameFormat\" BO_ 5 2;\n"), "011");
+  EXPECT_EQ(is_fd("BA_ \"VFrameFormat\" BO_ 5 14;\nBA_ \"VFrameFormat\" BO_ 2364549858 15;\n"),
+            "111");
+  EXPECT_EQ(is_fd(format + "BA_DEF_DEF_ \"VFrameFormat\" \"ExtendedCAN_FD\";\n"
+                           "BA_ \"VFrameFormat\" BO_ 5 0;\n"),
+            "101");
+}
+
 // Sections that the product has no use for are passed over without a word.
 TEST(DbcParser, PassesOverUnusedSections) {
   const Database database = parse_clean(

@@ -75,11 +75,18 @@ BO_ 294 Upside: 8 RIG
 BO_ 2565800190 ToOne: 8 RIG
  SG_ Rate : 0|16@1+ (0.01,-300) [-300|300] "deg/s" RIG
 
-BA_DEF_ BO_ "VFrameFormat" ENUM "StandardCAN","ExtendedCAN","reserved","J1939PG";
+BO_ 295 ShortFd: 8 RIG
+ SG_ Rate : 0|16@1- (0.01,0) [-300|300] "deg/s" RIG
+
+BO_ 2566842366 Packets: 20 RIG
+ SG_ Rate : 0|16@1+ (0.01,-300) [-300|300] "deg/s" RIG
+
+BA_DEF_ BO_ "VFrameFormat" ENUM "StandardCAN","ExtendedCAN","reserved","J1939PG","StandardCAN_FD";
 BA_DEF_ SG_ "GenSigStartValue" FLOAT -100000 100000;
 BA_DEF_DEF_ "VFrameFormat" "J1939PG";
 BA_DEF_DEF_ "GenSigStartValue" 0;
 BA_ "GenSigStartValue" SG_ 291 Start -5;
+BA_ "VFrameFormat" BO_ 295 4;
 VAL_ 291 Fine 255 "not available" ;
 VAL_ 291 Quality 0 "none" 1 "poor" 2 "good" 3 "best" ;
 )";
@@ -312,6 +319,16 @@ TEST_F(OutputLayoutTest, CanFd) {
   EXPECT_EQ(once(plan, invalid()), "124##" + std::string(40, '0'));
 }
 
+// Eight bytes are CAN FD where the DBC file says so, or the configuration.
+TEST_F(OutputLayoutTest, ShortCanFd) {
+  EXPECT_EQ(once(rig_layout("message = \"ShortFd\"\nrate = \"Rate\"\n"), rate_of(2.58)),
+            "127##0201000000000000");
+  EXPECT_EQ(once(rig_layout("message = \"ShortFd\"\nrate = \"Rate\"\nfd = false\n"), rate_of(2.58)),
+            "127#0201000000000000");
+  EXPECT_EQ(once(rig_layout("message = \"Upside\"\nrate = \"Rate\"\nfd = true\n"), rate_of(300.0)),
+            "126##0000000000000000");
+}
+
 // The page that carries the rate is turned to; a sum over identifier, length and bytes (Toyota's)
 // takes the identifier that is sent.
 TEST_F(OutputLayoutTest, PagesAndIdentifiers) {
@@ -417,8 +434,9 @@ TEST_F(EveryLayout, IsNeverReadAsValidWhenItIsNot) {
 
 // --- σ, time, the rest of the frame --------------------------------------------------------------
 
-// Of σ: to the nearest, never 0, and never less than it is. With a code what cannot be said is not
-// available; without one it is the most that can be said.
+// Never 0, and never less than it is. What cannot be said is "not available" where the signal has a
+// code for that; where it has none the rate is not valid either, for a reader would trust it too
+// much.
 TEST_F(OutputLayoutTest, SigmaIsNeverUnderstated) {
   LayoutEncoder plain(
       rig_layout("message = \"Guarded\"\nrate = \"Rate\"\nsigma = \"Sigma\"\n"
@@ -430,14 +448,35 @@ TEST_F(OutputLayoutTest, SigmaIsNeverUnderstated) {
     return rig::bits(*encoder.rate(output, at_ms(0)), bit, 8);
   };
   EXPECT_EQ(sigma_of(plain, rate_of(1.0, 0.126), 32), 13U);
+  EXPECT_EQ(sigma_of(plain, rate_of(1.0, 0.1201), 32), 13U);
+  EXPECT_EQ(sigma_of(plain, rate_of(1.0, 0.12), 32), 12U);
   EXPECT_EQ(sigma_of(plain, rate_of(1.0, 0.0001), 32), 1U);
+  EXPECT_EQ(sigma_of(plain, rate_of(1.0, 0.0), 32), 1U);
+  EXPECT_EQ(sigma_of(plain, rate_of(1.0, 2.545), 32), 255U);
+  EXPECT_EQ(plain.counts().valid, 6U);
   for (const double none : {2.56, 1e9, kInfinity, kNaN}) {
-    EXPECT_EQ(sigma_of(plain, rate_of(1.0, none), 32), 255U) << none;
+    const can::Frame* frame = plain.rate(rate_of(1.0, none), at_ms(0));
+    EXPECT_EQ(rig::bits(*frame, 48, 2), 0U) << none << ": not valid";
+    EXPECT_EQ(rig::bits(*frame, 16, 16), 0U) << none;
+    EXPECT_EQ(rig::bits(*frame, 32, 8), 255U) << none;
     EXPECT_EQ(sigma_of(coded, rate_of(1.0, none), 40), 255U) << none;
+    EXPECT_EQ(rig::bits(*coded.rate(rate_of(1.0, none), at_ms(0)), 48, 2), 2U) << none << ": valid";
   }
+  EXPECT_EQ(plain.counts().valid, 6U);
+  EXPECT_EQ(plain.counts().out_of_range, 4U);
   EXPECT_EQ(sigma_of(coded, rate_of(1.0, 2.54), 40), 254U);
-  EXPECT_EQ(sigma_of(coded, rate_of(1.0, 2.55), 40), 255U);
+  EXPECT_EQ(sigma_of(coded, rate_of(1.0, 2.541), 40), 255U);
   EXPECT_EQ(sigma_of(coded, invalid(), 40), 255U);
+  EXPECT_EQ(coded.counts().out_of_range, 0U);
+}
+
+// A method that states no σ cannot fill a signal that has no code for "not available".
+TEST_F(OutputLayoutTest, MethodWithoutSigmaNeedsACode) {
+  const std::string keys = "message = \"Guarded\"\nrate = \"Rate\"\nvalid = \"Quality >= 2\"\n";
+  const std::string mutual = "\n[corrector]\nmethod = \"mutual\"\n";
+  expect_error(keys + "sigma = \"Sigma\"\n" + mutual,
+               {"mutual states no σ", "Sigma has no code", "leave sigma out"});
+  EXPECT_TRUE(load("dbc = \"rig.dbc\"\n" + keys + "sigma = \"Fine\"\n" + mutual));
 }
 
 // "Quality >= 2": 2 when valid; 0 when not, for all ones would be valid.
@@ -466,6 +505,45 @@ TEST_F(OutputLayoutTest, EveryKeepsItsDistance) {
   EXPECT_EQ(encoder.counts().frames, 6U);
 }
 
+// Sensors that speak as often as the frames are wanted, at whatever phase of the grid, a little
+// early and a little late: every rate goes out.
+TEST_F(OutputLayoutTest, EveryLosesNothingToJitter) {
+  for (int phase_us = 0; phase_us < 10'000; phase_us += 250) {
+    LayoutEncoder encoder(rig_layout(
+        "message = \"RateOfTurn\"\nrate = \"Rate\"\nsource_address = 1\nevery_ms = 10\n"));
+    rig::Dice dice(kSeed);
+    int missed = 0;
+    for (int i = 100; i < 600; ++i) {
+      const auto late_us = static_cast<int>(dice.below(1001)) - 500;
+      const TimePoint stamp = time_from_ns(1'000LL * (10'000 * i + phase_us + late_us));
+      missed += encoder.rate(rate_of(1.0), stamp) == nullptr ? 1 : 0;
+    }
+    EXPECT_EQ(missed, 0) << phase_us;
+  }
+}
+
+// As many frames as there is time for, whatever the rates' own distance; and after a silence no
+// heap of them.
+TEST_F(OutputLayoutTest, EveryIsKeptOnAverage) {
+  for (const int interval_us : {125, 1000, 2000, 3000, 4100, 4999}) {
+    LayoutEncoder encoder(rig_layout(
+        "message = \"RateOfTurn\"\nrate = \"Rate\"\nsource_address = 1\nevery_ms = 10\n"));
+    constexpr int kSeconds = 20;
+    int before_us = -1'000'000;
+    int closest_us = 1'000'000;
+    for (int t_us = 0; t_us < kSeconds * 1'000'000; t_us += interval_us) {
+      if (t_us / 1'000'000 == 7) continue;
+      if (encoder.rate(rate_of(1.0), time_from_ns(1'000'000'000 + 1'000LL * t_us)) == nullptr)
+        continue;
+      closest_us = std::min(closest_us, t_us - before_us);
+      before_us = t_us;
+    }
+    EXPECT_NEAR(static_cast<double>(encoder.counts().frames), (kSeconds - 1) * 100.0, 2.0)
+        << interval_us;
+    EXPECT_GE(closest_us, 3000) << interval_us;
+  }
+}
+
 // A new configuration goes on counting where the old one stood, for the same frame.
 TEST_F(OutputLayoutTest, CounterGoesOnForTheSameFrame) {
   const OutputLayout plan = profile("bosch_mm7.dbc", kMm7);
@@ -485,6 +563,11 @@ TEST_F(OutputLayoutTest, J1939ToEverybody) {
   const OutputLayout plan =
       rig_layout("message = \"ToOne\"\nrate = \"Rate\"\nsource_address = 0x21\n");
   EXPECT_EQ(plan.id, 0x18EFFF21U);
+  EXPECT_EQ(
+      rig_layout("message = \"ToOne\"\nrate = \"Rate\"\nid = 0x0CEF1000\nsource_address = 0x21\n")
+          .id,
+      0x0CEF1021U)
+      << "whoever gives the whole identifier says to whom";
 }
 
 // What our own inputs read of such frames is what the virtual gyro said.
@@ -568,6 +651,10 @@ TEST_F(OutputLayoutTest, RefusesWhatCannotBeMeant) {
   expect_error(guarded + "crc = \"Crc\"\ne2e = \"profile_11c\"\ndata_id = 1\n",
                {"has its counter in the low nibble of byte 1"});
   expect_error("message = \"RateOfTurn\"\nrate = \"Rate\"\n", {"sent from an address"});
+  expect_error("message = \"Packets\"\nrate = \"Rate\"\nsource_address = 1\n",
+               {"Packets has 20 bytes", "several frames"});
+  expect_error("message = \"Long\"\nrate = \"Rate\"\nfd = false\n",
+               {"Long has 20 bytes", "holds 8 bytes"});
   expect_error("message = \"RateOfTurn\"\nrate = \"Rate\"\nsource_address = 254\n", {"0 to 253"});
   expect_error("message = \"Pages\"\nrate = \"RateZ\"\nvalid = \"Other == 1\"\n",
                {"Other is not on the page of RateZ"});

@@ -258,8 +258,7 @@ TEST_F(SenderTest, SinkThatThrowsEndsItsTurn) {
   EXPECT_EQ(out.frames[0].stamp, at_ms(2));
 }
 
-// --- foreign layouts
-// ------------------------------------------------------------------------------
+// --- foreign layouts -----------------------------------------------------------------------------
 
 constexpr std::uint32_t kLayoutId = 0x123;
 
@@ -361,6 +360,46 @@ TEST_F(SenderTest, LayoutsGoOnWithAnotherPlan) {
   EXPECT_EQ(told.layouts_out[0], (LayoutCounts{.frames = 1, .out_of_range = 1}));
   EXPECT_EQ(told.layouts_out[1], (LayoutCounts{.frames = 18, .out_of_range = 18}));
   EXPECT_EQ(told.layouts_total().frames, 19U);
+}
+
+// One identifier on two buses is two frames, each with a counter and books of its own.
+TEST_F(SenderTest, OneIdentifierOnTwoBusesIsCountedApart) {
+  OutputPlan plan;
+  plan.layouts = {layout_on(0), layout_on(2)};
+  plan.layouts[1].every = ms(100);
+  Sender going{plan};
+  TwoBuses buses;
+  const auto send = [&](int at) {
+    const Sender::Turn turn(going, buses, at_ms(at));
+    going.send_rate(rate_of(1.0));
+  };
+  for (int i = 0; i < 7; ++i)
+    send(1000 + i);
+  going.change_plan(plan);
+  send(1007);
+  send(1200);
+  EXPECT_EQ(rig::bits(buses.own.back(), 16, 4), 8U);
+  EXPECT_EQ(rig::bits(buses.other.back(), 16, 4), 1U);
+  Status told;
+  going.tell(told);
+  EXPECT_EQ(told.layouts_out[0], (LayoutCounts{.frames = 9, .valid = 9}));
+  EXPECT_EQ(told.layouts_out[1], (LayoutCounts{.frames = 2, .valid = 2}));
+}
+
+// What is no number is no valid rate, even where no VG_Rate is asked what it can carry.
+TEST_F(SenderTest, NoNumberIsNoValidRateWithoutVgRate) {
+  OutputPlan plan;
+  plan.vgyro_frames = false;
+  plan.layouts = {layout_on(0)};
+  Sender alone{plan};
+  const Sender::Turn turn(alone, out, at_ms(1));
+  EXPECT_FALSE(alone.send_rate(rate_of(kNaN)));
+  EXPECT_FALSE(alone.send_rate(rate_of(std::numeric_limits<double>::infinity())));
+  EXPECT_TRUE(alone.send_rate(rate_of(1e6))) << "no VG_Rate that could not carry it";
+  Status told;
+  alone.tell(told);
+  EXPECT_EQ(told.rates_out_valid, 1U);
+  EXPECT_EQ(told.layouts_out[0], (LayoutCounts{.frames = 3, .out_of_range = 3}));
 }
 
 // --- another plan --------------------------------------------------------------------------------
