@@ -123,7 +123,7 @@ void print_layout(const gateway::Plan& plan, const gateway::OutputLayout& layout
   }
   print_e2e(layout.e2e);
   for (const gateway::RestingSignal& signal : layout.resting)
-    detail("unused", fmt::format("{}: {}", signal.name, signal.says));
+    detail("fixed", fmt::format("{}: {}", signal.name, signal.says));
 }
 
 void print_plan(const gateway::Plan& plan) {
