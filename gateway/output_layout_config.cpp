@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <cmath>
 #include <optional>
 #include <string_view>
@@ -36,6 +37,10 @@ constexpr double kNarrow_dps = 100.0;
 constexpr double kEveryMost_ms = 60'000.0;
 constexpr std::size_t kProfile1Values = 15;  // 15 itself is "invalid"
 constexpr unsigned kNibble = 4;
+
+// How people name what receivers check, in any case of letters.
+constexpr std::array<std::string_view, 4> kCrcNames{"crc", "checksum", "chksum", "chksm"};
+constexpr std::array<std::string_view, 4> kCounterNames{"counter", "alive", "cntr", "rolling"};
 
 using Payload = std::array<std::uint8_t, can::kFdBytesMax>;
 
@@ -99,6 +104,7 @@ class LayoutReader {
   void fill_rest();
   std::optional<RawValue> filled(const dbc::Signal& signal, const toml::table* fill);
   void check_fill(const toml::table* fill);
+  void warn_of_resting(const dbc::Signal& signal, const RawValue& value);
   void warn_of_rate();
   void complain(std::string_view key, const Error& error) {
     reader_.complain(reader_.where(key), error.what, error.remedy);
@@ -420,6 +426,7 @@ void LayoutReader::fill_rest() {
     if (overlap(mask, taken_)) continue;
     const auto value = filled(signal, fill);
     if (!value) return;
+    if (fill == nullptr || !fill->contains(signal.name)) warn_of_resting(signal, *value);
     codec->encode_raw(value->raw, payload);
     add(taken_, mask);
     layout_->resting.push_back({signal.name, value->text});
@@ -464,6 +471,25 @@ std::optional<RawValue> LayoutReader::filled(const dbc::Signal& signal, const to
                   fmt::format("{:g} {}", *number, printable(signal.unit))};
 }
 
+// Its readers take no frame whose counter stands still or whose check value is wrong.
+void LayoutReader::warn_of_resting(const dbc::Signal& signal, const RawValue& value) {
+  std::string name = signal.name;
+  std::transform(name.begin(), name.end(), name.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  const auto named = [&](const auto& parts) {
+    return std::any_of(parts.begin(), parts.end(),
+                       [&](std::string_view part) { return name.find(part) != name.npos; });
+  };
+  const bool is_crc = named(kCrcNames);
+  if (!is_crc && !named(kCounterNames)) return;
+  context_.warnings.push_back(
+      {reader_.where("message"),
+       fmt::format("{} of {} is always {}: whoever checks it takes no frame", signal.name,
+                   layout_->message, value.text),
+       is_crc ? fmt::format("crc = \"{}\" and e2e, or fill", signal.name)
+              : fmt::format("counter = \"{}\", or fill", signal.name)});
+}
+
 void LayoutReader::warn_of_rate() {
   const OutputField& rate = layout_->rate;
   const auto warn = [&](std::string what, std::string remedy) {
@@ -499,7 +525,7 @@ std::string id_text(const FrameId& id) {
 }  // namespace
 
 void read_output_layouts(TomlReader& output, LayoutContext context, Plan& plan) {
-  const toml::array* tables = output.array("layout");
+  const toml::array* tables = output.array("layout", "a list of tables: [[output.layout]]");
   if (tables == nullptr) return;
   if (tables->size() > kOutputLayoutsMost) {
     output.complain(output.where("layout"),

@@ -50,6 +50,26 @@ SPEAKING = ("MM7_Yaw", "ARI", "RateOfTurn", "MTi_RateOfTurn", "SBG_ImuGyro")
 # Full scale, in deg/s, where the test turns faster.
 NARROW = {"MM7_Yaw": 163.84, "ESP_02": 163.84, "ARI": 252}
 
+# The frames of tests/gateway/output_layout_test.cpp, which were worked out by hand: what they say in the DBC file's unit.
+GOLDEN = {
+    "MM7_Yaw": {"C880000000000007": {"YawRate": 1, "YawStatus": 0, "YawCounter": 0},
+                "C88000000000011A": {"YawRate": 1, "YawStatus": 0, "YawCounter": 1},
+                "0080F00000000203": {"YawRate": 0, "YawStatus": 15, "YawCounter": 2},
+                "C880004B000000B5": {"YawRate": 1, "Temperature": 25}},
+    "ARI": {"FFFFFFFF007DCFFF": {"YawRate": 0, "YawRateMerit": 0, "PitchRateMerit": 3, "RollRateMerit": 3},
+            "FFFFFFFF807DCFFF": {"YawRate": 1}, "FFFFFFFFFFFACFFF": {"YawRate": 251.9921875},
+            "007D007D007DC0FF": {"PitchRate": 0, "RollRate": 0, "YawRate": 0, "PitchRateMerit": 0, "RollRateMerit": 0}},
+    "RateOfTurn": {"7D0B7D0200FFFFFF": {"SID": 125, "Rate": 163083 * 3.125e-8}},
+    "RT_RateVehicle": {"000000002EFB0000": {"RateZ": -12.34}},
+    "ESP_02": {"00000000007B4000": {"YawRateMagnitude": 1.23, "YawRateSign": 1},
+               "0000000000FF7F00": {"YawRateMagnitude": 163.83, "YawRateSign": 1}},
+    "Yaw_Data_FD1": {"000080E800000000": {"YawRate": 0.1}},
+    "IMU04_YawAccX": {"3FC0000000000000": {"YawRate": 1.5}},
+    "MTi_RateOfTurn": {"000000000200": {"RateZ": 1}},
+    "SBG_ImuGyro": {"00000000FA00": {"RateZ": 0.25}},
+    "HG1120_InertialZ": {"52B81E0500000000": {"RateZ": 1}},
+}
+
 
 def crc8_j1850(octets):
     value = 0xFF
@@ -119,6 +139,18 @@ class OutputLayouts(bench.Bench):
 
     def test_the_oracle_has_the_published_crc(self):
         self.assertEqual(crc8_j1850(CRC_CHECK[0]), CRC_CHECK[1])
+
+    def test_golden_frames_are_what_canmatrix_reads(self):
+        source = (bench.SOURCE / "tests/gateway/output_layout_test.cpp").read_text(encoding="utf-8")
+        self.assertEqual(set(GOLDEN), set(LAYOUTS))
+        for name, frames in GOLDEN.items():
+            matrix = matrix_of(PROFILES / LAYOUTS[name][0]).frame_by_name(name)
+            for data, wanted in frames.items():
+                self.assertIn(f"#{data}\"", source, "not a frame of the other test")
+                signals = matrix.decode(bytes.fromhex(data))
+                for signal, value in wanted.items():
+                    with self.subTest(frame=name, signal=signal):
+                        self.assertAlmostEqual(float(signals[signal].phys_value), value, 8)
 
     def test_no_profile_is_left_out(self):
         self.assertEqual({file for file, _, _, _ in LAYOUTS.values()}, {path.name for path in PROFILES.glob("*.dbc")})

@@ -682,7 +682,34 @@ TEST_F(OutputLayoutTest, WarnsOfWhatIsCoarseOrNarrow) {
       kProfiles));
   EXPECT_NE(vw.find("one direction"), std::string::npos) << vw;
   EXPECT_NE(vw.find("sign_signal"), std::string::npos) << vw;
-  EXPECT_EQ(warnings_of("dbc = \"rig.dbc\"\nmessage = \"Guarded\"\nrate = \"Rate\"\n"), "");
+  EXPECT_EQ(warnings_of("dbc = \"rig.dbc\"\nmessage = \"Upside\"\nrate = \"Rate\"\n"), "");
+}
+
+// A counter or a check value that nobody makes is a frame that nobody takes.
+TEST_F(OutputLayoutTest, WarnsOfWhatReadersCheckAndNobodyMakes) {
+  const std::string keys = "message = \"Guarded\"\nrate = \"Rate\"\nvalid = \"Quality >= 2\"\n";
+  const auto warnings_of = [&](const std::string& more) {
+    std::vector<std::string> text;
+    for (const Error& warning : resolved("dbc = \"rig.dbc\"\n" + keys + more).warnings)
+      text.push_back(warning.message());
+    return text;
+  };
+  const std::vector<std::string> both = warnings_of("");
+  ASSERT_EQ(both.size(), 2U) << fmt::format("{}", both);
+  EXPECT_NE(both[0].find("Crc of Guarded is always 0: whoever checks it takes no frame; "
+                         "crc = \"Crc\" and e2e, or fill"),
+            std::string::npos)
+      << both[0];
+  EXPECT_NE(both[1].find("counter = \"Counter\", or fill"), std::string::npos) << both[1];
+  EXPECT_EQ(warnings_of("counter = \"Counter\"\nfill = { Crc = 0 }\n").size(), 0U);
+}
+
+TEST_F(OutputLayoutTest, OneTableIsNoList) {
+  write("vgyro.toml", std::string(kConfig) + "[output.layout]\nmessage = \"Long\"\n");
+  const auto loaded = load_config((folder_ / "vgyro.toml").string());
+  ASSERT_FALSE(loaded);
+  EXPECT_NE(loaded.error()[0].message().find("[[output.layout]]"), std::string::npos)
+      << loaded.error()[0].message();
 }
 
 }  // namespace
