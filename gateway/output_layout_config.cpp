@@ -4,6 +4,7 @@
 #include <array>
 #include <cctype>
 #include <cmath>
+#include <iterator>
 #include <optional>
 #include <string_view>
 #include <utility>
@@ -545,14 +546,13 @@ void read_output_layouts(TomlReader& output, LayoutContext context, Plan& plan) 
 }
 
 void check_output_ids(TomlReader& output, const Plan& plan) {
-  for (can::BusIndex bus = 0; bus < plan.buses.size(); ++bus) {
+  for (std::size_t i = 0; i < plan.buses.size(); ++i) {
+    const auto bus = static_cast<can::BusIndex>(i);
     const std::vector<FrameId> ids = output_ids(plan.output, bus);
-    for (std::size_t i = 0; i < ids.size(); ++i) {
-      if (std::find(ids.begin() + static_cast<std::ptrdiff_t>(i) + 1, ids.end(), ids[i]) ==
-          ids.end())
-        continue;
+    for (auto id = ids.begin(); id != ids.end(); ++id) {
+      if (std::find(std::next(id), ids.end(), *id) == ids.end()) continue;
       output.complain(output.where(), "two output frames have the same identifier",
-                      fmt::format("{} on {}", id_text(ids[i]), plan.buses[bus]));
+                      fmt::format("{} on {}", id_text(*id), plan.buses[bus]));
     }
     if (plan.gyros.empty()) continue;
     for (const FrameMatch& input : plan.inputs()) {

@@ -388,7 +388,8 @@ void warn_of_senders_missed(const ReplaySummary& summary, const gateway::Plan& p
 
 // Two senders of one identifier: whoever reads VG_Rate would get both.
 void warn_of_other_senders(const ReplaySummary& summary, const gateway::Plan& plan) {
-  for (can::BusIndex bus = 0; bus < plan.buses.size(); ++bus) {
+  for (std::size_t i = 0; i < plan.buses.size(); ++i) {
+    const auto bus = static_cast<can::BusIndex>(i);
     const std::vector<gateway::FrameId> ours = gateway::output_ids(plan.output, bus);
     for (const IdCounts::Row& row : summary.ids.rows()) {
       const gateway::FrameId id{row.id, row.extended};

@@ -913,11 +913,6 @@ class ForeignLayoutsCase:
 
     def prepare(self, folder):
         self.twin.prepare(folder)
-        (folder / "boat.dbc").write_text(
-            'VERSION ""\nBU_: BOAT\nBO_ 2314277886 RateOfTurn: 8 BOAT\n SG_ SID : 0|8@1+ (1,0) [0|252] "" BOAT\n'
-            ' SG_ Rate : 8|32@1- (0.00000003125,0) [-67.108863|67.108863] "rad/s" BOAT\n'
-            'BA_DEF_ BO_ "VFrameFormat" ENUM "StandardCAN","ExtendedCAN","reserved","J1939PG";\n'
-            'BA_DEF_DEF_ "VFrameFormat" "J1939PG";\n', encoding="ascii")
         with open(folder / "vgyro.toml", "a", encoding="utf-8") as config:
             config.write(f"""
 [[output.layout]]
@@ -929,7 +924,7 @@ source_address = {self.ari[3]}
 
 [[output.layout]]
 bus = "can1"
-dbc = "boat.dbc"
+dbc = "{SOURCE}/dbc/profiles/nmea2000_rate_of_turn.dbc"
 message = "RateOfTurn"
 rate = "Rate"
 counter = "SID"
