@@ -4,6 +4,7 @@
 #include <cstring>
 
 #include "canlog/asc.h"
+#include "canlog/blf.h"
 #include "canlog/candump.h"
 #include "canlog/candump_screen.h"
 #include "canlog/csv.h"
@@ -44,6 +45,7 @@ constexpr std::array kForms{
          open_candump},
     Form{"candump's screen text with stamps", nullptr, is_candump_screen_line, open_candump_screen},
     Form{"Vector ASC", nullptr, is_asc_line, open_lines<AscReader>},
+    Form{"Vector BLF", is_blf, nullptr, BlfReader::open},
     Form{"PEAK TRC", nullptr, is_trc_line, open_lines<TrcReader>},
     Form{"python-can's CSV", nullptr, is_python_can_csv_line, open_lines<PythonCanCsvReader>},
     Form{"SavvyCAN's CSV", nullptr, is_savvycan_csv_line, open_lines<SavvyCanCsvReader>},
