@@ -8,6 +8,8 @@
 #include "canlog/candump.h"
 #include "canlog/candump_screen.h"
 #include "canlog/csv.h"
+#include "canlog/pcap.h"
+#include "canlog/pcapng.h"
 #include "canlog/text_line.h"
 #include "canlog/trc.h"
 
@@ -46,6 +48,8 @@ constexpr std::array kForms{
     Form{"candump's screen text with stamps", nullptr, is_candump_screen_line, open_candump_screen},
     Form{"Vector ASC", nullptr, is_asc_line, open_lines<AscReader>},
     Form{"Vector BLF", is_blf, nullptr, BlfReader::open},
+    Form{"pcap of CAN", is_pcap, nullptr, PcapReader::open},
+    Form{"pcapng of CAN", is_pcapng, nullptr, PcapngReader::open},
     Form{"PEAK TRC", nullptr, is_trc_line, open_lines<TrcReader>},
     Form{"python-can's CSV", nullptr, is_python_can_csv_line, open_lines<PythonCanCsvReader>},
     Form{"SavvyCAN's CSV", nullptr, is_savvycan_csv_line, open_lines<SavvyCanCsvReader>},
