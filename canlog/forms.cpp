@@ -8,6 +8,7 @@
 #include "canlog/candump.h"
 #include "canlog/candump_screen.h"
 #include "canlog/csv.h"
+#include "canlog/mdf.h"
 #include "canlog/pcap.h"
 #include "canlog/pcapng.h"
 #include "canlog/text_line.h"
@@ -49,6 +50,7 @@ constexpr std::array kForms{
     Form{"Vector ASC", nullptr, is_asc_line, open_lines<AscReader>},
     Form{"Vector BLF", is_blf, nullptr, BlfReader::open},
     Form{"pcap of CAN", is_pcap, nullptr, PcapReader::open},
+    Form{"MDF 4 with CAN frames (MF4)", is_mdf, nullptr, MdfReader::open},
     Form{"pcapng of CAN", is_pcapng, nullptr, PcapngReader::open},
     Form{"PEAK TRC", nullptr, is_trc_line, open_lines<TrcReader>},
     Form{"python-can's CSV", nullptr, is_python_can_csv_line, open_lines<PythonCanCsvReader>},

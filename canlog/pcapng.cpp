@@ -119,7 +119,7 @@ bool PcapngReader::next(LogRecord& record) {
       break;
     }
     if (!has_several_) return true;
-    by_stamp_.push(record, xl_);
+    by_stamp_.push(record, &xl_, record.bus);
   }
   if (by_stamp_.is_empty()) return false;
   StampOrder::Held held = by_stamp_.pop();

@@ -24,22 +24,24 @@ StampOrder::Held StampOrder::Queue::pop() {
   return held;
 }
 
-void StampOrder::push(const LogRecord& record, const XlFrame& xl) {
-  Held held{record, record.is_xl ? std::make_unique<XlFrame>(xl) : nullptr, pushed_++};
-  buses_[record.bus].push(std::move(held));
+void StampOrder::push(const LogRecord& record, const XlFrame* xl, std::size_t stream) {
+  const bool has_xl = record.is_xl && xl != nullptr;
+  Held held{record, has_xl ? std::make_unique<XlFrame>(*xl) : nullptr, pushed_++};
+  if (stream >= streams_.size()) streams_.resize(stream + 1);
+  streams_[stream].push(std::move(held));
   ++held_;
   last_ns_ = to_ns(record.stamp);
 }
 
-// Of those that are first on their bus, the one of the lowest stamp.
+// Of those that are first in their stream, the one of the lowest stamp.
 std::size_t StampOrder::first() const {
-  std::size_t best = buses_.size();
-  for (std::size_t i = 0; i < buses_.size(); ++i) {
-    if (buses_[i].is_empty()) continue;
-    const auto key = [&](std::size_t bus) {
-      return std::pair(buses_[bus].front().record.stamp, buses_[bus].front().number);
+  std::size_t best = streams_.size();
+  for (std::size_t i = 0; i < streams_.size(); ++i) {
+    if (streams_[i].is_empty()) continue;
+    const auto key = [&](std::size_t stream) {
+      return std::pair(streams_[stream].front().record.stamp, streams_[stream].front().number);
     };
-    if (best == buses_.size() || key(i) < key(best)) best = i;
+    if (best == streams_.size() || key(i) < key(best)) best = i;
   }
   return best;
 }
@@ -48,13 +50,13 @@ bool StampOrder::is_ready() const {
   if (held_ == 0) return false;
   if (closed_ || held_ >= kHeldMax) return true;
   // A clock that was set back by more does not hold up what came before.
-  const std::int64_t lead_ns = last_ns_ - to_ns(buses_[first()].front().record.stamp);
-  return lead_ns > kLateMax_ns || lead_ns < -kLateMax_ns;
+  const std::int64_t lead_ns = last_ns_ - to_ns(streams_[first()].front().record.stamp);
+  return lead_ns > late_max_ns_ || lead_ns < -late_max_ns_;
 }
 
 StampOrder::Held StampOrder::pop() {
   --held_;
-  return buses_[first()].pop();
+  return streams_[first()].pop();
 }
 
 }  // namespace vgyro::canlog

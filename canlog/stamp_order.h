@@ -1,10 +1,9 @@
 #pragma once
 
-// Records of several buses that were captured side by side, and written as each bus's buffer was
-// emptied: some tenths of a second of one bus, then of another. They come out by stamp; each bus
-// keeps its own order. Memory is bounded.
+// Records that were written stream by stream, as each one's buffer was emptied: some tenths of a
+// second of one bus, then of another. They come out by stamp; each stream keeps its own order.
+// Memory is bounded.
 
-#include <array>
 #include <memory>
 #include <vector>
 
@@ -14,10 +13,11 @@ namespace vgyro::canlog {
 
 class StampOrder {
  public:
-  /// How much later than its place by stamp a record may come.
-  static constexpr std::int64_t kLateMax_ns = 1'000'000'000;
-  /// As many are held at most: two buses at full load leave fewer in that time.
-  static constexpr std::size_t kHeldMax = 32'768;
+  /// As many are held at most: two buses at full load leave fewer in eight seconds.
+  static constexpr std::size_t kHeldMax = 131'072;
+
+  /// `late_max_ns`: how much later than its place by stamp a record may come.
+  explicit StampOrder(std::int64_t late_max_ns) : late_max_ns_(late_max_ns) {}
 
   struct Held {
     LogRecord record;
@@ -25,7 +25,8 @@ class StampOrder {
     std::uint64_t number = 0;     ///< in the order of the log
   };
 
-  void push(const LogRecord& record, const XlFrame& xl);
+  /// Streams count from 0 on.
+  void push(const LogRecord& record, const XlFrame* xl, std::size_t stream);
   /// Nothing more comes.
   void close() { closed_ = true; }
   [[nodiscard]] bool is_empty() const { return held_ == 0; }
@@ -51,7 +52,8 @@ class StampOrder {
 
   [[nodiscard]] std::size_t first() const;
 
-  std::array<Queue, InterfaceTable::kMax> buses_;
+  std::int64_t late_max_ns_;
+  std::vector<Queue> streams_;
   std::size_t held_ = 0;
   std::uint64_t pushed_ = 0;
   std::int64_t last_ns_ = 0;  ///< of the record pushed last

@@ -198,14 +198,13 @@ TEST(Pcapng, DamageIsSaidWithItsPlace) {
 }
 
 TEST(StampOrder, EachBusKeepsItsOwnOrderThoughItsClockIsSetBack) {
-  StampOrder order;
+  StampOrder order(1'000'000'000);
   LogRecord record;
-  const XlFrame no_xl;
   const auto push = [&](can::BusIndex bus, std::int64_t ms) {
     record.bus = bus;
     record.stamp = time_from_ns(ms * 1'000'000);
     record.frame.id = static_cast<std::uint32_t>(ms);
-    order.push(record, no_xl);
+    order.push(record, nullptr, bus);
   };
   push(0, 10'000);
   EXPECT_FALSE(order.is_ready());
@@ -223,12 +222,11 @@ TEST(StampOrder, EachBusKeepsItsOwnOrderThoughItsClockIsSetBack) {
 }
 
 TEST(StampOrder, HoldsNoMoreThanItSays) {
-  StampOrder order;
+  StampOrder order(1'000'000'000);
   LogRecord record;
-  const XlFrame no_xl;
   std::size_t pushed = 0;
   while (!order.is_ready()) {
-    order.push(record, no_xl);
+    order.push(record, nullptr, 0);
     ++pushed;
   }
   EXPECT_EQ(pushed, StampOrder::kHeldMax);
