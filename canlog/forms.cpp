@@ -83,6 +83,9 @@ constexpr std::array kForeign{
                 [](std::string_view h) { return starts(h, "SQLite format 3\0"sv); },
                 "`can_logconvert FILE.db OUT.log` of python-can converts its own; for a bag the "
                 "rosbags package for Python"},
+    ForeignForm{"is a packed or encrypted log of a CANedge (MFC, MFE, MFM)",
+                [](std::string_view h) { return starts(h, "Generic File"); },
+                "its maker's mdf2finalized makes an MF4 file of it"},
     ForeignForm{"is an HDF5 file, as MATLAB 7.3 writes too",
                 [](std::string_view h) { return starts(h, "\x89HDF\r\n\x1A\n"sv); },
                 "export the frames, not decoded signals, as ASC, BLF or CSV"},

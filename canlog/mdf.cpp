@@ -13,7 +13,7 @@ namespace {
 constexpr std::int64_t kSecond_ns = 1'000'000'000;
 constexpr std::uint64_t kHeadAt = 64;
 // Memory of each: a window onto its records, and one onto their payloads.
-constexpr std::size_t kGroupsMax = 256;
+constexpr std::size_t kGroupsMax = 128;
 
 // A date without a zone is one of this machine's (canlog/wall_time.h).
 std::int64_t from_local(std::int64_t wall_ns) {
@@ -63,19 +63,23 @@ Expected<void> MdfReader::open_groups() {
   if (!head) return tl::unexpected(head.error());
   const auto zero_ns = beginning_ns(*head);
   if (!zero_ns) return tl::unexpected(file_->damage(kHeadAt, "the measurement's beginning"));
+  bool has_frames = false;
   for (std::uint64_t at = head->link(0); at != 0;) {
     const auto block = file_->block(at, "##DG", 1);
     if (!block) return tl::unexpected(block.error());
     auto group = MdfGroup::open(file_, *block, counts_);
     if (!group) return tl::unexpected(group.error());
     (*group)->zero_ns = *zero_ns;
-    if ((*group)->has_frames()) streams_.push_back({std::move(*group), {}, false});
+    has_frames = has_frames || (*group)->has_frames();
+    if ((*group)->has_frames() && !(*group)->is_empty()) {
+      streams_.push_back({std::move(*group), {}, false});
+    }
     if (streams_.size() > kGroupsMax) {
-      return tl::unexpected(file_->damage(at, "more than 256 groups of frames"));
+      return tl::unexpected(file_->damage(at, "more than 128 groups of frames"));
     }
     at = block->link(0);
   }
-  if (streams_.empty()) {
+  if (!has_frames) {
     return fail(file_->name(), "is an MDF file without CAN frames: no group has CAN_DataFrame",
                 "decoded signals cannot be replayed; the logger's own file of frames is needed");
   }

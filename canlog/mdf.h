@@ -27,6 +27,8 @@ class MdfGroup {
   /// Some of its records are frames.
   [[nodiscard]] bool has_frames() const { return streams_ > 0; }
 
+  [[nodiscard]] bool is_empty() const { return ended_ || left_ == 0; }
+
   /// False at the end, or where it can be read no further. The record's bus is the file's own
   /// number of it.
   bool next(LogRecord& record);

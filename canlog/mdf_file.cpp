@@ -25,8 +25,8 @@ constexpr std::size_t kLinkBytes = 8;
 // Lists of blocks of data may be long: 4 MiB each make 256 GiB.
 constexpr std::uint64_t kLinksMax = 65'536;
 constexpr std::size_t kBlocksMax = 1'000'000;
-// Writers pack 4 MiB at most, as the standard has it.
-constexpr std::uint64_t kPackedBytesMax = 64ULL << 20U;
+// The standard has 4 MiB.
+constexpr std::uint64_t kPackedBytesMax = 16ULL << 20U;
 
 constexpr const char* kWayOut =
     "`can_logconvert FILE.mf4 OUT.log` of python-can with asammdf converts it";

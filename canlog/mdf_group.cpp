@@ -12,7 +12,7 @@ namespace vgyro::canlog {
 namespace {
 
 constexpr std::size_t kRecordBytesMax = 65'536;
-constexpr std::size_t kRecordsMax = 4'096;
+constexpr std::size_t kRecordsMax = 1'024;
 constexpr std::size_t kSizeBytes = 4;  // before a payload
 // Frames that wait for a payload that does not come.
 constexpr std::size_t kWaitingMax = 1'024;
