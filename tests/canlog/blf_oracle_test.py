@@ -13,6 +13,7 @@ import sys
 import time
 import unittest
 import zlib
+from pathlib import Path
 
 import can
 from can.io.blf import BLFReader, BLFWriter
@@ -97,6 +98,15 @@ class Reader(forms.Bench):
         for options in ({}, {"compression_level": 0}, {"compression_level": 9, "max_container_size": 1000}):
             with self.subTest(options):
                 self.expect_python_can(self.written(records, **options), records)
+
+    def test_a_golden_file(self):
+        # Objects go on from container to container.
+        golden = Path(__file__).resolve().parent / "golden"
+        found, twin = self.read(golden / "python_can.blf"), self.read(golden / "python_can_mf4.log")
+        self.assertEqual(len(found), len(twin))
+        for ours, expected in zip(found, twin):
+            self.assertLessEqual(abs(ours.pop("ns") - expected.pop("ns")), 1000)
+            self.assertEqual({**ours, "digits": 6}, expected)
 
     def test_appended_files(self):
         records = random_records(SEED + 1)
