@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <utility>
 
 #include "canlog/blf_layout.h"
 #include "canlog/byte_order.h"
@@ -111,7 +112,7 @@ Expected<std::unique_ptr<LogReader>> BlfReader::open(std::unique_ptr<ByteSource>
 
 BlfReader::BlfReader(std::unique_ptr<ByteWindow> bytes, std::string_view head)
     : BinaryReader("object"),
-      content_(std::move(bytes), counts_),
+      content_(std::move(bytes)),
       buffer_(std::make_unique<char[]>(kBufferBytes)) {
   const auto date_ns = read_date(&head[blf::file::kBegin]);
   zero_ns_ = date_ns.value_or(0);
@@ -135,7 +136,7 @@ bool BlfReader::next(LogRecord& record) {
 }
 
 BlfReader::Outcome BlfReader::read_object(LogRecord& record) {
-  if (!find_object()) return break_off(end_ - at_ >= blf::kPaddingOf);
+  if (!find_object()) return break_off(!lost_ && end_ - at_ >= blf::kPaddingOf);
   if (!fill(blf::object::kBaseBytes)) return break_off(true);
   Object object{buffer_.get() + at_, 0, 0, 0};
   object.head_bytes = load_little<std::uint16_t>(object.begin + blf::object::kHeadBytes);
@@ -204,7 +205,7 @@ bool BlfReader::fill(std::size_t size) {
   std::memmove(buffer_.get(), buffer_.get() + at_, end_ - at_);
   end_ -= at_;
   at_ = 0;
-  while (end_ < size && !torn_ && !ended_) {
+  while (end_ < size && torn_ == nullptr && !ended_) {
     const auto piece = content_.read(buffer_.get() + end_, kBufferBytes - end_);
     end_ += piece.size;
     torn_ = piece.torn;
@@ -225,14 +226,19 @@ bool BlfReader::pass(std::uint64_t size) {
 
 // No whole object is there: something is missing, or the log has ended, `inside` of one.
 BlfReader::Outcome BlfReader::break_off(bool inside) {
-  if (torn_) {
+  if (torn_ != nullptr) {
+    counts_.add_malformed(torn_);
     counts_.skipped_bytes += end_ - at_;
-    inside = false;
     lost_ = true;
+    torn_ = nullptr;
+    at_ = end_;
+    return Outcome::kNone;
   }
+  const std::size_t rest = end_ - at_;
   at_ = end_;
-  torn_ = false;
   if (!ended_) return Outcome::kNone;
+  if (std::exchange(finished_, true)) return Outcome::kEnd;
+  counts_.skipped_bytes += content_.skipped_bytes() + (lost_ ? rest : 0);
   if (content_.bytes().error()) {
     error_ = content_.bytes().error();
   } else if (inside || content_.is_cut_off()) {

@@ -63,8 +63,9 @@ class BlfReader final : public BinaryReader {
   std::unique_ptr<char[]> buffer_;
   std::size_t at_ = 0;
   std::size_t end_ = 0;
-  bool torn_ = false;   ///< something is missing behind what is in the buffer
-  bool lost_ = false;   ///< what comes next may begin inside an object
+  const char* torn_ = nullptr;  ///< why something is missing behind what is in the buffer
+  bool lost_ = false;           ///< what comes next may begin inside an object
+  bool finished_ = false;
   bool ended_ = false;  ///< of content_
 };
 

@@ -10,8 +10,8 @@
 
 namespace vgyro::canlog {
 
-BlfContent::BlfContent(std::unique_ptr<ByteWindow> bytes, LogCounts& counts)
-    : bytes_(std::move(bytes)), counts_(counts), stream_(std::make_unique<z_stream_s>()) {
+BlfContent::BlfContent(std::unique_ptr<ByteWindow> bytes)
+    : bytes_(std::move(bytes)), stream_(std::make_unique<z_stream_s>()) {
   // Fails for want of memory only; inflate() then says so for each container.
   ::inflateInit(stream_.get());
 }
@@ -22,41 +22,36 @@ BlfContent::~BlfContent() {
 
 BlfContent::Piece BlfContent::read(char* to, std::size_t size) {
   while (true) {
-    if (place_ == Place::kBetween && !enter_object()) return {0, std::exchange(torn_, false), true};
-    if (torn_) {
-      torn_ = false;
-      return {0, true, false};
+    if (torn_ != nullptr) return {0, std::exchange(torn_, nullptr), false};
+    if (place_ == Place::kBetween) {
+      if (ended_) return {0, nullptr, true};
+      enter_object();
+      continue;
     }
     const std::size_t got = place_ == Place::kDeflated ? inflate(to, size) : copy(to, size);
-    if (got > 0) return {got, false, false};
+    if (got > 0) return {got, nullptr, false};
   }
 }
 
-// False at the end of the file.
-bool BlfContent::enter_object() {
-  while (place_ == Place::kBetween) {
-    if (!find_object()) return false;
-    const std::string_view head = bytes_->peek(blf::object::kBaseBytes);
-    if (head.size() < blf::object::kBaseBytes) {
-      meet_end();
-      return false;
-    }
-    const std::size_t head_bytes = load_little<std::uint16_t>(&head[blf::object::kHeadBytes]);
-    left_ = load_little<std::uint32_t>(&head[blf::object::kBytes]);
-    if (head_bytes < blf::object::kBaseBytes || left_ < head_bytes) {
-      counts_.add_malformed("the head of an object in the file: sizes that cannot be");
-      bytes_->take(blf::kObjectMark.size());
-      torn_ = true;
-    } else if (load_little<std::uint32_t>(&head[blf::object::kType]) == blf::kContainer) {
-      enter_container(head_bytes);
-    } else {
-      place_ = Place::kOutside;
-    }
+void BlfContent::enter_object() {
+  if (!find_object()) return;
+  const std::string_view head = bytes_->peek(blf::object::kBaseBytes);
+  if (head.size() < blf::object::kBaseBytes) return meet_end();
+  const std::size_t head_bytes = load_little<std::uint16_t>(&head[blf::object::kHeadBytes]);
+  left_ = load_little<std::uint32_t>(&head[blf::object::kBytes]);
+  if (head_bytes < blf::object::kBaseBytes || left_ < head_bytes) {
+    left_ = blf::kObjectMark.size();
+    return leave("the head of an object in the file: sizes that cannot be");
   }
-  return true;
+  if (load_little<std::uint32_t>(&head[blf::object::kType]) == blf::kContainer) {
+    return enter_container(head_bytes);
+  }
+  lost_ = false;
+  place_ = Place::kOutside;
 }
 
-// To the mark of the next object. Padding before it is part of the form, more is not.
+// To the mark of the next object; false where none follows at once. Padding before it is part of
+// the form, more is not.
 bool BlfContent::find_object() {
   const std::string_view near = bytes_->peek(blf::kPaddingOf + blf::kObjectMark.size());
   const std::size_t padding = near.find(blf::kObjectMark);
@@ -65,12 +60,12 @@ bool BlfContent::find_object() {
     return true;
   }
   const std::uint64_t skipped = bytes_->pass_until(blf::kObjectMark);
-  const bool found = !bytes_->peek(1).empty();
-  if (!found && skipped < blf::kPaddingOf) return false;
-  counts_.skipped_bytes += skipped;
-  if (!torn_) counts_.add_malformed("between containers stands what is no object");
-  torn_ = true;
-  return found;
+  ended_ = bytes_->peek(1).empty();
+  if (ended_ && skipped < blf::kPaddingOf) return false;
+  skipped_bytes_ += skipped;
+  if (!lost_) torn_ = "between containers stands what is no object";
+  lost_ = true;
+  return false;
 }
 
 void BlfContent::enter_container(std::size_t head_bytes) {
@@ -83,6 +78,7 @@ void BlfContent::enter_container(std::size_t head_bytes) {
   bytes_->take(head.size());
   left_ -= head.size();
   produced_ = 0;
+  lost_ = false;
   if (plain > kContainerBytesMax || left_ > kContainerBytesMax) {
     return leave("container: claims to hold more than 256 MiB");
   }
@@ -144,15 +140,15 @@ std::size_t BlfContent::inflate(char* to, std::size_t size) {
 
 // What is left of the object is passed over.
 void BlfContent::leave(const char* why) {
-  counts_.add_malformed(why);
-  torn_ = true;
+  torn_ = why;
+  lost_ = true;
   place_ = Place::kBetween;
-  if (!bytes_->pass(std::exchange(left_, 0))) cut_off_ = true;
+  if (!bytes_->pass(std::exchange(left_, 0))) meet_end();
 }
 
 void BlfContent::meet_end() {
   bytes_->pass(bytes_->peek_some().size());
-  cut_off_ = true;
+  cut_off_ = ended_ = true;
   left_ = 0;
   place_ = Place::kBetween;
 }

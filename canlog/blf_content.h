@@ -8,7 +8,6 @@
 #include <memory>
 
 #include "canlog/byte_window.h"
-#include "canlog/record.h"
 
 struct z_stream_s;
 
@@ -20,20 +19,23 @@ class BlfContent {
   /// python-can fill them with 128 KiB.
   static constexpr std::uint64_t kContainerBytesMax = 256ULL << 20U;
 
-  /// `bytes` stand behind the file's head. What is wrong with containers is counted in `counts`.
-  BlfContent(std::unique_ptr<ByteWindow> bytes, LogCounts& counts);
+  /// `bytes` stand behind the file's head.
+  explicit BlfContent(std::unique_ptr<ByteWindow> bytes);
   ~BlfContent();
   BlfContent(const BlfContent&) = delete;
   BlfContent& operator=(const BlfContent&) = delete;
 
   struct Piece {
     std::size_t size = 0;
-    bool torn = false;  ///< something is missing before this piece: it may begin inside an object
-    bool end = false;   ///< nothing follows; then the size is 0
+    const char* torn = nullptr;  ///< why something is missing here: what follows may begin inside
+                                 ///< an object; then the size is 0
+    bool end = false;            ///< nothing follows; then the size is 0
   };
   /// Up to `size` bytes into `to`.
   Piece read(char* to, std::size_t size);
 
+  /// Bytes so far that belong to no object.
+  [[nodiscard]] std::uint64_t skipped_bytes() const { return skipped_bytes_; }
   /// The file ended inside a container.
   [[nodiscard]] bool is_cut_off() const { return cut_off_; }
   [[nodiscard]] ByteWindow& bytes() { return *bytes_; }
@@ -42,7 +44,7 @@ class BlfContent {
  private:
   enum class Place : std::uint8_t { kBetween, kStored, kDeflated, kOutside };
 
-  bool enter_object();
+  void enter_object();
   bool find_object();
   void enter_container(std::size_t head_bytes);
   std::size_t copy(char* to, std::size_t size);
@@ -51,12 +53,14 @@ class BlfContent {
   void meet_end();
 
   std::unique_ptr<ByteWindow> bytes_;
-  LogCounts& counts_;
   Place place_ = Place::kBetween;
   std::uint64_t left_ = 0;      ///< bytes of the object in the file
   std::uint64_t produced_ = 0;  ///< of the container
-  bool torn_ = false;
+  const char* torn_ = nullptr;  ///< not told yet
+  bool lost_ = false;           ///< since then no object was found
+  bool ended_ = false;
   bool cut_off_ = false;
+  std::uint64_t skipped_bytes_ = 0;
   std::unique_ptr<z_stream_s> stream_;
 };
 

@@ -79,7 +79,7 @@ CLI::App* add_convert(CLI::App& app, ConvertOptions& options) {
       "convert", "Read logs of any known form and write one that other tools read");
   command
       ->add_option("-o,--output", options.output,
-                   "the ending says the form: .log (candump), .asc (Vector); text also\n"
+                   "the ending says the form: .log (candump), .asc, .blf (Vector); text\nalso "
                    "packed: .log.gz, .log.xz, .log.zst; - is a candump log on\nstandard output")
       ->required();
   add_digits(*command, options.digits);
@@ -284,8 +284,8 @@ int run(int argc, char** argv) {
   // Frames are the main result; they give way only to a summary or a table that wants the same
   // place.
   const bool output_given = replay->count("--output") > 0;
-  const bool output_wanted = options.replay.json == "-" || options.replay.csv == "-";
-  if (!output_given && !output_wanted) options.replay.output = "-";
+  const bool stdout_taken = options.replay.json == "-" || options.replay.csv == "-";
+  if (!output_given && !stdout_taken) options.replay.output = "-";
   return run_replay(options.replay);
 }
 

@@ -13,6 +13,7 @@
 #include "cli/commands.h"
 #include "cli/exit_code.h"
 #include "cli/log_notes.h"
+#include "cli/other_senders.h"
 #include "cli/output/errors.h"
 #include "cli/output/gnuplot.h"
 #include "cli/output/json_text.h"
@@ -355,6 +356,27 @@ void warn_of_data(const ReplaySummary& summary, const gateway::Plan& plan) {
     warn({"estimate", gateway::restarts_text(status.estimate_restarts), ""});
 }
 
+// An input of which nothing came, while its J1939 parameter group came from other senders.
+void warn_of_senders_missed(const ReplaySummary& summary, const gateway::Plan& plan) {
+  const auto look = [&](const std::string& title, const std::string& message,
+                        const gateway::FrameMatch& match) {
+    if (!match.extended) return;
+    OtherSenders others;
+    for (const IdCounts::Row& row : summary.ids.rows()) {
+      if (!row.extended || summary.interfaces[row.bus] != plan.buses[match.bus]) continue;
+      if (match.carries(row.id, true)) return;
+      others.add(match.id, row.id);
+    }
+    if (!others.empty()) warn({title, others.text(message, match.id), others.remedy(match.mask)});
+  };
+  for (const gateway::GyroPlan& gyro : plan.gyros)
+    look("gyro " + gyro.name, gyro.message, gyro.match);
+  if (plan.reference) look("reference", plan.reference->message, plan.reference->match);
+  if (plan.accelerometer)
+    look("accelerometer", plan.accelerometer->message, plan.accelerometer->match);
+  if (plan.speed) look("speed", plan.speed->message, plan.speed->match);
+}
+
 // Two senders of one identifier: whoever reads VG_Rate would get both.
 void warn_of_other_senders(const ReplaySummary& summary, const gateway::Plan& plan) {
   const gateway::OutputPlan& output = plan.output;
@@ -454,6 +476,7 @@ int run_replay(const ReplayOptions& options) {
   const int written = write_results(options, plan, summary, replay.plot());
   warn_of_doubts(summary, plan);
   warn_of_data(summary, plan);
+  warn_of_senders_missed(summary, plan);
   warn_of_other_senders(summary, plan);
   if (trouble) return report(*trouble);
   return written;

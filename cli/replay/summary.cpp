@@ -123,8 +123,7 @@ Json hypotheses_json(const gateway::Status& status) {
 const gateway::GyroPlan* gyro_of(const gateway::Plan& plan, const std::string& interface,
                                  const IdCounts::Row& row) {
   for (const gateway::GyroPlan& gyro : plan.gyros) {
-    const bool same_id = ((gyro.match.id ^ row.id) & gyro.match.mask) == 0;
-    if (gyro.bus == interface && gyro.match.extended == row.extended && same_id) return &gyro;
+    if (gyro.bus == interface && gyro.match.carries(row.id, row.extended)) return &gyro;
   }
   return nullptr;
 }

@@ -107,6 +107,15 @@ std::string told(const LogCounts& counts) {
       counts.cut_off_lines, counts.skipped_bytes, fmt::join(malformed(counts), "; "));
 }
 
+can::Frame frame_with(std::uint32_t id, unsigned flags, std::vector<std::uint8_t> bytes) {
+  can::Frame frame;
+  frame.id = id;
+  frame.flags = static_cast<std::uint8_t>(flags);
+  frame.length = static_cast<std::uint8_t>(bytes.size());
+  std::copy(bytes.begin(), bytes.end(), frame.data.begin());
+  return frame;
+}
+
 can::Frame random_frame(std::mt19937_64& random) {
   can::Frame frame;
   const auto below = [&random](std::size_t n) { return static_cast<unsigned>(random() % n); };

@@ -479,6 +479,28 @@ class Thoughts(Replay):
         said = self.replay("-o", "out.log", "in.log").stderr.decode()
         self.assertRegex(said, r"can be read in two ways, and σ spans both: gyro left has stepped \d+ %; gyro right has stepped \d+ %")
 
+    def test_no_curve_and_no_stop_goes_on_across_a_hole(self):
+        lines = stops_and_turns(4)
+        begin = float(lines[0].split(")")[0][1:])
+        keep = [line for line in lines if not 0.3 < (float(line.split(")")[0][1:]) - begin) / (len(lines) / 200) < 0.7]
+        self.assertLess(len(keep), 0.7 * len(lines))
+        self.write("in.log", "".join(keep))
+        self.replay("-o", "x.log", "--plot", "x.svg", "in.log")
+        picture = self.read("x.svg")
+        curves = 0
+        for path in re.findall(r"<path stroke='rgb\([^']*\)'\s+d='([^']*)'", picture):
+            points = [(kind, float(x)) for kind, x in re.findall(r"([ML])([0-9.]+),", path)]
+            if len(points) < 400:
+                continue  # the grid, the legend, the line at zero
+            curves += 1
+            drawn = [to - before for (_, before), (kind, to) in zip(points, points[1:]) if kind == "L"]
+            width = max(x for _, x in points[2:]) - min(x for _, x in points[2:])
+            self.assertLess(max(drawn[1:]), 0.05 * width)
+        self.assertEqual(curves, 9, "of the rates, of what is off the virtual gyro, and of the two drifts")
+        shades = [float(to) - float(begin) for begin, to in re.findall(r"<polygon fill = '[^']*' points = '([0-9.]+),[^ ]* ([0-9.]+),", picture)]
+        self.assertGreater(len(shades), 8, "four pictures, each with its stops")
+        self.assertLess(max(shades), 0.2 * width)
+
     def test_picture_without_stretches_has_no_legend_of_them(self):
         self.write("in.log", "".join(self.lines))
         self.replay("-q", "-o", "out.log", "--method", "mutual", "--plot", "a.svg", "in.log")
@@ -534,6 +556,67 @@ class BadInput(Replay):
         said = self.refuse("-q", "in.log")
         for part in ("no frame of gyro right", "GYRO_B 102 on can1", "can0, vcan5", "--map LOGNAME=can1"):
             self.assertIn(part, said)
+
+    def test_a_missed_sender_of_the_same_pgn_is_told(self):
+        # The DBC file does not say J1939, so that only its own address matches; then the address is another one.
+        dbc = ('BO_ 2565876225 TURN: 8 X\n SG_ Rate : 0|16@1- (0.01,0) [-300|300] "deg/s" X\n'
+               'BO_ 512 REF: 8 X\n SG_ Rate : 0|16@1- (0.01,0) [-300|300] "deg/s" X\n')
+        config = "".join(f'[[gyro]]\nname = "{name}"\nbus = "can0"\ndbc = "t.dbc"\nmessage = "{message}"\nrate = "Rate"\n'
+                         for name, message in (("ref", "REF"), ("turn", "TURN"))) + '[output]\nbus = "can1"\n'
+        self.write("in.log", "(1.0) can0 200#0000000000000000\n(1.1) can0 18F02A13#0000000000000000\n"
+                             "(1.2) can1 18F02A14#0000000000000000\n")
+        self.write("t.dbc", dbc)
+        self.write("vgyro.toml", config)
+        said = self.refuse("in.log")
+        self.assertIn("gyro turn: no frame 18F02A01 came (TURN), but the same PGN came from 0x13; ", said)
+        self.assertIn("VFrameFormat = J1939PG", said)
+        self.write("t.dbc", dbc + 'BA_DEF_DEF_ "VFrameFormat" "J1939PG";\n')
+        self.write("vgyro.toml", config.replace('"TURN"\n', '"TURN"\nsource_address = 5\n'))
+        said = self.refuse("in.log")
+        self.assertIn("no frame 18F02A05 came (TURN), but the same PGN came from 0x13; another source_address", said)
+
+    def test_a_counter_is_followed_over_all_pages(self):
+        # Four pages, a counter of two bits that counts every frame: on one page it stands still.
+        self.write("t.dbc", """\
+BO_ 288 IMU: 8 X
+ SG_ Page M : 0|2@1+ (1,0) [0|3] "" X
+ SG_ Alive : 4|2@1+ (1,0) [0|3] "" X
+ SG_ RateZ m2 : 8|16@1- (0.01,0) [-300|300] "deg/s" X
+BO_ 512 REF: 8 X
+ SG_ Rate : 0|16@1- (0.01,0) [-300|300] "deg/s" X
+""")
+        self.write("vgyro.toml", """\
+[[gyro]]
+name = "imu"
+bus = "can0"
+dbc = "t.dbc"
+message = "IMU"
+rate = "RateZ"
+counter = "Alive"
+max_delta_counter = 1
+[[gyro]]
+name = "ref"
+bus = "can0"
+dbc = "t.dbc"
+message = "REF"
+rate = "Rate"
+[calibration]
+rest_s = 1
+[output]
+bus = "can1"
+""")
+        lines = []
+        for i in range(1200):
+            lines.append(f"({i // 400}.{i % 400 * 2500:06d}) can0 120#{i % 4 | i % 4 << 4:02X}{i % 7:02X}00\n")
+            if i % 4 == 1:
+                lines.append(f"({i // 400}.{i % 400 * 2500 + 100:06d}) can0 200#{i % 5:02X}00\n")
+        imu = self.summary(lines=lines)["gyros"][0]
+        causes = {cause: n for cause, n in imu["rejected"].items() if n > 0}
+        self.assertEqual((imu["samples"], imu["missing_by_counter"], causes), (300, 0, {"other_page": 900}))
+        without = [line for i, line in enumerate(lines) if i != 300]  # one frame of another page is lost
+        lost = self.summary(lines=without)["gyros"][0]
+        self.assertGreaterEqual(lost["samples"], 299)
+        self.assertEqual(lost["samples"] + lost["rejected"]["wrong_sequence"], 300)
 
     def test_gyro_without_a_usable_frame_says_why(self):
         # All frames there and none used: the DBC file is not that of this gyro.
