@@ -138,12 +138,17 @@ int append_buses(sd_bus_message* reply, const Snapshot& now) {
 int append_counters(sd_bus_message* reply, const Snapshot& now) {
   const gateway::Status& status = now.status;
   const can::TransmitCounts& sent = now.traffic.transmitted;
+  const gateway::LayoutCounts layouts = status.layouts_total();
   const std::pair<const char*, std::uint64_t> counters[] = {
       {"pairs", status.pairs},
       {"rates", status.rates_out},
       {"rates_valid", status.rates_out_valid},
       {"rates_out_of_range", status.rates_out_of_range},
       {"biases", status.biases_out},
+      {"layout_frames", layouts.frames},
+      {"layout_frames_valid", layouts.valid},
+      {"layout_out_of_range", layouts.out_of_range},
+      {"layout_withheld", layouts.withheld},
       {"windows", status.windows},
       {"windows_skipped", status.windows_skipped},
       {"stops", status.stops},

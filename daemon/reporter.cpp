@@ -270,6 +270,10 @@ void Reporter::tell_pipeline(const gateway::Status& status) {
   if (const std::uint64_t n = news(rates_out_of_range_, status.rates_out_of_range); n > 0) {
     log_.warning("{} virtual rates were beyond what VG_Rate can carry", n);
   }
+  const std::uint64_t beyond = status.layouts_total().out_of_range;
+  if (const std::uint64_t n = news(layouts_out_of_range_, beyond); n > 0) {
+    log_.warning("{} times the virtual rate was beyond what an [[output.layout]] can carry", n);
+  }
   if (const std::uint64_t n = news(reference_rejected_, status.reference_rejected); n > 0) {
     log_.warning("{} frames of the reference not used", n);
   }
@@ -364,7 +368,7 @@ void Reporter::tell_bus(const BusStatus& bus, BusTold& told) {
         Severity::kWarning, {.cause = "foreign_frames", .bus = bus.name},
         "{}: {} frames with our identifiers came from somebody else: is there a second "
         "gateway, or does the vehicle use them? [output] rate_id, bias_id and model_id choose "
-        "others",
+        "others; a sensor that an [[output.layout]] takes the place of must be off the bus",
         bus.name, n);
   }
   for (std::size_t i = 0; i < can::kErrorCauseCount; ++i) {

@@ -103,8 +103,8 @@ class Reporter {
   LineBudget health_lines_;
   std::uint64_t second_ = 0;
   std::array<GyroTold, 2> gyros_;
-  Told clock_steps_, rates_out_of_range_, reference_rejected_, accelerometer_rejected_,
-      speed_rejected_, windows_skipped_, restarts_, estimate_restarts_;
+  Told clock_steps_, rates_out_of_range_, layouts_out_of_range_, reference_rejected_,
+      accelerometer_rejected_, speed_rejected_, windows_skipped_, restarts_, estimate_restarts_;
   Told stale_, overflow_, failed_;
   std::map<std::string, BusTold> buses_;
   bool told_of_motion_ = false;

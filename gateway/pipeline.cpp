@@ -483,6 +483,10 @@ const Status& Pipeline::status() const {
   return impl_->refreshed_status();
 }
 
+std::uint64_t Pipeline::spoken() const {
+  return impl_->sender.spoken();
+}
+
 std::optional<SavedState> Pipeline::memory() const {
   return impl_->memory();
 }

@@ -65,4 +65,19 @@ std::string_view to_string(fusion::Hypothesis hypothesis) {
   return kNames[static_cast<std::size_t>(hypothesis)];
 }
 
+LayoutCounts& LayoutCounts::operator+=(const LayoutCounts& other) {
+  frames += other.frames;
+  valid += other.valid;
+  out_of_range += other.out_of_range;
+  withheld += other.withheld;
+  return *this;
+}
+
+LayoutCounts Status::layouts_total() const {
+  LayoutCounts total;
+  for (const LayoutCounts& layout : layouts_out)
+    total += layout;
+  return total;
+}
+
 }  // namespace vgyro::gateway

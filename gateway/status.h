@@ -115,6 +115,21 @@ struct GyroStatus {
   std::uint8_t waits_for = 0;
 };
 
+/// Layouts beside each other: more are a mistake, and the status has room for each.
+inline constexpr std::size_t kOutputLayoutsMost = 8;
+
+/// Frames of one [[output.layout]].
+struct LayoutCounts {
+  std::uint64_t frames = 0;
+  std::uint64_t valid = 0;  ///< of these, with a valid rate
+  std::uint64_t out_of_range =
+      0;                       ///< valid rates that the signal cannot carry, or whose σ it cannot
+  std::uint64_t withheld = 0;  ///< not sent: the layout cannot say that no rate is valid
+
+  LayoutCounts& operator+=(const LayoutCounts& other);
+  friend bool operator==(const LayoutCounts&, const LayoutCounts&) = default;
+};
+
 struct Status {
   State state = State::kWaiting;
   std::array<GyroStatus, 2> gyros;
@@ -131,7 +146,8 @@ struct Status {
   std::uint64_t rates_out_valid = 0;
   std::uint64_t rates_out_of_range = 0;  ///< virtual rate beyond what VG_Rate can carry
   std::uint64_t biases_out = 0;
-  std::uint64_t windows = 0;               ///< corrector windows completed
+  std::array<LayoutCounts, kOutputLayoutsMost> layouts_out{};  ///< in the order of the plan
+  std::uint64_t windows = 0;                                   ///< corrector windows completed
   std::uint64_t windows_skipped = 0;       ///< too few pairs in the window: drift held
   double rate_dps = 0.0;                   ///< last virtual rate; NaN when invalid
   double sigma_dps = 0.0;                  ///< its σ; NaN when invalid or not stated
@@ -154,6 +170,9 @@ struct Status {
   /// Of what may be the case, by fusion::Hypothesis.
   std::array<double, fusion::kHypotheses> probability{};
   std::uint64_t estimate_restarts = 0;  ///< times that the estimate was lost and began anew
+
+  /// Of all layouts.
+  [[nodiscard]] LayoutCounts layouts_total() const;
 };
 
 }  // namespace vgyro::gateway

@@ -254,6 +254,8 @@ class OnTheBus(Bench):
         self.assertRegex(done.stdout, r"(?m)^right +can1 +stuck +– ")
         self.assertRegex(done.stdout, r"(?m)^can0 +up +active +4321 +0 +0  bus off 3$")
         self.assertRegex(done.stdout, r"(?m)^can1 +not there ")
+        self.assertIn("layouts: 1000 frames, 900 with a valid rate, 3 rates beyond what they can carry, "
+                      "5 times silent while no rate was valid\n", done.stdout)
         self.assertRegex(done.stdout, r"(?m)^frames not used: accelerometer 4, speed 2$")
         # Columns stand under each other, also beside characters of several bytes.
         lines = done.stdout.splitlines()
