@@ -704,6 +704,41 @@ TEST_F(OutputLayoutTest, WarnsOfWhatReadersCheckAndNobodyMakes) {
   EXPECT_EQ(warnings_of("counter = \"Counter\"\nfill = { Crc = 0 }\n").size(), 0U);
 }
 
+// The identifier of another message of the files that describe the bus; vgyro's own are asked for
+// only where they go out.
+TEST_F(OutputLayoutTest, WarnsOfTheIdentifierOfAnotherMessage) {
+  const auto warnings_of = [&](const std::string& keys, const std::string& output) {
+    const auto loaded =
+        load("dbc = \"rig.dbc\"\nmessage = \"Upside\"\nrate = \"Rate\"\n" + keys, output);
+    std::string text;
+    if (!loaded) return text = loaded.error()[0].message();
+    for (const Error& warning : loaded->warnings)
+      text += warning.message() + "\n";
+    return text;
+  };
+  const std::string taken = warnings_of("bus = \"can0\"\nid = 0x123\n", "");
+  EXPECT_NE(
+      taken.find("message Guarded has the identifier 0x123, with which Upside goes out on can0; "
+                 "another id or bus for the [[output.layout]]"),
+      std::string::npos)
+      << taken;
+  EXPECT_EQ(warnings_of("bus = \"can0\"\n", ""), "");
+  EXPECT_EQ(warnings_of("id = 0x123\n", ""), "") << "nobody describes can1";
+  write("rig.dbc",
+        std::string(kDbc) + "BO_ 1552 Other: 8 RIG\n SG_ A : 0|8@1+ (1,0) [0|0] \"\" RIG\n");
+  const auto own = [&](const std::string& output) {
+    std::string config = kConfig;
+    config.replace(config.rfind("can1"), 4, "can0");
+    write("vgyro.toml",
+          config + output +
+              "[[output.layout]]\ndbc = \"rig.dbc\"\nmessage = \"Upside\"\nrate = \"Rate\"\n");
+    const auto loaded = load_config((folder_ / "vgyro.toml").string());
+    return loaded ? loaded->warnings.size() : 99;
+  };
+  EXPECT_EQ(own(""), 1U) << "0x610";
+  EXPECT_EQ(own("vgyro_frames = false\n"), 0U);
+}
+
 TEST_F(OutputLayoutTest, OneTableIsNoList) {
   write("vgyro.toml", std::string(kConfig) + "[output.layout]\nmessage = \"Long\"\n");
   const auto loaded = load_config((folder_ / "vgyro.toml").string());
