@@ -19,6 +19,14 @@ struct CheckOptions {
 };
 int run_check(const CheckOptions& options);
 
+struct InitOptions {
+  std::vector<std::string> logs;
+  std::vector<std::string> dbc_files;
+  std::string output = "vgyro.toml";  ///< "-": standard output
+  bool force = false;                 ///< replaces a file that is there
+};
+int run_init(const InitOptions& options);
+
 struct DecodeOptions {
   std::vector<std::string> dbc_files;
   std::string log;

@@ -19,6 +19,7 @@ using namespace vgyro::cli;
 
 struct Options {
   CheckOptions check;
+  InitOptions init;
   DecodeOptions decode;
   ReplayOptions replay;
   AllanOptions allan;
@@ -41,6 +42,28 @@ CLI::App* add_check(CLI::App& app, CheckOptions& options, std::string& method) {
   command->add_option("CONFIG", options.config, "configuration, e.g. vgyro.toml")->required();
   add_overrides(*command, method, options.model);
   return command;
+}
+
+CLI::App* add_init(CLI::App& app, InitOptions& options) {
+  CLI::App* command = app.add_subcommand(
+      "init", "Propose a configuration from a log: which two signals are the gyros");
+  command->add_option("--dbc", options.dbc_files, "DBC file; may be given several times")
+      ->allow_extra_args(false);
+  command->add_option("-o,--output", options.output, "configuration; - is standard output")
+      ->capture_default_str();
+  command->add_flag("--force", options.force, "replaces a file that is there already");
+  command->add_option("LOG", options.logs, "log in which both gyros turn; also DBC files")
+      ->required();
+  command->footer("Example: vgyro init drive.log --dbc car.dbc --dbc imu.dbc -o vgyro.toml");
+  return command;
+}
+
+// What ends in .dbc among the logs is a DBC file.
+void sort_init_files(InitOptions& options) {
+  const auto is_dbc = [](const std::string& name) { return name.ends_with(".dbc"); };
+  std::copy_if(options.logs.begin(), options.logs.end(), std::back_inserter(options.dbc_files),
+               is_dbc);
+  std::erase_if(options.logs, is_dbc);
 }
 
 CLI::App* add_decode(CLI::App& app, DecodeOptions& options) {
@@ -209,6 +232,7 @@ int run(int argc, char** argv) {
   app.footer("Exit codes: 0 done, 1 bad input (told on stderr), 2 wrong usage.");
   Options options;
   CLI::App* check = add_check(app, options.check, options.method);
+  CLI::App* init = add_init(app, options.init);
   CLI::App* decode = add_decode(app, options.decode);
   CLI::App* replay = add_replay(app, options.replay, options.method);
   CLI::App* model = add_model(app);
@@ -236,6 +260,10 @@ int run(int argc, char** argv) {
   options.check.method = method;
   options.replay.method = method;
   if (check->parsed()) return run_check(options.check);
+  if (init->parsed()) {
+    sort_init_files(options.init);
+    return run_init(options.init);
+  }
   if (decode->parsed()) return run_decode(options.decode);
   if (model->parsed()) return run_model_list();
   if (allan->parsed()) return run_allan(options.allan);

@@ -1,0 +1,43 @@
+#pragma once
+
+// Do two signals feel one motion? Compared are changes of means over short times, so that neither a
+// bias nor slow drift counts, at several time scales, of which the most telling one decides. Each
+// signal has stamps of its own. And: is one signal made of the other (a gateway's copy, filtered or
+// rounded)? Two sensors have noise of their own, a copy has none.
+
+#include <optional>
+#include <vector>
+
+namespace vgyro::analysis {
+
+/// One signal; stamps in the order of time.
+struct StampedSignal {
+  std::vector<double> t_s;
+  std::vector<double> value;
+  double step = 0.0;  ///< resolution of the values; 0 for floats
+};
+
+struct SignalFigures {
+  double interval_s = 0.0;  ///< median
+  double noise = 0.0;       ///< of a sample, in the quietest tenth: √½ of the rms of its steps
+  double peak = 0.0;        ///< 99.5 % of the values are within this of the median
+  double median = 0.0;
+  bool changes = false;  ///< at least two values
+};
+SignalFigures signal_figures(const StampedSignal& signal);
+
+struct Likeness {
+  double correlation = 0.0;   ///< of the changes, at lag_s
+  double significance = 0.0;  ///< in standard deviations of chance
+  double lag_s = 0.0;         ///< the second is later, where positive
+  double scale = 1.0;         ///< the second's change over the first's, total least squares
+  double scale_s = 0.0;       ///< time scale that was most telling
+};
+/// Nothing where they share less than a few seconds, or one of them does not change.
+std::optional<Likeness> likeness(const StampedSignal& first, const StampedSignal& second);
+
+/// Can `copy` be computed from the samples of `source`, but for its rounding? `lag_s`: the copy is
+/// later by this.
+bool is_made_of(const StampedSignal& copy, const StampedSignal& source, double lag_s);
+
+}  // namespace vgyro::analysis

@@ -1,0 +1,168 @@
+#!/usr/bin/python3
+"""`vgyro init`: the right pair out of mixtures of a vehicle's traffic whose truth is known. The frames are made here,
+by Python alone; seeds are fixed."""
+
+import random
+import re
+import struct
+import unittest
+
+import numpy as np
+
+import bench
+
+DBC = """\
+VERSION ""
+
+BU_: X
+
+BO_ 257 FOG: 8 X
+ SG_ YawRate : 0|32@1- (%(fog)s,0) [0|0] "%(unit)s" X
+ SG_ Temp : 32|8@1- (1,0) [-40|125] "degC" X
+ SG_ Alive : 40|8@1+ (1,0) [0|255] "" X
+ SG_ State : 48|4@1+ (1,0) [0|15] "" X
+ SG_ Check : 56|8@1+ (1,0) [0|255] "" X
+
+BO_ 258 MEMS: 8 X
+ SG_ RateZ : 7|16@0- (0.01,0) [0|0] "deg/s" X
+ SG_ RateX : 23|16@0- (0.01,0) [0|0] "deg/s" X
+ SG_ Count : 35|4@0+ (1,0) [0|15] "" X
+
+BO_ 259 COPY: 8 X
+ SG_ VehYawRate : 0|16@1- (%(copy)s,0) [0|0] "deg/s" X
+
+BO_ 260 STEER: 4 X
+ SG_ SteeringRate : 0|16@1- (0.1,0) [0|0] "deg/s" X
+ SG_ SteeringAngle : 16|16@1- (0.1,0) [0|0] "deg" X
+
+BO_ 261 ENGINE: 4 X
+ SG_ EngineSpeed : 0|16@1+ (0.25,0) [0|0] "rpm" X
+
+BO_ 262 WHEELS: 4 X
+ SG_ WheelSpeed : 0|16@1+ (0.01,0) [0|0] "km/h" X
+
+VAL_ 257 State 0 "ok" 1 "init" ;
+"""
+
+
+def crc8(data):
+    crc = 0xFF
+    for byte in data:
+        crc ^= byte
+        for _ in range(8):
+            crc = (crc << 1 ^ 0x1D) & 0xFF if crc & 0x80 else crc << 1
+    return crc ^ 0xFF
+
+
+class Mixture:
+    """40 s: rest, then bends; what each sender says and when."""
+
+    def __init__(self, seed, fog=True, mems=True, copy="exact"):
+        self.random = random.Random(seed)
+        noise = np.random.default_rng(seed)
+        self.sign = self.random.choice((1, -1))
+        self.unit = self.random.choice(("deg/s", "rad/s", "deg/h"))
+        self.buses = {name: f"can{self.random.randrange(3)}" for name in ("fog", "mems", "other")}
+        self.delay_s = self.random.uniform(0.0, 0.08)
+        per_unit = {"deg/s": 1.0, "rad/s": np.pi / 180, "deg/h": 3600.0}[self.unit]
+        self.step = {"deg/s": 1e-6, "rad/s": 1e-8, "deg/h": 1e-2}[self.unit]
+        self.copy_step = self.random.choice((0.001, 0.005))
+        t = np.arange(0.0, 60.0, 0.001)
+        walk = np.cumsum(noise.standard_normal(t.size))
+        smooth = np.convolve(walk - np.linspace(walk[0], walk[-1], t.size), np.ones(400) / 400, "same")
+        rate = np.where(t < 15.0, 0.0, smooth / np.abs(smooth).max() * 25.0)
+        other = np.convolve(np.cumsum(noise.standard_normal(t.size)), np.ones(300) / 300, "same")
+        other *= 10.0 / np.abs(other).max()
+        at = lambda when, values: np.interp(when, t, values)
+        self.lines = []
+        fog_t = np.arange(0.05, 59.0, 0.01)
+        fog_dps = at(fog_t, rate) + 0.05 + 0.02 * noise.standard_normal(fog_t.size)
+        for i, (when, value) in enumerate(zip(fog_t, fog_dps)):
+            data = struct.pack("<ibBB", round(value * per_unit / self.step), 30, i % 256, 0)
+            if fog:
+                self.put(when, "fog", 0x101, data + bytes([crc8(data)]))
+        for i, when in enumerate(np.arange(0.053, 59.0, 0.02)):
+            value = self.sign * (at(when - self.delay_s, rate) * 1.003 - 0.4 + 0.05 * noise.standard_normal())
+            roll = at(when, other) + 0.05 * noise.standard_normal()
+            if mems:
+                self.put(when, "mems", 0x102, struct.pack(">hhBBBB", round(value * 100), round(roll * 100), i % 16, 7, 7, 7))
+        filtered = np.convolve(fog_dps, np.ones(4) / 4)[:fog_dps.size] if copy == "filtered" else fog_dps
+        for when, value in zip(fog_t, filtered):
+            if copy:
+                self.put(when + 0.004, "other", 0x103, struct.pack("<h6x", round(value / self.copy_step)))
+            self.put(when + 0.001, "other", 0x104,
+                     struct.pack("<hh", round(np.gradient(at([when, when + 0.05], rate))[0] * 200), round(at(when, rate) * 10)))
+            self.put(when + 0.002, "other", 0x105, struct.pack("<Hxx", round(8000 + 200 * at(when, other))))
+            self.put(when + 0.003, "other", 0x106, struct.pack("<Hxx", 0 if when < 15 else 5000))
+            self.put(when + 0.005, "other", 0x300 + self.random.randrange(4), self.random.randbytes(8))
+
+    def put(self, when, sender, identifier, data):
+        us = 1_700_000_000_000_000 + round(when * 1e6)
+        self.lines.append((us, f"{bench.stamp(us)} {self.buses[sender]} {identifier:03X}#{data.hex().upper()}\n"))
+
+    def log(self):
+        return "".join(line for _, line in sorted(self.lines))
+
+    def dbc(self):
+        return DBC % {"fog": self.step, "unit": self.unit, "copy": self.copy_step}
+
+
+class Init(bench.Bench):
+    def prepare(self, mixture):
+        (self.folder / "vgyro.toml").unlink(missing_ok=True)
+        self.write("drive.log", mixture.log())
+        self.write("all.dbc", mixture.dbc())
+
+    def test_finds_the_pair_in_twenty_mixtures(self):
+        # Two sensors among a gateway's copies, other axes, and other things that turn.
+        for seed in range(20):
+            mixture = Mixture(seed, copy=("exact", "filtered")[seed % 2])
+            with self.subTest(seed=seed, unit=mixture.unit, sign=mixture.sign, buses=mixture.buses):
+                self.prepare(mixture)
+                said = self.good("init", "drive.log", "--dbc", "all.dbc").stderr.decode()
+                text = self.read("vgyro.toml")
+                gyros = text.split("[[gyro]]")[1:3]
+                self.assertEqual([re.search(r'message = "(\w+)"', gyro).group(1) for gyro in gyros], ["FOG", "MEMS"]
+                                 if 'message = "FOG"' in gyros[0] else ["MEMS", "FOG"], said + text)
+                fog, mems = gyros if 'message = "FOG"' in gyros[0] else gyros[::-1]
+                for part in ('rate = "YawRate"', f'bus = "{mixture.buses["fog"]}"', 'counter = "Alive"', 'temperature = "Temp"',
+                             'valid = "State == 0"', 'crc = "Check"', 'e2e = "crc8_j1850"'):
+                    self.assertIn(part, fog)
+                for part in ('rate = "RateZ"', f'bus = "{mixture.buses["mems"]}"', 'counter = "Count"'):
+                    self.assertIn(part, mems)
+                self.assertEqual(text.count("\nsign = -1"), 1 if mixture.sign < 0 else 0)
+                self.assertIn("the same sensor as", said)
+                self.assertIn("vgyro.toml: good", self.good("check", "vgyro.toml").stdout.decode())
+
+    def test_one_gyro_and_its_copy_are_one_gyro(self):
+        for copy in ("exact", "filtered", None):
+            with self.subTest(copy=copy):
+                self.prepare(Mixture(3, mems=False, copy=copy))
+                said = self.bad("init", "drive.log", "--dbc", "all.dbc")
+                self.assertIn("only one gyro", said)
+                self.assertIn("FOG.YawRate", said)
+                self.assertEqual(len(re.findall(r"^\[\[gyro\]\]", self.read("vgyro.toml"), re.MULTILINE)), 1)
+                self.assertIn("exactly two", self.bad("check", "vgyro.toml"))
+
+    def test_replaces_a_file_only_when_told_to(self):
+        self.prepare(Mixture(1))
+        self.write("vgyro.toml", "precious")
+        self.assertIn("--force", self.bad("init", "drive.log", "all.dbc"))
+        self.assertEqual(self.read("vgyro.toml"), "precious")
+        self.good("init", "drive.log", "all.dbc", "--force")
+        self.assertIn("[[gyro]]", self.read("vgyro.toml"))
+
+    def test_the_same_log_gives_the_same_bytes(self):
+        self.prepare(Mixture(5))
+        first = self.good("init", "drive.log", "all.dbc", "-o", "-").stdout
+        self.assertEqual(self.good("init", "drive.log", "all.dbc", "-o", "-").stdout, first)
+
+    def test_says_what_is_missing(self):
+        self.prepare(Mixture(1))
+        self.assertIn("no DBC file", self.bad("init", "drive.log"))
+        self.write("none.dbc", 'BO_ 1 NONE: 8 X\n SG_ A : 0|8@1+ (1,0) [0|0] "" X\n')
+        self.assertIn("no signal of the DBC files looks like a rate", self.bad("init", "drive.log", "none.dbc"))
+
+
+if __name__ == "__main__":
+    unittest.main()
