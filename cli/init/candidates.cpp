@@ -49,11 +49,23 @@ const dbc::Signal* sign_of(const dbc::Message& message, const dbc::Signal& rate)
   return sign;
 }
 
+/// Without a unit: by its name, unless it is what goes beside a rate and bears its name
+/// ("YawRateCrc").
+bool is_rate_by_name(const dbc::Signal& signal) {
+  constexpr unsigned kBitsLeast = 8;
+  if (!signal.unit.empty() || signal.length_bits < kBitsLeast) return false;
+  if (!signal.labels.empty() && signal.length_bits == kBitsLeast) return false;
+  if (has_any(lower(signal.name),
+              {"crc", "check", "count", "cnt", "status", "state", "flag", "valid", "qual", "merit",
+               "sign", "temp", "angle", "acc", "bias", "offset"}))
+    return false;
+  return name_score(signal.name, "") > 0.7;
+}
+
 std::optional<Candidate> candidate_of(const Found& found, const dbc::Signal& signal) {
   const auto known = gateway::convert_unit(gateway::Dimension::kRate, signal.unit);
   const double score = name_score(signal.name, found.message->name);
-  const bool named = name_score(signal.name, "") > 0.7;
-  if (!known && !(signal.unit.empty() && named)) return std::nullopt;
+  if (!known && !is_rate_by_name(signal)) return std::nullopt;
   Candidate candidate;
   candidate.found = found;
   candidate.signal = &signal;

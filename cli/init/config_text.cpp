@@ -42,9 +42,12 @@ std::string gyro_text(const Proposal& proposal, const Candidate& candidate, cons
   const Companions with = find_companions(candidate.found, *candidate.signal);
   std::string text = fmt::format("[[gyro]]\nname = \"{}\"\n", name);
   text += head_text(proposal, candidate.found);
-  text += fmt::format("rate = {:<24} # {:.0f} Hz, step {:g} deg/s, noise {:.2g} deg/s\n",
-                      toml_string(candidate.signal->name), 1.0 / candidate.figures.interval_s,
-                      candidate.series.step, candidate.figures.noise);
+  const std::string step = candidate.series.step > 0.0
+                               ? fmt::format("step {:.3g} deg/s", candidate.series.step)
+                               : "a float";
+  text += fmt::format("rate = {:<24} # {:.0f} Hz, {}, noise {:.2g} deg/s\n",
+                      toml_string(candidate.signal->name), 1.0 / candidate.figures.interval_s, step,
+                      candidate.figures.noise);
   if (!candidate.assumed_unit.empty()) {
     text += fmt::format("unit = {}                 # CHECK: the DBC file gives no unit; assumed\n",
                         toml_string(candidate.assumed_unit));

@@ -50,8 +50,10 @@ void print_candidates(const std::vector<Candidate>& candidates, const Choice& ch
                             forward ? alike.scale : 1.0 / alike.scale,
                             1e3 * (forward ? alike.lag_s : -alike.lag_s));
     }
-    tell("{:<40}{:>8.1f}{:>11.3g}{:>11.3g}{}\n", printable(one.place()),
-         1.0 / std::max(one.figures.interval_s, 1e-6), one.series.step, one.figures.noise, figures);
+    tell("{:<40}{:>8.1f}{:>11}{:>11.3g}{}\n", printable(one.place()),
+         1.0 / std::max(one.figures.interval_s, 1e-6),
+         one.series.step > 0.0 ? fmt::format("{:.3g}", one.series.step) : "float",
+         one.figures.noise, figures);
     if (!one.why_not.empty()) tell("    left out: {}\n", printable(one.why_not));
   }
   if (!candidates.empty())
