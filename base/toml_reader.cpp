@@ -58,7 +58,13 @@ std::optional<std::string> TomlReader::text(std::string_view key) {
 std::optional<double> TomlReader::number(std::string_view key) {
   const toml::node* found = node(key, "a number", toml::node_type::floating_point);
   if (found == nullptr) return std::nullopt;
-  return found->value<double>();
+  const auto value = found->value<double>();
+  // The library gives nothing for an integer that is no double, and a default would take its place.
+  if (!value) {
+    complain(where(key), fmt::format("{} {} has more digits than a number can hold", title_, key),
+             "at most 15 digits, or an exponent: 9.007e15");
+  }
+  return value;
 }
 
 std::optional<std::int64_t> TomlReader::integer(std::string_view key) {

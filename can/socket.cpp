@@ -29,11 +29,6 @@ namespace {
 constexpr std::size_t kControlBytes =
     CMSG_SPACE(sizeof(scm_timestamping)) + CMSG_SPACE(sizeof(std::uint32_t));
 
-struct Link {
-  int index = 0;
-  bool fd_frames = false;
-};
-
 template <class T>
 bool set_option(int fd, int level, int name, const T& value) {
   return ::setsockopt(fd, level, name, &value, sizeof(value)) == 0;
@@ -56,7 +51,7 @@ Expected<int> open_raw(const std::string& interface) {
   return fail(interface, "no CAN socket: " + system_reason(errno));
 }
 
-Expected<Link> find_link(int fd, const std::string& interface) {
+Expected<int> find_index(int fd, const std::string& interface) {
   ifreq request = request_for(interface);
   if (interface.size() >= IFNAMSIZ || ::ioctl(fd, SIOCGIFINDEX, &request) != 0) {
     return fail(interface, "no such interface",
@@ -64,12 +59,11 @@ Expected<Link> find_link(int fd, const std::string& interface) {
                             "{0} type vcan && ip link set {0} up`",
                             interface));
   }
-  Link link{request.ifr_ifindex, false};
+  const int index = request.ifr_ifindex;
   if (::ioctl(fd, SIOCGIFHWADDR, &request) != 0 || request.ifr_hwaddr.sa_family != ARPHRD_CAN) {
     return fail(interface, "not a CAN interface", "`ip link show type can` lists them");
   }
-  link.fd_frames = ::ioctl(fd, SIOCGIFMTU, &request) == 0 && request.ifr_mtu == CANFD_MTU;
-  return link;
+  return index;
 }
 
 bool set_filters(int fd, std::span<const Filter> filters) {
@@ -113,6 +107,13 @@ bool bind_to(int fd, int interface_index) {
   address.can_family = AF_CAN;
   address.can_ifindex = interface_index;
   return ::bind(fd, reinterpret_cast<const sockaddr*>(&address), sizeof(address)) == 0;
+}
+
+// A link that is down when it is bound leaves ENETDOWN, as if it had gone down since.
+void forget_error(int fd) {
+  int error = 0;
+  socklen_t size = sizeof(error);
+  ::getsockopt(fd, SOL_SOCKET, SO_ERROR, &error, &size);
 }
 
 TimePoint from_timespec(const timespec& t) {
@@ -197,9 +198,9 @@ Expected<Socket> Socket::open(const std::string& interface, std::span<const Filt
   const Expected<int> fd = open_raw(interface);
   if (!fd) return tl::unexpected(fd.error());
   Socket socket(interface, *fd);
-  const Expected<Link> link = find_link(*fd, interface);
-  if (!link) return tl::unexpected(link.error());
-  socket.fd_frames_ = link->fd_frames;
+  const Expected<int> index = find_index(*fd, interface);
+  if (!index) return tl::unexpected(index.error());
+  socket.index_ = *index;
   // All before bind(): nothing unwanted or unstamped is ever queued.
   if (!set_filters(*fd, filters) || !set_error_filter(*fd)) {
     return fail(interface, "no CAN filters: " + system_reason(errno));
@@ -208,10 +209,12 @@ Expected<Socket> Socket::open(const std::string& interface, std::span<const Filt
   if (!set_stamps_and_drop_count(*fd)) {
     return fail(interface, "no kernel time stamps: " + system_reason(errno));
   }
-  if (link->fd_frames && !set_option(*fd, SOL_CAN_RAW, CAN_RAW_FD_FRAMES, 1)) {
+  // Whatever the MTU is now: it may be raised while the link is down.
+  if (!set_option(*fd, SOL_CAN_RAW, CAN_RAW_FD_FRAMES, 1)) {
     return fail(interface, "no CAN FD frames: " + system_reason(errno));
   }
-  if (!bind_to(*fd, link->index)) return fail(interface, "cannot bind: " + system_reason(errno));
+  if (!bind_to(*fd, *index)) return fail(interface, "cannot bind: " + system_reason(errno));
+  forget_error(*fd);
   socklen_t size = sizeof(socket.receive_buffer_bytes_);
   ::getsockopt(*fd, SOL_SOCKET, SO_RCVBUF, &socket.receive_buffer_bytes_, &size);
   return socket;
@@ -234,7 +237,7 @@ Socket::Socket(Socket&& other) noexcept
     : Transmitter(other),
       interface_(std::move(other.interface_)),
       fd_(std::exchange(other.fd_, -1)),
-      fd_frames_(other.fd_frames_),
+      index_(other.index_),
       receive_buffer_bytes_(other.receive_buffer_bytes_),
       last_errno_(other.last_errno_),
       kernel_drops_(other.kernel_drops_),
@@ -245,7 +248,7 @@ Socket& Socket::operator=(Socket&& other) noexcept {
   std::swap(interface_, other.interface_);
   std::swap(fd_, other.fd_);
   std::swap(buffers_, other.buffers_);
-  fd_frames_ = other.fd_frames_;
+  index_ = other.index_;
   receive_buffer_bytes_ = other.receive_buffer_bytes_;
   last_errno_ = other.last_errno_;
   kernel_drops_ = other.kernel_drops_;
@@ -257,9 +260,21 @@ Socket::~Socket() {
   if (fd_ >= 0) ::close(fd_);
 }
 
-bool Socket::link_up() const {
+LinkState Socket::look() const {
   ifreq request = request_for(interface_);
-  return ::ioctl(fd_, SIOCGIFFLAGS, &request) == 0 && (request.ifr_flags & IFF_UP) != 0;
+  // By the configured name, which may be one of several: ip-link(8) gives alternative ones.
+  if (::ioctl(fd_, SIOCGIFINDEX, &request) != 0 || request.ifr_ifindex != index_) return {};
+  LinkState link{.is_ours = true};
+  link.is_up = ::ioctl(fd_, SIOCGIFFLAGS, &request) == 0 && (request.ifr_flags & IFF_UP) != 0;
+  // A link of CAN XL carries FD frames too, by an MTU that is larger still.
+  link.fd_frames = ::ioctl(fd_, SIOCGIFMTU, &request) == 0 && request.ifr_mtu >= int{CANFD_MTU};
+  return link;
+}
+
+std::string Socket::name_now() const {
+  ifreq request{};
+  request.ifr_ifindex = index_;
+  return ::ioctl(fd_, SIOCGIFNAME, &request) == 0 ? std::string(request.ifr_name) : std::string();
 }
 
 Batch Socket::receive() {

@@ -30,6 +30,14 @@ struct SocketOptions {
   int send_buffer_bytes = 0;           ///< 0: the kernel's default
 };
 
+/// What a socket's interface is at a moment. All false where it is not the one that the name means.
+struct LinkState {
+  bool is_ours = false;    ///< the name still means the interface that the socket is bound to
+  bool is_up = false;      ///< set up; a controller may be bus-off all the same
+  bool fd_frames = false;  ///< carries CAN FD
+  bool operator==(const LinkState&) const = default;
+};
+
 /// Is there hope that the interface appears? Not where one of that name is of another kind, and not
 /// where the kernel has no CAN.
 bool may_appear(const std::string& interface);
@@ -44,7 +52,7 @@ struct Received {
 enum class ReceiveStatus : std::uint8_t {
   kMore,        ///< the batch was full: ask again
   kDrained,     ///< nothing is left for now
-  kLinkDown,    ///< told once; the same socket goes on when the link is up again
+  kLinkDown,    ///< once for each time that it went down; the socket goes on when it is up again
   kDeviceGone,  ///< told once; the socket is dead, open a new one
   kFailed       ///< see last_errno()
 };
@@ -58,7 +66,8 @@ class Socket final : public Transmitter {
  public:
   static constexpr std::size_t kBatchFrames = 64;
 
-  /// Without filters the socket only writes.
+  /// Without filters the socket only writes. FD frames are heard wherever the link carries them,
+  /// now or later. A link that is down when it is bound is no event of receive(): look() says so.
   static Expected<Socket> open(const std::string& interface, std::span<const Filter> filters,
                                const SocketOptions& options = {});
   Socket(Socket&& other) noexcept;
@@ -69,8 +78,11 @@ class Socket final : public Transmitter {
   SendResult send(const Frame& frame) override;
 
   [[nodiscard]] int fd() const { return fd_; }
-  [[nodiscard]] bool fd_frames() const { return fd_frames_; }
-  [[nodiscard]] bool link_up() const;
+  /// Asks the kernel, in two or three calls. The socket is bound to an index, and hears and sends
+  /// there whatever the interface is called by then: a name that means another one is a removal.
+  [[nodiscard]] LinkState look() const;
+  /// What the interface that the socket was bound to is called; empty where it is no longer here.
+  [[nodiscard]] std::string name_now() const;
   /// Received frames that the kernel dropped because the buffer was full, as far as it has told.
   [[nodiscard]] std::uint64_t drops() const { return drops_; }
   [[nodiscard]] int receive_buffer_bytes() const { return receive_buffer_bytes_; }
@@ -84,7 +96,7 @@ class Socket final : public Transmitter {
 
   std::string interface_;
   int fd_ = -1;
-  bool fd_frames_ = false;
+  int index_ = 0;
   int receive_buffer_bytes_ = 0;
   int last_errno_ = 0;
   std::uint32_t kernel_drops_ = 0;

@@ -10,6 +10,8 @@
 
 #include <fmt/format.h>
 
+#include "canlog/text_line.h"
+
 namespace vgyro::canlog {
 
 namespace {
@@ -307,14 +309,6 @@ const char* parse_direction(Cursor& at, LogRecord& record) {
 
 }  // namespace
 
-std::optional<can::BusIndex> InterfaceTable::index_of(std::string_view name) {
-  const auto found = std::find(names_.begin(), names_.end(), name);
-  if (found != names_.end()) return static_cast<can::BusIndex>(found - names_.begin());
-  if (names_.size() == kMax) return std::nullopt;
-  names_.emplace_back(name);
-  return static_cast<can::BusIndex>(names_.size() - 1);
-}
-
 LineResult parse_line(std::string_view line, InterfaceTable& interfaces, LogRecord& record,
                       XlFrame& xl) {
   if (!line.empty() && line.back() == '\r') line.remove_suffix(1);
@@ -325,8 +319,11 @@ LineResult parse_line(std::string_view line, InterfaceTable& interfaces, LogReco
   if (const char* why = parse_stamp(at, record)) return {LineKind::kMalformed, why};
   at.skip_blanks();
   const std::string_view name = at.word();
-  if (name.empty() || name.size() > kInterfaceNameMax || name.find('#') != name.npos) {
+  if (name.empty() || name.find('#') != name.npos) {
     return {LineKind::kMalformed, "no interface name"};
+  }
+  if (name.size() > kInterfaceNameMax) {
+    return {LineKind::kMalformed, "the interface name is longer than 31 characters"};
   }
   at.skip_blanks();
   if (const char* why = parse_frame_text(at, record, xl)) return {LineKind::kMalformed, why};
@@ -468,7 +465,8 @@ bool CandumpReader::next(LogRecord& record) {
     }
     const auto* newline =
         static_cast<const char*>(std::memchr(at_, '\n', static_cast<std::size_t>(end_ - at_)));
-    const std::string_view line(at_, static_cast<std::size_t>(newline - at_));
+    const std::string_view line =
+        clean_line({at_, static_cast<std::size_t>(newline - at_)}, counts_.skipped_bytes);
     at_ = newline + 1;
     const std::size_t interfaces_before = interfaces_.names().size();
     const LineResult result = parse_line(line, interfaces_, record, *xl_);

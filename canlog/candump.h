@@ -51,6 +51,7 @@ class CandumpReader final : public LogReader {
   [[nodiscard]] std::uint64_t bytes_total() const override { return bytes_total_; }
   void before_wait(std::function<void()> callback) override;
 
+  [[nodiscard]] const XlFrame* xl_frame() const override { return xl_.get(); }
   /// The frame of the record read last, where that is_xl.
   [[nodiscard]] const XlFrame& xl() const { return *xl_; }
 

@@ -1,7 +1,7 @@
 #pragma once
 
-// The bytes of a log in blocks of whole lines: a file, standard input, or an .xz file unpacked on
-// the way. Memory stays the same however long the log is.
+// The bytes of a log of lines, in blocks of whole lines. Memory stays the same however long the log
+// is.
 
 #include <cstdint>
 #include <functional>
@@ -10,6 +10,7 @@
 #include <string_view>
 
 #include "base/error.h"
+#include "canlog/byte_source.h"
 
 namespace vgyro::canlog {
 
@@ -25,29 +26,23 @@ class LogSource {
   /// A line longer than this is no frame.
   static constexpr std::size_t kBufferBytes = 262'144;
 
-  virtual ~LogSource() = default;
+  explicit LogSource(std::unique_ptr<ByteSource> bytes);
   Expected<LogBlock> next();
-  /// Called before bytes are fetched, which may wait for a live source: the moment to flush output.
-  void before_wait(std::function<void()> callback) { before_wait_ = std::move(callback); }
 
-  /// Bytes taken in so far and in total, of the packed file where it is packed; 0 when unknown.
-  [[nodiscard]] virtual std::uint64_t bytes_read() const = 0;
-  [[nodiscard]] virtual std::uint64_t bytes_total() const = 0;
-
- protected:
-  LogSource();
-  /// Up to `size` bytes into `to`; 0 at the end.
-  virtual Expected<std::size_t> read(char* to, std::size_t size) = 0;
+  /// As ByteSource has them.
+  void before_wait(std::function<void()> callback) { bytes_->before_wait(std::move(callback)); }
+  [[nodiscard]] std::uint64_t bytes_read() const { return bytes_->bytes_read(); }
+  [[nodiscard]] std::uint64_t bytes_total() const { return bytes_->bytes_total(); }
 
  private:
-  std::function<void()> before_wait_;
+  std::unique_ptr<ByteSource> bytes_;
   std::unique_ptr<char[]> buffer_;
   std::size_t used_ = 0;    ///< bytes in the buffer
   std::size_t handed_ = 0;  ///< of these, in the block handed out last
   bool skipping_ = false;   ///< inside an overlong line
 };
 
-/// "-" is standard input; a name ending in ".xz" is unpacked.
+/// "-" is standard input; what is packed is unpacked.
 Expected<std::unique_ptr<LogSource>> open_source(const std::string& path);
 
 /// Text in memory, for tests; `chunk` bytes at a time.

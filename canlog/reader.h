@@ -8,8 +8,10 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "base/error.h"
+#include "canlog/byte_source.h"
 #include "canlog/record.h"
 
 namespace vgyro::canlog {
@@ -25,6 +27,8 @@ class LogReader {
   virtual bool next(LogRecord& record) = 0;
 
   [[nodiscard]] virtual const LogCounts& counts() const = 0;
+  /// Of each log, where this reads several (canlog/merged_reader.h), in the order of the arguments.
+  [[nodiscard]] virtual std::vector<const LogCounts*> parts() const { return {&counts()}; }
   [[nodiscard]] virtual const InterfaceTable& interfaces() const = 0;
   [[nodiscard]] virtual const std::optional<Error>& error() const = 0;
 
@@ -34,9 +38,16 @@ class LogReader {
 
   /// Called before bytes are fetched, which may wait for a live source: the moment to flush output.
   virtual void before_wait(std::function<void()> callback) = 0;
+
+  /// The frame of the record read last, where that is_xl; null for forms that know no such frames.
+  [[nodiscard]] virtual const XlFrame* xl_frame() const { return nullptr; }
 };
 
-/// By the log's content, not by its name; "-" is standard input.
+/// By the log's content, not by its name; "-" is standard input. Error where it cannot be read, or
+/// is of no form that is known (canlog/forms.h): then with the way out.
 Expected<std::unique_ptr<LogReader>> open_log(const std::string& path);
+
+/// Likewise from bytes that are unpacked already.
+Expected<std::unique_ptr<LogReader>> open_log(std::unique_ptr<ByteSource> bytes);
 
 }  // namespace vgyro::canlog

@@ -35,7 +35,7 @@ struct LogRecord {
   can::BusIndex bus = 0;             ///< into InterfaceTable
   std::uint8_t fraction_digits = 6;  ///< as the log had them: 6 or 9 as a rule
   Direction direction = Direction::kUnknown;
-  bool is_xl = false;  ///< then `frame` is empty and CandumpReader::xl() holds the frame
+  bool is_xl = false;  ///< then `frame` is empty and LogReader::xl_frame() holds the frame
   can::Frame frame;
 };
 
@@ -53,19 +53,28 @@ class InterfaceTable {
 };
 
 struct MalformedLine {
-  std::uint64_t line = 0;  ///< 1-based
+  std::uint64_t line = 0;  ///< 1-based; of LogCounts::item, which may be no line
   std::string why;
 };
 
+/// Text forms consist of lines; what binary forms consist of takes the place of a line.
 struct LogCounts {
+  std::string_view item = "line";  ///< "object", "packet", "record" …: one of `lines`
   std::uint64_t lines = 0;
   std::uint64_t frames = 0;
   std::uint64_t xl_frames = 0;
   std::uint64_t other_lines = 0;
   std::uint64_t malformed_lines = 0;
   std::uint64_t cut_off_lines = 0;  ///< the log ends inside a line: its frame is not used
+  std::uint64_t skipped_bytes = 0;  ///< that belong to no line, as NUL bytes after a power cut
   std::vector<MalformedLine> first_malformed;  ///< at most kFirstMalformedMax
   static constexpr std::size_t kFirstMalformedMax = 5;
+
+  /// Of the item that `lines` counted last.
+  void add_malformed(const char* why) {
+    ++malformed_lines;
+    if (first_malformed.size() < kFirstMalformedMax) first_malformed.push_back({lines, why});
+  }
 };
 
 }  // namespace vgyro::canlog

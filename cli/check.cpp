@@ -21,7 +21,7 @@ std::string id_text(const gateway::FrameMatch& match) {
 void print_row(std::string_view role, const std::string& bus, const gateway::FrameMatch& match,
                const std::string& message, const gateway::Quantity& quantity) {
   const std::string signal = message + "." + quantity.name;
-  say("  {:<14}{:<8}{:<10}{:<26}{:<8}{}\n", role, bus, id_text(match), signal,
+  say("  {:<14}{:<8}{:<10}{:<25} {:<7} {}\n", role, bus, id_text(match), signal,
       printable(quantity.unit), quantity.layout);
 }
 
@@ -40,12 +40,13 @@ void print_e2e(const gateway::E2ePlan& e2e) {
 
 void print_gyro(const gateway::GyroPlan& gyro) {
   print_row("gyro " + gyro.name, gyro.bus, gyro.match, gyro.message, gyro.rate);
-  // What the bits cannot hold never comes.
   detail("accepted",
-         fmt::format("{:g} to {:g} {}{}",
-                     std::max(gyro.rate.minimum, gyro.rate.codec.representable_min()),
-                     std::min(gyro.rate.maximum, gyro.rate.codec.representable_max()),
+         fmt::format("{:g} to {:g} {}{}", gyro.rate.lowest(), gyro.rate.highest(),
                      printable(gyro.rate.unit), gyro.rate.scale < 0 ? ", sign flipped" : ""));
+  if (!gyro.rate.codes.empty()) {
+    detail("codes", fmt::format("raw values from 0x{:X} to 0x{:X} are no measurement",
+                                gyro.rate.codes.first, gyro.rate.codes.last));
+  }
   if (gyro.sign) detail("sign", "from a signal of its own: 1 is negative");
   if (gyro.temperature) {
     detail("temperature", fmt::format("{} in {}, {}", gyro.temperature->name,
@@ -74,7 +75,7 @@ void print_model(const gateway::Plan& plan) {
 }
 
 void print_plan(const gateway::Plan& plan) {
-  say("  {:<14}{:<8}{:<10}{:<26}{:<8}{}\n", "", "bus", "id", "signal", "unit", "bits");
+  say("  {:<14}{:<8}{:<10}{:<25} {:<7} {}\n", "", "bus", "id", "signal", "unit", "bits");
   for (const gateway::GyroPlan& gyro : plan.gyros)
     print_gyro(gyro);
   if (plan.reference) {

@@ -29,10 +29,18 @@ int run_init(const InitOptions& options);
 
 struct DecodeOptions {
   std::vector<std::string> dbc_files;
-  std::string log;
+  std::vector<std::string> logs;
   bool text = false;
 };
 int run_decode(const DecodeOptions& options);
+
+struct ConvertOptions {
+  std::vector<std::string> logs;
+  std::string output;   ///< "-": a candump log on standard output
+  unsigned digits = 0;  ///< of a stamp's fraction, 6 or 9; 0: as the logs have them
+  bool quiet = false;
+};
+int run_convert(const ConvertOptions& options);
 
 struct ReplayOptions {
   std::string config;
@@ -45,6 +53,7 @@ struct ReplayOptions {
   std::string plot;                  ///< empty: none
   std::vector<std::string> bus_map;  ///< "LOGNAME=CONFIGNAME"
   std::vector<std::string> logs;
+  unsigned digits = 0;  ///< of the output's stamps, 6 or 9; 0: as the log has them
   bool quiet = false;
 };
 int run_replay(const ReplayOptions& options);
@@ -56,7 +65,7 @@ struct AllanOptions {
   std::string config;
   std::string json;  ///< "-": standard output; empty: nowhere
   std::string plot;  ///< empty: none
-  std::string log;
+  std::vector<std::string> logs;
 };
 int run_allan(const AllanOptions& options);
 

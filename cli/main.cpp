@@ -21,6 +21,7 @@ struct Options {
   CheckOptions check;
   InitOptions init;
   DecodeOptions decode;
+  ConvertOptions convert;
   ReplayOptions replay;
   AllanOptions allan;
   CompareOptions compare;
@@ -34,6 +35,24 @@ void add_overrides(CLI::App& command, std::string& method, std::optional<std::st
   command.add_option("--method", method, "corrector instead of the configured one")
       ->check(CLI::IsMember({"optimal", "mutual", "mean"}));
   command.add_option("--model", model, "model file instead of the configured one");
+}
+
+constexpr const char* kLogHelp = "log of any known form, packed or not; - is standard input";
+
+void add_logs(CLI::App& command, std::vector<std::string>& logs) {
+  command
+      .add_option("LOG", logs,
+                  "logs of any known form, packed or not; several are merged by stamp;\n"
+                  "- is standard input")
+      ->required();
+}
+
+void add_digits(CLI::App& command, unsigned& digits) {
+  command
+      .add_option("--digits", digits,
+                  "digits of a stamp's fraction, 6 or 9; default: as the log has them.\n"
+                  "canplayer wants 6")
+      ->check(CLI::IsMember({6, 9}));
 }
 
 CLI::App* add_check(CLI::App& app, CheckOptions& options, std::string& method) {
@@ -73,8 +92,25 @@ CLI::App* add_decode(CLI::App& app, DecodeOptions& options) {
       ->required()
       ->allow_extra_args(false);
   command->add_flag("--text", options.text, "lines for people instead of JSON");
-  command->add_option("LOG", options.log, "candump log, .xz too; - is standard input")->required();
+  add_logs(*command, options.logs);
   command->footer("Live monitor: candump -L can0 | vgyro decode --dbc vgyro.dbc --text -");
+  return command;
+}
+
+CLI::App* add_convert(CLI::App& app, ConvertOptions& options) {
+  CLI::App* command = app.add_subcommand(
+      "convert", "Read logs of any known form and write one that other tools read");
+  command
+      ->add_option("-o,--output", options.output,
+                   "the ending says the form: .log (candump), .asc (Vector); text also\n"
+                   "packed: .log.gz, .log.xz, .log.zst; - is a candump log on\nstandard output")
+      ->required();
+  add_digits(*command, options.digits);
+  command->add_flag("-q,--quiet", options.quiet, "no summary on stderr");
+  add_logs(*command, options.logs);
+  command->footer(
+      "Which tool reads what is in docs/log-format.md.\n"
+      "Example: vgyro convert -o drive.log.xz drive.asc");
   return command;
 }
 
@@ -97,8 +133,8 @@ CLI::App* add_replay(CLI::App& app, ReplayOptions& options, std::string& method)
                    "may be given several times")
       ->allow_extra_args(false);
   command->add_flag("-q,--quiet", options.quiet, "no summary on stderr");
-  command->add_option("LOG", options.logs, "candump logs, .xz too; - is standard input")
-      ->required();
+  add_digits(*command, options.digits);
+  add_logs(*command, options.logs);
   command->footer(
       "The same input gives the same bytes out, on every run.\n"
       "Example: vgyro replay --config vgyro.toml -o out.log --plot drift.svg drive.log.xz");
@@ -149,7 +185,7 @@ CLI::App* add_allan(CLI::App& app, AllanOptions& options) {
   command->add_option("--config", options.config, "configuration, e.g. vgyro.toml")->required();
   command->add_option("--json", options.json, "figures as JSON; - is standard output");
   command->add_option("--plot", options.plot, "picture of the curves: .svg, .png or .pdf");
-  command->add_option("LOG", options.log, "candump log, .xz too; - is standard input")->required();
+  add_logs(*command, options.logs);
   command->footer(
       "Best on an hour or more at rest; what the figures mean is in docs/allan.md.\n"
       "Example: vgyro allan --config vgyro.toml --plot allan.svg rest.log.xz");
@@ -158,8 +194,7 @@ CLI::App* add_allan(CLI::App& app, AllanOptions& options) {
 
 void add_recording(CLI::App& command, std::string& config, std::string& measured) {
   command.add_option("--config", config, "configuration, e.g. vgyro.toml")->required();
-  command.add_option("--measured", measured, "candump log, .xz too; - is standard input")
-      ->required();
+  command.add_option("--measured", measured, kLogHelp)->required();
 }
 
 CLI::App* add_compare(CLI::App& app, CompareOptions& options) {
@@ -234,6 +269,7 @@ int run(int argc, char** argv) {
   CLI::App* check = add_check(app, options.check, options.method);
   CLI::App* init = add_init(app, options.init);
   CLI::App* decode = add_decode(app, options.decode);
+  CLI::App* convert = add_convert(app, options.convert);
   CLI::App* replay = add_replay(app, options.replay, options.method);
   CLI::App* model = add_model(app);
   CLI::App* allan = add_allan(app, options.allan);
@@ -265,6 +301,7 @@ int run(int argc, char** argv) {
     return run_init(options.init);
   }
   if (decode->parsed()) return run_decode(options.decode);
+  if (convert->parsed()) return run_convert(options.convert);
   if (model->parsed()) return run_model_list();
   if (allan->parsed()) return run_allan(options.allan);
   if (compare->parsed()) return run_compare(options.compare);
@@ -275,8 +312,8 @@ int run(int argc, char** argv) {
   // Frames are the main result; they give way only to a summary or a table that wants the same
   // place.
   const bool output_given = replay->count("--output") > 0;
-  const bool output_wanted = options.replay.json == "-" || options.replay.csv == "-";
-  if (!output_given && !output_wanted) options.replay.output = "-";
+  const bool stdout_taken = options.replay.json == "-" || options.replay.csv == "-";
+  if (!output_given && !stdout_taken) options.replay.output = "-";
   return run_replay(options.replay);
 }
 

@@ -5,6 +5,7 @@
 
 #include <fmt/core.h>
 
+#include "cli/log_notes.h"
 #include "cli/role_frames.h"
 #include "fusion/alignment.h"
 #include "fusion/stamp_guard.h"
@@ -22,8 +23,8 @@ class Gatherer {
         inputs_{gateway::GyroIntake(0, gateway::GyroInput(plan.gyros[0])),
                 gateway::GyroIntake(1, gateway::GyroInput(plan.gyros[1]))} {}
 
-  Expected<void> read(const std::string& log) {
-    return frames_.read(log, "allan", [this](std::uint8_t roles, const canlog::LogRecord& record) {
+  Expected<void> read(const std::vector<std::string>& logs) {
+    return frames_.read(logs, "allan", [this](std::uint8_t roles, const canlog::LogRecord& record) {
       if ((roles & gateway::kGyro1) != 0) take_gyro(0, record);
       if ((roles & gateway::kGyro2) != 0) take_gyro(1, record);
     });
@@ -88,11 +89,11 @@ class Gatherer {
 
 }  // namespace
 
-Expected<analysis::PairRecording> read_pair_recording(const std::string& log,
+Expected<analysis::PairRecording> read_pair_recording(const std::vector<std::string>& logs,
                                                       const gateway::Plan& plan) {
   Gatherer gatherer(plan);
-  if (auto done = gatherer.read(log); !done) return tl::unexpected(done.error());
-  if (const auto complaint = gatherer.complaint(log)) return tl::unexpected(*complaint);
+  if (auto done = gatherer.read(logs); !done) return tl::unexpected(done.error());
+  if (const auto complaint = gatherer.complaint(name_of(logs))) return tl::unexpected(*complaint);
   return gatherer.finish();
 }
 

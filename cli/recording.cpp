@@ -20,10 +20,16 @@ constexpr double kLimitMost_dps = 5e4;
 
 double limit_of(const gateway::Quantity& rate) {
   const auto magnitude = [&](double raw) { return std::abs(raw * rate.scale + rate.shift); };
-  const double low = magnitude(std::max(rate.minimum, rate.codec.representable_min()));
-  const double high = magnitude(std::min(rate.maximum, rate.codec.representable_max()));
+  const double low = magnitude(rate.lowest());
+  const double high = magnitude(rate.highest());
   const double limit_dps = std::max(low, high);
   return limit_dps < kLimitMost_dps ? limit_dps : 0.0;
+}
+
+// A counter of all pages does not tell which frames of the gyro's own page are missing.
+bool counts_samples(const gateway::GyroPlan& gyro) {
+  const auto& counter = gyro.e2e.counter;
+  return counter && (gyro.rate.presence.always() || !counter->presence.always());
 }
 
 class Recorder {
@@ -36,7 +42,7 @@ class Recorder {
       const gateway::GyroPlan& gyro = plan.gyros[i];
       gap::GyroSeries& series = recording_.gyros[i];
       series.name = gyro.name;
-      series.counter_modulus = gyro.e2e.counter ? gyro.e2e.counter->modulus : 0;
+      series.counter_modulus = counts_samples(gyro) ? gyro.e2e.counter->modulus : 0;
       series.step_dps = gyro.rate.step;
       series.limit_dps = limit_of(gyro.rate);
     }
@@ -90,14 +96,14 @@ class Recorder {
   void take_gyro(std::size_t i, const canlog::LogRecord& record) {
     const gateway::GyroIntake::Result taken = inputs_[i].take(record.frame, record.stamp, guard_);
     // A frame whose counter moved is a new one, whatever its stamp.
-    const auto& counter = plan_.gyros[i].e2e.counter;
-    const bool new_at_old_stamp = counter && taken.reject == gateway::Reject::kStampRepeated;
+    const bool counted = counts_samples(plan_.gyros[i]);
+    const bool new_at_old_stamp = counted && taken.reject == gateway::Reject::kStampRepeated;
     if (taken.reject && !new_at_old_stamp) return;
     const double t_s = reach(taken.stamp.t);
     gap::GyroSeries& series = recording_.gyros[i];
     series.t_s.push_back(series.t_s.empty() ? t_s : std::max(series.t_s.back(), t_s));
     series.rate_dps.push_back(taken.rate_dps);
-    if (counter) series.counter.push_back(inputs_[i].input().counter());
+    if (counted) series.counter.push_back(inputs_[i].input().counter());
     if (plan_.gyros[i].temperature)
       series.temperature_c.push_back(inputs_[i].input().temperature_c());
     if (plan_.gyros[i].supply_voltage) series.supply_v.push_back(inputs_[i].input().supply_v());
@@ -164,7 +170,7 @@ Expected<gap::Recording> read_recording(const std::string& log, const gateway::P
   RoleFrames frames(plan);
   Recorder recorder(plan);
   const auto done = frames.read(
-      log, doing,
+      {log}, doing,
       [&](std::uint8_t roles, const canlog::LogRecord& record) { recorder.take(roles, record); });
   if (!done) return tl::unexpected(done.error());
   if (const auto missing = frames.missing_gyro(log, recorder.used())) {

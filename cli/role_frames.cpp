@@ -4,7 +4,8 @@
 
 #include <fmt/core.h>
 
-#include "canlog/reader.h"
+#include "canlog/merged_reader.h"
+#include "cli/log_notes.h"
 #include "cli/output/progress.h"
 
 namespace vgyro::cli {
@@ -13,12 +14,12 @@ namespace {
 constexpr std::uint64_t kFramesPerProgress = 1U << 16U;
 }
 
-Expected<void> RoleFrames::read(const std::string& log, const std::string& doing,
+Expected<void> RoleFrames::read(const std::vector<std::string>& logs, const std::string& doing,
                                 const Take& take) {
-  const auto opened = canlog::open_log(log);
+  const auto opened = canlog::open_logs(logs);
   if (!opened) return tl::unexpected(opened.error());
   canlog::LogReader& reader = **opened;
-  Progress progress(doing + " " + log);
+  Progress progress(doing + " " + name_of(logs));
   canlog::LogRecord record;
   std::uint64_t until_progress = kFramesPerProgress;
   while (reader.next(record)) {
@@ -48,21 +49,22 @@ std::uint8_t RoleFrames::roles(const canlog::LogRecord& record,
   return found;
 }
 
-std::optional<Error> RoleFrames::missing_gyro(const std::string& log,
+std::optional<Error> RoleFrames::missing_gyro(const std::string& name,
                                               const std::array<std::uint64_t, 2>& used) const {
   for (std::size_t i = 0; i < 2; ++i) {
     if (used[i] > 0) continue;
     const gateway::GyroPlan& gyro = plan_.gyros[i];
     if (frames_[i] > 0) {
       return Error{
-          log, fmt::format("none of the {} frames of gyro {} could be used", frames_[i], gyro.name),
+          name,
+          fmt::format("none of the {} frames of gyro {} could be used", frames_[i], gyro.name),
           "`vgyro replay` tells the causes, `vgyro check` which bits are read"};
     }
     std::string names;
-    for (const std::string& name : interfaces_)
-      names += (names.empty() ? "" : ", ") + name;
+    for (const std::string& bus : interfaces_)
+      names += (names.empty() ? "" : ", ") + bus;
     return Error{
-        log,
+        name,
         fmt::format("no frame of gyro {} ({} {:X} on {})", gyro.name, gyro.message, gyro.match.id,
                     gyro.bus),
         names.empty() ? "the log holds no CAN frame" : "the log's interfaces are: " + names};

@@ -24,11 +24,13 @@ class RoleFrames {
 
   explicit RoleFrames(const gateway::Plan& plan) : plan_(plan), router_(plan) {}
 
-  /// `doing` stands on the terminal's line of progress, before the log's name.
-  Expected<void> read(const std::string& log, const std::string& doing, const Take& take);
+  /// Several logs are merged by stamp. `doing` stands on the terminal's line of progress, before
+  /// the logs' name.
+  Expected<void> read(const std::vector<std::string>& logs, const std::string& doing,
+                      const Take& take);
 
-  /// After read(): what is wrong with a log of which so many samples of each gyro could be used.
-  [[nodiscard]] std::optional<Error> missing_gyro(const std::string& log,
+  /// After read(): what is wrong with logs of which so many samples of each gyro could be used.
+  [[nodiscard]] std::optional<Error> missing_gyro(const std::string& name,
                                                   const std::array<std::uint64_t, 2>& used) const;
 
  private:

@@ -16,7 +16,11 @@ Bus::Bus(std::string name, std::vector<can::Filter> filters, IdentifierWatch own
 Expected<void> Bus::open() {
   Expected<can::Socket> socket = can::Socket::open(name_, filters_, options_);
   if (!socket) {
-    if (!can::may_appear(name_)) return tl::unexpected(socket.error());
+    if (!can::may_appear(name_)) {
+      if (was_open_ && !std::exchange(told_of_absence_, true))
+        tell(Severity::kError, "interface_unusable", "{}", socket.error().message());
+      return tl::unexpected(socket.error());
+    }
     // After a removal there was a line already.
     if (!std::exchange(told_of_absence_, true) && !was_open_) {
       tell(Severity::kWarning, "interface_absent", "{}; waiting for it", socket.error().message());
@@ -25,15 +29,17 @@ Expected<void> Bus::open() {
   }
   socket_.emplace(std::move(*socket));
   clock_ = {};
+  arrivals_.opened(clocks());
   controller_.forget_state();
   own_.opened();
-  down_ = !socket_->link_up();
-  const char* form = socket_->fd_frames() ? ", CAN FD" : "";
+  const can::LinkState link = socket_->look();
+  down_ = !link.is_up;
+  carries_fd_ = link.fd_frames;
   const bool again = std::exchange(was_open_, true);
   if (again) ++reopened_;
   const bool late = std::exchange(told_of_absence_, false);
   tell(again || late ? Severity::kNotice : Severity::kInfo, "interface_bound", "{}: {}{}", name_,
-       again ? "open again" : "bound", form);
+       again ? "open again" : "bound", carries_fd_ ? ", CAN FD" : "");
   if (down_) {
     tell(Severity::kWarning, "link_down", "{}: link is down; `ip link set {} up` starts it", name_,
          name_);
@@ -52,11 +58,20 @@ Arrival Bus::peek() {
   }
   const can::Received& received = batch_.frames[next_];
   if (stamped_ == next_) {  // each stamp goes through the clock once
-    const TimePoint software = received.stamp == TimePoint{} ? turn_clock_->wall() : received.stamp;
-    next_stamp_ = clock_.host_time(software, received.hardware);
+    next_stamp_ = clock_.host_time(software_stamp(received.stamp), received.hardware);
     ++stamped_;
   }
   return {&received.frame, next_stamp_};
+}
+
+// The kernel's stamp, or the time of reading where that is no time of arrival.
+TimePoint Bus::software_stamp(TimePoint kernels) {
+  if (kernels != TimePoint{} && arrivals_.is_near(kernels)) return kernels;
+  if (!std::exchange(clocks_are_fresh_, true)) turn_clock_->begin_turn();
+  if (kernels == TimePoint{}) return turn_clock_->wall();
+  if (arrivals_.may_be_arrival(kernels, clocks())) return kernels;
+  ++restamped_;
+  return turn_clock_->wall();
 }
 
 bool Bus::refill() {
@@ -65,46 +80,82 @@ bool Bus::refill() {
   if (reads_left_ == 0 || !socket_) return false;
   --reads_left_;
   batch_ = socket_->receive();
+  clocks_are_fresh_ = false;
   more_ = batch_.status == can::ReceiveStatus::kMore;
   if (!more_) reads_left_ = 0;
   switch (batch_.status) {
     case can::ReceiveStatus::kMore:
     case can::ReceiveStatus::kDrained:
+      // What comes through a link that was down may be another bus's.
+      if (down_ && !batch_.frames.empty() && !look_after_link()) lose_interface();
       break;
     case can::ReceiveStatus::kLinkDown:
       link_went_down();
       break;
     case can::ReceiveStatus::kDeviceGone:
-      close_dead("the interface was removed");
+      lose_interface();
       break;
     case can::ReceiveStatus::kFailed:
-      close_dead(system_reason(socket_->last_errno()));
+      close_dead(system_reason(socket_->last_errno()) + "; waiting for it");
       break;
   }
   return !batch_.frames.empty();
 }
 
+can::SendResult Bus::send(const can::Frame& frame) {
+  if (!socket_) return can::SendResult::kLinkDown;
+  // Not closed here: the frame that caused this one may lie in the socket's batch.
+  if (down_) look_after_link();
+  if (down_) return can::SendResult::kLinkDown;
+  const can::SendResult result = socket_->send(frame);
+  // Whoever asks the socket first after the link went down is told of it, and nobody after that.
+  if (result == can::SendResult::kLinkDown) link_went_down();
+  return result;
+}
+
+bool Bus::look_after_link() {
+  const can::LinkState link = socket_->look();
+  if (link.is_ours) carries_fd_ = link.fd_frames;
+  if (down_ && link.is_up) link_came_up();
+  return link.is_ours;
+}
+
+void Bus::link_came_up() {
+  down_ = false;
+  controller_.forget_state();
+  tell(Severity::kNotice, "link_up", "{}: link is up again{}", name_,
+       carries_fd_ ? ", CAN FD" : "");
+}
+
+// Each time counts, also where it was up in between for less than a look.
 void Bus::link_went_down() {
-  if (std::exchange(down_, true)) return;
   ++downs_;
+  if (std::exchange(down_, true)) return;
   tell(Severity::kWarning, "link_down", "{}: link went down", name_);
 }
 
-void Bus::close_dead(const std::string& why) {
-  tell(Severity::kWarning, "interface_lost", "{}: {}; waiting for it", name_, why);
+// It was removed, went to another network namespace, or has another name now.
+void Bus::lose_interface() {
+  if (!std::exchange(down_, true)) ++downs_;
+  const std::string name_now = socket_->name_now();
+  close_dead(name_now.empty() ? "the interface was removed; waiting for it"
+                              : fmt::format("the interface is now called {}; looking for {} again",
+                                            name_now, name_));
+}
+
+void Bus::close_dead(const std::string& what_now) {
+  tell(Severity::kWarning, "interface_lost", "{}: {}", name_, what_now);
   lost_before_ += socket_->drops();
-  // The batch lives in the socket.
+  // The batch lives in the socket, and nothing more can come from it.
   batch_ = {};
+  more_ = false;
   socket_.reset();
 }
 
 void Bus::second_passed() {
   own_.second_passed();
-  if (down_ && socket_ && socket_->link_up()) {
-    down_ = false;
-    controller_.forget_state();
-    tell(Severity::kNotice, "link_up", "{}: link is up again", name_);
-  }
+  if (socket_ && !look_after_link()) lose_interface();
+  if (!more_) arrivals_.seen_empty(clocks());
   if (const std::uint64_t held = lines_.second_passed(); held > 0) {
     log_->tell(Severity::kWarning, {.cause = "link_flickers", .bus = name_},
                "{}: {} more changes of the link in the last minute", name_, held);
@@ -114,13 +165,14 @@ void Bus::second_passed() {
 BusStatus Bus::status() const {
   return {.name = name_,
           .present = is_open(),
-          .link_up = is_open() && !down_,
+          .link_up = is_up(),
           .controller = controller_.state(),
           .errors = controller_.counts(),
           .received = received_,
           .lost = lost_before_ + (socket_ ? socket_->drops() : 0),
           .downs = downs_,
           .reopened = reopened_,
+          .restamped = restamped_,
           .foreign = own_.count(),
           .contested = own_.is_contested()};
 }

@@ -1,7 +1,8 @@
 #pragma once
 
 // One interface as the loop sees it: its socket while there is one, the frames read from it and not
-// yet handed on, and what is known of the link. A link that is down or gone is never fatal.
+// yet handed on, and what is known of the link. A link that is down or gone is never fatal. An
+// interface that is renamed is gone: what has its name now is another bus.
 
 #include <cstdint>
 #include <optional>
@@ -10,6 +11,7 @@
 
 #include "base/error.h"
 #include "base/time.h"
+#include "can/arrival_watch.h"
 #include "can/error_frame.h"
 #include "can/socket.h"
 #include "can/stamp_clock.h"
@@ -35,7 +37,7 @@ class Bus final : public can::Transmitter {
       can::SocketOptions options, TurnClock& clock, Log& log);
 
   /// Binds a new socket, filters included. An interface that is not there yet is no error: it is
-  /// told once, and is_open() stays false.
+  /// told once, and is_open() stays false. What has its name and cannot be used is an error.
   Expected<void> open();
 
   /// Poll reported something: read again when peek() runs dry, but not without end.
@@ -55,9 +57,9 @@ class Bus final : public can::Transmitter {
   /// Nothing is left in the kernel as far as is known.
   [[nodiscard]] bool drained() const { return !more_; }
 
-  can::SendResult send(const can::Frame& frame) override {
-    return socket_ ? socket_->send(frame) : can::SendResult::kLinkDown;
-  }
+  /// While the link is down nothing is tried before the kernel has said that it is up again, and is
+  /// still the one that the name means.
+  can::SendResult send(const can::Frame& frame) override;
 
   /// Throws away what the kernel holds.
   void discard() {
@@ -65,13 +67,16 @@ class Bus final : public can::Transmitter {
       take();
   }
 
-  /// To be called about once a second: looks whether a link that was down is up again.
+  /// To be called about once a second, with nothing left to take: looks after the link.
   void second_passed();
 
   [[nodiscard]] const std::string& name() const { return name_; }
   [[nodiscard]] bool is_open() const { return socket_.has_value(); }
   /// Only while open.
   [[nodiscard]] const can::Socket& socket() const { return *socket_; }
+  /// As far as is known; a link that is down may be given another MTU.
+  [[nodiscard]] bool is_up() const { return is_open() && !down_; }
+  [[nodiscard]] bool carries_fd() const { return is_open() && carries_fd_; }
   [[nodiscard]] BusStatus status() const;
 
  private:
@@ -81,8 +86,14 @@ class Bus final : public can::Transmitter {
   static constexpr std::size_t kFewFrames = 4;
 
   bool refill();
+  [[nodiscard]] TimePoint software_stamp(TimePoint kernels);
+  can::ArrivalWatch::Clocks clocks() { return {turn_clock_->wall(), turn_clock_->steady()}; }
+  /// Whether the socket is still bound to the interface that is meant; notes that it is up.
+  bool look_after_link();
   void link_went_down();
-  void close_dead(const std::string& why);
+  void link_came_up();
+  void lose_interface();
+  void close_dead(const std::string& what_now);
   template <class... Args>
   void tell(Severity severity, std::string_view cause, fmt::format_string<Args...> text,
             Args&&... args) {
@@ -98,6 +109,8 @@ class Bus final : public can::Transmitter {
   LineBudget lines_;
   std::optional<can::Socket> socket_;
   can::StampClock clock_;
+  can::ArrivalWatch arrivals_;
+  bool clocks_are_fresh_ = false;  ///< read since the batch was
   can::ControllerWatch controller_;
   IdentifierWatch own_;
   can::Batch batch_;
@@ -107,12 +120,14 @@ class Bus final : public can::Transmitter {
   int reads_left_ = 0;
   bool more_ = false;
   bool down_ = false;
+  bool carries_fd_ = false;
   bool was_open_ = false;
   bool told_of_absence_ = false;
   std::uint64_t received_ = 0;
   std::uint64_t lost_before_ = 0;  ///< by sockets that are gone
   std::uint64_t downs_ = 0;
   std::uint64_t reopened_ = 0;
+  std::uint64_t restamped_ = 0;
 };
 
 }  // namespace vgyro::daemon

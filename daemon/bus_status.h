@@ -17,11 +17,12 @@ struct BusStatus {
   can::ControllerState controller = can::ControllerState::kActive;
   std::array<std::uint64_t, can::kErrorCauseCount> errors{};  ///< by can::ErrorCause
   std::uint64_t received = 0;                                 ///< frames that passed the filters
-  std::uint64_t lost = 0;      ///< of these, dropped because the receive buffer was full
-  std::uint64_t downs = 0;     ///< times that the link went down
-  std::uint64_t reopened = 0;  ///< times that the interface was bound again
-  std::uint64_t foreign = 0;   ///< frames with our identifiers that somebody else sent
-  bool contested = false;      ///< there was one lately
+  std::uint64_t lost = 0;       ///< of these, dropped because the receive buffer was full
+  std::uint64_t downs = 0;      ///< times that the link went down, or the interface away while up
+  std::uint64_t reopened = 0;   ///< times that the interface was bound again
+  std::uint64_t restamped = 0;  ///< frames whose stamp was no time of arrival
+  std::uint64_t foreign = 0;    ///< frames with our identifiers that somebody else sent
+  bool contested = false;       ///< there was one lately
 };
 
 }  // namespace vgyro::daemon

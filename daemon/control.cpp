@@ -112,6 +112,7 @@ int append_bus(sd_bus_message* reply, const BusStatus& bus) {
   fields.put("lost", bus.lost);
   fields.put("downs", bus.downs);
   fields.put("reopened", bus.reopened);
+  fields.put("restamped", bus.restamped);
   fields.put("foreign", bus.foreign);
   fields.put("contested", bus.contested);
   fields.put_counts("errors", bus.errors,

@@ -100,7 +100,8 @@ Expected<void> GatewayLoop::open_buses(Setup& setup) {
 
 Expected<void> GatewayLoop::check_output(const Setup& setup) {
   const Bus& output = setup.buses[setup.plan.output.bus];
-  if (!setup.plan.output.fd || !output.is_open() || output.socket().fd_frames()) return {};
+  // A link that is down may still be given another MTU before it is up.
+  if (!setup.plan.output.fd || !output.is_up() || output.carries_fd()) return {};
   return fail(output.name(), "carries no CAN FD frames, but the config says `[output] fd = true`",
               "set `fd = false`, or enable FD on the link (`ip link set " + output.name() +
                   " mtu 72` for vcan, `type can … dbitrate … fd on` for a controller)");
@@ -351,6 +352,7 @@ void GatewayLoop::second_passed() {
   for (Bus& bus : setup_->buses)
     bus.second_passed();
   reopen_dead_buses();
+  look_whether_output_fits();
   notifier_.status(status_line());
   control_->second_passed();
   if (metrics_ != nullptr && metrics_->second_passed()) metrics_->write(snapshot());
@@ -379,11 +381,16 @@ void GatewayLoop::reopen_dead_buses() {
     if (i != setup_->plan.output.bus) continue;
     polls_writable_ = false;
     queue_.on_writable();
-    if (const Expected<void> fits = check_output(*setup_); !fits) {
-      log_.tell(Severity::kError, {.cause = "no_fd", .bus = bus.name()}, "{}",
-                fits.error().message());
-    }
   }
+}
+
+void GatewayLoop::look_whether_output_fits() {
+  const Expected<void> fits = check_output(*setup_);
+  const bool fitted = std::exchange(output_fits_, fits.has_value());
+  if (fits || !fitted) return;
+  log_.tell(Severity::kError,
+            {.cause = "no_fd", .bus = setup_->buses[setup_->plan.output.bus].name()}, "{}",
+            fits.error().message());
 }
 
 // Not from within the dispatching: the buses are replaced.

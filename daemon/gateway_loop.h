@@ -83,6 +83,7 @@ class GatewayLoop final : private gateway::FrameSink {
   void look_at_status();
   void second_passed();
   void reopen_dead_buses();
+  void look_whether_output_fits();
   void begin_reload();
   Expected<void> take_reloaded();
   Expected<void> do_what_was_asked();
@@ -129,6 +130,7 @@ class GatewayLoop final : private gateway::FrameSink {
   bool recalibration_wanted_ = false;
   bool reload_refused_ = false;
   bool told_of_shortage_ = false;
+  bool output_fits_ = true;  ///< when last looked at
   std::uint64_t watchdog_half_usec_ = 0;
   LifeSign life_;
   std::uint64_t put_out_ = 0;  ///< frames that the pipeline has put out

@@ -13,7 +13,8 @@ namespace vgyro::daemon {
 
 /// The host's clocks as one turn of the loop sees them: each is read when it is first asked for,
 /// and then stands still. Most turns ask for none: under User Mode Linux, and wherever the kernel
-/// has no quick way, reading one costs as much as reading a frame.
+/// has no quick way, reading one costs as much as reading a frame. Begun anew within a turn by a
+/// bus that has to know whether a stamp lies in the future.
 class TurnClock {
  public:
   using Read = TimePoint (*)();

@@ -205,9 +205,14 @@ void add_buses(Text& text, const Snapshot& now) {
   text.family("vgyro_bus_lost_frames_total", "counter", "Lost in the socket's buffer.");
   for (const BusStatus& bus : buses)
     text.sample({{"bus", bus.name}}, bus.lost);
-  text.family("vgyro_bus_link_downs_total", "counter", "Times that the link went down.");
+  text.family("vgyro_bus_link_downs_total", "counter",
+              "Times that the link went down, or the interface away while up.");
   for (const BusStatus& bus : buses)
     text.sample({{"bus", bus.name}}, bus.downs);
+  text.family("vgyro_bus_restamped_frames_total", "counter",
+              "Frames whose stamp was no time of arrival: the time of reading is used.");
+  for (const BusStatus& bus : buses)
+    text.sample({{"bus", bus.name}}, bus.restamped);
   text.family("vgyro_bus_foreign_frames_total", "counter",
               "Frames with our identifiers that somebody else sent.");
   for (const BusStatus& bus : buses)

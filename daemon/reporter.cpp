@@ -336,6 +336,13 @@ void Reporter::tell_bus(const BusStatus& bus, BusTold& told) {
     log_.tell(Severity::kWarning, {.cause = "receive_overrun", .bus = bus.name},
               "{}: {} received frames lost: the socket's buffer was full", bus.name, n);
   }
+  if (const std::uint64_t n = news(told.restamped, bus.restamped); n > 0) {
+    log_.tell(Severity::kWarning, {.cause = "restamped", .bus = bus.name},
+              "{}: {} frames had a stamp that is not the time of their arrival, so the time of "
+              "reading is used; does a program on this host send them with a launch time "
+              "(SO_TXTIME)?",
+              bus.name, n);
+  }
   if (const std::uint64_t n = news(told.foreign, bus.foreign); n > 0) {
     log_.tell(
         Severity::kWarning, {.cause = "foreign_frames", .bus = bus.name},

@@ -70,6 +70,7 @@ class Reporter {
   struct BusTold {
     std::array<Told, can::kErrorCauseCount> errors;
     Told lost;
+    Told restamped;
     Told foreign;
   };
 

@@ -8,6 +8,7 @@
 
 #include <fmt/core.h>
 
+#include "dbc/codes.h"
 #include "dbc/layout_check.h"
 
 namespace vgyro::dbc {
@@ -36,6 +37,7 @@ class Assembly {
  private:
   void index();
   void comments();
+  void long_names();
   void floats();
   void labels();
   void multiplex();
@@ -59,6 +61,7 @@ Database Assembly::run(std::string path) {
   index();
   multiplex();
   comments();
+  long_names();
   floats();
   labels();
   frame_formats();
@@ -112,6 +115,17 @@ void Assembly::comments() {
       if (signal != nullptr) signal->comment = std::move(statement.text);
     } else if (const auto message = message_index(statement.at)) {
       contents_.messages[*message].comment = std::move(statement.text);
+    }
+  }
+}
+
+void Assembly::long_names() {
+  for (LongNameStatement& statement : contents_.long_names) {
+    if (!statement.at.signal.empty()) {
+      Signal* const signal = find(statement.at);
+      if (signal != nullptr) signal->long_name = std::move(statement.name);
+    } else if (const auto message = message_index(statement.at)) {
+      contents_.messages[*message].long_name = std::move(statement.name);
     }
   }
 }
@@ -233,8 +247,8 @@ void Assembly::frame_formats() {
   };
   const std::string& protocol =
       contents_.protocol.empty() ? contents_.protocol_default : contents_.protocol;
-  const bool all_j1939 =
-      protocol == kJ1939Protocol || is_j1939_format(contents_.frame_format_default);
+  const bool all_j1939 = protocol == kJ1939Protocol || names_nmea2000(protocol) ||
+                         is_j1939_format(contents_.frame_format_default);
   for (Message& message : contents_.messages)
     message.is_j1939 = message.extended && all_j1939;
   for (const FrameFormatStatement& statement : contents_.frame_formats) {
@@ -243,6 +257,8 @@ void Assembly::frame_formats() {
     Message& message = contents_.messages[*index];
     message.is_j1939 = message.extended && is_j1939_format(statement.value);
   }
+  for (Message& message : contents_.messages)
+    message.codes = code_rules_of(message.id, message.is_j1939, protocol);
 }
 
 void Assembly::check_layouts() {

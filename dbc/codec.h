@@ -44,6 +44,15 @@ class SignalCodec {
   /// Writes the lowest bits of `raw`. Precondition: fits(payload.size()).
   void encode_raw(std::uint64_t raw, std::span<std::uint8_t> payload) const;
 
+  /// All bits of the signal, at the bottom of a word.
+  [[nodiscard]] std::uint64_t raw_mask() const { return ~std::uint64_t{0} >> shift_down_; }
+  /// The smallest raw value, of an integer.
+  [[nodiscard]] std::int64_t raw_min() const {
+    return type_ == ValueType::kSigned ? -static_cast<std::int64_t>(raw_mask() / 2) - 1 : 0;
+  }
+  /// The physical value of a raw one, in the very digits that decode() gives.
+  [[nodiscard]] double value_of(std::int64_t raw) const { return number(raw) * factor_ + offset_; }
+
   /// Physical values of the smallest and the largest raw value (of floats: ±largest finite).
   [[nodiscard]] double representable_min() const;
   [[nodiscard]] double representable_max() const;
@@ -105,7 +114,7 @@ inline Reading SignalCodec::decode(std::span<const std::uint8_t> payload) const 
   const std::int64_t raw = type_ == ValueType::kSigned
                                ? static_cast<std::int64_t>(top) >> shift_down_
                                : static_cast<std::int64_t>(top >> shift_down_);
-  return {raw, number(raw) * factor_ + offset_};
+  return {raw, value_of(raw)};
 }
 
 }  // namespace vgyro::dbc

@@ -47,6 +47,11 @@ struct CommentStatement {
   std::string text;
 };
 
+struct LongNameStatement {
+  Reference at;
+  std::string name;
+};
+
 struct LabelsStatement {
   Reference at;
   std::vector<ValueLabel> labels;
@@ -87,6 +92,7 @@ struct Contents {
   std::vector<Message> messages;
   std::vector<SimpleMultiplex> simple_multiplex;
   std::vector<CommentStatement> comments;
+  std::vector<LongNameStatement> long_names;
   std::vector<LabelsStatement> labels;
   std::vector<FloatStatement> floats;
   std::vector<MultiplexStatement> multiplex;

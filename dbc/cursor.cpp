@@ -191,6 +191,7 @@ std::int64_t Cursor::label_value() {
 std::size_t Cursor::closing_quote(std::size_t open) const {
   for (std::size_t i = open + 1; i < text_.size(); ++i) {
     if (text_[i] == '"') return i;
+    if (backslash_ == Backslash::kIsText) continue;
     const bool pair =
         text_[i] == '\\' && i + 1 < text_.size() && (text_[i + 1] == '"' || text_[i + 1] == '\\');
     if (pair) ++i;
@@ -215,6 +216,7 @@ std::string Cursor::quoted(std::string_view what, Wrap wrap) {
   std::string out;
   out.reserve(inside.size());
   for (std::size_t i = 0; i < inside.size(); ++i) {
+    // Inside quotes a quote stands behind a backslash only.
     if (inside[i] == '\\' && i + 1 < inside.size() && inside[i + 1] == '"') continue;
     out.push_back(inside[i]);
   }
@@ -265,10 +267,14 @@ Cursor::Mark Cursor::mark() {
   return {position_, line_};
 }
 
-void Cursor::resume_after(const Mark& statement_start) {
+void Cursor::go_back_to(const Mark& mark) {
   error_.clear();
-  position_ = statement_start.position;
-  line_ = statement_start.line;
+  position_ = mark.position;
+  line_ = mark.line;
+}
+
+void Cursor::resume_after(const Mark& statement_start) {
+  go_back_to(statement_start);
   do {
     skip_line();
     if (position_ < text_.size()) step();

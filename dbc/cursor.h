@@ -39,6 +39,10 @@ class Cursor {
   /// An integer that may be negative, beyond 2^63 (two's complement), or written as "3.0".
   std::int64_t label_value();
   enum class Wrap : bool { kNo, kYes };
+  /// Does \" stand for a quote, or does the text end there? In Shift JIS the second byte of some
+  /// characters is a backslash. From now on, until set again.
+  enum class Backslash : bool { kEscapes, kIsText };
+  void take_backslash_as(Backslash backslash) { backslash_ = backslash; }
   /// Unescaped text between quotes, over several lines where it may wrap.
   std::string quoted(std::string_view what, Wrap wrap);
   /// Empty when the line ends here.
@@ -59,6 +63,8 @@ class Cursor {
   };
   [[nodiscard]] Mark mark();
   void resume_after(const Mark& statement_start);
+  /// Forgets the error and goes back.
+  void go_back_to(const Mark& mark);
 
  private:
   void skip_blanks();
@@ -69,6 +75,7 @@ class Cursor {
   std::string_view text_;
   std::size_t position_ = 0;
   unsigned line_ = 1;
+  Backslash backslash_ = Backslash::kEscapes;
   std::string error_;
 };
 

@@ -10,14 +10,19 @@ namespace {
 // name the content; below PF 240 (PDU1) neither does PS, which is then a destination address.
 constexpr std::uint32_t kExtendedMask = 0x1FFFFFFF;
 constexpr std::uint32_t kStandardMask = 0x7FF;
+constexpr std::uint32_t kAllButPriority = 0x03FFFFFF;
 constexpr std::uint32_t kPdu2Mask = 0x03FFFF00;
 constexpr std::uint32_t kPdu1Mask = 0x03FF0000;
 constexpr std::uint32_t kFirstPdu2Format = 240;
 
 template <class T>
 const T* find_named(const std::vector<T>& items, std::string_view name) {
-  const auto found =
-      std::find_if(items.begin(), items.end(), [name](const T& item) { return item.name == name; });
+  const auto with = [&](std::string T::*which) {
+    return std::find_if(items.begin(), items.end(),
+                        [&](const T& item) { return item.*which == name; });
+  };
+  auto found = with(&T::name);
+  if (found == items.end() && !name.empty()) found = with(&T::long_name);
   return found == items.end() ? nullptr : &*found;
 }
 
@@ -27,6 +32,9 @@ std::vector<std::string> names_of(const std::vector<T>& items) {
   names.reserve(items.size());
   for (const T& item : items)
     names.push_back(item.name);
+  for (const T& item : items) {
+    if (!item.long_name.empty()) names.push_back(item.long_name);
+  }
   return names;
 }
 
@@ -53,8 +61,15 @@ bool Message::matches(std::uint32_t frame_id, bool frame_extended) const {
 
 std::uint32_t Message::id_mask() const {
   if (!extended) return kStandardMask;
-  if (!is_j1939) return kExtendedMask;
+  return is_j1939 ? pgn_mask(id) : kExtendedMask;
+}
+
+std::uint32_t pgn_mask(std::uint32_t id) {
   return ((id >> 16U) & 0xFFU) < kFirstPdu2Format ? kPdu1Mask : kPdu2Mask;
+}
+
+bool same_sender(std::uint32_t id, std::uint32_t other) {
+  return ((id ^ other) & kAllButPriority) == 0;
 }
 
 const Message* Database::find_message(std::string_view message_name) const {

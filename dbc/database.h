@@ -17,6 +17,9 @@ namespace vgyro::dbc {
 enum class ByteOrder : std::uint8_t { kIntel, kMotorola };
 enum class ValueType : std::uint8_t { kUnsigned, kSigned, kFloat32, kFloat64 };
 
+/// Whose rules say which raw values are no measurement (dbc/codes.h).
+enum class CodeRules : std::uint8_t { kNone, kJ1939, kNmea2000 };
+
 struct ValueLabel {
   std::int64_t raw = 0;
   std::string text;
@@ -30,6 +33,7 @@ struct MultiplexCondition {
 
 struct Signal {
   std::string name;
+  std::string long_name;  ///< as SystemSignalLongSymbol gives it; empty: the name is all of it
   std::uint16_t start_bit = 0;  ///< as in the file: LSB for Intel, MSB for Motorola
   std::uint16_t length_bits = 0;
   ByteOrder byte_order = ByteOrder::kIntel;
@@ -53,22 +57,33 @@ struct Signal {
 
 struct Message {
   std::string name;
-  std::uint32_t id = 0;  ///< without flags
+  std::string long_name;  ///< as SystemMessageLongSymbol gives it; empty: the name is all of it
+  std::uint32_t id = 0;   ///< without flags
   bool extended = false;
   bool is_j1939 = false;  ///< compare by PGN, any source address
+  CodeRules codes = CodeRules::kNone;
   std::uint16_t size_bytes = 0;
   std::string sender;
   std::string comment;
   std::vector<Signal> signals;
   unsigned line = 0;
 
+  /// By its name, or by its long name where no signal has that for its name.
   [[nodiscard]] const Signal* find_signal(std::string_view signal_name) const;
+  /// For suggestions: names, then long names.
   [[nodiscard]] std::vector<std::string> signal_names() const;
   /// Does a frame with this identifier carry this message?
   [[nodiscard]] bool matches(std::uint32_t frame_id, bool frame_extended) const;
   /// Identifier bits that take part in the match: all 11 or 29, or J1939's PGN.
   [[nodiscard]] std::uint32_t id_mask() const;
 };
+
+/// The bits of a 29-bit identifier that name its J1939 parameter group: what a message's mask would
+/// be if it were a J1939 message.
+std::uint32_t pgn_mask(std::uint32_t id);
+/// J1939: the same parameter group from the same sender, whatever its priority, to the same
+/// receiver.
+bool same_sender(std::uint32_t id, std::uint32_t other);
 
 /// Something odd in the file. The rest of the file is kept.
 struct Diagnostic {
@@ -81,7 +96,9 @@ struct Database {
   std::vector<Message> messages;
   std::vector<Diagnostic> diagnostics;
 
+  /// By its name, or by its long name where no message has that for its name.
   [[nodiscard]] const Message* find_message(std::string_view message_name) const;
+  /// For suggestions: names, then long names.
   [[nodiscard]] std::vector<std::string> message_names() const;
 };
 

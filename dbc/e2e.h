@@ -50,6 +50,7 @@ class E2eProtection {
   /// Bytes from the check value on that the kind needs in a payload.
   static std::size_t header_bytes(E2eKind kind);
 
+  [[nodiscard]] E2eKind kind() const { return layout_.kind; }
   [[nodiscard]] std::size_t bytes() const { return layout_.bytes; }
   /// The check value that this payload should carry. Precondition, here and below: bytes().
   [[nodiscard]] std::uint16_t value(std::span<const std::uint8_t> payload) const;

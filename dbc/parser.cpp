@@ -23,6 +23,9 @@ constexpr std::uint32_t kUint16Max = std::numeric_limits<std::uint16_t>::max();
 constexpr std::uint32_t kUint32Max = std::numeric_limits<std::uint32_t>::max();
 constexpr std::string_view kFrameFormat = "VFrameFormat";
 constexpr std::string_view kProtocol = "ProtocolType";
+// Names beyond 32 characters stand in attributes; the file itself shortens them.
+constexpr std::string_view kLongMessageName = "SystemMessageLongSymbol";
+constexpr std::string_view kLongSignalName = "SystemSignalLongSymbol";
 
 class Parser {
  public:
@@ -32,6 +35,7 @@ class Parser {
 
  private:
   void statement();
+  bool read_with_plain_backslashes(const Cursor::Mark& start);
   void symbols();
   void message();
   void signal();
@@ -71,11 +75,23 @@ Contents Parser::run() {
     const Cursor::Mark start = cursor_.mark();
     line_ = start.line;
     statement();
-    if (!cursor_.failed()) continue;
-    odd(cursor_.error());
+    if (!cursor_.failed() || read_with_plain_backslashes(start)) continue;
     cursor_.resume_after(start);
   }
   return std::move(contents_);
+}
+
+/// A statement that failed, once more: \" may be the end of a text in Shift JIS, where the second
+/// byte of a character can be a backslash. What parses is right; a failure is told as it was first.
+bool Parser::read_with_plain_backslashes(const Cursor::Mark& start) {
+  const std::string first_error = cursor_.error();
+  cursor_.go_back_to(start);
+  cursor_.take_backslash_as(Cursor::Backslash::kIsText);
+  statement();
+  cursor_.take_backslash_as(Cursor::Backslash::kEscapes);
+  if (!cursor_.failed()) return true;
+  odd(first_error);
+  return false;
 }
 
 void Parser::statement() {
@@ -336,21 +352,25 @@ void Parser::attribute_default() {
 /// BA_ "VFrameFormat" BO_ 2566844926 3;
 void Parser::attribute() {
   const std::string name = cursor_.quoted("the name of an attribute", Cursor::Wrap::kNo);
-  std::optional<Reference> message = attribute_target();
+  std::optional<Reference> target = attribute_target();
   AttributeValue value = attribute_value();
   end_of_statement();
   if (cursor_.failed()) return;
-  if (name == kFrameFormat && message) {
-    contents_.frame_formats.push_back({std::move(*message), std::move(value)});
+  const bool of_message = target && target->signal.empty();
+  if (name == kFrameFormat && of_message) {
+    contents_.frame_formats.push_back({std::move(*target), std::move(value)});
+  } else if ((name == kLongMessageName && of_message) ||
+             (name == kLongSignalName && target && !of_message)) {
+    contents_.long_names.push_back({std::move(*target), std::move(value.text)});
   } else if (name == kProtocol) {
     contents_.protocol = std::move(value.text);
   }
 }
 
-/// Gives the message, where the attribute is one of a message.
+/// Gives the message or the signal, where the attribute is one of these.
 std::optional<Reference> Parser::attribute_target() {
   if (cursor_.accept_word("BO_")) return Reference{line_, file_id(), {}};
-  if (cursor_.accept_word("SG_")) signal_reference();
+  if (cursor_.accept_word("SG_")) return signal_reference();
   if (cursor_.accept_word("BU_") || cursor_.accept_word("EV_")) cursor_.word("a name");
   return std::nullopt;
 }

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <filesystem>
 #include <numbers>
+#include <set>
 
 #include <fmt/core.h>
 
@@ -13,6 +14,7 @@
 #include "base/toml_reader.h"
 #include "fusion/polynomial.h"
 #include "gateway/e2e_config.h"
+#include "gateway/input_conflicts.h"
 #include "gateway/model_plan.h"
 #include "gateway/signal_resolver.h"
 
@@ -31,6 +33,7 @@ struct Context {
   std::vector<Error> errors;
   Resolved resolved;
   DatabaseCache cache{resolved.warnings};
+  std::set<BusFile> bus_files = {};
 };
 
 // "Status == 0"
@@ -110,14 +113,15 @@ void read_sign(TomlReader& reader, Quantity& rate) {
 void read_source_address(TomlReader& reader, const dbc::Message& message, FrameMatch& match) {
   const auto address = reader.integer("source_address");
   if (!address) return;
-  if (!message.is_j1939 || *address < 0 || *address > 255) {
+  if (!message.is_j1939 || *address < 0 || *address > std::int64_t{kSourceMask}) {
     reader.complain(reader.where("source_address"),
                     "source_address is 0 to 255, for a J1939 message",
                     "a message is J1939 when its DBC attribute VFrameFormat is J1939PG");
     return;
   }
-  match.id = (match.id & ~0xFFU) | static_cast<std::uint32_t>(*address);
-  match.mask |= 0xFFU;
+  match.id = (match.id & ~kSourceMask) | static_cast<std::uint32_t>(*address);
+  match.mask |= kSourceMask;
+  match.others.clear();
 }
 
 std::optional<ValidCondition> read_condition(TomlReader& reader, SignalResolver& resolver,
@@ -147,6 +151,7 @@ std::optional<GyroPlan> read_gyro(const toml::table& table, std::size_t index, C
   }
   SignalResolver resolver(reader, context.cache, context.folder, context.resolved.plan.buses,
                           context.resolved.warnings);
+  context.bus_files.insert({resolver.bus(), resolver.dbc_path()});
   const dbc::Signal* rate_signal = resolver.signal("rate", true);
   const dbc::Signal* sign_signal = resolver.signal("sign_signal", false);
   const dbc::Signal* temperature_signal = resolver.signal("temperature", false);
@@ -212,9 +217,7 @@ void read_gyros(TomlReader& root, Context& context) {
     if (auto gyro = read_gyro(*table, i, context)) gyros.push_back(std::move(*gyro));
   }
   if (gyros.size() != 2) return;
-  const FrameMatch& a = gyros[0].match;
-  const FrameMatch& b = gyros[1].match;
-  if (a.bus == b.bus && a.extended == b.extended && ((a.id ^ b.id) & a.mask & b.mask) == 0) {
+  if (may_share_frames(gyros[0].match, gyros[1].match)) {
     root.complain(root.where("gyro"),
                   fmt::format("both gyros are read from the same frame: {} on {}", gyros[0].message,
                               gyros[0].bus),
@@ -232,6 +235,7 @@ void read_optional(TomlReader& root, std::string_view key, Context& context, Rea
   TomlReader reader(*table, context.file, fmt::format("[{}]", key), context.errors);
   SignalResolver resolver(reader, context.cache, context.folder, context.resolved.plan.buses,
                           context.resolved.warnings);
+  context.bus_files.insert({resolver.bus(), resolver.dbc_path()});
   read(reader, resolver);
   reader.finish();
 }
@@ -242,13 +246,14 @@ void read_reference(TomlReader& reader, SignalResolver& resolver, Plan& plan) {
   auto rate =
       signal == nullptr ? std::nullopt : resolver.quantity(*signal, "rate", Dimension::kRate, unit);
   if (!rate) {
-    reader.forgive({"sign"});
+    reader.forgive({"sign", "source_address"});
     forgive_e2e(reader);
     return;
   }
   read_sign(reader, *rate);
   plan.reference = ReferencePlan{resolver.bus(), resolver.message().name, resolver.match(), *rate,
                                  read_e2e(reader, resolver, *signal)};
+  read_source_address(reader, resolver.message(), plan.reference->match);
 }
 
 void read_accelerometer(TomlReader& reader, SignalResolver& resolver, Plan& plan) {
@@ -262,6 +267,7 @@ void read_accelerometer(TomlReader& reader, SignalResolver& resolver, Plan& plan
     last = signal;
   }
   if (axes.size() != 3) {
+    reader.forgive({"source_address"});
     forgive_e2e(reader);
     return;
   }
@@ -270,6 +276,7 @@ void read_accelerometer(TomlReader& reader, SignalResolver& resolver, Plan& plan
                                          resolver.match(),
                                          {axes[0], axes[1], axes[2]},
                                          read_e2e(reader, resolver, *last)};
+  read_source_address(reader, resolver.message(), plan.accelerometer->match);
 }
 
 void read_speed(TomlReader& reader, SignalResolver& resolver, Plan& plan) {
@@ -277,11 +284,13 @@ void read_speed(TomlReader& reader, SignalResolver& resolver, Plan& plan) {
   const auto speed =
       signal == nullptr ? std::nullopt : resolver.quantity(*signal, "signal", Dimension::kSpeed);
   if (!speed) {
+    reader.forgive({"source_address"});
     forgive_e2e(reader);
     return;
   }
   plan.speed = SpeedPlan{resolver.bus(), resolver.message().name, resolver.match(), *speed,
                          read_e2e(reader, resolver, *signal)};
+  read_source_address(reader, resolver.message(), plan.speed->match);
 }
 
 void read_when_moving(TomlReader& reader, CalibrationPlan& plan) {
@@ -487,7 +496,10 @@ ConfigResult load_config(const std::string& path, const ConfigOverrides& overrid
   read_corrector(root, context, overrides);
   read_output(root, context);
   root.finish();
+  if (context.errors.empty()) check_apart(root, plan);
   if (context.errors.empty()) apply_knowledge(context);
+  if (context.errors.empty())
+    warn_of_conflicts(root, plan, context.cache, context.bus_files, context.resolved.warnings);
   if (!context.errors.empty()) return tl::unexpected(std::move(context.errors));
   context.resolved.files = context.cache.paths();
   context.resolved.files.push_back(path);

@@ -15,10 +15,19 @@ std::optional<Reject> E2eCheck::verify(const can::Frame& frame) const {
   return std::nullopt;
 }
 
+// The bits of a signed signal are a number without sign, too.
+std::uint64_t E2eCheck::bits(std::span<const std::uint8_t> payload) const {
+  const dbc::SignalCodec& codec = plan_->counter->codec;
+  return static_cast<std::uint64_t>(codec.decode(payload).raw) & codec.raw_mask();
+}
+
+bool E2eCheck::is_beyond(std::span<const std::uint8_t> payload) const {
+  return bits(payload) >= plan_->counter->modulus;
+}
+
 std::uint32_t E2eCheck::read(std::span<const std::uint8_t> payload) const {
   const std::uint32_t modulus = plan_->counter->modulus;
-  const auto now = static_cast<std::uint32_t>(plan_->counter->codec.decode(payload).raw) &
-                   (std::bit_ceil(modulus) - 1);
+  const auto now = static_cast<std::uint32_t>(bits(payload)) & (std::bit_ceil(modulus) - 1);
   return now >= modulus ? now - modulus : now;
 }
 
@@ -26,15 +35,16 @@ std::uint32_t E2eCheck::step(std::uint32_t from, std::uint32_t to) const {
   return to >= from ? to - from : to + plan_->counter->modulus - from;
 }
 
-std::optional<Reject> E2eCheck::count(std::span<const std::uint8_t> payload,
-                                      std::uint32_t& missing) {
-  missing = 0;
-  if (!plan_->counter) return std::nullopt;
-  const std::uint32_t now = read(payload);
+// The counter did not move: another page of the same round, or the frame once more?
+bool E2eCheck::is_new_round(std::uint32_t now, Page page) const {
+  if (page == Page::kOther) return true;  // only its number is asked
+  return page_ == Page::kOther && own_counter_ != now;
+}
+
+std::optional<Reject> E2eCheck::follow(std::uint32_t now, std::uint32_t& missing) {
   const std::uint32_t most = plan_->counter->max_delta;
   const std::uint32_t moved = step(counter_, now);
-  if (known_ && moved == 0) return Reject::kCounterRepeated;
-  if (known_ && counts_missing_) {
+  if (known_ && counts_missing_ && moved > 0) {
     if (most == 0 || moved <= most) {
       missing = moved - 1;
     } else {
@@ -52,11 +62,29 @@ std::optional<Reject> E2eCheck::count(std::span<const std::uint8_t> payload,
   return std::nullopt;
 }
 
-std::optional<Reject> E2eCheck::judge(const can::Frame& frame) {
+std::optional<Reject> E2eCheck::count(std::span<const std::uint8_t> payload, std::uint32_t& missing,
+                                      Page page) {
+  missing = 0;
+  if (!plan_->counter) return std::nullopt;
+  const AliveCounter& counter = *plan_->counter;
+  const bool is_there = counter.codec.fits(payload.size()) &&
+                        (counter.presence.always() || counter.presence.holds(payload));
+  if (!is_there) return std::nullopt;
+  if (counter.strict && is_beyond(payload)) return Reject::kWrongSequence;
+  const std::uint32_t now = read(payload);
+  if (known_ && now == counter_ && !is_new_round(now, page)) return Reject::kCounterRepeated;
+  if (const auto reject = follow(now, missing)) return reject;
+  page_ = page;
+  if (page == Page::kOwn) own_counter_ = now;
+  return std::nullopt;
+}
+
+std::optional<Reject> E2eCheck::judge(const can::Frame& frame, Page page) {
   if (const auto reject = verify(frame)) return reject;
-  if (plan_->counter && !plan_->counter->codec.fits(frame.length)) return Reject::kTruncated;
+  const bool own = page == Page::kOwn;
+  if (own && plan_->counter && !plan_->counter->codec.fits(frame.length)) return Reject::kTruncated;
   std::uint32_t missing = 0;
-  return count(frame.payload(), missing);
+  return count(frame.payload(), missing, page);
 }
 
 void E2eCheck::fall_silent() {

@@ -23,12 +23,19 @@ class E2eCheck {
   /// that fails must not be counted.
   [[nodiscard]] std::optional<Reject> verify(const can::Frame& frame) const;
 
+  /// Whose frame of a multiplexed message it is: of the page that is read, or of another one.
+  enum class Page : std::uint8_t { kOwn, kOther };
+
   /// The alive counter of a frame that is whole; `missing` of them were lost before it. Nothing
-  /// when it is new, else the cause. Precondition: the counter fits the payload.
-  std::optional<Reject> count(std::span<const std::uint8_t> payload, std::uint32_t& missing);
+  /// when it is new, else the cause. A counter that stands on all pages is followed over all of
+  /// them, for it counts the frames of the message; where it counts rounds of the pages, a frame
+  /// of the own page is new when it differs from the one before. Precondition: on the own page the
+  /// counter fits the payload.
+  std::optional<Reject> count(std::span<const std::uint8_t> payload, std::uint32_t& missing,
+                              Page page = Page::kOwn);
 
   /// Both, for a message of which only that is asked.
-  std::optional<Reject> judge(const can::Frame& frame);
+  std::optional<Reject> judge(const can::Frame& frame, Page page = Page::kOwn);
 
   /// After a silence the counter says nothing about how many frames are missing. The last frame
   /// sent once more is still none that is new; of a healthy sender that costs one frame now and
@@ -39,14 +46,20 @@ class E2eCheck {
   [[nodiscard]] std::uint32_t counter() const { return counter_; }
 
  private:
+  [[nodiscard]] std::uint64_t bits(std::span<const std::uint8_t> payload) const;
+  [[nodiscard]] bool is_beyond(std::span<const std::uint8_t> payload) const;
   [[nodiscard]] std::uint32_t read(std::span<const std::uint8_t> payload) const;
   [[nodiscard]] std::uint32_t step(std::uint32_t from, std::uint32_t to) const;
+  std::optional<Reject> follow(std::uint32_t now, std::uint32_t& missing);
+  [[nodiscard]] bool is_new_round(std::uint32_t now, Page page) const;
 
   static const E2ePlan kNothing;
 
   const E2ePlan* plan_;
-  std::uint32_t counter_ = 0;
+  std::uint32_t counter_ = 0;  ///< of the newest frame of any page
   bool known_ = false;
+  Page page_ = Page::kOwn;                        ///< of that frame
+  std::optional<std::uint32_t> own_counter_;      ///< of the newest frame of the own page
   bool counts_missing_ = false;                   ///< the counter has not been interrupted since
   std::optional<std::uint32_t> out_of_sequence_;  ///< of the frame before, refused
 };

@@ -18,12 +18,57 @@ constexpr std::int64_t kDataIdMostList = 0xFF;  // profile 2: a byte for each co
 
 using DataIds = std::array<std::uint16_t, dbc::kE2eDataIdsMost>;
 
+// Profiles 1 and 11 leave 15 out, whatever a DBC file says of the signal.
+constexpr std::uint32_t kModulusProfile1 = 15;
+constexpr unsigned kCounterBitsProfile1 = 4;
+
+bool is_profile_1(dbc::E2eKind kind) {
+  return kind == dbc::E2eKind::kProfile1A || kind == dbc::E2eKind::kProfile1B ||
+         kind == dbc::E2eKind::kProfile1C;
+}
+
+/// counter_max, the sender's profile, or the DBC file's range says how far a counter runs. False
+/// after a complaint.
+bool set_modulus(TomlReader& reader, const dbc::Signal& signal,
+                 const std::optional<CheckValue>& crc, AliveCounter& counter) {
+  const std::int64_t bits_most = (std::int64_t{1} << signal.length_bits) - 1;
+  const bool profile_1 =
+      crc && is_profile_1(crc->protection.kind()) && signal.length_bits == kCounterBitsProfile1;
+  if (profile_1) counter.modulus = kModulusProfile1;
+  // AUTOSAR counters leave the last value out; any other range is not about the counter.
+  if (signal.maximum == static_cast<double>(bits_most - 1)) {
+    counter.modulus = static_cast<std::uint32_t>(bits_most);
+  }
+  if (!reader.has("counter_max")) return true;
+  const auto most = reader.integer("counter_max");
+  if (!most) return false;
+  if (*most < 1 || *most > bits_most) {
+    reader.complain(
+        reader.where("counter_max"), fmt::format("counter_max is {}", *most),
+        fmt::format("1 to {}: {} has {} bits", bits_most, signal.name, signal.length_bits));
+    return false;
+  }
+  if (profile_1 && *most != kModulusProfile1 - 1) {
+    reader.complain(reader.where("counter_max"),
+                    fmt::format("counter_max is {}, but the counter of {} runs from 0 to {}", *most,
+                                crc->kind, kModulusProfile1 - 1),
+                    "leave counter_max out");
+    return false;
+  }
+  counter.modulus = static_cast<std::uint32_t>(*most + 1);
+  counter.strict = true;
+  return true;
+}
+
 std::optional<AliveCounter> read_counter(TomlReader& reader, SignalResolver& resolver,
-                                         const dbc::Signal& main) {
+                                         const dbc::Signal& main,
+                                         const std::optional<CheckValue>& crc) {
   const auto max_delta = reader.integer("max_delta_counter");
   const dbc::Signal* signal = resolver.signal("counter", false);
-  if (max_delta && !reader.has("counter")) {
-    reader.complain(reader.where("max_delta_counter"), "max_delta_counter without a counter",
+  reader.forgive({"counter_max"});
+  for (const char* key : {"max_delta_counter", "counter_max"}) {
+    if (!reader.has(key) || reader.has("counter")) continue;
+    reader.complain(reader.where(key), fmt::format("{} without a counter", key),
                     "counter = \"NAME\", the signal that it is about");
   }
   if (signal == nullptr || !resolver.shares_page("counter", *signal, main)) return std::nullopt;
@@ -36,9 +81,11 @@ std::optional<AliveCounter> read_counter(TomlReader& reader, SignalResolver& res
         "an integer signal of 2 to 31 bits");
     return std::nullopt;
   }
+  const auto pages = resolver.presence(*signal);
+  if (!pages) return std::nullopt;
   AliveCounter counter{signal->name, *codec, 1U << signal->length_bits};
-  // AUTOSAR counters leave the last value out; any other range is not about the counter.
-  if (signal->maximum == counter.modulus - 2.0) counter.modulus -= 1;
+  counter.presence = *pages;
+  if (!set_modulus(reader, *signal, crc, counter)) return std::nullopt;
   if (!max_delta) return counter;
   if (*max_delta < 1 || *max_delta >= counter.modulus - 1) {
     reader.complain(reader.where("max_delta_counter"),
@@ -181,11 +228,14 @@ std::optional<CheckValue> read_check_value(TomlReader& reader, SignalResolver& r
 }  // namespace
 
 E2ePlan read_e2e(TomlReader& reader, SignalResolver& resolver, const dbc::Signal& main) {
-  return {read_check_value(reader, resolver, main), read_counter(reader, resolver, main)};
+  E2ePlan plan;
+  plan.crc = read_check_value(reader, resolver, main);
+  plan.counter = read_counter(reader, resolver, main, plan.crc);
+  return plan;
 }
 
 void forgive_e2e(TomlReader& reader) {
-  reader.forgive({"crc", "e2e", "data_id", "counter", "max_delta_counter"});
+  reader.forgive({"crc", "e2e", "data_id", "counter", "max_delta_counter", "counter_max"});
 }
 
 }  // namespace vgyro::gateway

@@ -1,7 +1,7 @@
 #pragma once
 
 // The keys of a table of the configuration that say how its message proves itself: crc, e2e,
-// data_id, counter, max_delta_counter.
+// data_id, counter, max_delta_counter, counter_max.
 
 #include "base/toml_reader.h"
 #include "gateway/plan.h"

@@ -37,8 +37,8 @@ Reject reject_of(Fault fault) {
 fusion::SensorLimits limits_of(const GyroPlan& plan) {
   const Quantity& rate = plan.rate;
   const auto value = [&](double raw) { return raw * rate.scale + rate.shift; };
-  const double low = value(std::max(rate.minimum, rate.codec.representable_min()));
-  const double high = value(std::min(rate.maximum, rate.codec.representable_max()));
+  const double low = value(rate.lowest());
+  const double high = value(rate.highest());
   fusion::SensorLimits limits{.lowest_dps = std::min(low, high),
                               .highest_dps = std::max(low, high),
                               .dead_band_dps = plan.dead_band_dps,
@@ -58,7 +58,8 @@ GyroHealth::GyroHealth(const GyroPlan& plan) : watch_(limits_of(plan)) {}
 
 bool GyroHealth::tells_of_sensor(Reject cause) {
   return cause == Reject::kFlaggedInvalid || cause == Reject::kNotFinite ||
-         cause == Reject::kOutOfRange || cause == Reject::kCounterRepeated;
+         cause == Reject::kOutOfRange || cause == Reject::kNoMeasurement ||
+         cause == Reject::kCounterRepeated;
 }
 
 std::optional<Fault> GyroHealth::fault_in(fusion::SensorWatch::Finding finding,

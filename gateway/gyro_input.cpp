@@ -24,10 +24,13 @@ std::size_t bytes_of(const GyroPlan& plan) {
 // Precondition: the signal is there and fits.
 std::optional<Reject> convert(const Quantity& quantity, std::span<const std::uint8_t> payload,
                               double& value) {
-  const double raw = quantity.codec.decode(payload).value;
-  value = raw * quantity.scale + quantity.shift;
-  if (raw >= quantity.minimum && raw <= quantity.maximum) return std::nullopt;
-  return std::isfinite(raw) ? Reject::kOutOfRange : Reject::kNotFinite;
+  const dbc::Reading reading = quantity.codec.decode(payload);
+  value = reading.value * quantity.scale + quantity.shift;
+  if (reading.value >= quantity.minimum && reading.value <= quantity.maximum) return std::nullopt;
+  if (quantity.codes_in_range && quantity.codes.contains(reading.raw)) {
+    return Reject::kNoMeasurement;
+  }
+  return std::isfinite(reading.value) ? Reject::kOutOfRange : Reject::kNotFinite;
 }
 
 }  // namespace
@@ -92,6 +95,7 @@ GyroInput::Result GyroInput::decode(const can::Frame& frame) {
   const auto payload = frame.payload();
   if (!plan_.rate.presence.always() && !plan_.rate.presence.holds(payload)) {
     keep_besides(frame);
+    (void)e2e_.count(payload, result.missing, E2eCheck::Page::kOther);
     result.reject = Reject::kOtherPage;
     return result;
   }

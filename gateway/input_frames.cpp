@@ -46,7 +46,11 @@ can::Frame empty_frame(const FrameMatch& match) {
 
 void put_quantity(const Quantity& quantity, double value, can::Frame& frame) {
   quantity.presence.arrange(payload_of(frame));
-  quantity.codec.encode(in_unit_of(quantity, value), payload_of(frame));
+  double there = in_unit_of(quantity, value);
+  // What is too large must not become a code that says "not available".
+  if (!quantity.codes.empty())
+    there = std::clamp(there, quantity.sendable_lowest(), quantity.sendable_highest());
+  quantity.codec.encode(there, payload_of(frame));
 }
 
 void put_gyro(const GyroPlan& plan, double rate_dps, std::uint64_t count, can::Frame& frame) {
@@ -76,9 +80,8 @@ bool carries(const GyroPlan& plan, const Quantity& beside, const can::Frame& fra
 }
 
 double carried_dps(const GyroPlan& plan) {
-  const dbc::SignalCodec& codec = plan.rate.codec;
-  const double low = codec.representable_min() * plan.rate.scale + plan.rate.shift;
-  const double high = codec.representable_max() * plan.rate.scale + plan.rate.shift;
+  const double low = plan.rate.sendable_lowest() * plan.rate.scale + plan.rate.shift;
+  const double high = plan.rate.sendable_highest() * plan.rate.scale + plan.rate.shift;
   if (plan.sign) return std::max(std::abs(low), std::abs(high));
   return std::min(std::abs(low), std::abs(high));
 }

@@ -6,6 +6,7 @@
 // refuse the same. Keeps no books and knows nothing of the pipeline's states; the guard is the
 // host's and is only lent.
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -57,7 +58,10 @@ class QuantityInput {
   };
   Result decode(const can::Frame& frame) {
     Result result;
-    result.reject = e2e_.judge(frame);
+    const bool own = std::all_of(quantities_.begin(), quantities_.end(), [&](const Quantity* q) {
+      return q->presence.always() || q->presence.holds(frame.payload());
+    });
+    result.reject = e2e_.judge(frame, own ? E2eCheck::Page::kOwn : E2eCheck::Page::kOther);
     for (std::size_t i = 0; i < N && !result.reject; ++i)
       result.reject = decode_quantity(*quantities_[i], frame, result.value[i]);
     return result;

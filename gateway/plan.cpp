@@ -1,6 +1,28 @@
 #include "gateway/plan.h"
 
+#include <algorithm>
+
 namespace vgyro::gateway {
+
+bool FrameMatch::carries(std::uint32_t frame_id, bool frame_extended) const {
+  if (frame_extended != extended || ((frame_id ^ id) & mask) != 0) return false;
+  return std::none_of(others.begin(), others.end(), [frame_id](std::uint32_t other) {
+    return dbc::same_sender(frame_id, other);
+  });
+}
+
+// The codes lie at the top of the raw values; what is below them measures.
+double Quantity::sendable_lowest() const {
+  if (codes.empty()) return codec.representable_min();
+  const double top = codec.value_of(static_cast<std::int64_t>(codes.first - 1));
+  return std::min(top, codec.value_of(codec.raw_min()));
+}
+
+double Quantity::sendable_highest() const {
+  if (codes.empty()) return codec.representable_max();
+  const double top = codec.value_of(static_cast<std::int64_t>(codes.first - 1));
+  return std::max(top, codec.value_of(codec.raw_min()));
+}
 
 std::vector<FrameMatch> Plan::inputs() const {
   std::vector<FrameMatch> matches{gyros[0].match, gyros[1].match};

@@ -3,6 +3,7 @@
 // A configuration after everything in it has been resolved: which bits of which frame on which bus
 // are which quantity. Built by gateway/config.h from files, or by tests by hand.
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <optional>
@@ -11,6 +12,7 @@
 
 #include "can/frame.h"
 #include "dbc/codec.h"
+#include "dbc/codes.h"
 #include "dbc/e2e.h"
 #include "dbc/multiplex.h"
 #include "fusion/calibration.h"
@@ -22,13 +24,19 @@ namespace vgyro::gateway {
 enum class Method : std::uint8_t { kMean, kMutual, kOptimal };
 
 /// A frame identifier on a bus: matches when (id & mask) == (frame.id & mask) and the format
-/// agrees.
+/// agrees, unless it is that of another message: an exact identifier goes before a PGN.
 struct FrameMatch {
   can::BusIndex bus = 0;
   std::uint32_t id = 0;
   std::uint32_t mask = 0;
   bool extended = false;
   std::uint8_t bytes = can::kClassicBytesMax;  ///< of the payload, by the DBC file
+  /// J1939 without a source address: identifiers that the DBC file gives other messages of the same
+  /// PGN.
+  std::vector<std::uint32_t> others = {};
+
+  /// Does a frame of this identifier carry the message? Of its bus the caller knows.
+  [[nodiscard]] bool carries(std::uint32_t frame_id, bool frame_extended) const;
 
   friend bool operator==(const FrameMatch&, const FrameMatch&) = default;
 };
@@ -43,8 +51,18 @@ struct Quantity {
   double shift = 0.0;  ///< the sign of the configuration is part of the scale
   double minimum = 0.0;  ///< accepted values, in the DBC's unit
   double maximum = 0.0;
-  std::string layout;  ///< for people: "32 bits from bit 0, Intel, signed, x 1e-06"
-  double step = 0.0;   ///< between neighbouring values, in the product's unit; 0 for floats
+  std::string layout;     ///< for people: "32 bits from bit 0, Intel, signed, x 1e-06"
+  double step = 0.0;      ///< between neighbouring values, in the product's unit; 0 for floats
+  dbc::Codes codes = {};  ///< raw values that are no measurement; outside minimum and maximum
+  bool codes_in_range = false;  ///< the DBC file's range does not leave them out
+
+  /// What the bits can hold and is a measurement, in the DBC's unit.
+  [[nodiscard]] double sendable_lowest() const;
+  [[nodiscard]] double sendable_highest() const;
+
+  /// The least and the greatest accepted value that can be sent, in the DBC's unit.
+  [[nodiscard]] double lowest() const { return std::max(minimum, sendable_lowest()); }
+  [[nodiscard]] double highest() const { return std::min(maximum, sendable_highest()); }
 
   friend bool operator==(const Quantity&, const Quantity&) = default;
 };
@@ -73,6 +91,8 @@ struct AliveCounter {
   dbc::SignalCodec codec;
   std::uint32_t modulus = 256;  ///< values it runs through: 0 … modulus − 1
   std::uint32_t max_delta = 0;  ///< a longer step is a wrong sequence; 0: any step is right
+  bool strict = false;          ///< a value beyond the modulus is a wrong sequence
+  dbc::Presence presence = {};  ///< of a multiplexed counter: the pages that carry it
 
   friend bool operator==(const AliveCounter&, const AliveCounter&) = default;
 };

@@ -23,8 +23,7 @@ void Router::add(const FrameMatch& match, std::uint8_t role) {
 std::uint8_t Router::extended_roles(can::BusIndex bus, std::uint32_t id) const {
   std::uint8_t roles = 0;
   for (const Entry& entry : extended_) {
-    const bool same_id = (id & entry.match.mask) == (entry.match.id & entry.match.mask);
-    if (entry.match.bus == bus && same_id) roles |= entry.role;
+    if (entry.match.bus == bus && entry.match.carries(id, true)) roles |= entry.role;
   }
   return roles;
 }

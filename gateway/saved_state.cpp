@@ -308,8 +308,9 @@ Expected<SavedState> saved_state_from(std::string_view text, const std::string& 
   if (!parsed) return tl::unexpected(parsed.error());
   const toml::table& root = *parsed;
   const toml::table* drift = root["drift"].as_table();
-  const std::optional<std::int64_t> format = root["format"].value<std::int64_t>();
-  if (drift == nullptr || format != kFormat) {
+  // Not by value<>(): the library casts a number with a fraction before it looks whether that fits.
+  const toml::value<std::int64_t>* format = root["format"].as_integer();
+  if (drift == nullptr || format == nullptr || format->get() != kFormat) {
     return fail(where, fmt::format("is of another version: only format {} is known", kFormat),
                 kRemedy);
   }

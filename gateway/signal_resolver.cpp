@@ -86,6 +86,11 @@ const dbc::Database* DatabaseCache::get(const std::string& path, TomlReader& rea
   return (files_[path] = std::make_unique<dbc::Database>(std::move(*loaded))).get();
 }
 
+const dbc::Database* DatabaseCache::loaded(const std::string& path) const {
+  const auto found = files_.find(path);
+  return found == files_.end() ? nullptr : found->second.get();
+}
+
 std::vector<std::string> DatabaseCache::paths() const {
   std::vector<std::string> paths;
   for (const auto& [path, database] : files_)
@@ -100,27 +105,46 @@ SignalResolver::SignalResolver(TomlReader& reader, DatabaseCache& cache,
   bus_ = required_bus(reader);
   const std::string dbc = reader.required_text("dbc", "bench.dbc");
   const std::string message = reader.required_text("message", "GYRO_A");
+  const auto codes = read_code_rules();
   if (bus_.empty() || dbc.empty() || message.empty()) return;
   bus_index_ = bus_index(buses, bus_);
   dbc_path_ = (std::filesystem::path(config_folder) / dbc).lexically_normal().string();
   find_message(message, cache);
+  if (message_ != nullptr) rules_ = codes.value_or(message_->codes);
 }
 
 void SignalResolver::find_message(std::string_view name, DatabaseCache& cache) {
-  const dbc::Database* database = cache.get(dbc_path_, reader_);
-  if (database == nullptr) return;
-  message_ = database->find_message(name);
+  database_ = cache.get(dbc_path_, reader_);
+  if (database_ == nullptr) return;
+  message_ = database_->find_message(name);
   if (message_ == nullptr) {
     reader_.complain(reader_.where("message"),
                      fmt::format("{} has no message \"{}\"", dbc_path_, name),
-                     suggest_name(name, database->message_names()));
+                     suggest_name(name, database_->message_names()));
   }
+}
+
+std::optional<dbc::CodeRules> SignalResolver::read_code_rules() {
+  const auto name = reader_.text("codes");
+  if (!name) return std::nullopt;
+  const auto rules = dbc::code_rules_from(*name);
+  if (!rules) {
+    reader_.complain(reader_.where("codes"), fmt::format("codes is \"{}\"", *name),
+                     suggest_name(*name, {"j1939", "nmea2000", "none"}));
+  }
+  return rules;
 }
 
 FrameMatch SignalResolver::match() const {
   const auto bytes = std::min<std::size_t>(message_->size_bytes, can::kFdBytesMax);
-  return {bus_index_, message_->id, message_->id_mask(), message_->extended,
-          static_cast<std::uint8_t>(bytes)};
+  FrameMatch match{bus_index_, message_->id, message_->id_mask(), message_->extended,
+                   static_cast<std::uint8_t>(bytes)};
+  if (!message_->is_j1939) return match;
+  for (const dbc::Message& other : database_->messages) {
+    const bool same_group = other.matches(message_->id, true) && message_->matches(other.id, true);
+    if (same_group && !dbc::same_sender(other.id, message_->id)) match.others.push_back(other.id);
+  }
+  return match;
 }
 
 const dbc::Signal* SignalResolver::signal(std::string_view key, bool required) {
@@ -160,14 +184,18 @@ std::optional<dbc::SignalCodec> SignalResolver::codec(const dbc::Signal& signal)
   return std::nullopt;
 }
 
+std::optional<dbc::Presence> SignalResolver::presence(const dbc::Signal& signal) {
+  auto made = dbc::Presence::make(*message_, signal, signal_place(signal));
+  if (made) return *made;
+  reader_.complain(made.error().where, made.error().what, made.error().remedy);
+  return std::nullopt;
+}
+
 std::optional<Quantity> SignalResolver::quantity(const dbc::Signal& signal, std::string_view key,
                                                  Dimension dimension,
                                                  const std::optional<std::string>& unit) {
   auto bits = codec(signal);
-  auto presence = dbc::Presence::make(*message_, signal, signal_place(signal));
-  if (!presence) {
-    reader_.complain(presence.error().where, presence.error().what, presence.error().remedy);
-  }
+  auto pages = presence(signal);
   const std::string& spelling = unit ? *unit : signal.unit;
   const auto conversion = convert_unit(dimension, spelling);
   if (!conversion) {
@@ -183,18 +211,29 @@ std::optional<Quantity> SignalResolver::quantity(const dbc::Signal& signal, std:
                            signal.name, signal_place(signal), spelling),
         remedy);
   }
-  if (!bits || !presence || !conversion) return std::nullopt;
+  if (!bits || !pages || !conversion) return std::nullopt;
   Quantity quantity{
       .name = signal.name,
       .unit = spelling,
       .codec = *bits,
-      .presence = *presence,
+      .presence = *pages,
       .scale = conversion->scale,
       .shift = conversion->shift,
       .layout = layout_of(signal),
       .step = signal.is_integer() ? std::abs(signal.factor) * conversion->scale : 0.0};
   set_limits(quantity, signal, dimension);
+  exclude_codes(quantity, signal);
   return quantity;
+}
+
+// Whatever range the file gives. Where that leaves the codes out already, they are out of range.
+void SignalResolver::exclude_codes(Quantity& quantity, const dbc::Signal& signal) const {
+  quantity.codes = dbc::codes_of(signal, rules_);
+  if (quantity.codes.empty()) return;
+  const double first = quantity.codec.value_of(static_cast<std::int64_t>(quantity.codes.first));
+  quantity.codes_in_range = first >= quantity.minimum && first <= quantity.maximum;
+  quantity.minimum = std::max(quantity.minimum, quantity.sendable_lowest());
+  quantity.maximum = std::min(quantity.maximum, quantity.sendable_highest());
 }
 
 // The DBC's range is believed only where the signal can reach it, and only with both directions of

@@ -23,6 +23,8 @@ class DatabaseCache {
   explicit DatabaseCache(std::vector<Error>& warnings) : warnings_(warnings) {}
   /// Null after a complaint.
   const dbc::Database* get(const std::string& path, TomlReader& reader);
+  /// Null when it was never asked for, or after a complaint.
+  [[nodiscard]] const dbc::Database* loaded(const std::string& path) const;
   [[nodiscard]] std::vector<std::string> paths() const;
 
  private:
@@ -33,7 +35,7 @@ class DatabaseCache {
 /// One message of one table of the configuration.
 class SignalResolver {
  public:
-  /// Reads the keys bus, dbc, message of the table.
+  /// Reads the keys bus, dbc, message, codes of the table.
   SignalResolver(TomlReader& reader, DatabaseCache& cache, const std::string& config_folder,
                  std::vector<std::string>& buses, std::vector<Error>& warnings);
 
@@ -54,11 +56,15 @@ class SignalResolver {
                                    Dimension dimension,
                                    const std::optional<std::string>& unit = {});
   std::optional<dbc::SignalCodec> codec(const dbc::Signal& signal);
+  /// The pages that carry the signal; nothing after a complaint.
+  std::optional<dbc::Presence> presence(const dbc::Signal& signal);
 
  private:
   [[nodiscard]] std::string signal_place(const dbc::Signal& signal) const;
   void set_limits(Quantity& quantity, const dbc::Signal& signal, Dimension dimension);
+  void exclude_codes(Quantity& quantity, const dbc::Signal& signal) const;
   void find_message(std::string_view name, DatabaseCache& cache);
+  std::optional<dbc::CodeRules> read_code_rules();
 
   TomlReader& reader_;
   std::vector<Error>& warnings_;
@@ -66,6 +72,8 @@ class SignalResolver {
   can::BusIndex bus_index_ = 0;
   std::string dbc_path_;
   const dbc::Message* message_ = nullptr;
+  const dbc::Database* database_ = nullptr;
+  dbc::CodeRules rules_ = dbc::CodeRules::kNone;  ///< of the key "codes", or of the DBC file
 };
 
 /// The key "bus" of any table, after a complaint where it cannot be an interface.

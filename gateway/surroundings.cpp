@@ -99,7 +99,8 @@ bool Surroundings::receive_speed(const can::Frame& frame, TimePoint raw,
                                  fusion::StampGuard& guard) {
   const ScalarIntake::Result taken = speed_->take(frame, raw, guard);
   // The sensor says that it does not know: what it said before is worth no more.
-  const bool unknown = taken.reject == Reject::kOutOfRange || taken.reject == Reject::kNotFinite;
+  const bool unknown = taken.reject == Reject::kOutOfRange || taken.reject == Reject::kNotFinite ||
+                       taken.reject == Reject::kNoMeasurement;
   if (unknown) speed_at_ = std::nullopt;
   if (taken.reject) return false;
   speed_at_ = taken.stamp.t;

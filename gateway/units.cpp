@@ -1,7 +1,11 @@
 #include "gateway/units.h"
 
+#include <algorithm>
 #include <cctype>
+#include <iterator>
 #include <numbers>
+
+#include <fmt/format.h>
 
 namespace vgyro::gateway {
 
@@ -23,9 +27,17 @@ constexpr Spelling kSpellings[] = {
     {Dimension::kRate, "rpm", {6.0}},
     {Dimension::kTemperature, "degc", {1.0}},
     {Dimension::kTemperature, "°c", {1.0}},
-    {Dimension::kTemperature, "ºc", {1.0}},
     {Dimension::kTemperature, "c", {1.0}},
     {Dimension::kTemperature, "celsius", {1.0}},
+    {Dimension::kTemperature, "degcelsius", {1.0}},
+    {Dimension::kTemperature, "degreec", {1.0}},
+    {Dimension::kTemperature, "degreesc", {1.0}},
+    {Dimension::kTemperature, "degreecelsius", {1.0}},
+    {Dimension::kTemperature, "degreescelsius", {1.0}},
+    {Dimension::kTemperature, "degrecelsi", {1.0}},  // of "Unit_DegreCelsi"
+    {Dimension::kTemperature, "gradc", {1.0}},
+    {Dimension::kTemperature, "gradcelsius", {1.0}},
+    {Dimension::kTemperature, "degk", {1.0, -273.15}},
     {Dimension::kTemperature, "k", {1.0, -273.15}},
     {Dimension::kTemperature, "kelvin", {1.0, -273.15}},
     {Dimension::kTemperature, "degf", {5.0 / 9.0, -160.0 / 9.0}},
@@ -36,8 +48,20 @@ constexpr Spelling kSpellings[] = {
     {Dimension::kAcceleration, "m/s2", {1.0 / kStandardGravity}},
     {Dimension::kAcceleration, "m/s²", {1.0 / kStandardGravity}},
     {Dimension::kAcceleration, "m/s/s", {1.0 / kStandardGravity}},
+    {Dimension::kAcceleration, "m/s**2", {1.0 / kStandardGravity}},
+    {Dimension::kAcceleration, "m/ss", {1.0 / kStandardGravity}},
+    {Dimension::kAcceleration, "m/sec^2", {1.0 / kStandardGravity}},
+    {Dimension::kAcceleration, "m/sec2", {1.0 / kStandardGravity}},
+    {Dimension::kAcceleration, "meterperseconsquar", {1.0 / kStandardGravity}},
+    {Dimension::kAcceleration, "meterpersecondsquared", {1.0 / kStandardGravity}},
     {Dimension::kSpeed, "m/s", {1.0}},
+    {Dimension::kSpeed, "m/sec", {1.0}},
+    {Dimension::kSpeed, "meterpersecon", {1.0}},
+    {Dimension::kSpeed, "meterpersecond", {1.0}},
     {Dimension::kSpeed, "km/h", {1.0 / 3.6}},
+    {Dimension::kSpeed, "km/hr", {1.0 / 3.6}},
+    {Dimension::kSpeed, "kmph", {1.0 / 3.6}},
+    {Dimension::kSpeed, "kilometerperhour", {1.0 / 3.6}},
     {Dimension::kSpeed, "kph", {1.0 / 3.6}},
     {Dimension::kSpeed, "kmh", {1.0 / 3.6}},
     {Dimension::kSpeed, "mph", {kMetrePerMile / 3600.0}},
@@ -53,9 +77,8 @@ struct Word {
   std::string_view word;
   double size;
 };
-// German "Grad" is a degree, not a gon; "º", the ordinal indicator, is typed for the degree sign.
-// Exports of some tools spell units out, and DBC names end after 32 characters:
-// "Unit_DegreOfArcPerSecon".
+// German "Grad" is a degree, not a gon. Exports of some tools spell units out, and DBC names end
+// after 32 characters: "Unit_DegreOfArcPerSecon".
 constexpr Word kAngles[] = {{"deg", 1.0},
                             {"degree", 1.0},
                             {"degrees", 1.0},
@@ -64,7 +87,6 @@ constexpr Word kAngles[] = {{"deg", 1.0},
                             {"degreofarc", 1.0},
                             {"degreesofarc", 1.0},
                             {"°", 1.0},
-                            {"º", 1.0},
                             {"grad", 1.0},
                             {"rad", kDegPerRad},
                             {"rads", kDegPerRad},
@@ -88,33 +110,49 @@ constexpr Quotient kQuotients[] = {{"/", ""},    {"per", ""},  {"pro", ""},  {""
                                    {"*", "-1"},  {"·", "-1"},  {".", "-1"},  {"", "⁻¹"},
                                    {"*", "⁻¹"},  {"·", "⁻¹"},  {".", "⁻¹"}};
 
+// Signs that are typed or shown for the degree sign: the ordinal indicator, the ring, UTF-8 that
+// was taken for cp1252 and written as UTF-8 once more; and letters that hold it.
+struct Sign {
+  std::string_view typed;
+  std::string_view meant;
+};
+constexpr Sign kSigns[] = {{"Â°", "°"}, {"Âº", "°"}, {"º", "°"},
+                           {"˚", "°"},  {"℃", "°c"}, {"℉", "°f"}};
+
 std::string normalised(std::string_view unit) {
   std::string text;
   for (const char c : unit) {
     if (c != ' ' && c != '_')
       text += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
   }
+  for (const Sign& sign : kSigns) {
+    for (std::size_t at = text.find(sign.typed); at != text.npos; at = text.find(sign.typed, at))
+      text.replace(at, sign.typed.size(), sign.meant);
+  }
   constexpr std::string_view kPrefix = "unit";
   if (text.starts_with(kPrefix)) text.erase(0, kPrefix.size());
   return text;
 }
 
+std::optional<double> degrees_of(std::string_view angle) {
+  for (const Word& prefix : kPrefixes) {
+    if (!angle.starts_with(prefix.word)) continue;
+    const std::string_view word = angle.substr(prefix.word.size());
+    const auto* const found = std::find_if(std::begin(kAngles), std::end(kAngles),
+                                           [&](const Word& one) { return one.word == word; });
+    if (found != std::end(kAngles)) return prefix.size * found->size;
+  }
+  return std::nullopt;
+}
+
 // An angle by a time, in deg/s.
 std::optional<double> rate_unit(std::string_view unit) {
-  for (const Word& prefix : kPrefixes) {
-    for (const Word& angle : kAngles) {
-      for (const Word& time : kTimes) {
-        for (const Quotient& quotient : kQuotients) {
-          std::string_view rest = unit;
-          bool fits = true;
-          for (const std::string_view part :
-               {prefix.word, angle.word, quotient.between, time.word, quotient.behind}) {
-            fits = fits && rest.starts_with(part);
-            if (fits) rest.remove_prefix(part.size());
-          }
-          if (fits && rest.empty()) return prefix.size * angle.size / time.size;
-        }
-      }
+  for (const Quotient& quotient : kQuotients) {
+    for (const Word& time : kTimes) {
+      const std::string tail = fmt::format("{}{}{}", quotient.between, time.word, quotient.behind);
+      if (!unit.ends_with(tail)) continue;
+      const auto degrees = degrees_of(unit.substr(0, unit.size() - tail.size()));
+      if (degrees) return *degrees / time.size;
     }
   }
   return std::nullopt;

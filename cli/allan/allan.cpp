@@ -9,6 +9,7 @@
 #include "cli/allan/report.h"
 #include "cli/commands.h"
 #include "cli/exit_code.h"
+#include "cli/log_notes.h"
 #include "cli/output/errors.h"
 #include "cli/output/gnuplot.h"
 #include "cli/output/json_text.h"
@@ -25,16 +26,16 @@ namespace {
 constexpr double kSecondsMin = 10.0;
 
 Expected<AllanReport> judge(const AllanOptions& options, const gateway::Plan& plan) {
-  const auto recording = read_pair_recording(options.log, plan);
+  const auto recording = read_pair_recording(options.logs, plan);
   if (!recording) return tl::unexpected(recording.error());
   const double seconds = recording->paired[0].seconds();
   if (seconds < kSecondsMin) {
     return fail(
-        options.log,
+        name_of(options.logs),
         fmt::format("holds {:.1f} s of both gyros, too short to tell noise from drift", seconds),
         fmt::format("{:g} s at the least; an hour at rest shows drift", kSecondsMin));
   }
-  AllanReport report{options.log, {plan.gyros[0].name, plan.gyros[1].name}, {}, {}};
+  AllanReport report{name_of(options.logs), {plan.gyros[0].name, plan.gyros[1].name}, {}, {}};
   report.noise = analysis::judge_pair(*recording);
   if (const auto& fit = report.noise.difference.fit) {
     report.recommendation = analysis::recommend(*fit, report.noise.difference.seconds);
@@ -53,7 +54,7 @@ int run_allan(const AllanOptions& options) {
     if (const auto good = check_picture_path(options.plot); !good) return report(good.error());
   }
   std::vector<std::string> inputs = loaded->files;
-  inputs.push_back(options.log);
+  inputs.insert(inputs.end(), options.logs.begin(), options.logs.end());
   const auto free = check_outputs(inputs, {options.json, options.plot});
   if (!free) return report(free.error());
   const auto judged = judge(options, loaded->plan);

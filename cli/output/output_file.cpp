@@ -15,9 +15,10 @@ constexpr int kDiscard = -1;
 
 namespace fs = std::filesystem;
 
-// What a file of this name is, or will be: through symbolic links. Empty for what is no file and
-// for what only names an open one, such as /dev/stdout: that is written to as it is.
-std::string place_of_file(const std::string& path) {
+// Where a file of this name is, or will be, through symbolic links. Empty for what a new file must
+// not replace: what is no file, what only names an open one, such as /dev/stdout, and a file that
+// may not be written to.
+std::string replaceable_place(const std::string& path) {
   std::error_code code;
   const fs::path place = fs::weakly_canonical(path, code);
   if (code || !place.has_filename()) return {};
@@ -25,7 +26,8 @@ std::string place_of_file(const std::string& path) {
   if (folder == "/dev" || folder.starts_with("/proc/")) return {};
   struct stat info {};
   if (::stat(place.c_str(), &info) != 0) return errno == ENOENT ? place.string() : std::string();
-  return S_ISREG(info.st_mode) ? place.string() : std::string();
+  const bool free = S_ISREG(info.st_mode) && ::access(place.c_str(), W_OK) == 0;
+  return free ? place.string() : std::string();
 }
 }  // namespace
 
@@ -47,9 +49,7 @@ OutputFile::OutputFile(OutputFile&& other) noexcept
       buffer_(std::move(other.buffer_)),
       used_(std::exchange(other.used_, 0)),
       error_(std::move(other.error_)),
-      unfinished_(std::move(other.unfinished_)) {
-  other.unfinished_.reset();
-}
+      unfinished_(std::move(other.unfinished_)) {}
 
 OutputFile::~OutputFile() {
   if (buffer_ != nullptr && !unfinished_) flush();
@@ -59,10 +59,8 @@ OutputFile::~OutputFile() {
 Expected<OutputFile> OutputFile::open(const std::string& path) {
   if (path.empty()) return OutputFile(kDiscard, "", false);
   if (path == "-") return OutputFile(STDOUT_FILENO, "standard output", false);
-  if (const std::string place = place_of_file(path); !place.empty()) {
-    // A file that may not be written to is not replaced either.
-    const bool free = ::access(place.c_str(), F_OK) != 0 || ::access(place.c_str(), W_OK) == 0;
-    auto unfinished = free ? Unfinished::beside(place, path) : fail(path, "");
+  if (const std::string place = replaceable_place(path); !place.empty()) {
+    auto unfinished = Unfinished::beside(place, path);
     if (unfinished) return OutputFile(std::move(*unfinished), path);
   }
   const int fd = ::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
@@ -92,6 +90,25 @@ void OutputFile::write(std::string_view text) {
     std::memcpy(room(part), text.data(), part);
     commit(part);
     text.remove_prefix(part);
+  }
+}
+
+bool OutputFile::can_rewrite() const {
+  struct stat info {};
+  return owned_ && ::fstat(fd_, &info) == 0 && S_ISREG(info.st_mode);
+}
+
+void OutputFile::rewrite(std::uint64_t offset, std::string_view text) {
+  flush();
+  while (!text.empty() && !error_) {
+    const ssize_t put = ::pwrite(fd_, text.data(), text.size(), static_cast<off_t>(offset));
+    if (put < 0 && errno == EINTR) continue;
+    if (put < 0) {
+      error_ = Error{name_, "cannot be written: " + system_reason(), {}};
+      return;
+    }
+    offset += static_cast<std::uint64_t>(put);
+    text.remove_prefix(static_cast<std::size_t>(put));
   }
 }
 

@@ -6,6 +6,7 @@
 // is written to as it is, and so is a file in a folder that takes no new one.
 
 #include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <string>
@@ -34,6 +35,9 @@ class OutputFile {
   void commit(std::size_t size) { used_ += size; }
   void write(std::string_view text);
   void flush();
+  /// Writes over bytes that were written before. Only where can_rewrite(): into a file.
+  void rewrite(std::uint64_t offset, std::string_view text);
+  [[nodiscard]] bool can_rewrite() const;
   /// Flushes, closes, and gives the file its name; the error names the file and the reason.
   Expected<void> close();
 

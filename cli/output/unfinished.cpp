@@ -13,6 +13,8 @@
 #include <unistd.h>
 #include <utility>
 
+#include "base/printable.h"
+
 namespace vgyro::cli {
 
 namespace {
@@ -71,14 +73,8 @@ std::size_t take_slot(const std::string& temporary, const std::string& shown) {
       std::find_if(slots.begin(), slots.end(), [](const Slot& slot) { return !slot.used; });
   if (free == slots.end() || temporary.size() >= free->temporary.size()) return slots.size();
   std::copy_n(temporary.c_str(), temporary.size() + 1, free->temporary.begin());
-  const std::size_t length = std::min(shown.size(), free->shown.size() - 1);
-  // The handler cannot ask what is printable.
-  std::transform(shown.begin(), shown.begin() + static_cast<std::ptrdiff_t>(length),
-                 free->shown.begin(), [](char c) {
-                   const auto byte = static_cast<unsigned char>(c);
-                   return byte < 0x20 || byte >= 0x7F ? '?' : c;
-                 });
-  free->shown[length] = '\0';
+  const std::string name = printable(shown).substr(0, free->shown.size() - 1);
+  std::copy_n(name.c_str(), name.size() + 1, free->shown.begin());
   free->used = true;
   return static_cast<std::size_t>(free - slots.begin());
 }

@@ -1,7 +1,10 @@
 #include "cli/replay/rate_table.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <limits>
+#include <string_view>
 
 #include <fmt/format.h>
 

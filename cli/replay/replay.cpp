@@ -9,9 +9,11 @@
 #include "base/file.h"
 #include "base/spelling.h"
 #include "canlog/candump.h"
-#include "canlog/reader.h"
+#include "canlog/merged_reader.h"
 #include "cli/commands.h"
 #include "cli/exit_code.h"
+#include "cli/log_notes.h"
+#include "cli/other_senders.h"
 #include "cli/output/errors.h"
 #include "cli/output/gnuplot.h"
 #include "cli/output/json_text.h"
@@ -121,8 +123,6 @@ class BusMap {
 
   [[nodiscard]] const std::vector<std::string>& interfaces() const { return interfaces_.names(); }
 
-  void new_log() { known_.clear(); }
-
  private:
   explicit BusMap(const gateway::Plan& plan) : plan_(&plan) {}
   [[nodiscard]] can::BusIndex plan_index(const std::string& name) const {
@@ -135,7 +135,7 @@ class BusMap {
   }
   const gateway::Plan* plan_;
   std::vector<std::pair<std::string, std::string>> entries_;
-  std::vector<Buses> known_;  ///< by the present log's own index
+  std::vector<Buses> known_;  ///< by the log's own index
   canlog::InterfaceTable interfaces_;
 };
 
@@ -156,13 +156,15 @@ class Replay {
   /// Before the first log.
   Expected<void> take_up(const gateway::SavedState& state) { return pipeline_.resume(state); }
 
-  Expected<void> run_log(const std::string& path) {
-    const auto opened = canlog::open_log(path);
-    if (!opened) return tl::unexpected(opened.error());
-    canlog::LogReader& reader = **opened;
-    if (path == "-") reader.before_wait([this] { output_.flush(); });
-    run_records(path, reader);
-    summary_.logs.push_back({path, reader.counts()});
+  /// `reader` reads the logs of these paths.
+  Expected<void> run_logs(const std::vector<std::string>& paths, canlog::LogReader& reader) {
+    if (std::count(paths.begin(), paths.end(), "-") > 0) {
+      reader.before_wait([this] { output_.flush(); });
+    }
+    run_records(name_of(paths), reader);
+    const auto parts = reader.parts();
+    for (std::size_t i = 0; i < paths.size(); ++i)
+      summary_.logs.push_back({paths[i], *parts[i]});
     summary_.interfaces = buses_.interfaces();
     if (reader.error()) return tl::unexpected(*reader.error());
     return {};
@@ -185,9 +187,8 @@ class Replay {
   const ReplayPlot& plot() const { return plot_; }
 
  private:
-  void run_records(const std::string& path, canlog::LogReader& reader) {
-    Progress progress("replay " + path);
-    buses_.new_log();
+  void run_records(const std::string& name, canlog::LogReader& reader) {
+    Progress progress("replay " + name);
     canlog::LogRecord record;
     std::uint64_t until_progress = kFramesPerProgress;
     std::uint64_t biases = 0;
@@ -198,7 +199,8 @@ class Replay {
       last_ = record.stamp;
       const BusMap::Buses buses = buses_.look_up(record.bus, reader.interfaces());
       summary_.ids.add(buses.all, record.frame);
-      sink_.fraction_digits = record.fraction_digits;
+      sink_.fraction_digits =
+          options_.digits != 0 ? options_.digits : unsigned{record.fraction_digits};
       pipeline_.receive(buses.plan, record.frame, record.stamp, sink_);
       if (--until_progress == 0) {
         until_progress = kFramesPerProgress;
@@ -275,8 +277,7 @@ std::optional<Error> explain_silence(const ReplaySummary& summary, const gateway
   for (const LogSummary& log : summary.logs)
     frames += log.counts.frames + log.counts.xl_frames;
   if (frames == 0) {
-    return Error{logs, "holds no CAN frame",
-                 "a log as `candump -L` prints and `candump -l` writes it is needed"};
+    return Error{logs, kNoFrame, kLogsRemedy};
   }
   for (std::size_t i = 0; i < 2; ++i) {
     if (summary.status.gyros[i].frames > 0) continue;
@@ -355,6 +356,27 @@ void warn_of_data(const ReplaySummary& summary, const gateway::Plan& plan) {
     warn({"estimate", gateway::restarts_text(status.estimate_restarts), ""});
 }
 
+// An input of which nothing came, while its J1939 parameter group came from other senders.
+void warn_of_senders_missed(const ReplaySummary& summary, const gateway::Plan& plan) {
+  const auto look = [&](const std::string& title, const std::string& message,
+                        const gateway::FrameMatch& match) {
+    if (!match.extended) return;
+    OtherSenders others;
+    for (const IdCounts::Row& row : summary.ids.rows()) {
+      if (!row.extended || summary.interfaces[row.bus] != plan.buses[match.bus]) continue;
+      if (match.carries(row.id, true)) return;
+      others.add(match.id, row.id);
+    }
+    if (!others.empty()) warn({title, others.text(message, match.id), others.remedy(match.mask)});
+  };
+  for (const gateway::GyroPlan& gyro : plan.gyros)
+    look("gyro " + gyro.name, gyro.message, gyro.match);
+  if (plan.reference) look("reference", plan.reference->message, plan.reference->match);
+  if (plan.accelerometer)
+    look("accelerometer", plan.accelerometer->message, plan.accelerometer->match);
+  if (plan.speed) look("speed", plan.speed->message, plan.speed->match);
+}
+
 // Two senders of one identifier: whoever reads VG_Rate would get both.
 void warn_of_other_senders(const ReplaySummary& summary, const gateway::Plan& plan) {
   const gateway::OutputPlan& output = plan.output;
@@ -380,7 +402,7 @@ int write_results(const ReplayOptions& options, const gateway::Plan& plan,
   if (!options.quiet) put_text(stderr, to_text(summary, plan));
   if (!options.plot.empty()) {
     const PlotTexts texts{
-        fmt::format("{}: {} over {:g}-s windows", options.logs.front(),
+        fmt::format("{}: {} over {:g}-s windows", name_of(options.logs),
                     gateway::to_string(plan.corrector.method), plan.corrector.window_s),
         {plan.gyros[0].name, plan.gyros[1].name}};
     if (const auto drawn = plot.draw(options.plot, texts); !drawn) return report(drawn.error());
@@ -428,6 +450,9 @@ int run_replay(const ReplayOptions& options) {
   if (const auto good = check_files(options, loaded->files); !good) return report(good.error());
   const auto state = read_state(options.state, plan);
   if (!state) return report(state.error());
+  // Several logs are merged by stamp.
+  const auto logs = canlog::open_logs(options.logs);
+  if (!logs) return report(logs.error());
   auto output = OutputFile::open(options.output);
   if (!output) return report(output.error());
   auto table = open_table(options.csv);
@@ -441,21 +466,17 @@ int run_replay(const ReplayOptions& options) {
   }
   if (*table) replay.write_table(**table);
   std::optional<Error> trouble;
-  for (const std::string& log : options.logs) {
-    if (const auto ran = replay.run_log(log); !ran) {
-      trouble = ran.error();
-      break;
-    }
-  }
+  if (const auto ran = replay.run_logs(options.logs, **logs); !ran) trouble = ran.error();
   const ReplaySummary& summary = replay.finish();
   if (const auto closed = output->close(); !closed) return report(closed.error());
   if (*table) {
     if (const auto closed = (*table)->close(); !closed) return report(closed.error());
   }
-  if (!trouble) trouble = explain_silence(summary, plan, options.logs.front());
+  if (!trouble) trouble = explain_silence(summary, plan, name_of(options.logs));
   const int written = write_results(options, plan, summary, replay.plot());
   warn_of_doubts(summary, plan);
   warn_of_data(summary, plan);
+  warn_of_senders_missed(summary, plan);
   warn_of_other_senders(summary, plan);
   if (trouble) return report(*trouble);
   return written;

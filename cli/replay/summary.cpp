@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "cli/log_notes.h"
 #include "gateway/condition_text.h"
 #include "gateway/config.h"
 #include "gateway/model_plan.h"
@@ -36,6 +37,7 @@ Json log_json(const LogSummary& log) {
           {"xl_frames", log.counts.xl_frames},
           {"other_lines", log.counts.other_lines},
           {"malformed_lines", log.counts.malformed_lines},
+          {"skipped_bytes", log.counts.skipped_bytes},
           {"cut_off_lines", log.counts.cut_off_lines},
           {"first_malformed", malformed}};
 }
@@ -121,8 +123,7 @@ Json hypotheses_json(const gateway::Status& status) {
 const gateway::GyroPlan* gyro_of(const gateway::Plan& plan, const std::string& interface,
                                  const IdCounts::Row& row) {
   for (const gateway::GyroPlan& gyro : plan.gyros) {
-    const bool same_id = ((gyro.match.id ^ row.id) & gyro.match.mask) == 0;
-    if (gyro.bus == interface && gyro.match.extended == row.extended && same_id) return &gyro;
+    if (gyro.bus == interface && gyro.match.carries(row.id, row.extended)) return &gyro;
   }
   return nullptr;
 }
@@ -284,21 +285,6 @@ void put_opinion(fmt::memory_buffer& text, const ReplaySummary& summary,
   }
 }
 
-void put_log(fmt::memory_buffer& text, const LogSummary& log) {
-  auto to = std::back_inserter(text);
-  fmt::format_to(to, "{}: {} frames", log.path, log.counts.frames);
-  if (log.counts.xl_frames > 0)
-    fmt::format_to(to, ", {} CAN XL frames passed over", log.counts.xl_frames);
-  if (log.counts.malformed_lines > 0)
-    fmt::format_to(to, ", {} lines not understood", log.counts.malformed_lines);
-  if (log.counts.cut_off_lines > 0) {
-    fmt::format_to(to, "; the log ends inside line {}, which was not used", log.counts.lines + 1);
-  }
-  fmt::format_to(to, "\n");
-  for (const canlog::MalformedLine& bad : log.counts.first_malformed)
-    fmt::format_to(to, "  line {}: {}\n", bad.line, bad.why);
-}
-
 void put_gyro(fmt::memory_buffer& text, const ReplaySummary& summary, const gateway::Plan& plan,
               std::size_t i) {
   auto to = std::back_inserter(text);
@@ -384,7 +370,7 @@ void put_method(fmt::memory_buffer& text, const ReplaySummary& summary, const ga
 std::string to_text(const ReplaySummary& summary, const gateway::Plan& plan) {
   fmt::memory_buffer text;
   for (const LogSummary& log : summary.logs)
-    put_log(text, log);
+    fmt::format_to(std::back_inserter(text), "{}", log_text(log.path, log.counts, false));
   for (std::size_t i = 0; i < 2; ++i)
     put_gyro(text, summary, plan, i);
   put_other_inputs(text, summary.status, plan);

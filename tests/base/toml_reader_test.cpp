@@ -86,5 +86,18 @@ TEST(TomlReader, NamesTheFirstUnknownKeysAndCountsTheRest) {
   EXPECT_EQ(errors[10].what, "… and 37 more unknown keys in [a]");
 }
 
+// The library gives nothing for it, and a default would take its place without a word.
+TEST(TomlReader, ComplainsOfAnIntegerThatNoNumberHolds) {
+  const auto table = parse_toml("a = 9007199254740993\nb = 9007199254740992\n", "a.toml");
+  ASSERT_TRUE(table);
+  std::vector<Error> errors;
+  TomlReader reader(*table, "a.toml", "the file", errors);
+  EXPECT_FALSE(reader.number("a"));
+  EXPECT_EQ(reader.number("b"), 0x1p53);
+  ASSERT_EQ(errors.size(), 1U);
+  EXPECT_EQ(errors[0].where, "a.toml:1");
+  EXPECT_NE(errors[0].what.find("more digits"), std::string::npos) << errors[0].what;
+}
+
 }  // namespace
 }  // namespace vgyro

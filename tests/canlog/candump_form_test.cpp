@@ -34,18 +34,9 @@ can::Frame frame_in(const std::string& text) {
   return parsed.record.frame;
 }
 
-can::Frame expected_frame(std::uint32_t id, unsigned flags, std::vector<std::uint8_t> bytes = {}) {
-  can::Frame frame;
-  frame.id = id;
-  frame.flags = static_cast<std::uint8_t>(flags);
-  frame.length = static_cast<std::uint8_t>(bytes.size());
-  std::copy(bytes.begin(), bytes.end(), frame.data.begin());
-  return frame;
-}
-
 can::Frame remote_frame(std::uint32_t id, unsigned flags, std::uint8_t length,
                         std::uint8_t raw_dlc) {
-  can::Frame frame = expected_frame(id, flags | can::kRemote);
+  can::Frame frame = frame_with(id, flags | can::kRemote);
   frame.length = length;
   frame.raw_dlc = raw_dlc;
   return frame;
@@ -64,27 +55,27 @@ std::string why_malformed_frame(const std::string& text) {
 
 // The number of digits tells standard from extended, not the number's size.
 TEST(CandumpForm, ReadsStandardAndExtendedFrames) {
-  EXPECT_EQ(frame_in("123#DEADBEEF"), expected_frame(0x123, 0, {0xDE, 0xAD, 0xBE, 0xEF}));
-  EXPECT_EQ(frame_in("000#"), expected_frame(0, 0));
-  EXPECT_EQ(frame_in("7FF#0102030405060708"), expected_frame(0x7FF, 0, {1, 2, 3, 4, 5, 6, 7, 8}));
-  EXPECT_EQ(frame_in("00000123#11"), expected_frame(0x123, can::kExtended, {0x11}));
-  EXPECT_EQ(frame_in("1FFFFFFF#"), expected_frame(0x1FFFFFFF, can::kExtended));
+  EXPECT_EQ(frame_in("123#DEADBEEF"), frame_with(0x123, 0, {0xDE, 0xAD, 0xBE, 0xEF}));
+  EXPECT_EQ(frame_in("000#"), frame_with(0, 0));
+  EXPECT_EQ(frame_in("7FF#0102030405060708"), frame_with(0x7FF, 0, {1, 2, 3, 4, 5, 6, 7, 8}));
+  EXPECT_EQ(frame_in("00000123#11"), frame_with(0x123, can::kExtended, {0x11}));
+  EXPECT_EQ(frame_in("1FFFFFFF#"), frame_with(0x1FFFFFFF, can::kExtended));
 }
 
 // can-utils' players read small letters and dots between bytes, so logs contain them.
 TEST(CandumpForm, ReadsSmallLettersAndDotsBetweenBytes) {
-  EXPECT_EQ(frame_in("12a#deadbeef"), expected_frame(0x12A, 0, {0xDE, 0xAD, 0xBE, 0xEF}));
-  EXPECT_EQ(frame_in("12A#DE.AD.BEEF"), expected_frame(0x12A, 0, {0xDE, 0xAD, 0xBE, 0xEF}));
+  EXPECT_EQ(frame_in("12a#deadbeef"), frame_with(0x12A, 0, {0xDE, 0xAD, 0xBE, 0xEF}));
+  EXPECT_EQ(frame_in("12A#DE.AD.BEEF"), frame_with(0x12A, 0, {0xDE, 0xAD, 0xBE, 0xEF}));
   EXPECT_EQ(frame_in("12A##1de.ad"),
-            expected_frame(0x12A, can::kFd | can::kBitRateSwitch, {0xDE, 0xAD}));
+            frame_with(0x12A, can::kFd | can::kBitRateSwitch, {0xDE, 0xAD}));
 }
 
 // Error frames have the error bit in eight digits; their identifier holds the error class.
 TEST(CandumpForm, ReadsErrorFrames) {
   EXPECT_EQ(frame_in("20000080#0000000000000000"),
-            expected_frame(0x80, can::kError, {0, 0, 0, 0, 0, 0, 0, 0}));
+            frame_with(0x80, can::kError, {0, 0, 0, 0, 0, 0, 0, 0}));
   EXPECT_EQ(frame_in("20000004#0004000000000000"),
-            expected_frame(0x4, can::kError, {0, 4, 0, 0, 0, 0, 0, 0}));
+            frame_with(0x4, can::kError, {0, 4, 0, 0, 0, 0, 0, 0}));
 }
 
 // Remote frames say how much they ask for, where the log's writer knew it.
@@ -101,7 +92,7 @@ TEST(CandumpForm, ReadsRemoteFrames) {
 // A classic frame may claim 9 to 15 in its DLC and still carries 8 bytes.
 TEST(CandumpForm, ReadsRawDlcAboveEight) {
   for (unsigned dlc = 9; dlc <= 15; ++dlc) {
-    can::Frame frame = expected_frame(0x123, 0, {0x11, 0x22, 0x33, 0x44, 0x55, 0x66, 0x77, 0x88});
+    can::Frame frame = frame_with(0x123, 0, {0x11, 0x22, 0x33, 0x44, 0x55, 0x66, 0x77, 0x88});
     frame.raw_dlc = static_cast<std::uint8_t>(dlc);
     EXPECT_EQ(frame_in(fmt::format("123#1122334455667788_{:X}", dlc)), frame);
     EXPECT_EQ(frame_in(fmt::format("123#1122334455667788_{:x}", dlc)), frame);
@@ -115,10 +106,10 @@ TEST(CandumpForm, ReadsFdFlagsWithAndWithoutTheFdfBit) {
     if ((nibble & 1U) != 0) flags |= can::kBitRateSwitch;
     if ((nibble & 2U) != 0) flags |= can::kErrorStateIndicator;
     EXPECT_EQ(frame_in(fmt::format("123##{:X}AABB", nibble)),
-              expected_frame(0x123, flags, {0xAA, 0xBB}));
+              frame_with(0x123, flags, {0xAA, 0xBB}));
   }
   EXPECT_EQ(frame_in("12345678##5"),
-            expected_frame(0x12345678, can::kExtended | can::kFd | can::kBitRateSwitch));
+            frame_with(0x12345678, can::kExtended | can::kFd | can::kBitRateSwitch));
 }
 
 // An FD frame holds up to 64 bytes; every length up to there is taken, none is padded.
@@ -126,7 +117,7 @@ TEST(CandumpForm, ReadsFdPayloadsOfEveryLength) {
   std::string text = "123##0";
   std::vector<std::uint8_t> bytes;
   for (unsigned i = 0; i <= can::kFdBytesMax; ++i) {
-    EXPECT_EQ(frame_in(text), expected_frame(0x123, can::kFd, bytes)) << i;
+    EXPECT_EQ(frame_in(text), frame_with(0x123, can::kFd, bytes)) << i;
     bytes.push_back(static_cast<std::uint8_t>(0xC0 + i));
     text += fmt::format("{:02X}", bytes.back());
   }
@@ -200,7 +191,7 @@ TEST(CandumpForm, ReadsDirectionsAndPadding) {
 TEST(CandumpForm, ReadsLinesThatEndInCarriageReturn) {
   const ParsedLine parsed = parse("(1.000000) can0 123#11\r");
   EXPECT_EQ(parsed.kind, LineKind::kFrame) << parsed.why;
-  EXPECT_EQ(parsed.record.frame, expected_frame(0x123, 0, {0x11}));
+  EXPECT_EQ(parsed.record.frame, frame_with(0x123, 0, {0x11}));
   EXPECT_EQ(parse("(1.000000) can0 123#11 T\r").record.direction, Direction::kTransmitted);
   EXPECT_EQ(parse("\r").kind, LineKind::kOther);
 }
@@ -243,7 +234,8 @@ TEST(CandumpForm, TellsWhatIsWrongWithAnInterface) {
   EXPECT_EQ(why_malformed("(1.5)"), "no interface name");
   EXPECT_EQ(why_malformed("(1.5) "), "no interface name");
   EXPECT_EQ(why_malformed("(1.5) 123#11"), "no interface name");
-  EXPECT_EQ(why_malformed("(1.5) " + std::string(32, 'c') + " 123#11"), "no interface name");
+  EXPECT_EQ(why_malformed("(1.5) " + std::string(32, 'c') + " 123#11"),
+            "the interface name is longer than 31 characters");
   EXPECT_EQ(parse("(1.5) " + std::string(31, 'c') + " 123#11").interface, std::string(31, 'c'));
 }
 

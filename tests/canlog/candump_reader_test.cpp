@@ -113,7 +113,8 @@ class LineMaker {
 TEST(CandumpReader, ReadsAnEmptyLog) {
   const ReadLog log = read_text("");
   EXPECT_TRUE(log.records.empty());
-  EXPECT_EQ(told(log.counts), "0 lines, 0 frames, 0 XL, 0 other, 0 malformed, 0 cut off; ");
+  EXPECT_EQ(told(log.counts),
+            "0 lines, 0 frames, 0 XL, 0 other, 0 malformed, 0 cut off, 0 skipped; ");
   EXPECT_EQ(log.error, "");
 }
 
@@ -132,7 +133,7 @@ TEST(CandumpReader, LosesNothingAroundAMalformedLine) {
       "(1.000006) can0 106#11\n");
   EXPECT_EQ(ids(log), (std::vector<std::uint32_t>{0x101, 0x103, 0x104, 0x105, 0x106}));
   EXPECT_EQ(told(log.counts),
-            "10 lines, 4 frames, 1 XL, 3 other, 2 malformed, 0 cut off; "
+            "10 lines, 4 frames, 1 XL, 3 other, 2 malformed, 0 cut off, 0 skipped; "
             "2: payload: an odd number of hex digits; 6: stamp: no closing parenthesis");
 }
 
@@ -164,7 +165,8 @@ TEST(CandumpReader, KeepsTheFirstFiveMalformedLinesAndCountsAll) {
 TEST(CandumpReader, DoesNotUseACutOffLastLine) {
   const ReadLog log = read_text(numbered_lines(0, 3) + "(1700000000.000003) can0 123#1122");
   EXPECT_EQ(ids(log), (std::vector<std::uint32_t>{0, 1, 2}));
-  EXPECT_EQ(told(log.counts), "3 lines, 3 frames, 0 XL, 0 other, 0 malformed, 1 cut off; ");
+  EXPECT_EQ(told(log.counts),
+            "3 lines, 3 frames, 0 XL, 0 other, 0 malformed, 1 cut off, 0 skipped; ");
   EXPECT_EQ(read_text("(1700000000.000003) can0 123#1122").counts.cut_off_lines, 1U);
 }
 
@@ -294,7 +296,27 @@ TEST(CandumpReader, TakesNulBytesForNoSecond) {
   const ReadLog log = read_text(fmt::format("(1.5) can0 123#\n({}.123456) can0 123#11\n{}",
                                             std::string(10, '\0'), std::string(200, '\n')));
   EXPECT_EQ(log.counts.frames, 1U);
-  EXPECT_EQ(malformed(log.counts), std::vector<std::string>{"2: stamp: the seconds are no number"});
+  EXPECT_EQ(log.counts.skipped_bytes, 11U);
+  EXPECT_EQ(log.counts.other_lines, 1U + 200U);
+}
+
+// A power cut leaves NUL bytes where a file had grown but its bytes were not written: the frame
+// behind them is whole, and what was skipped is counted.
+TEST(CandumpReader, FindsTheFrameBehindNulBytes) {
+  const std::string good = "(1700000000.000001) can0 123#11\n";
+  const ReadLog log = read_text(good + "(17000000" + std::string(4096, '\0') + good + good);
+  EXPECT_EQ(log.records.size(), 3U);
+  EXPECT_EQ(log.counts.skipped_bytes, 9U + 4096U);
+  EXPECT_EQ(log.counts.malformed_lines, 0U);
+}
+
+// Editors of one system put it before a text, and files that were put together have it inside.
+TEST(CandumpReader, ReadsOverByteOrderMarks) {
+  const std::string text = "\xEF\xBB\xBF(1.5) can0 123#11\n(2.5) can0 123#22\n";
+  const ReadLog log = read_text(text + text);
+  EXPECT_EQ(log.records.size(), 4U);
+  EXPECT_EQ(told(log.counts),
+            "4 lines, 4 frames, 0 XL, 0 other, 0 malformed, 0 cut off, 0 skipped; ");
 }
 
 }  // namespace

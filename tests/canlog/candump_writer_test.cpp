@@ -17,15 +17,6 @@ std::string line_of(TimePoint stamp, std::string_view interface, const can::Fram
   return {buffer, format_line(buffer, stamp, interface, frame, digits, direction)};
 }
 
-can::Frame frame_with(std::uint32_t id, unsigned flags, std::vector<std::uint8_t> bytes = {}) {
-  can::Frame frame;
-  frame.id = id;
-  frame.flags = static_cast<std::uint8_t>(flags);
-  frame.length = static_cast<std::uint8_t>(bytes.size());
-  std::copy(bytes.begin(), bytes.end(), frame.data.begin());
-  return frame;
-}
-
 constexpr TimePoint kStamp = time_from_ns(1'700'000'000'123'456'789);
 
 // The text is can-utils' own, down to capitals and leading zeros: other tools read it.

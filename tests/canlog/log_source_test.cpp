@@ -51,8 +51,10 @@ class OpenLog : public ::testing::Test {
 
   static ReadLog read(const std::string& path) {
     auto source = open_source(path);
-    EXPECT_TRUE(source) << source.error().message();
-    return source ? read_all(std::move(*source)) : ReadLog{};
+    if (source) return read_all(std::move(*source));
+    ReadLog log;
+    log.error = source.error().message();
+    return log;
   }
 
   /// The records of `log` are the first of `whole`.
@@ -76,7 +78,7 @@ TEST_F(OpenLog, ReadsAFileToItsEnd) {
   auto source = open_source(folder_ + "/a.log");
   ASSERT_TRUE(source);
   EXPECT_EQ((*source)->bytes_total(), text.size());
-  EXPECT_EQ((*source)->bytes_read(), 0U);
+  EXPECT_LE((*source)->bytes_read(), HeadedSource::kHeadBytesMax);
   while (!(*source)->next()->end) {
   }
   EXPECT_EQ((*source)->bytes_read(), text.size());
@@ -218,12 +220,12 @@ TEST_F(OpenLog, TellsAnErrorFromTheEnd) {
   EXPECT_EQ(read("/proc/self/mem").error, "/proc/self/mem: cannot be read: Input/output error");
 }
 
-// A plain log under a packed name, or nothing at all, is told apart from damage.
-TEST_F(OpenLog, TellsAFileThatIsNoXz) {
-  const std::string plain = file_with("plain.log.xz", log_text(10));
-  EXPECT_EQ(read(plain).error, plain + ": is not an .xz file");
-  const std::string empty = file_with("empty.log.xz", "");
-  EXPECT_EQ(read(empty).error, empty + ": ends in the middle of its packed data");
+// The content decides: people rename files.
+TEST_F(OpenLog, GoesByTheContentAndNotByTheName) {
+  const std::string text = log_text(10);
+  EXPECT_EQ(read(file_with("plain.log.xz", text)).records, read_by_parse_line(text).records);
+  EXPECT_EQ(read(file_with("packed.log", packed(text))).records, read_by_parse_line(text).records);
+  EXPECT_EQ(told(read(file_with("empty.log.xz", "")).counts), told(LogCounts{}));
 }
 
 }  // namespace

@@ -6,6 +6,8 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "canlog/text_line.h"
+
 namespace vgyro::canlog {
 
 bool operator==(const XlFrame& a, const XlFrame& b) {
@@ -70,8 +72,9 @@ ReadLog read_by_parse_line(const std::string& text) {
   std::size_t at = 0;
   for (std::size_t end = text.find('\n'); end != text.npos; end = text.find('\n', at)) {
     ++log.counts.lines;
-    const LineResult result =
-        parse_line(std::string_view(text).substr(at, end - at), interfaces, record, xl);
+    const LineResult result = parse_line(
+        clean_line(std::string_view(text).substr(at, end - at), log.counts.skipped_bytes),
+        interfaces, record, xl);
     at = end + 1;
     if (result.kind == LineKind::kFrame) ++log.counts.frames;
     if (result.kind == LineKind::kXl) ++log.counts.xl_frames;
@@ -98,10 +101,19 @@ std::vector<std::string> malformed(const LogCounts& counts) {
 }
 
 std::string told(const LogCounts& counts) {
-  return fmt::format("{} lines, {} frames, {} XL, {} other, {} malformed, {} cut off; {}",
-                     counts.lines, counts.frames, counts.xl_frames, counts.other_lines,
-                     counts.malformed_lines, counts.cut_off_lines,
-                     fmt::join(malformed(counts), "; "));
+  return fmt::format(
+      "{} lines, {} frames, {} XL, {} other, {} malformed, {} cut off, {} skipped; {}",
+      counts.lines, counts.frames, counts.xl_frames, counts.other_lines, counts.malformed_lines,
+      counts.cut_off_lines, counts.skipped_bytes, fmt::join(malformed(counts), "; "));
+}
+
+can::Frame frame_with(std::uint32_t id, unsigned flags, std::vector<std::uint8_t> bytes) {
+  can::Frame frame;
+  frame.id = id;
+  frame.flags = static_cast<std::uint8_t>(flags);
+  frame.length = static_cast<std::uint8_t>(bytes.size());
+  std::copy(bytes.begin(), bytes.end(), frame.data.begin());
+  return frame;
 }
 
 can::Frame random_frame(std::mt19937_64& random) {

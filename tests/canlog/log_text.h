@@ -43,6 +43,7 @@ std::vector<std::string> malformed(const LogCounts& counts);
 /// All that LogCounts holds, for comparisons.
 std::string told(const LogCounts& counts);
 
+can::Frame frame_with(std::uint32_t id, unsigned flags, std::vector<std::uint8_t> bytes = {});
 /// A frame of any form that the writer knows.
 can::Frame random_frame(std::mt19937_64& random);
 XlFrame random_xl_frame(std::mt19937_64& random);

@@ -160,11 +160,86 @@ class Decode(bench.Bench):
         self.write("prose.log", "hello\n")
         self.write("no.dbc", "hello\n")
         self.assertIn("holds no CAN frame", self.bad("decode", "--dbc", "bench.dbc", "empty.log"))
-        self.assertIn("holds no CAN frame", self.bad("decode", "--dbc", "bench.dbc", "prose.log"))
+        self.assertIn("no log of CAN frames", self.bad("decode", "--dbc", "bench.dbc", "prose.log"))
         self.assertIn("nowhere.log", self.bad("decode", "--dbc", "bench.dbc", "nowhere.log"))
         self.assertIn("nowhere.dbc", self.bad("decode", "--dbc", "nowhere.dbc", "empty.log"))
         self.assertIn("no.dbc", self.bad("decode", "--dbc", "no.dbc", "empty.log"))
         self.assertIn("directory", self.bad("decode", "--dbc", "bench.dbc", "."))
+
+    def test_the_exact_identifier_goes_before_the_pgn(self):
+        # Two senders of one parameter group, each with a layout of its own; of a third one nothing else is known.
+        self.write("turn.dbc", """\
+BO_ 2565876225 TURN_LEFT: 8 X
+ SG_ Rate : 0|16@1- (0.01,0) [-300|300] "deg/s" X
+BO_ 2565876226 TURN_RIGHT: 8 X
+ SG_ Rate : 16|16@1- (0.02,0) [-300|300] "deg/s" X
+BA_DEF_DEF_ "VFrameFormat" "J1939PG";
+""")
+        found = self.objects("".join(f"({i}.0) can0 {name}#6400C80000000000\n" for i, name in
+                                     enumerate(("18F02A02", "18F02A01", "0CF02A02", "18F02A33"))), dbc=("turn.dbc",))
+        self.assertEqual([(f["message"], f["signals"]["Rate"]["value"]) for f in found],
+                         [("TURN_RIGHT", 4), ("TURN_LEFT", 1), ("TURN_RIGHT", 4), ("TURN_LEFT", 1)])
+
+    def test_no_value_is_null(self):
+        # People integrate what stands there. raw and label stay.
+        self.write("codes.dbc", """\
+BO_ 2565868030 VDC2: 8 X
+ SG_ Yaw : 24|16@1+ (0.0001220703125,-3.92) [0|0] "rad/s" X
+ SG_ Count : 56|8@1+ (1,0) [0|255] "" X
+BO_ 2314277886 TURN: 8 X
+ SG_ Rate : 8|32@1- (0.00000003125,0) [0|0] "rad/s" X
+BO_ 256 PLAIN: 8 X
+ SG_ Rate : 0|16@1- (0.01,0) [-300|300] "deg/s" X
+ SG_ State : 16|2@1+ (1,0) [0|3] "" X
+BA_DEF_DEF_ "VFrameFormat" "J1939PG";
+VAL_ 256 Rate -32768 "Signal ung\xfcltig" 0 "standing" ;
+VAL_ 256 State 0 "valid" 1 "invalid" 3 "SNA" ;
+""".encode("cp1252"))
+        log = ("(1.0) can0 18F00901#000000FEFFFFFFFF\n(2.0) can0 18F00901#000000FFFAFFFF00\n"
+               "(3.0) can0 09F11323#00FFFFFF7F\n(4.0) can0 09F11323#00FCFFFF7F\n(5.0) can0 09F11323#00FFFFFFFF\n"
+               "(6.0) can0 100#008003\n(7.0) can0 100#000001\n")
+        found = [f["signals"] for f in self.objects(log, dbc=("codes.dbc",))]
+        self.assertEqual(found[0]["Yaw"], {"value": None, "raw": 0xFFFE, "unit": "rad/s", "label": None})
+        self.assertEqual(found[0]["Count"]["value"], 255)
+        self.assertAlmostEqual(found[1]["Yaw"]["value"], 0xFAFF / 8192 - 3.92, places=9)
+        self.assertEqual([f["Rate"]["value"] for f in found[2:5]], [None, 67.108863875, -3.125e-08])
+        self.assertEqual(found[5]["Rate"], {"value": None, "raw": -32768, "unit": "deg/s", "label": "Signal ungültig"})
+        self.assertEqual(found[5]["State"], {"value": None, "raw": 3, "unit": "", "label": "SNA"})
+        self.assertEqual(found[6]["Rate"], {"value": 0, "raw": 0, "unit": "deg/s", "label": "standing"})
+        self.assertEqual(found[6]["State"], {"value": 1, "raw": 1, "unit": "", "label": "invalid"})
+        text = self.decode(log, "--text", dbc=("codes.dbc",)).splitlines()
+        self.assertIn("Yaw=not available (0xFFFE)", text[0])
+        self.assertIn("Rate=not available (0x7FFFFFFF)", text[2])
+
+    def test_the_virtual_gyro_says_when_it_has_no_rate(self):
+        # Raw 0x800000 is no 419 deg/s to the left. VG_Valid's "invalid" is its value.
+        self.write("vg.dbc", (bench.SOURCE / "dbc/vgyro.dbc").read_text())
+        one, = self.objects("(1.0) can0 610#0000000080FFFFF0\n", dbc=("vg.dbc",))
+        signals = one["signals"]
+        self.assertEqual(signals["VG_Rate"], {"value": None, "raw": -8388608, "unit": "deg/s", "label": "invalid"})
+        self.assertIsNone(signals["VG_Sigma"]["value"])
+        self.write("valid.log", "(1.0) can0 610#0000000000000000\n")
+        valid = json.loads(self.good("decode", "--dbc", "vg.dbc", "valid.log").stdout)["signals"]
+        self.assertEqual(valid["VG_Valid"], {"value": 0, "raw": 0, "unit": "", "label": "invalid"})
+        self.assertEqual(valid["VG_Rate"]["value"], 0)
+
+    def test_a_file_that_decodes_nothing_is_told(self):
+        # The wrong file of two, or the wrong log.
+        self.write("in.log", "(1.0) can0 101#0000000000000000\n(2.0) can0 0CF02A3E#00\n")
+        said = self.good("decode", "--dbc", "bench.dbc", "--dbc", "other.dbc", "in.log").stderr.decode()
+        self.assertNotIn("none of its", said)
+        self.write("in.log", "(1.0) can0 101#0000000000000000\n(2.0) can0 7A0#00\n")
+        said = self.good("decode", "--dbc", "bench.dbc", "--dbc", "other.dbc", "in.log").stderr.decode()
+        self.assertIn("warning: other.dbc: none of its 5 messages is in the log; the log's identifiers are: 101, 7A0", said)
+        self.assertNotIn("bench.dbc", said)
+
+    def test_a_missed_sender_is_told(self):
+        # The file does not say that it is J1939, so that only its own address matches.
+        self.write("silent.dbc", "VERSION \"\"\n\nBO_ 2565876225 TURN: 8 X\n SG_ Rate : 0|16@1- (0.01,0) [0|0] \"deg/s\" X\n")
+        self.write("in.log", "(1.0) can0 18F02A13#0000000000000000\n(2.0) can0 0CF02A14#0000000000000000\n")
+        said = self.good("decode", "--dbc", "silent.dbc", "in.log").stderr.decode()
+        self.assertIn("silent.dbc:3: no frame 18F02A01 came (TURN), but the same PGN came from 0x13, 0x14", said)
+        self.assertIn("VFrameFormat = J1939PG", said)
 
     def test_full_disk_is_an_error(self):
         # Half an output that looks whole is worse than none.

@@ -2,6 +2,7 @@
 """`vgyro replay`: what comes out, what the summary counts, and what is said of bad input."""
 
 import collections
+import gzip
 import json
 import lzma
 import math
@@ -90,6 +91,39 @@ class Output(Replay):
         self.write("first.log", "".join(self.lines[:301]))
         self.write("second.log", "".join(self.lines[301:]))
         self.assertEqual(self.replay("first.log", "second.log").stdout, whole)
+
+    def test_logs_of_the_same_time_are_merged(self):
+        # One `candump -l` per bus is what people have. One more begins later, one comes packed from a pipe.
+        whole = self.replay("in.log").stdout
+        for bus in ("can0", "can1"):
+            self.write(f"{bus}.log", "".join(line for line in self.lines if f" {bus} " in line))
+        self.assertEqual(self.replay("can0.log", "can1.log").stdout, whole)
+        self.assertEqual(self.replay("can1.log", "can0.log").stdout, whole)
+        packed = gzip.compress((self.folder / "can1.log").read_bytes())
+        self.assertEqual(self.replay("can0.log", "-", stdin=packed).stdout, whole)
+        found = self.summary("can0.log", "can1.log")
+        self.assertEqual([log["frames"] for log in found["logs"]], [len(self.lines) // 2] * 2)
+
+    def test_logs_that_cannot_belong_together_are_refused(self):
+        self.write("relative.log", bench.line_b(3_000_000, 0.3))
+        self.assertIn("nobody can tell what was at the same time", self.refuse("in.log", "relative.log"))
+        self.assertIn("is named twice", self.refuse("in.log", "in.log"))
+
+    def test_stamps_have_as_many_digits_as_asked_for(self):
+        # canplayer stops at nine.
+        nine = [line.replace(") ", "000) ", 1) for line in self.lines]
+        self.write("nine.log", "".join(nine))
+        self.assertEqual(self.replay("--digits", "6", "nine.log").stdout, self.replay("in.log").stdout)
+        self.assertEqual(self.replay("--digits", "9", "in.log").stdout, self.replay("nine.log").stdout)
+
+    def test_what_was_passed_over_is_told(self):
+        # A byte-order mark costs nothing; NUL bytes of a power cut, and other lines, are counted.
+        text = b"\xef\xbb\xbf" + "".join(self.lines[:400]).encode() + b"a remark\n" + bytes(4096)
+        (self.folder / "odd.log").write_bytes(text + "".join(self.lines[400:]).encode())
+        done = self.replay("odd.log")
+        self.assertEqual(done.stdout, self.replay("in.log").stdout)
+        self.assertIn("1 other line, 4096 stray bytes passed over", done.stderr.decode())
+        self.assertEqual(self.summary("odd.log")["logs"][0]["skipped_bytes"], 4096)
 
     def test_method_may_be_chosen_on_the_command_line(self):
         # The plain mean keeps the gyros' own biases: 0.5 and -0.3 deg/s.
@@ -468,9 +502,10 @@ class BadInput(Replay):
         # A log of nothing is no success.
         self.write("empty.log", "")
         self.write("prose.log", "Dear diary,\nno frames today.\n")
-        for log in ("empty.log", "prose.log", "/dev/null"):
+        for log, what in (("empty.log", "holds no CAN frame"), ("/dev/null", "holds no CAN frame"),
+                          ("prose.log", "is text, but no log of CAN frames that is known")):
             said = self.refuse("-q", log)
-            self.assertIn("holds no CAN frame", said)
+            self.assertIn(what, said)
             self.assertIn("candump -L", said)
 
     def test_directory(self):
@@ -481,9 +516,17 @@ class BadInput(Replay):
         # What came before the damage is not lost, but the end is told.
         packed = lzma.compress("".join(self.lines).encode())
         (self.folder / "cut.log.xz").write_bytes(packed[: len(packed) // 2])
-        (self.folder / "text.log.xz").write_bytes(b"hello, I am text" * 9)
         self.assertIn("cut.log.xz: ends in the middle", self.refuse("-q", "cut.log.xz"))
-        self.assertIn("text.log.xz: is not an .xz file", self.refuse("-q", "text.log.xz"))
+
+    def test_the_content_of_a_log_counts_and_not_its_name(self):
+        # People rename files, and some programs unpack them on the way.
+        self.write("plain.log.xz", "".join(self.lines))
+        (self.folder / "packed.log").write_bytes(gzip.compress("".join(self.lines).encode()))
+        expected = self.replay("in.log").stdout
+        self.assertEqual(self.replay("plain.log.xz").stdout, expected)
+        self.assertEqual(self.replay("packed.log").stdout, expected)
+        self.write("drive.bag", "#ROSBAG V2.0\n")
+        self.assertIn("is a ROS 1 bag", self.refuse("-q", "drive.bag"))
 
     def test_one_gyro_missing_lists_the_interfaces_of_the_log(self):
         # Nine times out of ten it is the name of the interface.
@@ -491,6 +534,67 @@ class BadInput(Replay):
         said = self.refuse("-q", "in.log")
         for part in ("no frame of gyro right", "GYRO_B 102 on can1", "can0, vcan5", "--map LOGNAME=can1"):
             self.assertIn(part, said)
+
+    def test_a_missed_sender_of_the_same_pgn_is_told(self):
+        # The DBC file does not say J1939, so that only its own address matches; then the address is another one.
+        dbc = ('BO_ 2565876225 TURN: 8 X\n SG_ Rate : 0|16@1- (0.01,0) [-300|300] "deg/s" X\n'
+               'BO_ 512 REF: 8 X\n SG_ Rate : 0|16@1- (0.01,0) [-300|300] "deg/s" X\n')
+        config = "".join(f'[[gyro]]\nname = "{name}"\nbus = "can0"\ndbc = "t.dbc"\nmessage = "{message}"\nrate = "Rate"\n'
+                         for name, message in (("ref", "REF"), ("turn", "TURN"))) + '[output]\nbus = "can1"\n'
+        self.write("in.log", "(1.0) can0 200#0000000000000000\n(1.1) can0 18F02A13#0000000000000000\n"
+                             "(1.2) can1 18F02A14#0000000000000000\n")
+        self.write("t.dbc", dbc)
+        self.write("vgyro.toml", config)
+        said = self.refuse("in.log")
+        self.assertIn("gyro turn: no frame 18F02A01 came (TURN), but the same PGN came from 0x13; ", said)
+        self.assertIn("VFrameFormat = J1939PG", said)
+        self.write("t.dbc", dbc + 'BA_DEF_DEF_ "VFrameFormat" "J1939PG";\n')
+        self.write("vgyro.toml", config.replace('"TURN"\n', '"TURN"\nsource_address = 5\n'))
+        said = self.refuse("in.log")
+        self.assertIn("no frame 18F02A05 came (TURN), but the same PGN came from 0x13; another source_address", said)
+
+    def test_a_counter_is_followed_over_all_pages(self):
+        # Four pages, a counter of two bits that counts every frame: on one page it stands still.
+        self.write("t.dbc", """\
+BO_ 288 IMU: 8 X
+ SG_ Page M : 0|2@1+ (1,0) [0|3] "" X
+ SG_ Alive : 4|2@1+ (1,0) [0|3] "" X
+ SG_ RateZ m2 : 8|16@1- (0.01,0) [-300|300] "deg/s" X
+BO_ 512 REF: 8 X
+ SG_ Rate : 0|16@1- (0.01,0) [-300|300] "deg/s" X
+""")
+        self.write("vgyro.toml", """\
+[[gyro]]
+name = "imu"
+bus = "can0"
+dbc = "t.dbc"
+message = "IMU"
+rate = "RateZ"
+counter = "Alive"
+max_delta_counter = 1
+[[gyro]]
+name = "ref"
+bus = "can0"
+dbc = "t.dbc"
+message = "REF"
+rate = "Rate"
+[calibration]
+rest_s = 1
+[output]
+bus = "can1"
+""")
+        lines = []
+        for i in range(1200):
+            lines.append(f"({i // 400}.{i % 400 * 2500:06d}) can0 120#{i % 4 | i % 4 << 4:02X}{i % 7:02X}00\n")
+            if i % 4 == 1:
+                lines.append(f"({i // 400}.{i % 400 * 2500 + 100:06d}) can0 200#{i % 5:02X}00\n")
+        imu = self.summary(lines=lines)["gyros"][0]
+        causes = {cause: n for cause, n in imu["rejected"].items() if n > 0}
+        self.assertEqual((imu["samples"], imu["missing_by_counter"], causes), (300, 0, {"other_page": 900}))
+        without = [line for i, line in enumerate(lines) if i != 300]  # one frame of another page is lost
+        lost = self.summary(lines=without)["gyros"][0]
+        self.assertGreaterEqual(lost["samples"], 299)
+        self.assertEqual(lost["samples"] + lost["rejected"]["wrong_sequence"], 300)
 
     def test_gyro_without_a_usable_frame_says_why(self):
         # All frames there and none used: the DBC file is not that of this gyro.

@@ -10,7 +10,9 @@ COMMANDS = {
     "check": {"CONFIG", "--method", "--model"},
     "decode": {"--dbc", "--text", "LOG"},
     "allan": {"--config", "--json", "--plot", "LOG"},
-    "replay": {"--config", "--method", "--model", "--state", "-o", "--output", "--json", "--csv", "--plot", "--map", "-q", "--quiet", "LOG"},
+    "replay": {"--config", "--method", "--model", "--state", "-o", "--output", "--json", "--csv", "--plot", "--map", "--digits", "-q", "--quiet",
+               "LOG"},
+    "convert": {"-o", "--output", "--digits", "-q", "--quiet", "LOG"},
 }
 
 

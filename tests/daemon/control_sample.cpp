@@ -69,6 +69,7 @@ struct SampleGateway {
     daemon::BusStatus bus{.name = "can0", .present = true, .link_up = true};
     bus.errors[static_cast<std::size_t>(can::ErrorCause::kBusOff)] = 3;
     bus.received = 4321;
+    bus.restamped = 23;
     bus.foreign = 17;
     bus.contested = true;
     now.traffic.buses = {bus, {.name = "can1"}};

@@ -345,6 +345,20 @@ TEST_F(ReporterTest, WarnsWhenTheSavedBiasesCannotBeRight) {
   EXPECT_EQ(second(), "");
 }
 
+TEST_F(ReporterTest, TellsOnceAMinuteThatStampsAreNoTimesOfArrival) {
+  bus().restamped = 500;
+  const std::string said = second();
+  EXPECT_NE(said.find("can0: 500 frames had a stamp that is not the time of their arrival"),
+            std::string::npos)
+      << said;
+  EXPECT_NE(said.find("SO_TXTIME"), std::string::npos) << said;
+  for (int i = 1; i < 60; ++i) {
+    bus().restamped += 500;
+    EXPECT_EQ(second(), "");
+  }
+  EXPECT_NE(second().find("can0: 29500 frames"), std::string::npos);
+}
+
 TEST_F(ReporterTest, TellsOnceAMinuteThatSomebodyElseSendsOurIdentifiers) {
   bus().foreign = 3;
   bus().contested = true;

@@ -69,5 +69,13 @@ TEST(Database, FindsByName) {
   EXPECT_EQ(found->label(7), nullptr);
 }
 
+// The sender is the last byte; in addressed groups the receiver stands before it.
+TEST(Message, KnowsTheSameSenderWhateverItsPriority) {
+  EXPECT_TRUE(same_sender(0x0CF02A13, 0x18F02A13));
+  EXPECT_FALSE(same_sender(0x0CF02A13, 0x0CF02A14));
+  EXPECT_FALSE(same_sender(0x0CF02A13, 0x0CF02B13));
+  EXPECT_FALSE(same_sender(0x18EA2103, 0x18EA2203));
+}
+
 }  // namespace
 }  // namespace vgyro::dbc

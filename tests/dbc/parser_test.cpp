@@ -472,5 +472,97 @@ TEST(DbcLoad, RefusesFilesWithoutMessages) {
   EXPECT_EQ(empty.error().where, path + ":2");
 }
 
+// --- Shift JIS -----------------------------------------------------------------------------------
+
+// The second byte of some characters is a backslash, and ends the text before the quote does: 表 is
+// 0x95 0x5C, 能 is 0x94 0x5C.
+TEST(DbcParser, ReadsTextsThatEndInABackslashOfShiftJis) {
+  const Database database =
+      parse_clean(kGyro +
+                  "CM_ SG_ 291 Status \"\x95\\\";\n"
+                  "CM_ SG_ 291 Rate \"rate\";\n"
+                  "VAL_ 291 Status 0 \"\x8B@\x94\\\" 1 \"ok\" 2 \"\x95\\\" ;\n"
+                  "BA_DEF_ BO_ \"X\" INT 0 1;\n"
+                  "CM_ BO_ 291 \"\x94\\\";");
+  const Signal& status = signal_in(database, "GYRO", "Status");
+  EXPECT_EQ(status.comment, "•\\");
+  EXPECT_EQ(signal_in(database, "GYRO", "Rate").comment, "rate");
+  ASSERT_EQ(status.labels.size(), 3U);
+  EXPECT_EQ(status.labels[0].text, "‹@”\\");
+  EXPECT_EQ(status.labels[1].text, "ok");
+  EXPECT_EQ(status.labels[2].text, "•\\");
+  EXPECT_EQ(database.messages[0].comment, "”\\");
+}
+
+TEST(DbcParser, StillTakesEscapedQuotesForQuotes) {
+  const Database database = parse_clean(kGyro +
+                                        "CM_ SG_ 291 Rate \"called \\\"rate\\\"\";\n"
+                                        "VAL_ 291 Status 0 \"\\\"\" 1 \"say \\\"on\\\"\" ;\n");
+  EXPECT_EQ(signal_in(database, "GYRO", "Rate").comment, "called \"rate\"");
+  const Signal& status = signal_in(database, "GYRO", "Status");
+  ASSERT_EQ(status.labels.size(), 2U);
+  EXPECT_EQ(status.labels[0].text, "\"");
+  EXPECT_EQ(status.labels[1].text, "say \"on\"");
+}
+
+// A unit in Shift JIS costs no signal; what parses neither way is told once, as it was first.
+TEST(DbcParser, TriesTheOtherMeaningOfABackslashOnce) {
+  const Database unit = parse_clean(
+      "BO_ 291 GYRO: 8 ECU\n SG_ Rate : 0|16@1- (1,0) [0|0] \"\x95\\\" ECU\n"
+      " SG_ Next : 16|8@1- (1,0) [0|0] \"\" ECU\n");
+  EXPECT_EQ(signal_in(unit, "GYRO", "Rate").unit, "•\\");
+  EXPECT_EQ(signal_in(unit, "GYRO", "Next").start_bit, 16);
+  const Database broken = parse(kGyro + "CM_ SG_ 291 Rate \"a\\\" b;\n", "test.dbc");
+  ASSERT_EQ(broken.diagnostics.size(), 1U);
+  EXPECT_EQ(broken.diagnostics[0].line, 4U);
+}
+
+// --- long names ----------------------------------------------------------------------------------
+
+TEST(DbcParser, FindsMessagesAndSignalsByTheirLongNamesToo) {
+  const Database database = parse_clean(
+      "BA_ \"SystemSignalLongSymbol\" SG_ 291 Rate \"RateAroundTheVerticalAxisFiltered\";\n" +
+      kGyro +
+      "BA_DEF_ BO_ \"SystemMessageLongSymbol\" STRING ;\n"
+      "BA_DEF_DEF_ \"SystemMessageLongSymbol\" \"\";\n"
+      "BA_ \"SystemMessageLongSymbol\" BO_ 291 \"GYRO_OF_THE_LEFT_FRONT_AXLE_REPEATED\";\n"
+      "BA_ \"GenSigStartValue\" SG_ 291 Status 3;\n");
+  const Message* const message = database.find_message("GYRO_OF_THE_LEFT_FRONT_AXLE_REPEATED");
+  ASSERT_NE(message, nullptr);
+  EXPECT_EQ(message, database.find_message("GYRO"));
+  EXPECT_EQ(message->find_signal("RateAroundTheVerticalAxisFiltered"),
+            message->find_signal("Rate"));
+  EXPECT_NE(message->find_signal("Rate"), nullptr);
+  EXPECT_EQ(message->find_signal(""), nullptr);
+  EXPECT_EQ(database.message_names(),
+            (std::vector<std::string>{"GYRO", "GYRO_OF_THE_LEFT_FRONT_AXLE_REPEATED"}));
+  EXPECT_EQ(message->signal_names(),
+            (std::vector<std::string>{"Rate", "Status", "RateAroundTheVerticalAxisFiltered"}));
+}
+
+// The name that the file itself gives goes before the long name of another one.
+TEST(DbcParser, PrefersNamesToLongNames) {
+  const Database database =
+      parse_clean(kGyro + "BA_ \"SystemSignalLongSymbol\" SG_ 291 Rate \"Status\";\n");
+  EXPECT_EQ(database.find_message("GYRO")->find_signal("Status")->name, "Status");
+}
+
+// --- NMEA 2000 -----------------------------------------------------------------------------------
+
+TEST(DbcParser, KnowsWhoseCodesAMessageHas) {
+  const std::string messages =
+      "BO_ 2314277886 TURN: 8 X\nBO_ 2364549886 ARI: 8 X\nBO_ 256 PLAIN: 8 X\n";
+  const std::string j1939 = "BA_DEF_DEF_ \"VFrameFormat\" \"J1939PG\";\n";
+  const Database truck = parse_clean(messages + j1939);
+  EXPECT_EQ(truck.messages[0].codes, CodeRules::kNmea2000);
+  EXPECT_EQ(truck.messages[1].codes, CodeRules::kJ1939);
+  EXPECT_EQ(truck.messages[2].codes, CodeRules::kNone);
+  const Database boat = parse_clean(messages + "BA_ \"ProtocolType\" \"NMEA2000\";\n");
+  EXPECT_TRUE(boat.messages[1].is_j1939) << "its frames are J1939's";
+  EXPECT_EQ(boat.messages[1].codes, CodeRules::kNmea2000);
+  EXPECT_EQ(boat.messages[2].codes, CodeRules::kNone);
+  EXPECT_EQ(parse_clean(messages).messages[0].codes, CodeRules::kNone);
+}
+
 }  // namespace
 }  // namespace vgyro::dbc

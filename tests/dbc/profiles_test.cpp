@@ -1,6 +1,8 @@
 // The DBC files that come with the product, against frames whose meaning is known.
 
 #include <cstdint>
+#include <filesystem>
+#include <fstream>
 #include <string>
 #include <vector>
 
@@ -135,6 +137,36 @@ TEST(Profiles, DescribeTheFdOutputFrame) {
       EXPECT_EQ(ours.signals[i].start_bit, theirs.signals[i].start_bit);
       EXPECT_EQ(ours.signals[i].length_bits, theirs.signals[i].length_bits);
       EXPECT_EQ(ours.signals[i].factor, theirs.signals[i].factor);
+    }
+  }
+}
+
+// PGN 127251 of a boat that turns to starboard by 1 deg/s: 0.01745329 rad/s are 558505 steps. And
+// the three codes, which the file labels.
+TEST(Profiles, ReadTheRateOfTurnOfNmea2000) {
+  const Database boat = loaded("profiles/nmea2000_rate_of_turn.dbc");
+  const Bytes turning = {0x05, 0xA9, 0x85, 0x08, 0x00, 0xFF, 0xFF, 0xFF};
+  EXPECT_NEAR(value_of(boat, 0x09F11323, true, "Rate", turning), 3.14159265 / 180, 2e-8);
+  const Bytes back = {0xFF, 0x57, 0x7A, 0xF7, 0xFF, 0xFF, 0xFF, 0xFF};
+  EXPECT_NEAR(value_of(boat, 0x0DF113A0, true, "Rate", back), -3.14159265 / 180, 2e-8);
+  const Message& message = boat.messages[0];
+  EXPECT_EQ(message.id >> 8U & 0x3FFFFU, 127251U);
+  EXPECT_EQ(message.codes, CodeRules::kNmea2000);
+  const Signal& rate = *message.find_signal("Rate");
+  EXPECT_EQ(*rate.label(0x7FFFFFFF), "not_available");
+  EXPECT_GT(0x7FFFFFFC * rate.factor, rate.maximum - 1e-6);
+}
+
+// Readers of others drop signals whose factor has an exponent.
+TEST(Profiles, WriteTheirNumbersAsPlainDecimals) {
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(VGYRO_DBC_DIR)) {
+    if (entry.path().extension() != ".dbc") continue;
+    std::ifstream file(entry.path());
+    for (std::string line; std::getline(file, line);) {
+      const std::size_t open = line.find('(');
+      if (line.find("SG_ ") != 1 || open == line.npos) continue;
+      const std::string scaling = line.substr(open, line.find(')') - open);
+      EXPECT_EQ(scaling.find_first_of("eE"), scaling.npos) << entry.path() << ": " << line;
     }
   }
 }

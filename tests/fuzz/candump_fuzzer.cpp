@@ -21,14 +21,10 @@ using vgyro::canlog::ReadLog;
 using vgyro::canlog::ReadRecord;
 
 /// Hands the text out in pieces whose sizes the fuzzer chooses.
-class PiecesSource final : public vgyro::canlog::LogSource {
+class PiecesSource final : public vgyro::canlog::ByteSource {
  public:
   PiecesSource(std::string text, std::vector<std::uint8_t> sizes)
       : text_(std::move(text)), sizes_(std::move(sizes)) {}
-  [[nodiscard]] std::uint64_t bytes_read() const override { return at_; }
-  [[nodiscard]] std::uint64_t bytes_total() const override { return text_.size(); }
-
- protected:
   vgyro::Expected<std::size_t> read(char* to, std::size_t size) override {
     const std::size_t piece = 1U + sizes_[next_++ % sizes_.size()];
     const std::size_t count = std::min({size, piece, text_.size() - at_});
@@ -36,8 +32,13 @@ class PiecesSource final : public vgyro::canlog::LogSource {
     at_ += count;
     return count;
   }
+  [[nodiscard]] const std::string& name() const override { return name_; }
+  [[nodiscard]] std::uint64_t bytes_read() const override { return at_; }
+  [[nodiscard]] std::uint64_t bytes_total() const override { return text_.size(); }
+  void before_wait(std::function<void()> /*callback*/) override {}
 
  private:
+  std::string name_ = "fuzz";
   std::string text_;
   std::vector<std::uint8_t> sizes_;
   std::size_t at_ = 0;
@@ -72,7 +73,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const std::string text(reinterpret_cast<const char*>(data) + kSizes, size - kSizes);
   if (text.size() >= vgyro::canlog::LogSource::kBufferBytes) return 0;  // lines of any length fit
 
-  const ReadLog quick = vgyro::canlog::read_all(std::make_unique<PiecesSource>(text, sizes));
+  const ReadLog quick = vgyro::canlog::read_all(
+      std::make_unique<vgyro::canlog::LogSource>(std::make_unique<PiecesSource>(text, sizes)));
   const ReadLog slow = vgyro::canlog::read_by_parse_line(text);
   require(told(quick.counts) == told(slow.counts), "the counts differ");
   require(quick.interfaces == slow.interfaces, "the interfaces differ");

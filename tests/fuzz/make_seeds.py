@@ -1,6 +1,8 @@
 #!/usr/bin/python3
 """Corpora for the fuzzers to begin with, from the project's own recordings and files: make_seeds.py FOLDER."""
 
+import bz2
+import gzip
 import lzma
 import re
 import struct
@@ -26,6 +28,20 @@ def candump_logs(lines):
     yield b"\x01\x07\x3f\xff" + "".join(forms).encode()
     yield b"\xff\xff\xff\xff" + "".join(lines[:200]).encode()
     yield b"\x00\x00\x00\x00" + "".join(lines[5000:5040] + forms).encode()
+
+
+def logs_of_all_forms(lines):
+    """The fuzzer's first byte is the size of the pieces in which a log arrives; then the log, from the forms' own test."""
+    text = (ROOT / "tests/canlog/forms_test.cpp").read_text(encoding="utf-8")
+    # Adjacent string literals of C++ are one text.
+    for parts in re.findall(r'((?:"(?:[^"\\\n]|\\.)*"\s*)+)', text):
+        literal = "".join(re.findall(r'"((?:[^"\\\n]|\\.)*)"', parts))
+        log = literal.encode("utf-8").decode("unicode_escape").encode("latin-1", "replace")
+        if b"\n" in log:
+            yield b"\x10" + log
+    plain = "".join(lines[:100]).encode()
+    for packed in (gzip.compress(plain, mtime=0), bz2.compress(plain), lzma.compress(plain)):
+        yield b"\x40" + packed
 
 
 def configurations():
@@ -135,7 +151,7 @@ def frames(lines):
 def main():
     folder = Path(sys.argv[1])
     lines = recording()
-    corpora = {"dbc": dbc_files(), "candump": candump_logs(lines), "config": configurations(), "model": models(),
+    corpora = {"dbc": dbc_files(), "candump": candump_logs(lines), "forms": logs_of_all_forms(lines), "config": configurations(), "model": models(),
                "saved_state": saved_states(), "pipeline": frames(lines)}
     for name, seeds in corpora.items():
         to = folder / f"fuzz_{name}"

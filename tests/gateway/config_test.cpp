@@ -407,6 +407,162 @@ TEST_F(Config, IgnoresARangeThatLeavesOutOneDirectionOfARate) {
   EXPECT_DOUBLE_EQ(both->plan.gyros[0].rate.minimum, -75.0);
 }
 
+// --- J1939 and NMEA 2000 -------------------------------------------------------------------------
+
+constexpr const char* kBoat = R"(BO_ 2314277886 TURN: 8 BOW
+ SG_ Rate : 8|32@1- (0.00000003125,0) [0|0] "rad/s" BOW
+BO_ 2565876225 LEFT: 8 A
+ SG_ Rate : 0|16@1+ (0.01,-250) [0|0] "deg/s" A
+ SG_ Speed : 16|16@1+ (0.01,0) [0|0] "km/h" A
+BO_ 2565876226 RIGHT: 8 B
+ SG_ Rate : 0|16@1+ (0.01,-250) [0|0] "deg/s" B
+ SG_ Speed : 16|16@1+ (0.01,0) [0|0] "km/h" B
+BO_ 256 MEMS: 8 A
+ SG_ Rate : 0|16@1- (0.01,0) [-300|300] "deg/s" A
+ SG_ Other : 16|16@1- (0.01,0) [-300|300] "deg/s" A
+BA_DEF_DEF_ "VFrameFormat" "J1939PG";
+)";
+
+std::string input_of(const std::string& table, const std::string& message,
+                     const std::string& more = "rate = \"Rate\"\n") {
+  return fmt::format("{}\nbus = \"can0\"\ndbc = \"boat.dbc\"\nmessage = \"{}\"\n{}", table, message,
+                     more);
+}
+const std::string kToCan1 = "[output]\nbus = \"can1\"\n";
+
+// The protocol's codes bound what is accepted, whatever the file says; the key has the last word.
+TEST_F(Config, AcceptsNoCodesOfAProtocol) {
+  write("boat.dbc", kBoat);
+  const std::string text = input_of("[[gyro]]", "TURN") + input_of("[[gyro]]", "LEFT") + kToCan1;
+  const Plan plan = plan_of(text);
+  ASSERT_EQ(plan.gyros.size(), 2U);
+  EXPECT_EQ(plan.gyros[0].rate.codes, (dbc::Codes{0x7FFFFFFD, 0x7FFFFFFF}));
+  EXPECT_DOUBLE_EQ(plan.gyros[0].rate.maximum, 0x7FFFFFFC * 3.125e-8);
+  EXPECT_EQ(plan.gyros[1].rate.codes, (dbc::Codes{0xFB00, 0xFFFF}));
+  EXPECT_TRUE(plan.gyros[1].rate.codes_in_range);
+  EXPECT_DOUBLE_EQ(plan.gyros[1].rate.maximum, 0xFAFF * 0.01 - 250);
+  const Plan none = plan_of(replaced(text, "\"LEFT\"\n", "\"LEFT\"\ncodes = \"none\"\n"));
+  ASSERT_EQ(none.gyros.size(), 2U);
+  EXPECT_TRUE(none.gyros[1].rate.codes.empty());
+  const Plan boat = plan_of(replaced(text, "\"LEFT\"\n", "\"LEFT\"\ncodes = \"nmea2000\"\n"));
+  ASSERT_EQ(boat.gyros.size(), 2U);
+  EXPECT_EQ(boat.gyros[1].rate.codes, (dbc::Codes{0xFFFD, 0xFFFF}));
+  const auto bad = messages_of(replaced(text, "\"LEFT\"\n", "\"LEFT\"\ncodes = \"nmea\"\n"));
+  ASSERT_EQ(bad.size(), 1U);
+  EXPECT_NE(bad[0].find("j1939, nmea2000, none"), std::string::npos) << bad[0];
+}
+
+// Every input has a sender.
+TEST_F(Config, TakesASourceAddressForEveryInput) {
+  write("boat.dbc", kBoat);
+  const std::string axes = "x = \"Ax\"\ny = \"Ax\"\nz = \"Ax\"\n";
+  write("boat.dbc", std::string(kBoat) +
+                        "BO_ 2565876483 ACC: 8 A\n"
+                        " SG_ Ax : 0|16@1- (0.001,0) [-30|30] \"g\" A\n");
+  const Plan plan = plan_of(input_of("[[gyro]]", "TURN") + input_of("[[gyro]]", "MEMS") +
+                            input_of("[reference]", "LEFT") + "source_address = 7\n" +
+                            input_of("[accelerometer]", "ACC", axes) + "source_address = 8\n" +
+                            input_of("[speed]", "LEFT", "signal = \"Speed\"\n") +
+                            "source_address = 9\n" + kToCan1);
+  ASSERT_TRUE(plan.reference && plan.accelerometer && plan.speed);
+  EXPECT_TRUE(plan.reference->match.carries(0x18F02A07, true));
+  EXPECT_FALSE(plan.reference->match.carries(0x18F02A08, true));
+  EXPECT_EQ(plan.accelerometer->match.id & 0xFFU, 8U);
+  EXPECT_EQ(plan.speed->match.id & 0xFFU, 9U);
+}
+
+// The identifier of another message of the same PGN is that one's alone.
+TEST_F(Config, PassesOverTheIdentifiersOfOtherMessages) {
+  write("boat.dbc", kBoat);
+  const Plan plan = plan_of(input_of("[[gyro]]", "LEFT") + input_of("[[gyro]]", "MEMS") + kToCan1);
+  ASSERT_EQ(plan.gyros.size(), 2U);
+  EXPECT_TRUE(plan.gyros[0].match.carries(0x18F02A01, true));
+  EXPECT_TRUE(plan.gyros[0].match.carries(0x0CF02A33, true));
+  EXPECT_FALSE(plan.gyros[0].match.carries(0x18F02A02, true));
+  EXPECT_FALSE(plan.gyros[0].match.carries(0x0CF02A02, true));
+}
+
+TEST_F(Config, RefusesInputsThatCannotBeToldApart) {
+  write("boat.dbc", kBoat);
+  const std::string left = input_of("[[gyro]]", "LEFT");
+  const std::string mems = input_of("[[gyro]]", "MEMS");
+  const auto refused = [&](const std::string& text) {
+    const auto messages = messages_of(text + kToCan1);
+    return messages.size() == 1 && messages[0].find("cannot be told apart") != std::string::npos;
+  };
+  EXPECT_TRUE(refused(left + mems + input_of("[reference]", "RIGHT")));
+  EXPECT_FALSE(refused(left + mems + input_of("[reference]", "RIGHT") + "source_address = 2\n"));
+  EXPECT_TRUE(refused(left + mems + input_of("[reference]", "RIGHT") + "source_address = 3\n"));
+  EXPECT_FALSE(refused(left + "source_address = 1\n" + mems + input_of("[reference]", "RIGHT") +
+                       "source_address = 3\n"));
+  EXPECT_TRUE(refused(left + mems + input_of("[reference]", "LEFT"))) << "the very same signal";
+  EXPECT_TRUE(refused(left + mems + input_of("[reference]", "MEMS"))) << "the very same signal";
+  EXPECT_FALSE(refused(left + mems + input_of("[reference]", "MEMS", "rate = \"Other\"\n")));
+  EXPECT_FALSE(refused(left + mems + input_of("[speed]", "LEFT", "signal = \"Speed\"\n")))
+      << "one message may serve several inputs";
+  EXPECT_TRUE(refused(left + mems + input_of("[speed]", "RIGHT", "signal = \"Speed\"\n")));
+}
+
+// --- counters ------------------------------------------------------------------------------------
+
+// AUTOSAR's profile 1 leaves 15 out, whatever the file says of the signal.
+TEST_F(Config, CountsProfile1To14) {
+  write("bench.dbc", replaced(kBench, "48|4@1+ (1,0) [0|14]", "48|4@1+ (1,0) [0|15]"));
+  EXPECT_EQ(plan_of(kGood).gyros[0].e2e.counter->modulus, 16U);
+  const std::string protection = "crc = \"Crc\"\ne2e = \"profile_1a\"\ndata_id = 1\n";
+  write("bench.dbc", replaced(replaced(kBench, "48|4@1+ (1,0) [0|14]", "48|4@1+ (1,0) [0|15]"),
+                              "Crc : 56|8", "Crc : 40|8"));
+  const std::string text =
+      replaced(kGood, "counter = \"Counter\"\n", "counter = \"Counter\"\n" + protection);
+  EXPECT_EQ(plan_of(text).gyros[0].e2e.counter->modulus, 15U);
+  const std::string second = replaced(text, "\"profile_1a\"", "\"crc8_j1850\"");
+  EXPECT_EQ(plan_of(replaced(second, "data_id = 1\n", "")).gyros[0].e2e.counter->modulus, 16U);
+  const auto said = messages_of(replaced(text, "data_id = 1\n", "data_id = 1\ncounter_max = 9\n"));
+  ASSERT_EQ(said.size(), 1U);
+  EXPECT_NE(said[0].find("runs from 0 to 14"), std::string::npos) << said[0];
+}
+
+TEST_F(Config, TakesTheHighestValueOfACounter) {
+  const std::string key = "counter = \"Counter\"\n";
+  const Plan plan = plan_of(replaced(kGood, key, key + "counter_max = 9\nmax_delta_counter = 1\n"));
+  ASSERT_EQ(plan.gyros.size(), 2U);
+  EXPECT_EQ(plan.gyros[0].e2e.counter->modulus, 10U);
+  EXPECT_TRUE(plan.gyros[0].e2e.counter->strict);
+  EXPECT_EQ(plan_of(replaced(kGood, key, key + "counter_max = 15\n")).gyros[0].e2e.counter->modulus,
+            16U)
+      << "against the file's range";
+  expect_error(key, key + "counter_max = 16\n", "counter_max", {"counter_max is 16", "1 to 15"});
+  expect_error(key, key + "counter_max = 0\n", "counter_max", {"counter_max is 0", "1 to 15"});
+  expect_error(key, "counter_max = 9\n", "counter_max", {"counter_max without a counter"});
+}
+
+// --- what is odd ---------------------------------------------------------------------------------
+
+TEST_F(Config, WarnsOfOneNameForBothGyros) {
+  const auto loaded = load(replaced(kGood, "\"right\"", "\"left\""));
+  ASSERT_TRUE(loaded);
+  ASSERT_EQ(loaded->warnings.size(), 1U);
+  EXPECT_NE(loaded->warnings[0].message().find("both gyros have the name \"left\""),
+            std::string::npos);
+}
+
+// Somebody on the output's bus has our identifier; on another bus that does not matter, and the
+// gateway's own messages may stand in a file of all messages.
+TEST_F(Config, WarnsOfMessagesThatHaveAnIdentifierOfOurs) {
+  write("bench.dbc", std::string(kBench) + "BO_ 1568 RADAR: 8 RIG\nBO_ 1569 VG_Bias: 8 RIG\n");
+  const auto loaded = load(kGood);
+  ASSERT_TRUE(loaded);
+  ASSERT_EQ(loaded->warnings.size(), 1U);
+  const std::string warning = loaded->warnings[0].message();
+  EXPECT_NE(warning.find("message RADAR has the identifier 0x620, with which VG_Rate goes out"),
+            std::string::npos)
+      << warning;
+  EXPECT_NE(warning.find("rate_id"), std::string::npos) << warning;
+  const auto apart = load(replaced(kGood, "[output]\nbus = \"can0\"", "[output]\nbus = \"can3\""));
+  ASSERT_TRUE(apart);
+  EXPECT_TRUE(apart->warnings.empty());
+}
+
 // --- what is wrong -------------------------------------------------------------------------------
 
 // A mistyped key in any table: the nearest name that the table knows.

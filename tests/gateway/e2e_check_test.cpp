@@ -126,5 +126,73 @@ TEST(E2eCheck, AnythingNewIsRightAfterASilence) {
   EXPECT_EQ(judge(check, 13), Reject::kWrongSequence);
 }
 
+// --- multiplexed messages ------------------------------------------------------------------------
+
+std::optional<Reject> judge_other(E2eCheck& check, unsigned counter) {
+  return check.judge(counted(counter), E2eCheck::Page::kOther);
+}
+
+// Four pages and a counter of 0…3: the own page always carries the same number.
+TEST(E2eCheck, FollowsACounterOverAllPages) {
+  E2ePlan plan = plan_of(1, false);
+  plan.counter->modulus = 4;
+  E2eCheck check(plan);
+  for (int round = 0; round < 10; ++round) {
+    EXPECT_FALSE(judge_other(check, 0));
+    EXPECT_FALSE(judge_other(check, 1));
+    EXPECT_FALSE(judge(check, 2)) << round;
+    EXPECT_EQ(judge(check, 2), Reject::kCounterRepeated) << round;
+    EXPECT_FALSE(judge_other(check, 3));
+  }
+}
+
+TEST(E2eCheck, CountsWhatIsMissingOnOtherPages) {
+  const E2ePlan plan = plan_of(0, false);
+  E2eCheck check(plan);
+  std::uint32_t missing = 0;
+  EXPECT_FALSE(check.count(counted(0).payload(), missing));
+  EXPECT_FALSE(check.count(counted(3).payload(), missing, E2eCheck::Page::kOther));
+  EXPECT_EQ(missing, 2U);
+  EXPECT_FALSE(check.count(counted(4).payload(), missing));
+  EXPECT_EQ(missing, 0U);
+}
+
+// A counter that counts the rounds stands still within one.
+TEST(E2eCheck, TakesACounterOfRounds) {
+  const E2ePlan plan = plan_of(1, false);
+  E2eCheck check(plan);
+  for (unsigned round = 0; round < 30; ++round) {
+    EXPECT_FALSE(judge_other(check, round % 15));
+    EXPECT_FALSE(judge(check, round % 15)) << round;
+    EXPECT_FALSE(judge_other(check, round % 15));
+  }
+}
+
+// All pages go on, the counter does not: nothing is new.
+TEST(E2eCheck, FindsACounterThatStandsOnAllPages) {
+  const E2ePlan plan = plan_of(0, false);
+  E2eCheck check(plan);
+  EXPECT_FALSE(judge_other(check, 5));
+  EXPECT_FALSE(judge(check, 5));
+  for (int i = 0; i < 5; ++i) {
+    EXPECT_FALSE(judge_other(check, 5));
+    EXPECT_EQ(judge(check, 5), Reject::kCounterRepeated);
+  }
+}
+
+// Where the highest value was configured, one beyond it is no number of the sender's.
+TEST(E2eCheck, RefusesNumbersBeyondTheConfiguredHighest) {
+  E2ePlan plan = plan_of(0, false);
+  plan.counter->modulus = 10;
+  plan.counter->strict = true;
+  E2eCheck check(plan);
+  EXPECT_FALSE(judge(check, 8));
+  EXPECT_FALSE(judge(check, 9));
+  EXPECT_EQ(judge(check, 12), Reject::kWrongSequence);
+  std::uint32_t missing = 7;
+  EXPECT_FALSE(check.count(counted(0).payload(), missing));
+  EXPECT_EQ(missing, 0U);
+}
+
 }  // namespace
 }  // namespace vgyro::gateway

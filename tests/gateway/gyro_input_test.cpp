@@ -251,6 +251,23 @@ TEST(GyroInput, ReadsAMultiplexedRateOnItsOwnPageOnly) {
   EXPECT_TRUE(input.decode(frame_of(kIdA, {0x64, 0})).reject);
 }
 
+// J1939: 0xFAFF is the last measurement. What the DBC file's range leaves out is out of range.
+TEST(GyroInput, RefusesTheCodesOfAProtocol) {
+  dbc::Signal signal = signal_of(0, 16, 1.0 / 128, -250.0, ValueType::kUnsigned);
+  GyroPlan plan = small_plan();
+  plan.rate = quantity_of(signal, 1e5);
+  plan.rate.codes = dbc::codes_of(signal, dbc::CodeRules::kJ1939);
+  plan.rate.codes_in_range = true;
+  plan.rate.maximum = plan.rate.highest();
+  GyroInput input(plan);
+  EXPECT_DOUBLE_EQ(input.decode(frame_of(kIdA, {0xFF, 0xFA})).rate_dps, 0xFAFF / 128.0 - 250);
+  EXPECT_EQ(input.decode(frame_of(kIdA, {0x00, 0xFB})).reject, Reject::kNoMeasurement);
+  EXPECT_EQ(input.decode(frame_of(kIdA, {0x00, 0xFE})).reject, Reject::kNoMeasurement);
+  EXPECT_EQ(input.decode(frame_of(kIdA, {0xFF, 0xFF})).reject, Reject::kNoMeasurement);
+  plan.rate.codes_in_range = false;
+  EXPECT_EQ(input.decode(frame_of(kIdA, {0x00, 0xFE})).reject, Reject::kOutOfRange);
+}
+
 // Motorola order counts from the most significant bit.
 TEST(GyroInput, ReadsMotorolaOrder) {
   GyroPlan plan = small_plan();

@@ -121,5 +121,17 @@ TEST(InputFrames, TurnToTheQuantitysPage) {
   EXPECT_EQ(bytes_of(other), (std::vector<int>{4, 21, 0, 0}));
 }
 
+// J1939, 1/128 deg/s from -250: 300 deg/s would be a code that says "error".
+TEST(InputFrames, StopBelowTheCodesOfAProtocol) {
+  GyroPlan plan = small_plan();
+  dbc::Signal signal = signal_of(0, 16, 1.0 / 128, -250.0, ValueType::kUnsigned);
+  plan.rate = quantity_of(signal, 1e5);
+  plan.rate.codes = dbc::codes_of(signal, dbc::CodeRules::kJ1939);
+  EXPECT_EQ(bytes_of(gyro_frame(plan, 300.0)), (std::vector<int>{0xFF, 0xFA, 0, 0}));
+  EXPECT_EQ(bytes_of(gyro_frame(plan, 0.0)), (std::vector<int>{0x00, 0x7D, 0, 0}));
+  EXPECT_EQ(bytes_of(gyro_frame(plan, -300.0)), (std::vector<int>{0, 0, 0, 0}));
+  EXPECT_DOUBLE_EQ(carried_dps(plan), 250.0);
+}
+
 }  // namespace
 }  // namespace vgyro::gateway

@@ -76,5 +76,15 @@ TEST(Router, GivesErrorFramesNoRole) {
   EXPECT_EQ(router.roles(0, frame_of(rig::kIdA, {}, can::kError | can::kExtended)), 0);
 }
 
+// An identifier that the DBC file gives another message of the same PGN is that one's.
+TEST(Router, LeavesTheIdentifiersOfOtherMessagesToThem) {
+  Plan plan = j1939_plan();
+  plan.gyros[0].match.others = {0x0CF02A07};
+  const Router router(plan);
+  EXPECT_EQ(router.roles(0, frame_of(0x0CF02A06, {}, can::kExtended)), kGyro1);
+  EXPECT_EQ(router.roles(0, frame_of(0x0CF02A07, {}, can::kExtended)), 0);
+  EXPECT_EQ(router.roles(0, frame_of(0x18F02A07, {}, can::kExtended)), 0);
+}
+
 }  // namespace
 }  // namespace vgyro::gateway

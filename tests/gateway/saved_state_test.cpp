@@ -204,6 +204,8 @@ TEST(SavedState, WhatCannotBeIsRefusedBehindARightChecksum) {
   const Forgery forgeries[] = {
       {"format = 1", "format = 2", "format 1"},
       {"format = 1", "format = \"1\"", "format 1"},
+      {"format = 1", "format = 5e19", "format 1"},
+      {"format = 1", "format = nan", "format 1"},
       {"[drift]", "[other]", "format 1"},
       {"bias_dps = [0.0331", "bias_dps = [nan", "bias_dps holds nan"},
       {"bias_dps = [0.0331", "bias_dps = [inf", "bias_dps holds inf"},

@@ -82,6 +82,19 @@ TEST(Units, IgnoreLetterCaseAndBlanks) {
   EXPECT_DOUBLE_EQ(converted(Dimension::kSpeed, "Km/H", 3.6), 1.0);
 }
 
+// Of temperature, acceleration and speed too; "Â°" is UTF-8 that was taken for cp1252.
+TEST(Units, AreKnownAsPublicFilesWriteThem) {
+  for (const std::string_view unit : {"ºC", "˚C", "℃", "Â°C", "deg C", "degrees C",
+                                      "Degree Celsius", "Grad C", "Unit_DegreCelsi"})
+    EXPECT_DOUBLE_EQ(converted(Dimension::kTemperature, unit, 20.0), 20.0) << unit;
+  for (const std::string_view unit : {"m/s**2", "m/sec^2", "m/ss", "Unit_MeterPerSeconSquar"})
+    EXPECT_DOUBLE_EQ(converted(Dimension::kAcceleration, unit, 9.80665), 1.0) << unit;
+  for (const std::string_view unit : {"km/hr", "KPH", "kmph", "Unit_KiloMeterPerHour"})
+    EXPECT_DOUBLE_EQ(converted(Dimension::kSpeed, unit, 36.0), 10.0) << unit;
+  for (const std::string_view unit : {"º/s", "˚/s", "Â°/s", "°/Sek", "Grad/sec"})
+    EXPECT_DOUBLE_EQ(converted(Dimension::kRate, unit, 6.0), 6.0) << unit;
+}
+
 // A unit of another dimension is not a rate with a strange scale: m/s must not pass as deg/s.
 TEST(Units, RefuseOtherDimensions) {
   for (const std::string_view unit : {"m/s", "deg", "V", "", "g", "degC", "deg/s^2", "rad"}) {

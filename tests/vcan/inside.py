@@ -4,10 +4,12 @@ own, or in a User Mode Linux guest. Takes its orders from plan.json in the folde
 what it saw beside it, and keeps captures meanwhile in the folder named second. Starting programs is
 slow in the guest, so this starts few and imports little."""
 
+import fcntl
 import json
 import os
 import signal
 import socket
+import struct
 import subprocess
 import sys
 import time
@@ -36,6 +38,7 @@ class Daemon:
         self.reloads_us = []
         self.frozen_us = []  # from, to
         self.listened_us = []  # from, to: what this harness does in between, starting programs, takes the processor too
+        self.is_heard = True  # else nobody reads what it tells
         self.start()
 
     def start(self):
@@ -77,6 +80,9 @@ class Daemon:
         end = time.monotonic() + seconds
         while (left := end - time.monotonic()) > 0:
             self.listener.settimeout(min(left, 0.1))
+            if not self.is_heard:
+                time.sleep(min(left, 0.1))
+                continue
             try:
                 text = self.listener.recv(4096).decode()
             except TimeoutError:
@@ -110,6 +116,7 @@ class Daemon:
         except subprocess.TimeoutExpired:
             self.process.kill()
             code = "still running after its signal"
+        self.is_heard = True
         self.listen(0.05)
         self.listener.close()
         return code
@@ -207,6 +214,15 @@ def play(log, daemon, folder, after_s=None, what=None):
         raise OSError(f"canplayer {log}: exit {player.returncode}")
 
 
+def run_meanwhile(command, daemon):
+    """A program that takes long."""
+    running = subprocess.Popen(command)
+    while running.poll() is None:
+        daemon.listen(0.2)
+    if running.returncode != 0:
+        raise OSError(f"{' '.join(command)}: exit {running.returncode}")
+
+
 def wait_until_said(text, daemon, seconds):
     """By the daemon, to people."""
     end = time.monotonic() + seconds
@@ -216,6 +232,18 @@ def wait_until_said(text, daemon, seconds):
                 return
         daemon.listen(0.1)
     raise OSError(f"not said within {seconds:g} s: {text}")
+
+
+def flap(interface, times, pause_s, daemon):
+    """Takes a link down and up again and again, from here: starting programs would take too long for it."""
+    get_flags, set_flags, up = 0x8913, 0x8914, 1  # linux/sockios.h, linux/if.h
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as control:
+        for _ in range(times):
+            request = struct.pack("16sh14x", interface.encode(), 0)
+            flags = struct.unpack("16sh14x", fcntl.ioctl(control, get_flags, request))[1]
+            for now in (flags & ~up, flags | up):
+                fcntl.ioctl(control, set_flags, struct.pack("16sh14x", interface.encode(), now))
+                daemon.listen(pause_s)
 
 
 def take_steps(steps, daemon, folder):
@@ -232,6 +260,12 @@ def take_steps(steps, daemon, folder):
             play(what[0], daemon, folder, what[1], daemon.reload)
         elif verb == "play_and_freeze":
             play(what[0], daemon, folder, what[1], lambda seconds=what[2]: daemon.freeze(seconds))
+        elif verb == "play_and_flap":
+            play(what[0], daemon, folder, what[1], lambda flaps=what[2]: flap(*flaps, daemon))
+        elif verb == "run_meanwhile":
+            run_meanwhile(what, daemon)
+        elif verb == "stop_reading_notices":
+            daemon.is_heard = False
         elif verb == "reload":
             daemon.reload()
         else:

@@ -182,7 +182,7 @@ TEST_F(SocketProbe, CarriesEveryKindOfFrameUnchanged) {
 
 TEST_F(SocketProbe, RefusesFdFramesOnAClassicLink) {
   Socket socket = open(kClassicBus, {});
-  EXPECT_FALSE(socket.fd_frames());
+  EXPECT_EQ(socket.look(), (LinkState{.is_ours = true, .is_up = true, .fd_frames = false}));
   EXPECT_EQ(socket.send(frame_of(0x123, kFd, 32)), SendResult::kUnsupported);
   EXPECT_EQ(socket.send(classic(0x123)), SendResult::kSent);
 }
@@ -328,16 +328,16 @@ TEST_F(SocketProbe, SendsWhatASlowBusTakesInTimeAndDropsTheRest) {
 TEST_F(SocketProbe, GoesOnWithTheSameSocketAfterTheLinkWasDown) {
   Socket sender = open(kBus, {});
   Socket receiver = open(kBus, everything_);
-  EXPECT_TRUE(receiver.link_up());
+  EXPECT_TRUE(receiver.look().is_up);
   change_links("ip link set probe0 down");
   EXPECT_EQ(receiver.receive().status, ReceiveStatus::kLinkDown);
   EXPECT_EQ(receiver.receive().status, ReceiveStatus::kDrained) << "told once";
-  EXPECT_FALSE(receiver.link_up());
+  EXPECT_FALSE(receiver.look().is_up);
   EXPECT_EQ(sender.receive().status, ReceiveStatus::kLinkDown) << "a writer learns it too";
   EXPECT_EQ(sender.send(classic(1)), SendResult::kLinkDown);
   EXPECT_EQ(sender.send(classic(1)), SendResult::kLinkDown);
   change_links("ip link set probe0 up");
-  EXPECT_TRUE(receiver.link_up());
+  EXPECT_TRUE(receiver.look().is_up);
   EXPECT_EQ(sender.send(classic(2)), SendResult::kSent);
   EXPECT_EQ(frames_of(receive_all(receiver)), (std::vector<Frame>{classic(2)}));
 }
@@ -345,12 +345,41 @@ TEST_F(SocketProbe, GoesOnWithTheSameSocketAfterTheLinkWasDown) {
 TEST_F(SocketProbe, OpensOnALinkThatIsDown) {
   change_links("ip link set probe0 down");
   Socket receiver = open(kBus, everything_);
-  EXPECT_FALSE(receiver.link_up());
-  EXPECT_EQ(receiver.receive().status, ReceiveStatus::kLinkDown);
+  EXPECT_FALSE(receiver.look().is_up);
+  EXPECT_EQ(receiver.receive().status, ReceiveStatus::kDrained) << "it did not go down since";
   change_links("ip link set probe0 up");
   Socket sender = open(kBus, {});
   EXPECT_EQ(sender.send(classic(2)), SendResult::kSent);
   EXPECT_EQ(receive_all(receiver).size(), 1U);
+}
+
+TEST_F(SocketProbe, HearsFdFramesOnALinkThatIsGivenAnFdMtuLater) {
+  Socket socket = open(kClassicBus, everything_);
+  for (const char* mtu : {"72", "2060"}) {
+    change_links(fmt::format(
+        "ip link set probe1 down && ip link set probe1 mtu {} && ip link set probe1 up", mtu));
+    EXPECT_EQ(socket.receive().status, ReceiveStatus::kLinkDown);
+    EXPECT_TRUE(socket.look().fd_frames) << mtu;
+    Socket sender = open(kClassicBus, {});
+    const Frame frame = frame_of(0x123, kFd, 32);
+    EXPECT_EQ(sender.send(frame), SendResult::kSent) << mtu;
+    EXPECT_EQ(frames_of(receive_all(socket)), (std::vector<Frame>{frame})) << mtu;
+  }
+}
+
+TEST_F(SocketProbe, KnowsThatItsNameMeansAnotherInterface) {
+  Socket socket = open(kBus, everything_);
+  EXPECT_TRUE(socket.look().is_ours);
+  EXPECT_EQ(socket.name_now(), kBus);
+  change_links(
+      "ip link set probe0 down && ip link set probe0 name probe2 && ip link set probe2 up");
+  EXPECT_EQ(socket.look(), LinkState{}) << "nothing has its name";
+  EXPECT_EQ(socket.name_now(), "probe2");
+  change_links("ip link add probe0 mtu 72 type vcan && ip link set probe0 up");
+  EXPECT_EQ(socket.look(), LinkState{}) << "another one has its name";
+  change_links("ip link del probe2");
+  EXPECT_EQ(socket.look(), LinkState{});
+  EXPECT_EQ(socket.name_now(), "");
 }
 
 TEST_F(SocketProbe, NeedsANewSocketAfterTheDeviceWasDeleted) {

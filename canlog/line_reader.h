@@ -1,0 +1,79 @@
+#pragma once
+
+// What the readers of text forms share: lines one after the other, counted and judged; each form
+// says what one line means. The candump log has a faster reader of its own.
+
+#include <memory>
+#include <optional>
+#include <string_view>
+
+#include "canlog/log_source.h"
+#include "canlog/reader.h"
+#include "canlog/text_line.h"
+
+namespace vgyro::canlog {
+
+enum class Verdict : std::uint8_t {
+  kFrame,
+  kHead,   ///< no frame, and understood: a date, a comment, a blank line; it is not counted apart
+  kOther,  ///< no frame, but something else: counted, as people may miss it
+  kMalformed  ///< looks like a frame and is none
+};
+struct Parsed {
+  Verdict verdict = Verdict::kOther;
+  const char* why = "";  ///< of a malformed line
+};
+
+class LineReader : public LogReader {
+ public:
+  bool next(LogRecord& record) final;
+  [[nodiscard]] const LogCounts& counts() const final { return counts_; }
+  [[nodiscard]] const InterfaceTable& interfaces() const final { return interfaces_; }
+  [[nodiscard]] const std::optional<Error>& error() const final { return error_; }
+  [[nodiscard]] std::uint64_t bytes_read() const final { return bytes_read_; }
+  [[nodiscard]] std::uint64_t bytes_total() const final { return bytes_total_; }
+  void before_wait(std::function<void()> callback) final;
+
+ protected:
+  explicit LineReader(std::unique_ptr<ByteSource> bytes);
+
+  /// `line` has neither its end nor noise. `record` begins as default; for kFrame the callee has
+  /// filled it in.
+  virtual Parsed parse(std::string_view line, LogRecord& record) = 0;
+
+  static Parsed frame() { return {Verdict::kFrame, ""}; }
+  static Parsed head() { return {Verdict::kHead, ""}; }
+  static Parsed other() { return {Verdict::kOther, ""}; }
+  static Parsed malformed(const char* why) { return {Verdict::kMalformed, why}; }
+  /// The record's bus by name; false when there are too many, which malformed(kTooManyBuses) tells.
+  bool set_bus(std::string_view name, LogRecord& record);
+  /// By the channel's number, from 1 on (canlog/writer.h).
+  bool set_channel(unsigned channel, LogRecord& record);
+  static constexpr const char* kTooManyBuses = "more than 64 different interfaces";
+
+ private:
+  bool refill();
+
+  std::unique_ptr<LogSource> source_;
+  std::string_view block_;
+  InterfaceTable interfaces_;
+  LogCounts counts_;
+  std::uint64_t bytes_read_ = 0;
+  std::uint64_t bytes_total_ = 0;
+  std::optional<Error> error_;
+};
+
+/// Payload bytes from words, as many as the frame's length says, in the given base. Null, or why it
+/// cannot be.
+const char* read_payload(Words& words, can::Frame& frame, int base);
+
+/// A classic or FD frame's length; for FD padded up to what an FD frame can have. Null, or why not.
+const char* set_length(unsigned bytes, can::Frame& frame);
+
+/// A DLC code, 0 to 15: of FD the length it stands for, of a classic frame above 8 a raw DLC.
+const char* set_dlc(unsigned dlc, can::Frame& frame);
+
+/// What a log says that tells no more of an error frame than that there was one: as asc2log has it.
+void set_error_frame(can::Frame& frame);
+
+}  // namespace vgyro::canlog

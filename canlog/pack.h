@@ -1,0 +1,27 @@
+#pragma once
+
+// Packs on the way into another sink: gzip, xz or zstd, by the ending of a name.
+
+#include <memory>
+#include <string_view>
+
+#include "canlog/writer.h"
+
+namespace vgyro::canlog {
+
+/// A sink that wants to hear when nothing more comes.
+class PackingSink : public ByteSink {
+ public:
+  void rewrite(std::uint64_t /*offset*/, std::string_view /*bytes*/) final {}
+  [[nodiscard]] bool can_rewrite() const final { return false; }
+  /// Once, behind the last write().
+  virtual void finish() = 0;
+};
+
+/// The ending of `path` that names a packing (".gz", ".xz", ".zst"), or an empty one.
+std::string_view packing_ending(std::string_view path);
+
+/// `ending` as of packing_ending(), not empty. What comes out goes into `to`.
+std::unique_ptr<PackingSink> packing_sink(std::string_view ending, ByteSink& to);
+
+}  // namespace vgyro::canlog

@@ -1,0 +1,112 @@
+#include "gateway/input_conflicts.h"
+
+#include <algorithm>
+#include <array>
+#include <string_view>
+
+#include <fmt/core.h>
+
+namespace vgyro::gateway {
+
+namespace {
+
+struct Input {
+  std::string name;
+  std::string_view key;  ///< of the table, for the place
+  const std::string& message;
+  const FrameMatch& match;
+  const Quantity* rate;  ///< null: it reads none
+};
+
+std::vector<Input> inputs_of(const Plan& plan) {
+  std::vector<Input> inputs;
+  for (const GyroPlan& gyro : plan.gyros)
+    inputs.push_back({"gyro " + gyro.name, "gyro", gyro.message, gyro.match, &gyro.rate});
+  if (const auto& it = plan.reference)
+    inputs.push_back({"reference", "reference", it->message, it->match, &it->rate});
+  if (const auto& it = plan.accelerometer)
+    inputs.push_back({"accelerometer", "accelerometer", it->message, it->match, nullptr});
+  if (const auto& it = plan.speed)
+    inputs.push_back({"speed", "speed", it->message, it->match, nullptr});
+  return inputs;
+}
+
+// Two inputs may read the same frames for other signals. Frames of one sender that pass for another
+// one's, and one rate for two, are a mistake.
+bool confused(const Input& a, const Input& b) {
+  if (!may_share_frames(a.match, b.match)) return false;
+  const bool same_bits = a.rate != nullptr && b.rate != nullptr && a.rate->codec == b.rate->codec &&
+                         a.rate->presence == b.rate->presence;
+  if (same_bits) return true;
+  const bool other_sender =
+      a.match.mask != b.match.mask || !dbc::same_sender(a.match.id, b.match.id);
+  return a.match.extended && other_sender && a.message != b.message;
+}
+
+}  // namespace
+
+bool may_share_frames(const FrameMatch& a, const FrameMatch& b) {
+  const bool same_group =
+      a.bus == b.bus && a.extended == b.extended && ((a.id ^ b.id) & a.mask & b.mask) == 0;
+  if (!same_group) return false;
+  // Who takes any sender passes over those that the DBC file describes as other messages.
+  const auto passes_over = [](const FrameMatch& any, const FrameMatch& one) {
+    return (any.mask & kSourceMask) == 0 && (one.mask & kSourceMask) != 0 &&
+           !any.carries(one.id, one.extended);
+  };
+  return !passes_over(a, b) && !passes_over(b, a);
+}
+
+void check_apart(TomlReader& root, const Plan& plan) {
+  const std::vector<Input> inputs = inputs_of(plan);
+  for (std::size_t i = 0; i < inputs.size(); ++i) {
+    // The two gyros among themselves were looked at before.
+    for (std::size_t k = std::max<std::size_t>(i + 1, 2); k < inputs.size(); ++k) {
+      const Input& a = inputs[i];
+      const Input& b = inputs[k];
+      if (!confused(a, b)) continue;
+      root.complain(root.where(b.key),
+                    fmt::format("{} ({}) and {} ({}) cannot be told apart: a frame of one of them "
+                                "on {} is taken for both",
+                                a.name, a.message, b.name, b.message, plan.buses[b.match.bus]),
+                    b.match.extended ? "source_address = N in each of them, or another signal"
+                                     : "another signal for one of them");
+    }
+  }
+}
+
+void warn_of_conflicts(TomlReader& root, const Plan& plan, const DatabaseCache& cache,
+                       const std::set<BusFile>& files, std::vector<Error>& warnings) {
+  if (plan.gyros[0].name == plan.gyros[1].name) {
+    warnings.push_back({root.where("gyro"),
+                        fmt::format("both gyros have the name \"{}\"", plan.gyros[0].name),
+                        "a name for each: messages and summaries tell them apart by it"});
+  }
+  struct Own {
+    std::string_view message;
+    std::string_view key;
+    std::uint32_t id;
+  };
+  const OutputPlan& output = plan.output;
+  const std::array<Own, 3> own{{{"VG_Rate", "rate_id", output.rate_id},
+                                {"VG_Bias", "bias_id", output.bias_id},
+                                {"VG_Model", "model_id", output.model_id}}};
+  for (const auto& [bus, path] : files) {
+    const dbc::Database* database = cache.loaded(path);
+    if (database == nullptr || bus != plan.buses[output.bus]) continue;
+    for (const dbc::Message& message : database->messages) {
+      for (const Own& ours : own) {
+        const bool taken = !message.extended && message.id == ours.id;
+        if (!taken || message.name == ours.message) continue;
+        warnings.push_back(
+            {at_line(path, message.line),
+             fmt::format("message {} has the identifier {:#x}, with which {} goes "
+                         "out on {}",
+                         message.name, ours.id, ours.message, plan.buses[output.bus]),
+             fmt::format("[output] {} = another identifier", ours.key)});
+      }
+    }
+  }
+}
+
+}  // namespace vgyro::gateway

@@ -1,0 +1,35 @@
+#pragma once
+
+// What single tables of a configuration cannot see: inputs that take each other's frames, names and
+// identifiers that stand for two things.
+
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "base/toml_reader.h"
+#include "gateway/plan.h"
+#include "gateway/signal_resolver.h"
+
+namespace vgyro::gateway {
+
+/// J1939: the last byte of an identifier is the sender's address.
+inline constexpr std::uint32_t kSourceMask = 0xFF;
+
+/// Can one frame be of both?
+bool may_share_frames(const FrameMatch& a, const FrameMatch& b);
+
+/// Complains of inputs besides the gyros that cannot be told apart from another one. Signals of one
+/// message may serve several inputs.
+void check_apart(TomlReader& root, const Plan& plan);
+
+/// A bus and the path of a DBC file that describes it.
+using BusFile = std::pair<std::string, std::string>;
+
+/// What is usable, but will puzzle people: one name for both gyros; a message of the bus that has
+/// an identifier of ours.
+void warn_of_conflicts(TomlReader& root, const Plan& plan, const DatabaseCache& cache,
+                       const std::set<BusFile>& files, std::vector<Error>& warnings);
+
+}  // namespace vgyro::gateway
