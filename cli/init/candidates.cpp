@@ -1,12 +1,13 @@
 #include "cli/init/candidates.h"
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 
 #include <fmt/core.h>
 
+#include "cli/init/words.h"
 #include "dbc/codec.h"
+#include "dbc/codes.h"
 #include "dbc/multiplex.h"
 #include "gateway/units.h"
 
@@ -18,24 +19,7 @@ constexpr std::size_t kFramesLeast = 32;
 constexpr double kRateLeast_hz = 5.0;     // below it no motion can be followed
 constexpr double kPeakMost_dps = 3000.0;  // more is an engine, not a platform
 
-std::string lower(std::string_view text) {
-  std::string result;
-  for (const char c : text)
-    result += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return result;
-}
-
-bool has_any(const std::string& text, std::initializer_list<std::string_view> words) {
-  return std::any_of(words.begin(), words.end(),
-                     [&](std::string_view word) { return text.find(word) != text.npos; });
-}
-
-bool says_invalid(const std::string& label) {
-  return has_any(lower(label), {"invalid", "not available", "not_available", "notavailable", "sna",
-                                "error", "fault", "ungueltig", "ungültig", "init"});
-}
-
-/// A message's factor on raw values that stand in front of and behind each other.
+/// The bit that says negative, where the rate is a magnitude.
 const dbc::Signal* sign_of(const dbc::Message& message, const dbc::Signal& rate) {
   if (rate.type != dbc::ValueType::kUnsigned || rate.offset < 0.0) return nullptr;
   const dbc::Signal* sign = nullptr;
@@ -116,12 +100,16 @@ std::vector<Found> find_messages(const Traffic& traffic,
   std::vector<Found> all;
   for (const Stream* stream : traffic.streams()) {
     Found best{stream, nullptr, nullptr};
+    int closest = 0;
     for (const dbc::Database& database : databases) {
       for (const dbc::Message& message : database.messages) {
         if (!message.matches(stream->id, stream->extended)) continue;
-        const bool exact = message.id == stream->id;
-        if (best.message == nullptr || (exact && best.message->id != stream->id))
-          best = {stream, &database, &message};
+        const int close = message.id == stream->id                   ? 3
+                          : dbc::same_sender(message.id, stream->id) ? 2
+                                                                     : 1;
+        if (close <= closest) continue;
+        closest = close;
+        best = {stream, &database, &message};
       }
     }
     if (best.message != nullptr) all.push_back(best);
@@ -144,13 +132,13 @@ analysis::StampedSignal series_of(const Found& found, const dbc::Signal& signal,
                        signal.minimum >= codec->representable_min() - std::abs(signal.factor) &&
                        signal.maximum <= codec->representable_max() + std::abs(signal.factor);
   if (signal.is_integer()) series.step = std::abs(signal.factor * scale);
+  const dbc::NoValues no_values(signal, found.message->codes);
   double newest_s = -1e300;
   for (const Stream::Kept& frame : found.stream->kept) {
     const auto payload = found.stream->payload(frame);
     if (!codec->fits(payload.size()) || !presence->holds(payload)) continue;
     const dbc::Reading reading = codec->decode(payload);
-    const std::string* label = signal.label(reading.raw);
-    if (!std::isfinite(reading.value) || (label != nullptr && says_invalid(*label))) continue;
+    if (!std::isfinite(reading.value) || no_values.contains(reading.raw)) continue;
     if (limited && (reading.value < signal.minimum || reading.value > signal.maximum)) continue;
     // Of the epoch a double keeps a quarter of a microsecond.
     const double t_s = static_cast<double>(frame.t_ns) * 1e-9;

@@ -21,7 +21,8 @@ struct Found {
   const dbc::Message* message = nullptr;
 };
 
-/// Exact identifiers before J1939's PGN; a message of the first file that knows it.
+/// The very identifier goes before J1939's PGN from the same sender, that before any sender; a
+/// message of the first file that knows it.
 std::vector<Found> find_messages(const Traffic& traffic,
                                  const std::vector<dbc::Database>& databases);
 
@@ -52,18 +53,20 @@ struct E2eFound {
 
 struct Companions {
   std::string counter;
+  std::optional<std::int64_t> counter_max;  ///< where it is not what gateway takes by itself
   std::string temperature;
   std::string valid;
   std::optional<E2eFound> e2e;
   std::vector<std::string> remarks;  ///< doubts, for the file
 };
-Companions find_companions(const Found& found, const dbc::Signal& rate);
+/// `main`: the signal that the message is read for.
+Companions find_companions(const Found& found, const dbc::Signal& main);
 
 /// A protection that all frames agree with; tried at every byte.
 std::optional<E2eFound> find_e2e(const Found& found);
 
-/// Of a signal, with its stamps since the epoch's own second `zero_ns`; what lies out of the DBC
-/// file's range or is labelled invalid is left out.
+/// Of a signal, times `scale`; stamps since the epoch. What lies out of the DBC file's range, is
+/// labelled invalid or is one of the protocol's codes is left out.
 analysis::StampedSignal series_of(const Found& found, const dbc::Signal& signal, double scale,
                                   const dbc::Signal* sign = nullptr);
 

@@ -2,13 +2,14 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <cmath>
+#include <map>
 #include <set>
 
 #include <fmt/core.h>
 
 #include "cli/init/candidates.h"
+#include "cli/init/words.h"
 #include "dbc/codec.h"
 #include "dbc/e2e.h"
 #include "gateway/units.h"
@@ -19,13 +20,6 @@ namespace {
 
 constexpr std::size_t kFramesLooked = 2000;
 constexpr double kMostly = 0.95;
-
-std::string lower(std::string_view text) {
-  std::string result;
-  for (const char c : text)
-    result += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return result;
-}
 
 /// Raw values in the order of the log.
 std::vector<std::int64_t> raw_values(const Found& found, const dbc::Signal& signal) {
@@ -40,20 +34,35 @@ std::vector<std::int64_t> raw_values(const Found& found, const dbc::Signal& sign
   return values;
 }
 
-/// Counts one more with every frame, to its bits' end or one before it.
-bool counts(const Found& found, const dbc::Signal& signal) {
-  if (!signal.is_integer() || signal.length_bits < 2 || signal.length_bits > 31) return false;
-  if (signal.condition || signal.is_multiplexor) return false;
+/// Where a counter counts one more with every frame: its highest value, as far as the log shows it
+/// (its bits' where it never began anew). Nothing where it does not count.
+std::optional<std::int64_t> counts_to(const Found& found, const dbc::Signal& signal) {
+  if (!signal.is_integer() || signal.length_bits < 2 || signal.length_bits > 31) return {};
+  if (signal.condition || signal.is_multiplexor) return {};
   const auto values = raw_values(found, signal);
-  if (values.size() < 16) return false;
-  const std::int64_t modulus = std::int64_t{1} << signal.length_bits;
+  if (values.size() < 16) return {};
   std::size_t right = 0;
+  std::map<std::int64_t, std::size_t> ends;  // a value → how often 0 came next
   for (std::size_t i = 1; i < values.size(); ++i) {
-    const std::int64_t step = ((values[i] - values[i - 1]) % modulus + modulus) % modulus;
-    const bool wrapped = step == 2 && values[i] == 0;  // 0 to 14
-    right += step == 1 || wrapped ? 1 : 0;
+    right += values[i] == values[i - 1] + 1 ? 1U : 0U;
+    if (values[i] == 0 && values[i - 1] > 0) ++ends[values[i - 1]];
   }
-  return static_cast<double>(right) >= kMostly * static_cast<double>(values.size() - 1);
+  std::int64_t most = (std::int64_t{1} << signal.length_bits) - 1;
+  const auto end = std::max_element(
+      ends.begin(), ends.end(), [](const auto& a, const auto& b) { return a.second < b.second; });
+  const std::int64_t highest = *std::max_element(values.begin(), values.end());
+  if (end != ends.end() && end->first == highest) {
+    most = highest;
+    right += end->second;
+  }
+  if (static_cast<double>(right) < kMostly * static_cast<double>(values.size() - 1)) return {};
+  return most;
+}
+
+/// What the gateway takes for the highest value by itself.
+std::int64_t counter_max_of(const dbc::Signal& signal) {
+  const std::int64_t bits_most = (std::int64_t{1} << signal.length_bits) - 1;
+  return signal.maximum == static_cast<double>(bits_most - 1) ? bits_most - 1 : bits_most;
 }
 
 std::size_t shared_beginning(std::string_view a, std::string_view b) {
@@ -243,27 +252,32 @@ std::optional<E2eFound> find_e2e(const Found& found) {
 
 Companions find_companions(const Found& found, const dbc::Signal& rate) {
   Companions companions;
+  companions.e2e = find_e2e(found);
+  const auto& e2e = companions.e2e;
   for (const dbc::Signal& signal : found.message->signals) {
-    if (&signal != &rate && companions.counter.empty() && counts(found, signal))
-      companions.counter = signal.name;
+    if (&signal == &rate || !companions.counter.empty()) continue;
+    const auto most = counts_to(found, signal);
+    if (!most) continue;
+    companions.counter = signal.name;
+    const bool fixed = e2e && e2e->kind.starts_with("profile_1");
+    if (!fixed && *most != counter_max_of(signal)) companions.counter_max = most;
   }
   find_temperature(found, companions);
   find_valid(found, rate, companions);
-  companions.e2e = find_e2e(found);
-  const auto& e2e = companions.e2e;
   if (e2e && e2e->signal.empty()) {
-    companions.remarks.push_back(
-        fmt::format("byte {} carries a check value ({}), but the DBC file has no signal there: "
-                    "add one and name it by crc and e2e",
-                    e2e->byte, e2e->kind));
+    const bool wide = e2e->kind == "profile_5";
+    companions.remarks.push_back(fmt::format(
+        "byte {} carries a check value that agrees with {}, but the DBC file has no signal there. "
+        "To have it checked, add to the file\n#     SG_ VG_CHECK : {}|{}@1+ (1,0) [0|0] \"\" "
+        "Vector__XXX\n# and here crc = \"VG_CHECK\", e2e = \"{}\"{}",
+        e2e->byte, e2e->kind, 8 * e2e->byte, wide ? 16 : 8, e2e->kind,
+        e2e->data_id.empty() ? "" : ", data_id = " + e2e->data_id));
   }
   for (const dbc::Signal& signal : found.message->signals) {
-    const std::string name = lower(signal.name);
-    const bool named = name.find("crc") != name.npos || name.find("checksum") != name.npos;
-    if (named && !e2e)
-      companions.remarks.push_back(fmt::format(
-          "{} looks like a check value; none of the kinds that `e2e` knows agrees with the frames",
-          signal.name));
+    if (e2e || !has_any(lower(signal.name), {"crc", "checksum", "chksum"})) continue;
+    companions.remarks.push_back(fmt::format(
+        "{} looks like a check value; none of the kinds that `e2e` knows agrees with the frames",
+        signal.name));
   }
   return companions;
 }

@@ -37,6 +37,54 @@ std::string head_text(const Proposal& proposal, const Found& found) {
                      toml_string(dbc_path(proposal, found)), toml_string(found.message->name));
 }
 
+/// A key, and behind it in a column of its own why.
+std::string line(std::string_view key, const std::string& value, std::string_view why = {}) {
+  const std::string text = fmt::format("{} = {}", key, value);
+  if (why.empty()) return text + "\n";
+  return fmt::format("{:<31} # {}\n", text, printable(why));
+}
+
+/// A comment, folded; a line of it that begins with a blank stays whole.
+std::string comment(std::string_view text) {
+  constexpr std::size_t kColumns = 98;
+  std::string result;
+  while (!text.empty()) {
+    std::string_view one = text.substr(0, text.find('\n'));
+    text.remove_prefix(std::min(text.size(), one.size() + 1));
+    while (one.size() > kColumns && !one.starts_with(' ')) {
+      const std::size_t blank = one.substr(0, kColumns).rfind(' ');
+      if (blank == one.npos) break;
+      result += "# " + printable(one.substr(0, blank)) + "\n";
+      one.remove_prefix(blank + 1);
+    }
+    result += "# " + printable(one) + "\n";
+  }
+  return result;
+}
+
+/// Counter and check value, of any input.
+std::string e2e_text(const Companions& with) {
+  std::string text;
+  if (!with.counter.empty())
+    text += line("counter", toml_string(with.counter), "one more with every frame");
+  if (with.counter_max)
+    text += line("counter_max", std::to_string(*with.counter_max), "its highest value in the log");
+  if (with.e2e && !with.e2e->signal.empty()) {
+    text += line("crc", toml_string(with.e2e->signal), "agrees with the log's frames");
+    text += line("e2e", toml_string(with.e2e->kind));
+    if (!with.e2e->data_id.empty())
+      text += line("data_id", with.e2e->data_id, "found by trial: the first of those that agree");
+  }
+  for (const std::string& remark : with.remarks)
+    text += comment("CHECK: " + remark);
+  return text;
+}
+
+std::string sender_text(const Found& found) {
+  if (!found.message->is_j1939) return "";
+  return line("source_address", std::to_string(found.stream->id & 0xFFU), "the sender in this log");
+}
+
 std::string gyro_text(const Proposal& proposal, const Candidate& candidate, const char* name,
                       bool flipped) {
   const Companions with = find_companions(candidate.found, *candidate.signal);
@@ -45,37 +93,21 @@ std::string gyro_text(const Proposal& proposal, const Candidate& candidate, cons
   const std::string step = candidate.series.step > 0.0
                                ? fmt::format("step {:.3g} deg/s", candidate.series.step)
                                : "a float";
-  text += fmt::format("rate = {:<24} # {:.0f} Hz, {}, noise {:.2g} deg/s\n",
-                      toml_string(candidate.signal->name), 1.0 / candidate.figures.interval_s, step,
-                      candidate.figures.noise);
+  text += line("rate", toml_string(candidate.signal->name),
+               fmt::format("{:.0f} Hz, {}, noise {:.2g} deg/s", 1.0 / candidate.figures.interval_s,
+                           step, candidate.figures.noise));
   if (!candidate.assumed_unit.empty()) {
-    text += fmt::format("unit = {}                 # CHECK: the DBC file gives no unit; assumed\n",
-                        toml_string(candidate.assumed_unit));
+    text += line("unit", toml_string(candidate.assumed_unit),
+                 "CHECK: the DBC file gives no unit; assumed");
   }
-  if (flipped) text += "sign = -1                      # moves against the other gyro\n";
+  if (flipped) text += line("sign", "-1", "moves against the other gyro");
   if (!candidate.sign_signal.empty())
-    text += fmt::format("sign_signal = {:<17} # CHECK: by its name\n",
-                        toml_string(candidate.sign_signal));
-  if (candidate.found.message->is_j1939) {
-    text += fmt::format("source_address = {:<14} # the sender in this log\n",
-                        candidate.found.stream->id & 0xFFU);
-  }
-  if (!with.counter.empty())
-    text +=
-        fmt::format("counter = {:<21} # one more with every frame\n", toml_string(with.counter));
-  if (!with.temperature.empty())
-    text += fmt::format("temperature = {}\n", toml_string(with.temperature));
+    text += line("sign_signal", toml_string(candidate.sign_signal), "CHECK: by its name");
+  text += sender_text(candidate.found);
+  if (!with.temperature.empty()) text += line("temperature", toml_string(with.temperature));
   if (!with.valid.empty())
-    text += fmt::format("valid = {:<23} # CHECK: by its label in the DBC file\n",
-                        toml_string(with.valid));
-  if (with.e2e && !with.e2e->signal.empty()) {
-    text += fmt::format("crc = {:<25} # agrees with the log's frames\ne2e = {}\n",
-                        toml_string(with.e2e->signal), toml_string(with.e2e->kind));
-    if (!with.e2e->data_id.empty()) text += fmt::format("data_id = {}\n", with.e2e->data_id);
-  }
-  for (const std::string& remark : with.remarks)
-    text += fmt::format("# CHECK: {}\n", printable(remark));
-  return text + "\n";
+    text += line("valid", toml_string(with.valid), "CHECK: by its label in the DBC file");
+  return text + e2e_text(with) + "\n";
 }
 
 std::string commented(const std::string& text) {
@@ -104,23 +136,61 @@ std::string followers_text(const Proposal& proposal) {
 }
 
 std::string speed_text(const Proposal& proposal) {
-  const Found* best = nullptr;
-  const dbc::Signal* signal = nullptr;
-  for (const Found& found : proposal.messages) {
-    for (const dbc::Signal& other : found.message->signals) {
-      if (!gateway::convert_unit(gateway::Dimension::kSpeed, other.unit) || other.condition)
-        continue;
-      if (found.stream->frames_per_s() < 2.0) continue;
-      if (best != nullptr) continue;
-      best = &found;
-      signal = &other;
-    }
+  if (!proposal.circumstances.speed) return "";
+  const SpeedFound& speed = *proposal.circumstances.speed;
+  constexpr double kStanding_m_s = 0.05;  // as the gateway has it
+  std::string why = "CHECK: is it 0 when the vehicle stands? This log has no rest";
+  if (speed.resting_m_s && *speed.resting_m_s < kStanding_m_s) {
+    why = "0 while the gyros rest in this log";
+  } else if (speed.resting_m_s) {
+    why = fmt::format("CHECK: {:.2f} m/s while the gyros rest in this log", *speed.resting_m_s);
   }
-  if (best == nullptr) return "";
-  return fmt::format(
-      "[speed]                        # CHECK: 0 when the vehicle stands?\n{}signal = "
-      "{}\n\n",
-      head_text(proposal, *best), toml_string(signal->name));
+  std::string text = "[speed]\n" + head_text(proposal, *speed.found);
+  text += line("signal", toml_string(speed.signal->name), why);
+  text += sender_text(*speed.found) + e2e_text(find_companions(*speed.found, *speed.signal));
+  // What stands still in a rest would tell the corrector that the vehicle rolls.
+  const bool wrong = speed.resting_m_s && *speed.resting_m_s >= kStanding_m_s;
+  return (wrong ? commented(text) : text) + "\n";
+}
+
+std::string accelerometer_text(const Proposal& proposal) {
+  if (!proposal.circumstances.accelerometer) return "";
+  const AccelerometerFound& with = *proposal.circumstances.accelerometer;
+  constexpr double kGravityOff = 0.15;
+  const bool good = std::abs(with.magnitude_g - 1.0) < kGravityOff;
+  std::string text = "[accelerometer]\n" + head_text(proposal, *with.found);
+  text += line("x", toml_string(with.axes[0]->name),
+               fmt::format("{}the three together are {:.2f} g, {}", good ? "" : "CHECK: ",
+                           with.magnitude_g, good ? "as gravity" : "which is not gravity"));
+  text += line("y", toml_string(with.axes[1]->name)) + line("z", toml_string(with.axes[2]->name));
+  text += sender_text(*with.found) + e2e_text(find_companions(*with.found, *with.axes[0]));
+  return (good ? text : commented(text)) + "\n";
+}
+
+std::string calibration_text(const Proposal& proposal) {
+  constexpr double kRest_s = 60.0;
+  constexpr double kMargin_s = 2.0;  // a second at each end may be cut
+  const auto& rest = proposal.circumstances.rest;
+  const bool paired = proposal.choice.pair.has_value();
+  std::string seconds = "60";
+  std::string why = "CHECK: the platform must rest so long first";
+  if (rest && rest->seconds() >= kRest_s + kMargin_s) {
+    why =
+        fmt::format("of rest; this log has it from {:.0f} s to {:.0f} s", rest->from_s, rest->to_s);
+  } else if (rest) {
+    seconds = fmt::format("{:.0f}", std::floor(rest->seconds() - kMargin_s));
+    why = fmt::format("CHECK: all that this log has, from {:.0f} s to {:.0f} s; 60 is better",
+                      rest->from_s, rest->to_s);
+  } else if (paired) {
+    why = "CHECK: of rest, and this log has no 30 s of it";
+  }
+  std::string text = "[calibration]\n" + line("rest_s", seconds, why);
+  if (paired && !rest) {
+    text += comment(
+        "A replay of this log would wait for rest to its end, with no valid rate. Take a log that "
+        "begins at rest, or name a [reference] and set source = \"reference\".");
+  }
+  return text + "# latitude_deg = 50.45         # of the place, for the Earth's rotation\n\n";
 }
 
 std::string output_text(const Proposal& proposal, const std::string& bus) {
@@ -168,11 +238,10 @@ std::string config_text(const Proposal& proposal) {
         "[[gyro]]\nname = \"b\"\nbus = \"can0\"\ndbc = \"FILE.dbc\"\nmessage = \"MESSAGE\"\n"
         "rate = \"SIGNAL\"\n\n");
   }
-  text += followers_text(proposal) + speed_text(proposal);
-  text +=
-      "[calibration]\nrest_s = 60                    # CHECK: the platform must rest so long "
-      "first\n# latitude_deg = 50.45         # of the place, for the Earth's rotation\n\n"
-      "[corrector]\nmethod = \"optimal\"\n\n";
+  text += followers_text(proposal) + accelerometer_text(proposal) + speed_text(proposal);
+  for (const std::string& remark : proposal.circumstances.remarks)
+    text += comment(remark + ".") + "\n";
+  text += calibration_text(proposal) + "[corrector]\nmethod = \"optimal\"\n\n";
   return text + output_text(proposal, first.found.stream->bus);
 }
 

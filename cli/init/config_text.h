@@ -5,6 +5,7 @@
 #include <string>
 
 #include "cli/init/choice.h"
+#include "cli/init/circumstances.h"
 
 namespace vgyro::cli {
 
@@ -12,6 +13,7 @@ struct Proposal {
   const std::vector<Candidate>& candidates;
   const Choice& choice;
   const std::vector<Found>& messages;
+  const Circumstances& circumstances;
   const Traffic& traffic;
   std::string folder;  ///< of the file, for the paths in it
 };

@@ -89,9 +89,8 @@ int run_init(const InitOptions& options) {
     databases.push_back(std::move(*loaded));
   }
   Traffic traffic;
-  for (const std::string& log : options.logs) {
-    if (const auto read = traffic.read(log); !read) return report(read.error());
-  }
+  if (const auto read = traffic.read(options.logs); !read) return report(read.error());
+  tell("{}", printable_lines(traffic.notes()));
   tell("{} frames of {} identifiers in {:.0f} s{}\n\n", traffic.frames(), traffic.streams().size(),
        traffic.seconds(), traffic.thinned() ? "; a long log: part of it was looked at" : "");
   const auto messages = find_messages(traffic, databases);
@@ -99,8 +98,11 @@ int run_init(const InitOptions& options) {
   const Choice choice = choose(candidates);
   print_candidates(candidates, choice);
   if (!choice.pair && !choice.alone) return nothing_found(traffic, messages);
-  const Proposal proposal{candidates, choice, messages, traffic,
-                          std::filesystem::path(options.output).parent_path().string()};
+  const Circumstances circumstances =
+      find_circumstances(messages, candidates, choice, traffic.begin_s());
+  const Proposal proposal{candidates, choice,
+                          messages,   circumstances,
+                          traffic,    std::filesystem::path(options.output).parent_path().string()};
   if (const auto written = write(options.output, config_text(proposal)); !written)
     return report(written.error());
   const std::string name = options.output == "-" ? "standard output" : options.output;

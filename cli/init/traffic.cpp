@@ -2,7 +2,8 @@
 
 #include <algorithm>
 
-#include "canlog/reader.h"
+#include "canlog/merged_reader.h"
+#include "cli/log_notes.h"
 #include "cli/output/progress.h"
 
 namespace vgyro::cli {
@@ -12,14 +13,13 @@ double Stream::frames_per_s() const {
   return seconds > 0.0 ? static_cast<double>(frames - 1) / seconds : 0.0;
 }
 
-Expected<void> Traffic::read(const std::string& log) {
+Expected<void> Traffic::read(const std::vector<std::string>& logs) {
   constexpr std::uint64_t kFramesPerProgress = 1U << 15U;
-  const auto opened = canlog::open_log(log);
+  const auto opened = canlog::open_logs(logs);
   if (!opened) return tl::unexpected(opened.error());
   canlog::LogReader& reader = **opened;
-  Progress progress("reading " + log);
+  Progress progress("reading " + name_of(logs));
   canlog::LogRecord record;
-  const std::uint64_t before = frames_;
   while (reader.next(record)) {
     if (record.is_xl || !record.frame.is_data()) continue;
     add(reader.interfaces().name(record.bus), record);
@@ -27,9 +27,11 @@ Expected<void> Traffic::read(const std::string& log) {
       progress.update(reader.bytes_read(), reader.bytes_total(), frames_);
   }
   if (reader.error()) return tl::unexpected(*reader.error());
-  if (frames_ == before) {
-    return fail(log, "holds no CAN frame",
-                "a log as `candump -L` prints and `candump -l` writes it is needed");
+  if (frames_ == 0) return fail(name_of(logs), kNoFrame, kLogsRemedy);
+  const auto parts = reader.parts();
+  for (std::size_t i = 0; i < logs.size(); ++i) {
+    if (parts[i]->malformed_lines + parts[i]->cut_off_lines > 0)
+      notes_ += log_text(logs[i], *parts[i], false);
   }
   return {};
 }

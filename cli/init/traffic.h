@@ -46,14 +46,17 @@ class Traffic {
 
   explicit Traffic(std::size_t bytes_most = kBytesMost) : bytes_most_(bytes_most) {}
 
-  /// Adds a log. Error when it cannot be read.
-  Expected<void> read(const std::string& log);
+  /// Several logs are merged by stamp. Error when one cannot be read, or none holds a frame.
+  Expected<void> read(const std::vector<std::string>& logs);
   void add(const std::string& bus, const canlog::LogRecord& record);
 
   [[nodiscard]] std::vector<const Stream*> streams() const;
   [[nodiscard]] std::uint64_t frames() const { return frames_; }
   [[nodiscard]] bool thinned() const { return every_ > 1; }
   [[nodiscard]] double seconds() const;
+  [[nodiscard]] double begin_s() const { return static_cast<double>(begin_ns_) * 1e-9; }
+  /// What in the logs was no frame, for people; empty where all was.
+  [[nodiscard]] const std::string& notes() const { return notes_; }
   [[nodiscard]] bool has(const std::string& bus, std::uint32_t id) const;
 
  private:
@@ -67,6 +70,7 @@ class Traffic {
   std::int64_t begin_ns_ = 0;
   std::uint64_t frames_ = 0;
   std::map<Key, Stream> streams_;
+  std::string notes_;
 };
 
 }  // namespace vgyro::cli

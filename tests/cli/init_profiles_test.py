@@ -87,6 +87,8 @@ ALL = (
     Profile("j1939_ari", "ARI", "YawRate", identifier=0x0CF02AE2,
             beside=lambda i, dps: {"PitchRateMerit": 3, "RollRateMerit": 3, "YawRateMerit": 0},
             expect=("source_address = 226", 'valid = "YawRateMerit == 0"')),
+    Profile("nmea2000_rate_of_turn", "RateOfTurn", "Rate", RAD, rate_hz=20.0, identifier=0x09F11323,
+            beside=lambda i, dps: {"SID": i % 253}, expect=("source_address = 35",)),
     Profile("oxts_rt", "RT_RateVehicle", "RateZ"),
     Profile("racelogic_imu04", "IMU04_YawAccX", "YawRate"),
     Profile("sbg_ellipse", "SBG_ImuGyro", "RateZ", RAD),
@@ -215,7 +217,8 @@ class InitProfiles(bench.Bench):
                 first = 1 if where[0] else drive.sign
                 error_dps, share = self.error_dps(drive, first)
                 self.assertGreater(share, 0.98)
-                self.assertLess(error_dps, 0.15, said)  # the coarsest, 0.11 deg/s a bit, and 4 ms between the two
+                # The coarsest have 0.11 deg/s a bit; the two are 4 ms apart; a pair of a slow one is a mean over its interval.
+                self.assertLess(error_dps, 0.15 if profile.rate_hz >= 50.0 else 0.3, said)
 
 
 if __name__ == "__main__":
