@@ -18,6 +18,9 @@ constexpr std::array kScales_s{0.1, 0.4, 1.6};  // a hand's or a rotor's motion 
 constexpr std::size_t kGridMost = 150'000;
 constexpr double kGapMost_s = 0.5;  // nothing is interpolated across more
 constexpr double kSharedLeast_s = 4.0;
+constexpr double kQuickStep_s = 0.05;
+constexpr std::array<std::size_t, 2> kQuickSpans{8, 32};  // steps: 0.4 and 1.6 s
+constexpr double kQuickMost_s = 300.0;
 
 double quantile(std::vector<double> values, double share) {
   if (values.empty()) return 0.0;
@@ -135,6 +138,8 @@ Likeness at_scale(const Sums& first, const Sums& second, const Grid& grid, doubl
   result.correlation = best.correlation();
   result.lag_s = (static_cast<double>(lag) + offset) * grid.step_s;
   result.scale_s = scale_s;
+  if (best.xx > 0.0 && best.xy != 0.0)
+    result.ratio = std::copysign(std::sqrt(best.yy / best.xx), best.xy);
   const double tilt = best.yy - best.xx;
   if (best.xy != 0.0) result.scale = (tilt + std::hypot(tilt, 2.0 * best.xy)) / (2.0 * best.xy);
   const double independent = best.count * static_cast<double>(stride) * grid.step_s / (2 * scale_s);
@@ -268,6 +273,37 @@ std::optional<Likeness> likeness(const StampedSignal& first, const StampedSignal
     if (scale_s < interval_s) continue;
     const Likeness here = at_scale(x, y, grid, scale_s);
     if (!best || here.significance > best->significance) best = here;
+  }
+  return best;
+}
+
+double Likeness::scale_error() const {
+  const double magnitude = std::min(std::abs(correlation), 0.999999);
+  if (magnitude <= 0.0 || significance <= 0.0) return 1.0;
+  const double independent = std::pow(significance / std::atanh(magnitude), 2);
+  return std::sqrt((1.0 / (magnitude * magnitude) - 1.0) / independent);
+}
+
+ChangeShape change_shape(const StampedSignal& signal, double begin_s, double seconds) {
+  const Grid grid{begin_s, kQuickStep_s,
+                  static_cast<std::size_t>(std::min(seconds, kQuickMost_s) / kQuickStep_s)};
+  const Sums sums = resample(signal, grid);
+  ChangeShape shape;
+  for (std::size_t i = 0; i < shape.changes.size(); ++i)
+    shape.changes[i] = changes(sums, kQuickSpans[i]);
+  return shape;
+}
+
+double quick_correlation(const ChangeShape& first, const ChangeShape& second) {
+  const long most = std::lround(kLagMost_s / kQuickStep_s);
+  constexpr double kShared = 80;  // spans' quarters: some twenty independent ones
+  double best = 0.0;
+  for (std::size_t i = 0; i < kQuickSpans.size(); ++i) {
+    const std::size_t stride = kQuickSpans[i] / 4;
+    for (long lag = -most; lag <= most; lag += static_cast<long>(stride)) {
+      const Moments sum = moments(first.changes[i], second.changes[i], lag, stride);
+      if (sum.count >= kShared) best = std::max(best, std::abs(sum.correlation()));
+    }
   }
   return best;
 }

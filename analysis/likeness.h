@@ -5,6 +5,7 @@
 // signal has stamps of its own. And: is one signal made of the other (a gateway's copy, filtered or
 // rounded)? Two sensors have noise of their own, a copy has none.
 
+#include <array>
 #include <optional>
 #include <vector>
 
@@ -31,10 +32,25 @@ struct Likeness {
   double significance = 0.0;  ///< in standard deviations of chance
   double lag_s = 0.0;         ///< the second is later, where positive
   double scale = 1.0;         ///< the second's change over the first's, total least squares
+  double ratio = 1.0;         ///< likewise by their rms: for signals of different units
   double scale_s = 0.0;       ///< time scale that was most telling
+  /// Standard error of the scale's logarithm, as far as noise makes it.
+  [[nodiscard]] double scale_error() const;
 };
 /// Nothing where they share less than a few seconds, or one of them does not change.
 std::optional<Likeness> likeness(const StampedSignal& first, const StampedSignal& second);
+
+/// What quick_correlation() compares: changes over two of the times that likeness() looks at, on a
+/// common grid. NaN where samples are missing.
+struct ChangeShape {
+  std::array<std::vector<double>, 2> changes;
+};
+/// `begin_s` and `seconds` of what is compared; of more than 300 s the first.
+ChangeShape change_shape(const StampedSignal& signal, double begin_s, double seconds);
+
+/// The magnitude of the correlation at the best lag, to a few hundredths; a thirtieth of the cost
+/// of likeness(). 0 where hardly anything is shared.
+double quick_correlation(const ChangeShape& first, const ChangeShape& second);
 
 /// Can `copy` be computed from the samples of `source`, but for its rounding? `lag_s`: the copy is
 /// later by this.

@@ -24,6 +24,8 @@ struct InitOptions {
   std::vector<std::string> dbc_files;
   std::string output = "vgyro.toml";  ///< "-": standard output
   bool force = false;                 ///< replaces a file that is there
+  std::vector<std::uint32_t> ids{};   ///< identifiers to look at; empty: all
+  double turned_deg = 0.0;            ///< in the whole log, positive to the left; 0: not told
 };
 int run_init(const InitOptions& options);
 

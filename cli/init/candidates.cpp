@@ -92,6 +92,11 @@ double name_score(std::string_view signal, std::string_view message) {
 }
 
 std::string Candidate::place() const {
+  if (guessed) {
+    return fmt::format("{} {:03X} byte {}, {} bits{}", found.stream->bus, found.stream->id,
+                       signal->start_bit / 8, signal->length_bits,
+                       signal->byte_order == dbc::ByteOrder::kIntel ? "" : ", Motorola");
+  }
   return fmt::format("{} {}.{}", found.stream->bus, found.message->name, signal->name);
 }
 

@@ -33,6 +33,7 @@ struct Candidate {
   std::string assumed_unit;        ///< where the DBC file has none
   analysis::StampedSignal series;  ///< deg/s
   analysis::SignalFigures figures;
+  bool guessed = false;     ///< by trial of layouts: the series is in raw numbers
   double name_score = 0.0;  ///< by the name alone: above 0 a yaw rate, below it something else
   std::string why_not;      ///< set: no gyro, whatever it correlates with
 

@@ -14,7 +14,7 @@ namespace {
 constexpr double kCorrelationLeast = 0.6;   // coarse or noisy ones on a straight road
 constexpr double kSignificanceLeast = 6.0;  // hundreds of pairs and lags are looked at
 constexpr double kCopyCorrelation = 0.9;
-constexpr std::size_t kJudgedMost = 40;
+constexpr std::size_t kJudgedMost = 60;
 
 /// A signal that repeats another one is later, or is what cannot be undone: filtered, rounded.
 void mark_copies(std::vector<Candidate>& candidates, const std::vector<PairFigures>& pairs) {
@@ -42,7 +42,8 @@ double score(const std::vector<Candidate>& candidates, const PairFigures& pair) 
   const Candidate& a = candidates[pair.first];
   const Candidate& b = candidates[pair.second];
   const double correlation = std::min(std::abs(pair.likeness.correlation), 0.9999);
-  const double off_scale = std::abs(std::log(std::abs(pair.likeness.scale)));
+  const bool scaled = !a.guessed && !b.guessed;
+  const double off_scale = scaled ? std::abs(std::log(std::abs(pair.likeness.scale))) : 0.0;
   const double slower_s = std::max(a.figures.interval_s, b.figures.interval_s);
   return 0.5 * std::atanh(correlation) + a.name_score + b.name_score -
          3.0 * std::min(off_scale, 1.0) - 0.3 * std::log10(slower_s / 0.01);
@@ -71,25 +72,31 @@ Choice choose(std::vector<Candidate>& candidates) {
     for (std::size_t k = i + 1; k < judged.size(); ++k) {
       const auto found =
           analysis::likeness(candidates[judged[i]].series, candidates[judged[k]].series);
-      if (found) choice.pairs.push_back({judged[i], judged[k], *found});
+      if (!found) continue;
+      PairFigures pair{judged[i], judged[k], *found};
+      const bool raw = candidates[judged[i]].guessed || candidates[judged[k]].guessed;
+      if (raw) pair.likeness.scale = pair.likeness.ratio;
+      choice.pairs.push_back(pair);
     }
   }
   mark_copies(candidates, choice.pairs);
-  double best = -1e300;
+  std::vector<std::pair<double, PairFigures>> alike;
   for (const PairFigures& pair : choice.pairs) {
     const Candidate& a = candidates[pair.first];
     const Candidate& b = candidates[pair.second];
     if (!pair.alike() || !usable(a) || !usable(b)) continue;
     if (a.found.stream == b.found.stream) continue;  // one frame is one sensor's
-    const double now = score(candidates, pair);
-    if (now <= best) continue;
-    best = now;
-    choice.pair = pair;
+    alike.emplace_back(score(candidates, pair), pair);
   }
+  std::stable_sort(alike.begin(), alike.end(),
+                   [](const auto& a, const auto& b) { return a.first > b.first; });
+  if (!alike.empty()) choice.pair = alike.front().second;
+  for (std::size_t i = 1; i < alike.size(); ++i)
+    choice.others.push_back(alike[i].second);
   for (const std::size_t i : judged) {
     const bool better =
         !choice.alone || candidates[i].name_score > candidates[*choice.alone].name_score;
-    if (usable(candidates[i]) && better) choice.alone = i;
+    if (usable(candidates[i]) && better && !candidates[i].guessed) choice.alone = i;
   }
   if (!choice.pair) return choice;
   for (const PairFigures& pair : choice.pairs) {

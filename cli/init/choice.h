@@ -22,6 +22,7 @@ struct Choice {
   std::vector<PairFigures> pairs;  ///< of all that could be judged
   std::optional<PairFigures> pair;
   std::optional<std::size_t> alone;    ///< where there is no pair: the one gyro that is there
+  std::vector<PairFigures> others;     ///< that move alike too, likelier ones first
   std::vector<std::size_t> followers;  ///< neither chosen nor copies, but of the same rotation
 };
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <set>
 
 #include <fmt/core.h>
 
@@ -85,8 +86,9 @@ std::string sender_text(const Found& found) {
   return line("source_address", std::to_string(found.stream->id & 0xFFU), "the sender in this log");
 }
 
+/// `flipped`: why its sign is -1; empty: it is not.
 std::string gyro_text(const Proposal& proposal, const Candidate& candidate, const char* name,
-                      bool flipped) {
+                      const std::string& flipped) {
   const Companions with = find_companions(candidate.found, *candidate.signal);
   std::string text = fmt::format("[[gyro]]\nname = \"{}\"\n", name);
   text += head_text(proposal, candidate.found);
@@ -100,7 +102,7 @@ std::string gyro_text(const Proposal& proposal, const Candidate& candidate, cons
     text += line("unit", toml_string(candidate.assumed_unit),
                  "CHECK: the DBC file gives no unit; assumed");
   }
-  if (flipped) text += line("sign", "-1", "moves against the other gyro");
+  if (!flipped.empty()) text += line("sign", "-1", flipped);
   if (!candidate.sign_signal.empty())
     text += line("sign_signal", toml_string(candidate.sign_signal), "CHECK: by its name");
   text += sender_text(candidate.found);
@@ -125,10 +127,11 @@ std::string followers_text(const Proposal& proposal) {
   std::string text;
   for (const std::size_t i : proposal.choice.followers) {
     const Candidate& other = proposal.candidates[i];
-    text += fmt::format(
-        "# {} follows the same rotation. If it can be trusted more than a gyro (rate "
-        "table,\n# dual-antenna GNSS), it may be the reference:\n",
-        printable(other.place()));
+    if (other.guessed) continue;  // told above
+    text += comment(
+        fmt::format("{} follows the same rotation. If it can be trusted more than a gyro (rate "
+                    "table, dual-antenna GNSS), it may be the reference:",
+                    other.place()));
     text += commented(fmt::format("[reference]\n{}rate = {}\n\n", head_text(proposal, other.found),
                                   toml_string(other.signal->name)));
   }
@@ -193,6 +196,63 @@ std::string calibration_text(const Proposal& proposal) {
   return text + "# latitude_deg = 50.45         # of the place, for the Earth's rotation\n\n";
 }
 
+std::string turn_text(const Turn& turn) {
+  constexpr double kScaleOff = 0.03;
+  if (!turn.seen_deg) {
+    return comment(
+        "CHECK: --turned was not used: samples of gyro a are missing, so that its angle is not "
+        "known.");
+  }
+  const double seen_deg = turn.is_backward() ? -*turn.seen_deg : *turn.seen_deg;
+  const bool off = std::abs(seen_deg - turn.told_deg) > kScaleOff * std::abs(turn.told_deg);
+  return comment(fmt::format(
+      "{}Gyro a turned by {:+.1f} deg where --turned says {:+g}.{}", off ? "CHECK: " : "", seen_deg,
+      turn.told_deg, off ? " Is the log's beginning a rest of 3 s, and the unit right?" : ""));
+}
+
+/// Where layouts were tried: which other fields may be the gyros instead, and how to say so.
+std::string others_text(const Proposal& proposal) {
+  constexpr std::size_t kTold = 4;
+  std::string text;
+  std::size_t told = 0;
+  std::set<std::pair<const Stream*, const Stream*>> streams;
+  for (const PairFigures& pair : proposal.choice.others) {
+    const Candidate& a = proposal.candidates[pair.first];
+    const Candidate& b = proposal.candidates[pair.second];
+    const bool again = !streams.insert({a.found.stream, b.found.stream}).second;
+    if (!a.guessed || !b.guessed || again || told == kTold) continue;
+    ++told;
+    text +=
+        fmt::format("   --id {:X} --id {:X}: {} and {}, correlation {:+.3f}\n", a.found.stream->id,
+                    b.found.stream->id, a.place(), b.place(), pair.likeness.correlation);
+  }
+  if (text.empty()) return "";
+  return comment(
+      "Others move alike too. Where the gyros are among them, run `vgyro init` again with\n" +
+      text);
+}
+
+/// What is known of the pair, and what a log cannot tell.
+std::string pair_text(const Proposal& proposal) {
+  const analysis::Likeness& alike = proposal.choice.pair->likeness;
+  std::string text;
+  for (const std::string& remark : proposal.remarks)
+    text += comment("CHECK: " + remark);
+  if (!proposal.remarks.empty()) text += others_text(proposal);
+  text += fmt::format("# b against a: correlation {:+.3f}, scale {:+.4f}, {:.0f} ms {}.\n",
+                      alike.correlation, alike.scale, 1e3 * std::abs(alike.lag_s),
+                      alike.lag_s >= 0.0 ? "later" : "earlier");
+  if (proposal.turn) text += turn_text(*proposal.turn);
+  if (!proposal.turn || !proposal.turn->seen_deg) {
+    text += comment(
+        "CHECK: which way is positive. If the turn to the left must be positive and is not, swap "
+        "the signs of both.");
+  }
+  if (std::abs(std::log(std::abs(alike.scale))) > 0.1)
+    text += "# CHECK: the scales differ: is the unit of one of them wrong in its DBC file?\n";
+  return text;
+}
+
 std::string output_text(const Proposal& proposal, const std::string& bus) {
   unsigned base = 0x610;
   const auto taken = [&](unsigned first) {
@@ -217,21 +277,14 @@ std::string config_text(const Proposal& proposal) {
       "# Proposed by `vgyro init`. Lines with CHECK are for a person to confirm.\n\n";
   const Candidate& first =
       proposal.candidates[choice.pair ? choice.pair->first : choice.alone.value_or(0)];
+  const bool backward = proposal.turn && proposal.turn->is_backward();
+  if (choice.pair) text += pair_text(proposal);
+  text += gyro_text(proposal, first, "a", backward ? "turns to the right are positive in it" : "");
   if (choice.pair) {
-    const analysis::Likeness& alike = choice.pair->likeness;
-    text += fmt::format("# b against a: correlation {:+.3f}, scale {:+.4f}, {:.0f} ms {}.\n",
-                        alike.correlation, alike.scale, 1e3 * std::abs(alike.lag_s),
-                        alike.lag_s >= 0.0 ? "later" : "earlier");
-    text +=
-        "# CHECK: which way is positive. If the turn to the left must be positive and is not, "
-        "swap the\n# signs of both.\n";
-    if (std::abs(std::log(std::abs(alike.scale))) > 0.1)
-      text += "# CHECK: the scales differ: is the unit of one of them wrong in its DBC file?\n";
-  }
-  text += gyro_text(proposal, first, "a", false);
-  if (choice.pair) {
+    const bool against = choice.pair->likeness.scale < 0.0;
+    const std::string why = against ? "moves against the other gyro" : "as the other gyro";
     text += gyro_text(proposal, proposal.candidates[choice.pair->second], "b",
-                      choice.pair->likeness.scale < 0.0);
+                      against != backward ? why : "");
   } else {
     text += "# No second gyro was found in the log: this file does not work before it has one.\n";
     text += commented(

@@ -56,7 +56,7 @@ void Traffic::add(const std::string& bus, const canlog::LogRecord& record) {
   Stream& stream = found->second;
   ++stream.frames;
   stream.last_ns = std::max(stream.last_ns, t_ns);
-  if (!wanted(t_ns)) return;
+  if (!wanted(t_ns) || (!only_.empty() && !only_.contains(stream.id))) return;
   const auto payload = record.frame.payload();
   stream.kept.push_back({t_ns, stream.bytes.size(), record.frame.length});
   stream.bytes.insert(stream.bytes.end(), payload.begin(), payload.end());

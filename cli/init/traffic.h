@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <map>
+#include <set>
 #include <span>
 #include <string>
 #include <tuple>
@@ -46,6 +47,8 @@ class Traffic {
 
   explicit Traffic(std::size_t bytes_most = kBytesMost) : bytes_most_(bytes_most) {}
 
+  /// From now on frames of other identifiers are counted alone; empty: all are kept.
+  void only(const std::vector<std::uint32_t>& ids) { only_ = {ids.begin(), ids.end()}; }
   /// Several logs are merged by stamp. Error when one cannot be read, or none holds a frame.
   Expected<void> read(const std::vector<std::string>& logs);
   void add(const std::string& bus, const canlog::LogRecord& record);
@@ -69,6 +72,7 @@ class Traffic {
   std::int64_t every_ = 1;
   std::int64_t begin_ns_ = 0;
   std::uint64_t frames_ = 0;
+  std::set<std::uint32_t> only_;
   std::map<Key, Stream> streams_;
   std::string notes_;
 };
