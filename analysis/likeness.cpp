@@ -206,10 +206,13 @@ Fit fit(const Rows& rows) {
           mean_value - mean.dot(weights)};
 }
 
-/// Rounding of the copy and of the source, in a difference of this order.
-double rounding(const StampedSignal& copy, const StampedSignal& source, std::size_t order) {
+/// Rounding of the copy and of the source, which may have another unit, in a difference of this
+/// order.
+double rounding(const StampedSignal& copy, const StampedSignal& source, double gain,
+                std::size_t order) {
   constexpr std::array kGain{1.0, 2.0, 6.0};
-  const double steps = copy.step * copy.step + source.step * source.step;
+  const double source_step = gain * source.step;
+  const double steps = copy.step * copy.step + source_step * source_step;
   return kGain[order] * steps / 12.0;
 }
 
@@ -221,7 +224,7 @@ bool all_explained(const StampedSignal& copy, const StampedSignal& source, doubl
   for (std::size_t order = 0; order < 3; ++order) {
     if (order > 0) rows = differences(rows);
     const Fit now = order == 0 ? level : fit(rows);
-    const double rounded = rounding(copy, source, order);
+    const double rounded = rounding(copy, source, level.gain, order);
     const double unexplained = std::max(0.0, now.residual - 1.5 * rounded);
     if (unexplained > kUnexplainedMost * now.explained + 0.2 * rounded) return false;
     noise_seen = order == 2 && now.explained > 2.0 * rounded;

@@ -139,7 +139,11 @@ analysis::StampedSignal series_of(const Found& found, const dbc::Signal& signal,
   if (signal.is_integer()) series.step = std::abs(signal.factor * scale);
   const dbc::NoValues no_values(signal, found.message->codes);
   double newest_s = -1e300;
-  for (const Stream::Kept& frame : found.stream->kept) {
+  const auto& kept = found.stream->kept;
+  for (std::size_t i = 0; i < kept.size(); ++i) {
+    const Stream::Kept& frame = kept[i];
+    // A stamp that the next one falls behind was too late; all others up to it would be too early.
+    if (i + 1 < kept.size() && kept[i + 1].t_ns < frame.t_ns) continue;
     const auto payload = found.stream->payload(frame);
     if (!codec->fits(payload.size()) || !presence->holds(payload)) continue;
     const dbc::Reading reading = codec->decode(payload);

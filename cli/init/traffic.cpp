@@ -9,7 +9,7 @@
 namespace vgyro::cli {
 
 double Stream::frames_per_s() const {
-  const double seconds = static_cast<double>(last_ns - first_ns) * 1e-9;
+  const double seconds = to_seconds(span(time_from_ns(first_ns), time_from_ns(last_ns)));
   return seconds > 0.0 ? static_cast<double>(frames - 1) / seconds : 0.0;
 }
 
@@ -37,7 +37,7 @@ Expected<void> Traffic::read(const std::vector<std::string>& logs) {
 }
 
 bool Traffic::wanted(std::int64_t t_ns) const {
-  return (t_ns - begin_ns_) / kBlock_ns % every_ == 0;
+  return span(time_from_ns(begin_ns_), time_from_ns(t_ns)).count() / kBlock_ns % every_ == 0;
 }
 
 void Traffic::add(const std::string& bus, const canlog::LogRecord& record) {
@@ -55,7 +55,7 @@ void Traffic::add(const std::string& bus, const canlog::LogRecord& record) {
   }
   Stream& stream = found->second;
   ++stream.frames;
-  stream.last_ns = std::max(stream.last_ns, t_ns);
+  stream.last_ns = t_ns;  // not the latest: one stamp from nowhere must not stretch the log
   if (!wanted(t_ns) || (!only_.empty() && !only_.contains(stream.id))) return;
   const auto payload = record.frame.payload();
   stream.kept.push_back({t_ns, stream.bytes.size(), record.frame.length});
@@ -96,7 +96,7 @@ double Traffic::seconds() const {
     first = std::min(first, stream.first_ns);
     last = std::max(last, stream.last_ns);
   }
-  return last > first ? static_cast<double>(last - first) * 1e-9 : 0.0;
+  return last > first ? to_seconds(span(time_from_ns(first), time_from_ns(last))) : 0.0;
 }
 
 bool Traffic::has(const std::string& bus, std::uint32_t id) const {

@@ -23,7 +23,7 @@ struct Stream {
   bool extended = false;
   std::uint64_t frames = 0;  ///< in the whole log
   std::int64_t first_ns = 0;
-  std::int64_t last_ns = 0;
+  std::int64_t last_ns = 0;  ///< of its last frame
 
   struct Kept {
     std::int64_t t_ns = 0;

@@ -178,6 +178,17 @@ class Init(bench.Bench):
                 self.assertEqual(len(re.findall(r"^\[\[gyro\]\]", self.read("vgyro.toml"), re.MULTILINE)), 1)
                 self.assertIn("exactly two", self.bad("check", "vgyro.toml"))
 
+    def test_a_copy_that_no_dbc_file_knows_is_no_second_gyro(self):
+        for copy in ("exact", "filtered"):
+            with self.subTest(copy=copy):
+                mixture = Mixture(3, mems=False, copy=copy)
+                mixture.lines = [line for line in mixture.lines if " 104#" not in line[1]]  # the motion without noise
+                self.prepare(mixture)
+                self.write("all.dbc", mixture.dbc().replace("BO_ 259 COPY", "BO_ 1859 COPY"))
+                said = self.bad("init", "drive.log", "--dbc", "all.dbc")
+                self.assertIn("only one gyro", said)
+                self.assertIn("the same sensor as", said)
+
     def test_finds_speed_accelerometer_and_their_checks(self):
         mixture = Mixture(4, rest_s=40.0)
         mixture.add_surroundings(4)
@@ -249,9 +260,22 @@ class Init(bench.Bench):
 
     def test_says_what_is_missing(self):
         self.prepare(Mixture(1))
-        self.assertIn("no DBC file", self.bad("init", "drive.log"))
-        self.write("none.dbc", 'BO_ 1 NONE: 8 X\n SG_ A : 0|8@1+ (1,0) [0|0] "" X\n')
-        self.assertIn("no signal of the DBC files looks like a rate", self.bad("init", "drive.log", "none.dbc"))
+        self.assertIn("cannot be read", self.bad("init", "drive.log", "--dbc", "missing.dbc").replace("No such file", "cannot be read"))
+        self.write("still.log", "".join(f"({1700000000 + i / 100:.6f}) can0 101#{i % 256:02X}00\n" for i in range(3000)))
+        self.assertIn("no signal of the DBC files looks like a rate", self.bad("init", "still.log", "all.dbc"))
+        self.write("empty.log", "")
+        self.assertIn("holds no CAN frame", self.bad("init", "empty.log", "all.dbc"))
+
+    def test_one_stamp_far_ahead_costs_one_frame(self):
+        mixture = Mixture(8)
+        self.prepare(mixture)
+        whole = self.good("init", "drive.log", "all.dbc", "-o", "-").stdout
+        lines = mixture.log().splitlines(True)
+        spoilt = next(i for i, line in enumerate(lines) if i > 9000 and " 101#" in line)
+        lines[spoilt] = lines[spoilt].replace("(17000", "(19000")
+        self.write("drive.log", "".join(lines))
+        text = self.good("init", "drive.log", "all.dbc", "-o", "-").stdout.decode()
+        self.assertEqual(re.findall("(?m)^(?:message|rate|sign|bus) = .*?(?= *#|$)", text), re.findall("(?m)^(?:message|rate|sign|bus) = .*?(?= *#|$)", whole.decode()))
 
 
 if __name__ == "__main__":
