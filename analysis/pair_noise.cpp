@@ -5,6 +5,7 @@
 #include <numbers>
 #include <span>
 
+#include "analysis/resolution.h"
 #include "analysis/spectrum.h"
 
 namespace vgyro::analysis {
@@ -41,18 +42,16 @@ SeriesNoise judge(const Series& series, double interpolation_gain, bool fit) {
   return noise;
 }
 
-double least_step(const Series& series) {
-  double least = 0.0;
-  for (const Part& part : series.parts) {
-    for (std::size_t i = 1; i < part.rate_dps.size(); ++i) {
-      const double step = std::abs(part.rate_dps[i] - part.rate_dps[i - 1]);
-      // Rounding of the decoded values is no step.
-      if (step > 1e-9 * (1.0 + std::abs(part.rate_dps[i])) && (least == 0.0 || step < least)) {
-        least = step;
-      }
-    }
+SeriesNoise judge_gyro(const Series& series, double step_dps, bool rests) {
+  SeriesNoise noise = judge(series, 1.0, rests);
+  if (!rests) return noise;
+  noise.hidden_by_step = step_hides_noise(series, step_dps);
+  if (noise.hidden_by_step) {
+    noise.fit = bounded_by_step(noise.fit, step_dps, series);
+  } else if (noise.fit) {
+    noise.fit = without_rounding(*noise.fit, step_dps, series.interval_s);
   }
-  return least;
+  return noise;
 }
 
 // Above this frequency nothing but white noise matters; white noise is there.
@@ -108,7 +107,9 @@ std::optional<Correlation> correlate(const std::array<Series, 2>& paired, double
 
 std::optional<Correlation> white_correlation(const PairNoise& noise,
                                              const std::array<Series, 2>& paired) {
-  if (!noise.gyros[0].fit || !noise.gyros[1].fit) return {};
+  for (const SeriesNoise& gyro : noise.gyros) {
+    if (!gyro.fit || gyro.hidden_by_step) return {};
+  }
   double from_hz = 0.0;
   double to_hz = kShareOfRate / paired[0].interval_s;
   for (const SeriesNoise& gyro : noise.gyros) {
@@ -128,8 +129,9 @@ PairNoise judge_pair(const PairRecording& recording) {
     return partly ? slice(series, noise.motion.rest->from_s, noise.motion.rest->to_s) : series;
   };
   for (std::size_t i = 0; i < 2; ++i) {
-    noise.gyros[i] = judge(resting(recording.own[i]), 1.0, noise.motion.rest.has_value());
-    noise.step_dps[i] = least_step(recording.own[i]);
+    noise.step_dps[i] = recording.step_dps[i];
+    noise.gyros[i] =
+        judge_gyro(resting(recording.own[i]), noise.step_dps[i], noise.motion.rest.has_value());
   }
   const Difference judged = difference(recording.paired, noise.motion);
   noise.removed = judged.removed;

@@ -15,8 +15,9 @@
 namespace vgyro::analysis {
 
 struct PairRecording {
-  std::array<Series, 2> own;     ///< each gyro's samples as they came
-  std::array<Series, 2> paired;  ///< both at common instants
+  std::array<Series, 2> own;         ///< each gyro's samples as they came
+  std::array<Series, 2> paired;      ///< both at common instants
+  std::array<double, 2> step_dps{};  ///< between the values that a gyro can send; 0: unknown
   /// White-noise variance of the interpolated rates over that of raw samples, 1 without.
   double interpolation_gain = 1.0;
 };
@@ -28,6 +29,7 @@ struct SeriesNoise {
   double filled_share = 0.0;
   double mean_dps = 0.0;
   std::vector<AllanPoint> allan;
+  bool hidden_by_step = false;  ///< the step between its values hides this gyro's own noise
   std::optional<NoiseFit> fit;  ///< nothing where motion is in it, or the record is too short
 };
 
@@ -41,8 +43,8 @@ struct PairNoise {
   std::array<SeriesNoise, 2> gyros;  ///< over motion.rest; without one over everything, no fit
   SeriesNoise difference;
   std::optional<Mismatch> removed;         ///< from the difference
-  std::optional<Correlation> correlation;  ///< ρ of the white noises; needs rest
-  std::array<double, 2> step_dps{};        ///< least change of the values: their resolution
+  std::optional<Correlation> correlation;  ///< ρ of the white noises; needs rest, none hidden
+  std::array<double, 2> step_dps{};        ///< between its values: the resolution of each gyro
 };
 
 PairNoise judge_pair(const PairRecording& recording);

@@ -5,6 +5,7 @@
 
 #include <fmt/core.h>
 
+#include "analysis/resolution.h"
 #include "cli/log_notes.h"
 #include "cli/role_frames.h"
 #include "fusion/alignment.h"
@@ -41,8 +42,12 @@ class Gatherer {
 
   analysis::PairRecording finish() {
     analysis::PairRecording recording;
-    for (std::size_t i = 0; i < 2; ++i)
+    for (std::size_t i = 0; i < 2; ++i) {
       recording.own[i] = own_[i].finish()[0];
+      // Coarser than what the DBC file allows, often; where nothing ever changed, at least that.
+      const double seen_dps = steps_[i].step_dps();
+      recording.step_dps[i] = seen_dps > 0.0 ? seen_dps : plan_.gyros[i].rate.step;
+    }
     recording.paired = paired_.finish();
     // Averaging a faster gyro leaves white noise white.
     const double ratio = to_seconds(aligner_.interval(aligner_.pacing_gyro())) /
@@ -65,6 +70,7 @@ class Gatherer {
     if (!aligner_.push(gyro, t, taken.rate_dps)) return;
     if (samples_[0] + samples_[1] == 0) origin_ = t;
     ++samples_[gyro];
+    steps_[gyro].add(taken.rate_dps);
     own_[gyro].add(to_seconds(t - origin_), {taken.rate_dps, 0.0});
     fusion::AlignedPair pair;
     while (aligner_.pop(pair)) {
@@ -80,6 +86,7 @@ class Gatherer {
   fusion::StampGuard guard_;
   fusion::Aligner aligner_;
   std::array<analysis::SeriesBuilder, 2> own_;
+  std::array<analysis::StepFinder, 2> steps_;
   analysis::SeriesBuilder paired_;
   std::array<std::uint64_t, 2> samples_{};
   std::uint64_t pairs_ = 0;

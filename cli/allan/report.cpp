@@ -152,13 +152,14 @@ std::string caution(const std::string& name, const SeriesNoise& noise) {
   return text;
 }
 
-// White noise no stronger than rounding to the step makes it.
 std::string step_caution(const std::string& name, const SeriesNoise& noise, double step_dps) {
-  if (!noise.fit || step_dps <= 0.0) return {};
-  const double rounding = step_dps * std::sqrt(noise.interval_s / 12.0);
-  if (noise.fit->white_dps_rthz.value > 1.5 * rounding) return {};
-  return fmt::format("{}: its values step by {:.3g} deg/s, which drowns its own noise.\n", name,
-                     step_dps);
+  if (!noise.hidden_by_step) return {};
+  return fmt::format(
+      "{}: its values step by {:.3g} deg/s, and its own noise is at most half of that: the step "
+      "hides\nit. White noise has a bound here, no value, and drift within a step does not show. "
+      "An "
+      "output of finer\nsteps would show more.\n",
+      name, step_dps);
 }
 
 std::string cautions(const AllanReport& report) {
@@ -167,6 +168,12 @@ std::string cautions(const AllanReport& report) {
     const std::string name = "gyro " + report.gyro_names[i];
     text += caution(name, report.noise.gyros[i]);
     text += step_caution(name, report.noise.gyros[i], report.noise.step_dps[i]);
+  }
+  const bool hidden = report.noise.gyros[0].hidden_by_step || report.noise.gyros[1].hidden_by_step;
+  if (hidden) {
+    text +=
+        "difference: holds those steps, too. Its figures, and the window below, are a rough "
+        "guide.\n";
   }
   return text + caution("difference", report.noise.difference);
 }
@@ -246,6 +253,7 @@ nlohmann::ordered_json noise_json(const SeriesNoise& noise) {
   json["sample_rate_hz"] = 1.0 / noise.interval_s;
   json["bridged_share"] = noise.filled_share;
   json["mean_dps"] = noise.mean_dps;
+  json["hidden_by_step"] = noise.hidden_by_step;
   json["noise"] = noise.fit ? fit_json(*noise.fit) : nlohmann::ordered_json(nullptr);
   json["allan"] = nlohmann::ordered_json::array();
   for (const analysis::AllanPoint& point : noise.allan) {

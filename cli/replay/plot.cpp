@@ -12,6 +12,12 @@ namespace vgyro::cli {
 namespace {
 
 constexpr double kSecondsPerHour = 3600.0;
+// Of the table: gnuplot draws past a value that is missing, and interrupts the line at one that is
+// no number.
+constexpr const char* kMissing = "-";
+// A hole is as long as the one the summary tells, and longer than a slow gyro's usual pace.
+constexpr double kHole_s = 0.5;
+constexpr double kHoleIntervals = 5.0;
 constexpr std::array<const char*, 2> kColours{"#e0a030", "#70a0d0"};
 
 struct ShadeStyle {
@@ -24,6 +30,7 @@ constexpr std::array<ShadeStyle, 3> kShadeStyles{
 }  // namespace
 
 void ReplayPlot::Stretches::follow(TimePoint t, bool is_so) {
+  if (open_ && t - stretches_.back().to > kHole) open_ = false;
   if (is_so && !open_) stretches_.push_back({t, t});
   if (open_ || is_so) stretches_.back().to = t;
   open_ = is_so;
@@ -65,7 +72,7 @@ void ReplayPlot::Mean::merge(const Mean& other) {
 }
 
 std::string ReplayPlot::Mean::text(double scale) const {
-  return count == 0 ? "NaN" : fmt::format("{:.9g}", scale * sum / static_cast<double>(count));
+  return count == 0 ? kMissing : fmt::format("{:.9g}", scale * sum / static_cast<double>(count));
 }
 
 void ReplayPlot::Bucket::merge(const Bucket& other) {
@@ -116,15 +123,58 @@ void ReplayPlot::add_bias(TimePoint t, const std::array<double, 2>& bias_dps) {
     bucket.bias[i].add(bias_dps[i]);
 }
 
+// A curve's points are often sparser than the buckets: the line goes on to the next one. Where it
+// must not, across a hole, the curve gets a point that is none.
+std::vector<bool> ReplayPlot::breaks(const Mean& (*column)(const Bucket&)) const {
+  std::vector<std::size_t> filled;
+  for (std::size_t i = 0; i < buckets_.size(); ++i) {
+    if (column(buckets_[i]).count > 0) filled.push_back(i);
+  }
+  std::vector<bool> broken(buckets_.size(), false);
+  if (filled.size() < 2) return broken;
+  std::vector<std::size_t> steps;
+  for (std::size_t i = 1; i < filled.size(); ++i)
+    steps.push_back(filled[i] - filled[i - 1]);
+  std::vector<std::size_t> sorted = steps;
+  const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
+  std::nth_element(sorted.begin(), middle, sorted.end());
+  const double usual_s = to_seconds(width_) * static_cast<double>(*middle);
+  const double hole_s = std::max(kHoleIntervals * usual_s, kHole_s);
+  for (std::size_t i = 0; i < steps.size(); ++i) {
+    if (to_seconds(width_) * static_cast<double>(steps[i]) > hole_s) broken[filled[i] + 1] = true;
+  }
+  return broken;
+}
+
 void ReplayPlot::write_data(std::string& to) const {
+  struct Column {
+    const Mean& (*mean)(const Bucket&);
+    double scale;
+  };
+  constexpr std::array<Column, 8> kColumns{{
+      {[](const Bucket& b) -> const Mean& { return b.raw[0]; }, 1.0},
+      {[](const Bucket& b) -> const Mean& { return b.raw[1]; }, 1.0},
+      {[](const Bucket& b) -> const Mean& { return b.average; }, 1.0},
+      {[](const Bucket& b) -> const Mean& { return b.rate; }, 1.0},
+      {[](const Bucket& b) -> const Mean& { return b.excess[0]; }, kSecondsPerHour},
+      {[](const Bucket& b) -> const Mean& { return b.excess[1]; }, kSecondsPerHour},
+      {[](const Bucket& b) -> const Mean& { return b.bias[0]; }, kSecondsPerHour},
+      {[](const Bucket& b) -> const Mean& { return b.bias[1]; }, kSecondsPerHour},
+  }};
+  std::array<std::vector<bool>, kColumns.size()> broken;
+  for (std::size_t k = 0; k < kColumns.size(); ++k)
+    broken[k] = breaks(kColumns[k].mean);
   put(to, "$rates << EOD\n");
   for (std::size_t i = 0; i < buckets_.size(); ++i) {
-    const Bucket& b = buckets_[i];
-    if (b.average.count == 0 && b.rate.count == 0 && b.bias[0].count == 0) continue;
-    put(to, "{:.9g} {} {} {} {} {} {} {} {}\n", to_seconds(width_) * (static_cast<double>(i) + 0.5),
-        b.raw[0].text(1.0), b.raw[1].text(1.0), b.average.text(1.0), b.rate.text(1.0),
-        b.excess[0].text(kSecondsPerHour), b.excess[1].text(kSecondsPerHour),
-        b.bias[0].text(kSecondsPerHour), b.bias[1].text(kSecondsPerHour));
+    std::string row;
+    bool empty = true;
+    for (std::size_t k = 0; k < kColumns.size(); ++k) {
+      const Mean& mean = kColumns[k].mean(buckets_[i]);
+      row += broken[k][i] ? std::string(" NaN") : " " + mean.text(kColumns[k].scale);
+      empty = empty && mean.count == 0 && !broken[k][i];
+    }
+    if (empty) continue;
+    put(to, "{:.9g}{}\n", to_seconds(width_) * (static_cast<double>(i) + 0.5), row);
   }
   put(to, "EOD\n");
 }
@@ -192,7 +242,7 @@ std::string ReplayPlot::script(const std::string& path, const PlotTexts& texts) 
   std::string text = fmt::format(
       "{}set multiplot layout {},1 title {} noenhanced\n"
       "set grid lc rgb '#dddddd'\nset key outside top right horizontal noenhanced\n"
-      "set lmargin 12\nset rmargin 3\nset xrange [0:{:.9g}]\nset datafile missing 'NaN'\n"
+      "set lmargin 12\nset rmargin 3\nset xrange [0:{:.9g}]\nset datafile missing '-'\n"
       "set ylabel 'rate, deg/s'\n{}{}"
       "plot $rates u 1:2 w l lc rgb '{}' t {}, '' u 1:3 w l lc rgb '{}' t {}, "
       "'' u 1:4 w l lc rgb '#909090' t 'mean'",

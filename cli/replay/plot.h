@@ -66,12 +66,16 @@ class ReplayPlot {
 
    private:
     static constexpr std::size_t kMax = 500;
+    /// Nobody knows what was in between: longer than the pace of any gyro worth having.
+    static constexpr Duration kHole = std::chrono::seconds(5);
     void join_nearest();
     std::vector<Stretch> stretches_;
     bool open_ = false;
   };
 
   Bucket& bucket_at(TimePoint t);
+  /// Per bucket: is this curve interrupted there?
+  [[nodiscard]] std::vector<bool> breaks(const Mean& (*column)(const Bucket&)) const;
   void write_data(std::string& to) const;
   [[nodiscard]] bool has_rates() const;
   [[nodiscard]] std::string script(const std::string& path, const PlotTexts& texts) const;

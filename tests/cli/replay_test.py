@@ -479,6 +479,28 @@ class Thoughts(Replay):
         said = self.replay("-o", "out.log", "in.log").stderr.decode()
         self.assertRegex(said, r"can be read in two ways, and σ spans both: gyro left has stepped \d+ %; gyro right has stepped \d+ %")
 
+    def test_no_curve_and_no_stop_goes_on_across_a_hole(self):
+        lines = stops_and_turns(4)
+        begin = float(lines[0].split(")")[0][1:])
+        keep = [line for line in lines if not 0.3 < (float(line.split(")")[0][1:]) - begin) / (len(lines) / 200) < 0.7]
+        self.assertLess(len(keep), 0.7 * len(lines))
+        self.write("in.log", "".join(keep))
+        self.replay("-o", "x.log", "--plot", "x.svg", "in.log")
+        picture = self.read("x.svg")
+        curves = 0
+        for path in re.findall(r"<path stroke='rgb\([^']*\)'\s+d='([^']*)'", picture):
+            points = [(kind, float(x)) for kind, x in re.findall(r"([ML])([0-9.]+),", path)]
+            if len(points) < 400:
+                continue  # the grid, the legend, the line at zero
+            curves += 1
+            drawn = [to - before for (_, before), (kind, to) in zip(points, points[1:]) if kind == "L"]
+            width = max(x for _, x in points[2:]) - min(x for _, x in points[2:])
+            self.assertLess(max(drawn[1:]), 0.05 * width)
+        self.assertEqual(curves, 9, "of the rates, of what is off the virtual gyro, and of the two drifts")
+        shades = [float(to) - float(begin) for begin, to in re.findall(r"<polygon fill = '[^']*' points = '([0-9.]+),[^ ]* ([0-9.]+),", picture)]
+        self.assertGreater(len(shades), 8, "four pictures, each with its stops")
+        self.assertLess(max(shades), 0.2 * width)
+
     def test_picture_without_stretches_has_no_legend_of_them(self):
         self.write("in.log", "".join(self.lines))
         self.replay("-q", "-o", "out.log", "--method", "mutual", "--plot", "a.svg", "in.log")
