@@ -19,8 +19,10 @@ constexpr std::size_t kGridMost = 150'000;
 constexpr double kGapMost_s = 0.5;  // nothing is interpolated across more
 constexpr double kSharedLeast_s = 4.0;
 constexpr double kQuickStep_s = 0.05;
-constexpr std::array<std::size_t, 2> kQuickSpans{8, 32};  // steps: 0.4 and 1.6 s
-constexpr double kQuickMost_s = 300.0;
+constexpr double kQuickStepMost_s = 0.5;
+constexpr double kQuickPoints = 6000;  // as many as a grid has, before its step grows
+constexpr std::size_t kQuickPointsMost = 30'000;
+constexpr std::array<std::size_t, 2> kQuickSpans{8, 32};  // steps
 
 double quantile(std::vector<double> values, double share) {
   if (values.empty()) return 0.0;
@@ -98,14 +100,14 @@ struct Moments {
   }
 };
 
-Moments moments(const std::vector<double>& x, const std::vector<double>& y, long lag,
-                std::size_t stride) {
+template <class T>
+Moments moments(const std::vector<T>& x, const std::vector<T>& y, long lag, std::size_t stride) {
   Moments sum;
   const long size = static_cast<long>(x.size());
   for (long k = std::max(0L, -lag); k < std::min(size, size - lag);
        k += static_cast<long>(stride)) {
-    const double a = x[static_cast<std::size_t>(k)];
-    const double b = y[static_cast<std::size_t>(k + lag)];
+    const auto a = static_cast<double>(x[static_cast<std::size_t>(k)]);
+    const auto b = static_cast<double>(y[static_cast<std::size_t>(k + lag)]);
     if (std::isnan(a) || std::isnan(b)) continue;
     sum.xx += a * a;
     sum.yy += b * b;
@@ -288,22 +290,24 @@ double Likeness::scale_error() const {
 }
 
 ChangeShape change_shape(const StampedSignal& signal, double begin_s, double seconds) {
-  const Grid grid{begin_s, kQuickStep_s,
-                  static_cast<std::size_t>(std::min(seconds, kQuickMost_s) / kQuickStep_s)};
-  const Sums sums = resample(signal, grid);
   ChangeShape shape;
-  for (std::size_t i = 0; i < shape.changes.size(); ++i)
-    shape.changes[i] = changes(sums, kQuickSpans[i]);
+  shape.step_s = std::clamp(seconds / kQuickPoints, kQuickStep_s, kQuickStepMost_s);
+  const double points = std::min(seconds / shape.step_s, static_cast<double>(kQuickPointsMost));
+  const Sums sums = resample(signal, {begin_s, shape.step_s, static_cast<std::size_t>(points)});
+  for (std::size_t i = 0; i < shape.changes.size(); ++i) {
+    const std::vector<double> all = changes(sums, kQuickSpans[i]);
+    shape.changes[i].assign(all.begin(), all.end());
+  }
   return shape;
 }
 
 double quick_correlation(const ChangeShape& first, const ChangeShape& second) {
-  const long most = std::lround(kLagMost_s / kQuickStep_s);
+  const long most = std::max(1L, std::lround(kLagMost_s / first.step_s));
   constexpr double kShared = 80;  // spans' quarters: some twenty independent ones
   double best = 0.0;
   for (std::size_t i = 0; i < kQuickSpans.size(); ++i) {
     const std::size_t stride = kQuickSpans[i] / 4;
-    for (long lag = -most; lag <= most; lag += static_cast<long>(stride)) {
+    for (long lag = -most; lag <= most; lag += std::min<long>(most, static_cast<long>(stride))) {
       const Moments sum = moments(first.changes[i], second.changes[i], lag, stride);
       if (sum.count >= kShared) best = std::max(best, std::abs(sum.correlation()));
     }

@@ -40,16 +40,18 @@ struct Likeness {
 /// Nothing where they share less than a few seconds, or one of them does not change.
 std::optional<Likeness> likeness(const StampedSignal& first, const StampedSignal& second);
 
-/// What quick_correlation() compares: changes over two of the times that likeness() looks at, on a
-/// common grid. NaN where samples are missing.
+/// What quick_correlation() compares: changes over two spans of time, on a common grid. NaN where
+/// samples are missing.
 struct ChangeShape {
-  std::array<std::vector<double>, 2> changes;
+  double step_s = 0.0;
+  std::array<std::vector<float>, 2> changes;
 };
-/// `begin_s` and `seconds` of what is compared; of more than 300 s the first.
+/// `begin_s` and `seconds` of what is compared. Of five minutes or less the spans are 0.4 and 1.6
+/// s, of longer times up to ten times that; of more than four hours the first four are taken.
 ChangeShape change_shape(const StampedSignal& signal, double begin_s, double seconds);
 
 /// The magnitude of the correlation at the best lag, to a few hundredths; a thirtieth of the cost
-/// of likeness(). 0 where hardly anything is shared.
+/// of likeness(). 0 where hardly anything is shared. Precondition: shapes of the same time.
 double quick_correlation(const ChangeShape& first, const ChangeShape& second);
 
 /// Can `copy` be computed from the samples of `source`, but for its rounding? `lag_s`: the copy is

@@ -268,8 +268,8 @@ Companions find_companions(const Found& found, const dbc::Signal& rate) {
     const bool wide = e2e->kind == "profile_5";
     companions.remarks.push_back(fmt::format(
         "byte {} carries a check value that agrees with {}, but the DBC file has no signal there. "
-        "To have it checked, add to the file\n#     SG_ VG_CHECK : {}|{}@1+ (1,0) [0|0] \"\" "
-        "Vector__XXX\n# and here crc = \"VG_CHECK\", e2e = \"{}\"{}",
+        "To have it checked, add to the file\n   SG_ VG_CHECK : {}|{}@1+ (1,0) [0|0] \"\" "
+        "Vector__XXX\nand here crc = \"VG_CHECK\", e2e = \"{}\"{}",
         e2e->byte, e2e->kind, 8 * e2e->byte, wide ? 16 : 8, e2e->kind,
         e2e->data_id.empty() ? "" : ", data_id = " + e2e->data_id));
   }

@@ -193,7 +193,8 @@ std::string calibration_text(const Proposal& proposal) {
         "A replay of this log would wait for rest to its end, with no valid rate. Take a log that "
         "begins at rest, or name a [reference] and set source = \"reference\".");
   }
-  return text + "# latitude_deg = 50.45         # of the place, for the Earth's rotation\n\n";
+  return text + commented(line("latitude_deg", "50.45", "of the place, for the Earth's rotation")) +
+         "\n";
 }
 
 std::string turn_text(const Turn& turn) {
@@ -261,12 +262,11 @@ std::string output_text(const Proposal& proposal, const std::string& bus) {
   };
   while (taken(base) && base < 0x7F0)
     base += 0x10;
-  std::string text = fmt::format("[output]\nbus = {}\n", toml_string(bus));
+  std::string text = "[output]\n" + line("bus", toml_string(bus));
   if (base == 0x610) return text;
-  return text + fmt::format(
-                    "rate_id = {:#x}                # 0x610 to 0x612 are in use in this "
-                    "log\nbias_id = {:#x}\nmodel_id = {:#x}\n",
-                    base, base + 1, base + 2);
+  text += line("rate_id", fmt::format("{:#x}", base), "0x610 to 0x612 are in use in this log");
+  text += line("bias_id", fmt::format("{:#x}", base + 1));
+  return text + line("model_id", fmt::format("{:#x}", base + 2));
 }
 
 }  // namespace

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
+#include <charconv>
 #include <cmath>
 #include <limits>
 #include <set>
@@ -59,28 +61,33 @@ double quietest_value(const analysis::StampedSignal& series) {
   return value;
 }
 
+/// To so many digits, as the shortest number that has them.
 double rounded(double value, int digits) {
-  if (value == 0.0 || !std::isfinite(value)) return 0.0;
-  const double unit = std::pow(10.0, std::floor(std::log10(std::abs(value))) - digits + 1);
-  return std::round(value / unit) * unit;
+  const std::string text = fmt::format("{:.{}e}", value, digits - 1);
+  double result = value;
+  std::from_chars(text.data(), text.data() + text.size(), result);
+  return result;
 }
 
-/// As a name's score: a rate lies on both sides of a number that stands for none: 0, or where there
-/// is no sign the middle of its bits, or of those that change. Speeds, temperatures and levels of
-/// something keep to one side.
-double shape_score(const Candidate& candidate) {
-  const dbc::Signal& signal = *candidate.signal;
+/// 0, or where there is no sign the middle of the bits, or of those that change.
+std::vector<double> usual_zeros(const dbc::Signal& signal, double near) {
   std::vector<double> zeros{0.0};
-  if (signal.type == dbc::ValueType::kUnsigned)
-    zeros = {std::ldexp(1.0, signal.length_bits - 1), 32000.0};
-  if (signal.is_integer() && candidate.figures.median > 0.0) {
-    // Of a field that does not fill its bytes.
-    const double power = std::round(std::log2(candidate.figures.median));
-    if (power >= 7.0) zeros.push_back(std::exp2(power));
+  if (signal.type == dbc::ValueType::kUnsigned) {
+    zeros = {std::ldexp(1.0, signal.length_bits - 1)};
+    if (signal.length_bits == 16) zeros.push_back(32000.0);  // J1939
   }
+  constexpr double kBitsLeast = 7.0;
+  if (signal.is_integer() && near > 0.0 && std::round(std::log2(near)) >= kBitsLeast)
+    zeros.push_back(std::exp2(std::round(std::log2(near))));
+  return zeros;
+}
+
+/// As a name's score: a rate lies on both sides of what stands for none. Speeds, temperatures and
+/// levels of something keep to one side.
+double shape_score(const Candidate& candidate) {
   constexpr double kShareLeast = 0.02;
   const auto size = static_cast<double>(candidate.series.value.size());
-  for (const double zero : zeros) {
+  for (const double zero : usual_zeros(*candidate.signal, candidate.figures.median)) {
     const auto above = static_cast<double>(
         std::count_if(candidate.series.value.begin(), candidate.series.value.end(),
                       [&](double value) { return value > zero; }));
@@ -228,33 +235,29 @@ Scales scales_of(const Candidate& first, const Candidate& second,
   return scales;
 }
 
-/// What raw number stands for no rotation: one that is usual, where the log rests near it.
-double zero_of(const Candidate& candidate, double scale_dps) {
-  constexpr double kNear_dps = 8.0;
+/// What raw number stands for no rotation: one that is usual, where the log rests near it as
+/// against its motion. The scale has no say, for it may be wrong.
+double zero_of(const Candidate& candidate) {
   const dbc::Signal& signal = *candidate.signal;
   const double rest = quietest_value(candidate.series);
-  std::vector<double> usual{0.0};
-  if (signal.type == dbc::ValueType::kUnsigned) {
-    usual = {std::ldexp(1.0, signal.length_bits - 1)};
-    if (signal.length_bits == 16) usual.push_back(32000.0);  // J1939
-  }
   double zero = signal.is_integer() ? std::round(rest) : rest;
-  double off_dps = kNear_dps;
-  for (const double one : usual) {
-    const double here_dps = std::abs(rest - one) * scale_dps;
-    if (here_dps >= off_dps) continue;
-    off_dps = here_dps;
+  double off = candidate.figures.peak;
+  for (const double one : usual_zeros(signal, rest)) {
+    if (std::abs(rest - one) >= off) continue;
+    off = std::abs(rest - one);
     zero = one;
   }
   return zero;
 }
+
+constexpr int kDigits = 9;
 
 dbc::Message described_message(const Candidate& candidate, double scale_dps) {
   dbc::Message message = *candidate.found.message;
   dbc::Signal rate = *candidate.signal;
   rate.name = "Rate";
   rate.factor = scale_dps;
-  rate.offset = 0.0 - rounded(zero_of(candidate, scale_dps) * scale_dps, 9);
+  rate.offset = 0.0 - rounded(zero_of(candidate) * scale_dps, kDigits);
   rate.unit = "deg/s";
   rate.comment =
       "Found by trial in a log: place, length, byte order and sign are likely, scale and zero a "
@@ -280,6 +283,52 @@ void point_into(Candidate& candidate, const dbc::Database& database, const dbc::
   candidate.signal = &message.signals.front();
   candidate.series = series_of(candidate.found, *candidate.signal, 1.0);
   candidate.figures = analysis::signal_figures(candidate.series);
+}
+
+// --- which fields are worth a closer look --------------------------------------------------------
+
+/// Their series are made when they are needed: all at once would be many times the log.
+analysis::StampedSignal series_of(const Candidate& candidate) {
+  return candidate.guessed ? series_of(candidate.found, *candidate.signal, 1.0) : candidate.series;
+}
+
+struct Span {
+  double begin_s = 0.0;
+  double seconds = 0.0;
+};
+
+Span span_of(const std::vector<Candidate>& candidates) {
+  Span all{1e300, 0.0};
+  double end_s = -1e300;
+  for (const Candidate& candidate : candidates) {
+    const auto& kept = candidate.found.stream->kept;
+    if (kept.empty()) continue;
+    all.begin_s = std::min(all.begin_s, static_cast<double>(kept.front().t_ns) * 1e-9);
+    end_s = std::max(end_s, static_cast<double>(kept.back().t_ns) * 1e-9);
+  }
+  all.seconds = std::max(0.0, end_s - all.begin_s);
+  return all;
+}
+
+/// Each candidate's best quick correlation with one of another message.
+std::vector<double> best_correlations(const std::vector<Candidate>& candidates) {
+  const Span span = span_of(candidates);
+  std::vector<analysis::ChangeShape> shapes;
+  for (const Candidate& candidate : candidates)
+    shapes.push_back(analysis::change_shape(series_of(candidate), span.begin_s, span.seconds));
+  std::vector<double> best(candidates.size());
+  Progress progress("comparing");
+  for (std::size_t i = 0; i < candidates.size(); ++i) {
+    progress.update("fields", static_cast<double>(i) / static_cast<double>(candidates.size()));
+    for (std::size_t k = 0; k < i; ++k) {
+      if (candidates[i].found.stream == candidates[k].found.stream) continue;
+      if (!candidates[k].why_not.empty()) continue;
+      const double here = analysis::quick_correlation(shapes[i], shapes[k]);
+      best[i] = std::max(best[i], here);
+      best[k] = std::max(best[k], here);
+    }
+  }
+  return best;
 }
 
 }  // namespace
@@ -323,52 +372,27 @@ void add_guessed(std::vector<Candidate>& candidates, const Guess& guess) {
       candidate.found = found;
       candidate.signal = &signal;
       candidate.guessed = true;
-      candidate.series = series_of(found, signal, 1.0);
-      if (candidate.series.t_s.size() > 1) candidates.push_back(std::move(candidate));
+      candidates.push_back(std::move(candidate));
     }
   }
-  double begin_s = 1e300;
-  double end_s = 0.0;
-  for (const Candidate& candidate : candidates) {
-    if (candidate.series.t_s.empty()) continue;
-    begin_s = std::min(begin_s, candidate.series.t_s.front());
-    end_s = std::max(end_s, candidate.series.t_s.back());
-  }
-  std::vector<analysis::ChangeShape> shapes;
-  for (const Candidate& candidate : candidates)
-    shapes.push_back(analysis::change_shape(candidate.series, begin_s, end_s - begin_s));
-  std::vector<std::pair<double, std::size_t>> best(candidates.size());
-  Progress progress("comparing");
-  for (std::size_t i = 0; i < candidates.size(); ++i) {
-    best[i].second = i;
-    progress.update("fields", static_cast<double>(i) / static_cast<double>(candidates.size()));
-    for (std::size_t k = 0; k < i; ++k) {
-      if (candidates[i].found.stream == candidates[k].found.stream) continue;
-      if (k < known && !candidates[k].why_not.empty()) continue;
-      const double here = analysis::quick_correlation(shapes[i], shapes[k]);
-      best[i].first = std::max(best[i].first, here);
-      best[k].first = std::max(best[k].first, here);
-    }
-  }
-  std::vector<std::pair<double, std::size_t>> order(
-      best.begin() + static_cast<std::ptrdiff_t>(known), best.end());
-  std::stable_sort(order.begin(), order.end(),
-                   [](const auto& a, const auto& b) { return a.first > b.first; });
-  std::erase_if(order, [](const auto& one) { return one.first < kQuickLeast; });
-  order.resize(std::min(order.size(), kGuessedMost));
+  const std::vector<double> best = best_correlations(candidates);
   std::vector<std::size_t> kept;
-  for (const auto& one : order)
-    kept.push_back(one.second);
-  std::sort(kept.begin(), kept.end());
-  std::vector<Candidate> left(
-      std::make_move_iterator(candidates.begin()),
-      std::make_move_iterator(candidates.begin() + static_cast<std::ptrdiff_t>(known)));
-  for (const std::size_t i : kept) {
-    candidates[i].figures = analysis::signal_figures(candidates[i].series);
-    candidates[i].name_score = shape_score(candidates[i]);
-    left.push_back(std::move(candidates[i]));
+  for (std::size_t i = known; i < candidates.size(); ++i) {
+    if (best[i] >= kQuickLeast) kept.push_back(i);
   }
-  candidates = std::move(left);
+  std::stable_sort(kept.begin(), kept.end(),
+                   [&](std::size_t a, std::size_t b) { return best[a] > best[b]; });
+  kept.resize(std::min(kept.size(), kGuessedMost));
+  std::sort(kept.begin(), kept.end());
+  std::vector<Candidate> fields;
+  for (const std::size_t i : kept) {
+    Candidate& field = fields.emplace_back(std::move(candidates[i]));
+    field.series = series_of(field);
+    field.figures = analysis::signal_figures(field.series);
+    field.name_score = shape_score(field);
+  }
+  candidates.resize(known);
+  std::move(fields.begin(), fields.end(), std::back_inserter(candidates));
 }
 
 std::optional<double> turned_angle(const analysis::StampedSignal& series) {
