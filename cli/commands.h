@@ -19,6 +19,16 @@ struct CheckOptions {
 };
 int run_check(const CheckOptions& options);
 
+struct InitOptions {
+  std::vector<std::string> logs;
+  std::vector<std::string> dbc_files;
+  std::string output = "vgyro.toml";  ///< "-": standard output
+  bool force = false;                 ///< replaces a file that is there
+  std::vector<std::uint32_t> ids{};   ///< identifiers to look at; empty: all
+  double turned_deg = 0.0;            ///< in the whole log, positive to the left; 0: not told
+};
+int run_init(const InitOptions& options);
+
 struct DecodeOptions {
   std::vector<std::string> dbc_files;
   std::vector<std::string> logs;

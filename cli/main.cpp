@@ -1,10 +1,13 @@
 // vgyro: replays, checks, decodes and judges recordings of the gateway's CAN traffic.
 
+#include <charconv>
 #include <sstream>
 
 #include <CLI/CLI.hpp>
 
+#include "base/printable.h"
 #include "base/spelling.h"
+#include "can/frame.h"
 #include "cli/commands.h"
 #include "cli/exit_code.h"
 #include "cli/number_option.h"
@@ -19,6 +22,7 @@ using namespace vgyro::cli;
 
 struct Options {
   CheckOptions check;
+  InitOptions init;
   DecodeOptions decode;
   ConvertOptions convert;
   ReplayOptions replay;
@@ -60,6 +64,54 @@ CLI::App* add_check(CLI::App& app, CheckOptions& options, std::string& method) {
   command->add_option("CONFIG", options.config, "configuration, e.g. vgyro.toml")->required();
   add_overrides(*command, method, options.model);
   return command;
+}
+
+void read_ids(const std::vector<std::string>& words, std::vector<std::uint32_t>& ids) {
+  for (const std::string& word : words) {
+    std::string_view digits = word;
+    if (digits.starts_with("0x") || digits.starts_with("0X")) digits.remove_prefix(2);
+    std::uint32_t id = 0;
+    const char* end = digits.data() + digits.size();
+    const auto [at, code] = std::from_chars(digits.data(), end, id, 16);
+    if (code != std::errc() || at != end || id > vgyro::can::kExtendedIdMax)
+      throw CLI::ValidationError("--id",
+                                 fmt::format("\"{}\" is no identifier in hexadecimal digits, "
+                                             "such as 1A4 or 18F02A0B",
+                                             vgyro::printable(word)));
+    ids.push_back(id);
+  }
+}
+
+CLI::App* add_init(CLI::App& app, InitOptions& options) {
+  CLI::App* command = app.add_subcommand(
+      "init", "Propose a configuration from a log: which two signals are the gyros");
+  command->add_option("--dbc", options.dbc_files, "DBC file; may be given several times")
+      ->allow_extra_args(false);
+  command->add_option("-o,--output", options.output, "configuration; - is standard output")
+      ->capture_default_str();
+  command->add_flag("--force", options.force, "replaces a file that is there already");
+  command
+      ->add_option_function<std::vector<std::string>>(
+          "--id",
+          [&options](const std::vector<std::string>& words) { read_ids(words, options.ids); },
+          "identifier (hex) to look at; may be given several times; without it all are")
+      ->allow_extra_args(false);
+  constexpr double kTurnedMost_deg = 1e6;
+  add_number(
+      *command, "--turned", options.turned_deg, {-kTurnedMost_deg, kTurnedMost_deg},
+      "degrees by which the platform turned in the whole log, positive to the left; 0: not known");
+  command->add_option("LOG", options.logs, "log in which both gyros turn; also DBC files")
+      ->required();
+  command->footer("Example: vgyro init drive.log --dbc car.dbc --dbc imu.dbc -o vgyro.toml");
+  return command;
+}
+
+// What ends in .dbc among the logs is a DBC file.
+void sort_init_files(InitOptions& options) {
+  const auto is_dbc = [](const std::string& name) { return name.ends_with(".dbc"); };
+  std::copy_if(options.logs.begin(), options.logs.end(), std::back_inserter(options.dbc_files),
+               is_dbc);
+  std::erase_if(options.logs, is_dbc);
 }
 
 CLI::App* add_decode(CLI::App& app, DecodeOptions& options) {
@@ -244,6 +296,7 @@ int run(int argc, char** argv) {
   app.footer("Exit codes: 0 done, 1 bad input (told on stderr), 2 wrong usage.");
   Options options;
   CLI::App* check = add_check(app, options.check, options.method);
+  CLI::App* init = add_init(app, options.init);
   CLI::App* decode = add_decode(app, options.decode);
   CLI::App* convert = add_convert(app, options.convert);
   CLI::App* replay = add_replay(app, options.replay, options.method);
@@ -272,6 +325,10 @@ int run(int argc, char** argv) {
   options.check.method = method;
   options.replay.method = method;
   if (check->parsed()) return run_check(options.check);
+  if (init->parsed()) {
+    sort_init_files(options.init);
+    return run_init(options.init);
+  }
   if (decode->parsed()) return run_decode(options.decode);
   if (convert->parsed()) return run_convert(options.convert);
   if (model->parsed()) return run_model_list();

@@ -1,0 +1,17 @@
+#pragma once
+
+// Names of signals, as a person reads them.
+
+#include <initializer_list>
+#include <string>
+#include <string_view>
+
+namespace vgyro::cli {
+
+/// ASCII letters alone are changed.
+std::string lower(std::string_view text);
+
+/// Does one of the words stand in the text?
+bool has_any(std::string_view text, std::initializer_list<std::string_view> words);
+
+}  // namespace vgyro::cli

@@ -1,0 +1,18 @@
+#pragma once
+
+// Messages and signals as the text of a DBC file. Written are names, layouts, factors, ranges,
+// units, comments, value labels and J1939 frame formats; not: multiplexing, long names, receivers.
+
+#include <string>
+#include <vector>
+
+#include "dbc/database.h"
+
+namespace vgyro::dbc {
+
+/// Reads back as it was (dbc/parser.h). Numbers are plain decimals, because there are readers that
+/// drop signals whose factor has an exponent. Quotes in texts become apostrophes. Precondition:
+/// names are C identifiers; no signal is multiplexed.
+std::string to_text(const std::vector<Message>& messages, const std::string& comment);
+
+}  // namespace vgyro::dbc
