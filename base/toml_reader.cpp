@@ -85,9 +85,10 @@ const toml::table* TomlReader::table(std::string_view key) {
   return found == nullptr ? nullptr : found->as_table();
 }
 
-const toml::array* TomlReader::array(std::string_view key) {
+const toml::array* TomlReader::array(std::string_view key, const std::string& shape) {
+  const std::string tables = fmt::format("a list of tables: [[{}]]", key);
   const toml::node* found =
-      node(key, fmt::format("a list of tables: [[{}]]", key).c_str(), toml::node_type::array);
+      node(key, (shape.empty() ? tables : shape).c_str(), toml::node_type::array);
   return found == nullptr ? nullptr : found->as_array();
 }
 

@@ -41,7 +41,7 @@ class TomlReader {
   std::optional<std::int64_t> integer(std::string_view key);
   std::optional<bool> boolean(std::string_view key);
   const toml::table* table(std::string_view key);
-  const toml::array* array(std::string_view key);
+  const toml::array* array(std::string_view key, const std::string& shape = {});
 
   /// Like text(), and a complaint when the key is not there.
   std::string required_text(std::string_view key, std::string_view example);

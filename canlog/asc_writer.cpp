@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include "canlog/frame_fields.h"
 #include "canlog/wall_time.h"
 
 namespace vgyro::canlog {
@@ -34,15 +35,6 @@ std::string id_text(const can::Frame& frame) {
   return fmt::format("{:X}{}", frame.id, frame.has(can::kExtended) ? "x" : "");
 }
 
-// The smallest code whose length holds the bytes.
-unsigned fd_code(std::size_t bytes) {
-  constexpr std::array<std::size_t, 7> kAboveEight{12, 16, 20, 24, 32, 48, 64};
-  if (bytes <= can::kClassicBytesMax) return static_cast<unsigned>(bytes);
-  const auto* const found = std::lower_bound(kAboveEight.begin(), kAboveEight.end(), bytes);
-  constexpr unsigned kCodeOfTwelve = 9;
-  return kCodeOfTwelve + static_cast<unsigned>(found - kAboveEight.begin());
-}
-
 void put_classic(Text& text, const can::Frame& frame, unsigned channel, const char* direction) {
   auto to = std::back_inserter(text);
   const bool remote = frame.has(can::kRemote);
@@ -61,7 +53,7 @@ void put_fd(Text& text, const can::Frame& frame, unsigned channel, const char* d
   const bool error_state = frame.has(can::kErrorStateIndicator);
   auto to = std::back_inserter(text);
   fmt::format_to(to, "CANFD {:>3} {:<4} {:>9} {:>32} {:d} {:d} {:x} {:>2}", channel, direction,
-                 id_text(frame), "", rate_switch, error_state, fd_code(frame.length), frame.length);
+                 id_text(frame), "", rate_switch, error_state, dlc_of(frame.length), frame.length);
   put_bytes(text, frame);
   fmt::format_to(
       to, " {:>8} {:>4} {:>8X} {:>8} {:>8} {:>8} {:>8} {:>8}", 0, 0,

@@ -77,14 +77,9 @@ std::optional<std::uint32_t> hex_id(std::string_view text) {
   return number_of<std::uint32_t>(text, 16);
 }
 
-const char* set_id(std::optional<std::uint32_t> id, bool extended, can::Frame& frame) {
-  if (!id) return "identifier: no hex number";
-  if (*id > (extended ? can::kExtendedIdMax : can::kStandardIdMax)) {
-    return "identifier: larger than its kind can be";
-  }
-  frame.id = *id;
-  if (extended) frame.flags |= can::kExtended;
-  return nullptr;
+const char* set_hex_id(std::string_view text, bool extended, can::Frame& frame) {
+  const auto id = hex_id(text);
+  return id ? set_id(*id, extended, frame) : "identifier: no hex number";
 }
 
 // As Python prints a float: "1700000000.25", small ones as "1e-05".
@@ -118,7 +113,7 @@ Parsed read_python_can(const Fields& fields, LogRecord& record) {
     set_error_frame(frame);
     return {Verdict::kFrame, ""};
   }
-  if (const char* why = set_id(hex_id(fields.at(1)), is_true(fields.at(2)), frame)) {
+  if (const char* why = set_hex_id(fields.at(1), is_true(fields.at(2)), frame)) {
     return {Verdict::kMalformed, why};
   }
   const auto length = number_of<unsigned>(fields.at(5));
@@ -189,7 +184,7 @@ Parsed SavvyCanCsvReader::parse(std::string_view line, LogRecord& record) {
   record.fraction_digits = stamp->digits > 0 ? 9 : 6;
   if (!is_truth(fields.at(extended_))) return malformed("extended: neither true nor false");
   can::Frame& frame = record.frame;
-  if (const char* why = set_id(hex_id(fields.at(id_)), is_true(fields.at(extended_)), frame)) {
+  if (const char* why = set_hex_id(fields.at(id_), is_true(fields.at(extended_)), frame)) {
     return malformed(why);
   }
   const auto length = number_of<unsigned>(fields.at(length_));

@@ -4,9 +4,13 @@
 #include <cstring>
 
 #include "canlog/asc.h"
+#include "canlog/blf.h"
 #include "canlog/candump.h"
 #include "canlog/candump_screen.h"
 #include "canlog/csv.h"
+#include "canlog/mdf.h"
+#include "canlog/pcap.h"
+#include "canlog/pcapng.h"
 #include "canlog/text_line.h"
 #include "canlog/trc.h"
 
@@ -44,6 +48,10 @@ constexpr std::array kForms{
          open_candump},
     Form{"candump's screen text with stamps", nullptr, is_candump_screen_line, open_candump_screen},
     Form{"Vector ASC", nullptr, is_asc_line, open_lines<AscReader>},
+    Form{"Vector BLF", is_blf, nullptr, BlfReader::open},
+    Form{"pcap of CAN", is_pcap, nullptr, PcapReader::open},
+    Form{"MDF 4 with CAN frames (MF4)", is_mdf, nullptr, MdfReader::open},
+    Form{"pcapng of CAN", is_pcapng, nullptr, PcapngReader::open},
     Form{"PEAK TRC", nullptr, is_trc_line, open_lines<TrcReader>},
     Form{"python-can's CSV", nullptr, is_python_can_csv_line, open_lines<PythonCanCsvReader>},
     Form{"SavvyCAN's CSV", nullptr, is_savvycan_csv_line, open_lines<SavvyCanCsvReader>},
@@ -75,6 +83,9 @@ constexpr std::array kForeign{
                 [](std::string_view h) { return starts(h, "SQLite format 3\0"sv); },
                 "`can_logconvert FILE.db OUT.log` of python-can converts its own; for a bag the "
                 "rosbags package for Python"},
+    ForeignForm{"is a packed or encrypted log of a CANedge (MFC, MFE, MFM)",
+                [](std::string_view h) { return starts(h, "Generic File"); },
+                "its maker's mdf2finalized makes an MF4 file of it"},
     ForeignForm{"is an HDF5 file, as MATLAB 7.3 writes too",
                 [](std::string_view h) { return starts(h, "\x89HDF\r\n\x1A\n"sv); },
                 "export the frames, not decoded signals, as ASC, BLF or CSV"},

@@ -7,6 +7,7 @@
 #include <optional>
 #include <string_view>
 
+#include "canlog/frame_fields.h"
 #include "canlog/log_source.h"
 #include "canlog/reader.h"
 #include "canlog/text_line.h"
@@ -66,14 +67,5 @@ class LineReader : public LogReader {
 /// Payload bytes from words, as many as the frame's length says, in the given base. Null, or why it
 /// cannot be.
 const char* read_payload(Words& words, can::Frame& frame, int base);
-
-/// A classic or FD frame's length; for FD padded up to what an FD frame can have. Null, or why not.
-const char* set_length(unsigned bytes, can::Frame& frame);
-
-/// A DLC code, 0 to 15: of FD the length it stands for, of a classic frame above 8 a raw DLC.
-const char* set_dlc(unsigned dlc, can::Frame& frame);
-
-/// What a log says that tells no more of an error frame than that there was one: as asc2log has it.
-void set_error_frame(can::Frame& frame);
 
 }  // namespace vgyro::canlog

@@ -4,6 +4,7 @@
 #include <array>
 
 #include "canlog/asc_writer.h"
+#include "canlog/blf_writer.h"
 #include "canlog/candump.h"
 #include "canlog/text_line.h"
 
@@ -76,6 +77,7 @@ std::unique_ptr<LogWriter> make(ByteSink& sink, const WriterOptions& options) {
 constexpr std::array kWrittenForms{
     WrittenForm{".log", "candump log", true, false, make<CandumpWriter>},
     WrittenForm{".asc", "Vector ASC", true, false, make<AscWriter>},
+    WrittenForm{".blf", "Vector BLF", false, true, make<BlfWriter>},
 };
 
 }  // namespace

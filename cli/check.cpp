@@ -74,6 +74,58 @@ void print_model(const gateway::Plan& plan) {
   }
 }
 
+// "0xFFFF, not available", or what it says although it has no code.
+std::string said_of_none(const gateway::OutputField& field) {
+  return field.has_code ? field.code : fmt::format("0x{:X}", field.none_raw);
+}
+
+std::string range_text(const gateway::OutputField& field) {
+  std::string text =
+      fmt::format("{:g} to {:g} {}", field.minimum, field.maximum, printable(field.unit));
+  if (field.step > 0.0) text += fmt::format(" in steps of {:g} deg/s", field.step);
+  return text;
+}
+
+void print_layout_rate(const gateway::OutputLayout& layout) {
+  const gateway::OutputField& rate = layout.rate;
+  detail("carries", range_text(rate) + (rate.scale < 0 ? ", sign flipped" : ""));
+  if (layout.sign) detail("sign", "in a signal of its own: 1 is negative");
+  if (layout.valid) {
+    detail("valid", fmt::format("{}: 0x{:X}, and 0x{:X} when no rate is valid", layout.valid->text,
+                                layout.valid->valid_raw, layout.valid->invalid_raw));
+  }
+  if (!layout.can_say_invalid()) {
+    detail("not valid",
+           "silence: neither the rate nor another signal can say it; `valid` or "
+           "`rate_not_available` may name one");
+    return;
+  }
+  detail("not valid", said_of_none(rate) + (rate.has_code ? "" : ", no rotation, and flagged"));
+  if (rate.beyond_raw != rate.none_raw)
+    detail("beyond", fmt::format("0x{:X}, out of range", rate.beyond_raw));
+}
+
+void print_layout(const gateway::Plan& plan, const gateway::OutputLayout& layout) {
+  const gateway::OutputField& rate = layout.rate;
+  const std::string id = gateway::to_string(gateway::FrameId{layout.id, layout.extended});
+  say("  {:<14}{:<8}{:<10}{:<26}{:<8}{}\n", "layout", plan.buses[layout.bus], id,
+      layout.message + "." + rate.name, printable(rate.unit), rate.layout);
+  detail("frame",
+         fmt::format("{} bytes{}, {}", layout.bytes, layout.fd ? ", CAN FD" : "",
+                     layout.every ? fmt::format("every {:g} ms", to_seconds(*layout.every) * 1e3)
+                                  : "with every rate"));
+  print_layout_rate(layout);
+  if (layout.sigma) {
+    detail(
+        "sigma",
+        fmt::format("{}, {}; unknown or beyond: {}", layout.sigma->name, range_text(*layout.sigma),
+                    layout.sigma->has_code ? layout.sigma->code : "the rate is not valid"));
+  }
+  print_e2e(layout.e2e);
+  for (const gateway::RestingSignal& signal : layout.resting)
+    detail("fixed", fmt::format("{}: {}", signal.name, signal.says));
+}
+
 void print_plan(const gateway::Plan& plan) {
   say("  {:<14}{:<8}{:<10}{:<25} {:<7} {}\n", "", "bus", "id", "signal", "unit", "bits");
   for (const gateway::GyroPlan& gyro : plan.gyros)
@@ -111,9 +163,13 @@ void print_plan(const gateway::Plan& plan) {
   }
   say("\n");
   print_model(plan);
-  say("  {:<14}{:<8}VG_Rate {:03X}, VG_Bias {:03X}, VG_Model {:03X}, {}\n", "output",
-      plan.buses[plan.output.bus], plan.output.rate_id, plan.output.bias_id, plan.output.model_id,
-      plan.output.fd ? "VG_Rate as CAN FD" : "classic CAN");
+  if (plan.output.vgyro_frames) {
+    say("  {:<14}{:<8}VG_Rate {:03X}, VG_Bias {:03X}, VG_Model {:03X}, {}\n", "output",
+        plan.buses[plan.output.bus], plan.output.rate_id, plan.output.bias_id, plan.output.model_id,
+        plan.output.fd ? "VG_Rate as CAN FD" : "classic CAN");
+  }
+  for (const gateway::OutputLayout& layout : plan.output.layouts)
+    print_layout(plan, layout);
 }
 
 }  // namespace

@@ -76,12 +76,16 @@ void copy_records(canlog::LogReader& reader, canlog::LogWriter& writer, const st
   writer.finish();
 }
 
-// What was read of each log, and which name has become which channel.
-void tell_result(const ConvertOptions& options, const Target& target,
-                 const canlog::LogReader& reader, const canlog::LogWriter& writer) {
+void tell_logs(const ConvertOptions& options, const canlog::LogReader& reader) {
   const auto parts = reader.parts();
   for (std::size_t i = 0; i < parts.size(); ++i)
     tell("{}", log_text(options.logs[i], *parts[i], true));
+}
+
+// What was read of each log, and which name has become which channel.
+void tell_result(const ConvertOptions& options, const Target& target,
+                 const canlog::LogReader& reader, const canlog::LogWriter& writer) {
+  tell_logs(options, reader);
   std::string channels;
   if (writer.channels() != nullptr) {
     for (const auto& [name, channel] : writer.channels()->entries())
@@ -120,6 +124,7 @@ int run_convert(const ConvertOptions& options) {
   copy_records(reader, *writer, name_of(options.logs));
   if (packed) packed->finish();
   if (reader.counts().frames + reader.counts().xl_frames == 0 && !reader.error()) {
+    if (!options.quiet) tell_logs(options, reader);
     return report(Error{name_of(options.logs), kNoFrame, kLogsRemedy});
   }
   if (const auto closed = output->close(); !closed) return report(closed.error());

@@ -131,7 +131,7 @@ CLI::App* add_convert(CLI::App& app, ConvertOptions& options) {
       "convert", "Read logs of any known form and write one that other tools read");
   command
       ->add_option("-o,--output", options.output,
-                   "the ending says the form: .log (candump), .asc (Vector); text also\n"
+                   "the ending says the form: .log (candump), .asc, .blf (Vector); text\nalso "
                    "packed: .log.gz, .log.xz, .log.zst; - is a candump log on\nstandard output")
       ->required();
   add_digits(*command, options.digits);

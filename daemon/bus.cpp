@@ -11,7 +11,7 @@ Bus::Bus(std::string name, std::vector<can::Filter> filters, IdentifierWatch own
       options_(options),
       turn_clock_(&clock),
       log_(&log),
-      own_(own) {}
+      own_(std::move(own)) {}
 
 Expected<void> Bus::open() {
   Expected<can::Socket> socket = can::Socket::open(name_, filters_, options_);

@@ -138,12 +138,17 @@ int append_buses(sd_bus_message* reply, const Snapshot& now) {
 int append_counters(sd_bus_message* reply, const Snapshot& now) {
   const gateway::Status& status = now.status;
   const can::TransmitCounts& sent = now.traffic.transmitted;
+  const gateway::LayoutCounts layouts = status.layouts_total();
   const std::pair<const char*, std::uint64_t> counters[] = {
       {"pairs", status.pairs},
       {"rates", status.rates_out},
       {"rates_valid", status.rates_out_valid},
       {"rates_out_of_range", status.rates_out_of_range},
       {"biases", status.biases_out},
+      {"layout_frames", layouts.frames},
+      {"layout_frames_valid", layouts.valid},
+      {"layout_out_of_range", layouts.out_of_range},
+      {"layout_withheld", layouts.withheld},
       {"windows", status.windows},
       {"windows_skipped", status.windows_skipped},
       {"stops", status.stops},
@@ -151,6 +156,7 @@ int append_counters(sd_bus_message* reply, const Snapshot& now) {
       {"stops_open", status.stops_open},
       {"estimate_restarts", status.estimate_restarts},
       {"disagreements", status.disagreements},
+      {"contradictions", status.contradictions},
       {"calibration_restarts", status.calibration_restarts},
       {"clock_steps", status.clock_steps},
       {"reference_rejected", status.reference_rejected},
@@ -233,6 +239,16 @@ constexpr Property kProperties[] = {
      }},
     {"Disagree",
      [](sd_bus_message* m, const Snapshot& now) { return append_flag(m, now.status.disagree); }},
+    {"Contradiction",
+     [](sd_bus_message* m, const Snapshot& now) {
+       return append_text(m, gateway::to_string(now.status.pair.contradiction));
+     }},
+    {"ContradictionText",
+     [](sd_bus_message* m, const Snapshot& now) {
+       return append_text(
+           m, gateway::contradiction_text(now.status.pair,
+                                          {now.plan->gyros[0].name, now.plan->gyros[1].name}));
+     }},
     {"Ambiguous",
      [](sd_bus_message* m, const Snapshot& now) { return append_flag(m, now.status.ambiguous); }},
     {"RatesTooFarApart",
@@ -272,6 +288,8 @@ const sd_bus_vtable Control::kInterface[] = {
     SD_BUS_PROPERTY("Restored", "s", on_get, 0, SD_BUS_VTABLE_PROPERTY_EMITS_CHANGE),
     SD_BUS_PROPERTY("Valid", "b", on_get, 0, SD_BUS_VTABLE_PROPERTY_EMITS_CHANGE),
     SD_BUS_PROPERTY("Disagree", "b", on_get, 0, SD_BUS_VTABLE_PROPERTY_EMITS_CHANGE),
+    SD_BUS_PROPERTY("Contradiction", "s", on_get, 0, SD_BUS_VTABLE_PROPERTY_EMITS_CHANGE),
+    SD_BUS_PROPERTY("ContradictionText", "s", on_get, 0, SD_BUS_VTABLE_PROPERTY_EMITS_CHANGE),
     SD_BUS_PROPERTY("Ambiguous", "b", on_get, 0, SD_BUS_VTABLE_PROPERTY_EMITS_CHANGE),
     SD_BUS_PROPERTY("RatesTooFarApart", "b", on_get, 0, SD_BUS_VTABLE_PROPERTY_EMITS_CHANGE),
     SD_BUS_PROPERTY("Hypotheses", "a{sd}", on_get, 0, SD_BUS_VTABLE_PROPERTY_EMITS_CHANGE),
@@ -358,10 +376,10 @@ void Control::second_passed() {
 void Control::tell_changes() {
   std::uint64_t queued = 0;
   if (sd_bus_get_n_queued_write(bus_, &queued) < 0 || queued > kQueuedMost) return;
-  sd_bus_emit_properties_changed(bus_, kPath, kName, "State", "Quality", "Restored", "Valid",
-                                 "Disagree", "Ambiguous", "RatesTooFarApart", "Hypotheses",
-                                 "RateDps", "SigmaDps", "BiasSigmaDps", "CalibratedS",
-                                 "ConfigRefused", "Gyros", "Buses", "Counters", nullptr);
+  sd_bus_emit_properties_changed(
+      bus_, kPath, kName, "State", "Quality", "Restored", "Valid", "Disagree", "Contradiction",
+      "ContradictionText", "Ambiguous", "RatesTooFarApart", "Hypotheses", "RateDps", "SigmaDps",
+      "BiasSigmaDps", "CalibratedS", "ConfigRefused", "Gyros", "Buses", "Counters", nullptr);
 }
 
 int Control::on_get(sd_bus*, const char*, const char*, const char* property, sd_bus_message* reply,

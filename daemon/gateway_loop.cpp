@@ -35,16 +35,13 @@ TimePoint read_clock() {
   return time_from_ns(static_cast<std::int64_t>(now.tv_sec) * 1'000'000'000 + now.tv_nsec);
 }
 
-std::array<std::uint32_t, 3> own_ids(const gateway::OutputPlan& output) {
-  return {output.rate_id, output.bias_id, output.model_id};
-}
-
 // What comes in, and our own identifiers, which nobody else should send.
 std::vector<can::Filter> filters_of(const gateway::Plan& plan, std::size_t bus) {
   std::vector<can::Filter> filters;
-  if (bus == plan.output.bus) {
-    for (const std::uint32_t id : own_ids(plan.output))
-      filters.push_back({id, can::kStandardIdMax, false});
+  const auto index = static_cast<can::BusIndex>(bus);
+  for (const gateway::FrameId& own : gateway::output_ids(plan.output, index)) {
+    filters.push_back(
+        {own.id, own.extended ? can::kExtendedIdMax : can::kStandardIdMax, own.extended});
   }
   for (const gateway::FrameMatch& match : plan.inputs()) {
     if (match.bus == bus) filters.push_back({match.id, match.mask, match.extended});
@@ -58,14 +55,14 @@ GatewayLoop::Setup::Setup(gateway::Plan the_plan, TurnClock& clock, Log& log)
     : plan(std::move(the_plan)),
       reporter(std::make_unique<Reporter>(std::array{plan.gyros[0].name, plan.gyros[1].name},
                                           plan.calibration.rest_s, log)),
-      pipeline(plan) {
+      pipeline(plan),
+      outlets(plan.buses) {
   buses.reserve(plan.buses.size());
   for (std::size_t i = 0; i < plan.buses.size(); ++i) {
     can::SocketOptions options;
     options.send_buffer_bytes = kSendBufferBytes;
-    const IdentifierWatch own =
-        i == plan.output.bus ? IdentifierWatch(own_ids(plan.output)) : IdentifierWatch();
-    buses.emplace_back(plan.buses[i], filters_of(plan, i), own, options, clock, log);
+    IdentifierWatch own(gateway::output_ids(plan.output, static_cast<can::BusIndex>(i)));
+    buses.emplace_back(plan.buses[i], filters_of(plan, i), std::move(own), options, clock, log);
   }
 }
 
@@ -99,11 +96,28 @@ Expected<void> GatewayLoop::open_buses(Setup& setup) {
 }
 
 Expected<void> GatewayLoop::check_output(const Setup& setup) {
-  const Bus& output = setup.buses[setup.plan.output.bus];
+  const gateway::OutputPlan& output = setup.plan.output;
+  if (output.fd && output.vgyro_frames) {
+    const Expected<void> fits =
+        check_fd(setup.buses[output.bus], "but the config says `[output] fd = true`");
+    if (!fits) return fits;
+  }
+  for (const gateway::OutputLayout& layout : output.layouts) {
+    if (!layout.fd) continue;
+    const Expected<void> fits =
+        check_fd(setup.buses[layout.bus], "which " + layout.message + " of [[output.layout]] is");
+    if (!fits) return fits;
+  }
+  return {};
+}
+
+Expected<void> GatewayLoop::check_fd(const Bus& output, const std::string& wanted) {
   // A link that is down may still be given another MTU before it is up.
-  if (!setup.plan.output.fd || !output.is_up() || output.carries_fd()) return {};
-  return fail(output.name(), "carries no CAN FD frames, but the config says `[output] fd = true`",
-              "set `fd = false`, or enable FD on the link (`ip link set " + output.name() +
+  if (!output.is_up() || output.carries_fd()) return {};
+  return fail(output.name(), "carries no CAN FD frames, " + wanted,
+              "choose another frame or bus (`fd = false` is classic CAN), or enable FD on the link "
+              "(`ip link set " +
+                  output.name() +
                   " mtu 72` for vcan, `type can … dbitrate … fd on` for a controller)");
 }
 
@@ -218,7 +232,7 @@ Expected<void> GatewayLoop::turn(std::span<const epoll_event> ready) {
     } else if (event.data.u32 == kLoaderTag) {
       loaded = true;
     } else {
-      if ((event.events & EPOLLOUT) != 0) queue_.on_writable();
+      if ((event.events & EPOLLOUT) != 0) setup_->outlets[event.data.u32].queue.on_writable();
       if ((event.events & ~std::uint32_t{EPOLLOUT}) != 0)
         setup_->buses[event.data.u32].begin_reading();
     }
@@ -226,7 +240,9 @@ Expected<void> GatewayLoop::turn(std::span<const epoll_event> ready) {
   hand_on_arrivals();
   if (rang_) look_at_time();
   flush();
-  if (std::exchange(has_spoken_, false)) look_at_status();
+  const std::uint64_t spoken = setup_->pipeline.spoken();
+  const bool spoke = std::exchange(spoken_, spoken) != spoken;
+  if (std::exchange(has_spoken_, false) || spoke) look_at_status();
   if (events_ready) {
     if (Expected<void> done = serve_events(true); !done) return done;
     if (Expected<void> done = do_what_was_asked(); !done) return done;
@@ -256,7 +272,7 @@ void GatewayLoop::look_at_time() {
 
 void GatewayLoop::set_alarm() {
   const TimePoint due = setup_->pipeline.next_deadline();
-  const TimePoint queue_due = queue_.next_deadline().value_or(TimePoint::max());
+  const TimePoint queue_due = setup_->outlets.next_deadline().value_or(TimePoint::max());
   if (!rang_ && !alarm_.is_late_for(due, queue_due)) return;
   timer_.set(alarm_.set(due, pipeline_now(), queue_due, clock_.steady()));
 }
@@ -296,13 +312,21 @@ Bus* GatewayLoop::earliest(Arrival& arrival) {
 }
 
 void GatewayLoop::put(const can::Frame& frame, TimePoint stamp) {
-  if (frame.id == setup_->plan.output.rate_id) patience_.rate_at(stamp);
-  if (!is_timely(stamp) || !queue_.send_at_once(frame, setup_->buses[setup_->plan.output.bus])) {
+  put_on(setup_->plan.output.bus, frame, stamp);
+}
+
+void GatewayLoop::put_on(can::BusIndex bus, const can::Frame& frame, TimePoint stamp) {
+  const gateway::OutputPlan& output = setup_->plan.output;
+  // Whatever else goes out goes out with a rate.
+  const bool is_own = output.vgyro_frames && bus == output.bus && !frame.has(can::kExtended);
+  const bool is_bias = is_own && (frame.id == output.bias_id || frame.id == output.model_id);
+  if (!is_bias) patience_.rate_at(stamp);
+  can::TransmitQueue& queue = setup_->outlets[bus].queue;
+  if (!is_timely(stamp) || !queue.send_at_once(frame, setup_->buses[bus])) {
     const Duration left = stamp + kAgeMost - clock_.wall();
-    queue_.push(frame, clock_.steady() + std::min(patience_.value(), left));
+    queue.push(frame, clock_.steady() + std::min(patience_.value(), left));
   }
   has_spoken_ = true;
-  ++put_out_;
 }
 
 // A process that was stopped finds its timer gone off, or many frames at once where it was about to
@@ -317,19 +341,23 @@ bool GatewayLoop::is_timely(TimePoint stamp) {
 }
 
 void GatewayLoop::flush() {
-  if (queue_.size() == 0) return;
-  queue_.drain(clock_.steady(), setup_->buses[setup_->plan.output.bus]);
-  if (queue_.wants_writable() != polls_writable_) poll_writable(!polls_writable_);
+  for (std::size_t i = 0; i < setup_->outlets.size(); ++i) {
+    Outlet& outlet = setup_->outlets[i];
+    if (outlet.queue.size() == 0) continue;
+    outlet.queue.drain(clock_.steady(), setup_->buses[i]);
+    if (outlet.queue.wants_writable() != outlet.polls_writable) poll_writable(i);
+  }
 }
 
-void GatewayLoop::poll_writable(bool wanted) {
-  const Bus& output = setup_->buses[setup_->plan.output.bus];
+void GatewayLoop::poll_writable(std::size_t bus) {
+  const Bus& output = setup_->buses[bus];
   if (!output.is_open()) return;
+  const bool wanted = setup_->outlets[bus].queue.wants_writable();
   epoll_event event{};
   event.events = EPOLLIN | (wanted ? std::uint32_t{EPOLLOUT} : 0U);
-  event.data.u32 = setup_->plan.output.bus;
+  event.data.u32 = static_cast<std::uint32_t>(bus);
   if (::epoll_ctl(epoll_fd_, EPOLL_CTL_MOD, output.socket().fd(), &event) == 0) {
-    polls_writable_ = wanted;
+    setup_->outlets[bus].polls_writable = wanted;
   }
 }
 
@@ -342,7 +370,7 @@ Traffic GatewayLoop::traffic() const {
   Traffic traffic;
   for (const Bus& bus : setup_->buses)
     traffic.buses.push_back(bus.status());
-  traffic.transmitted = queue_.counts();
+  traffic.transmitted = setup_->outlets.counts();
   return traffic;
 }
 
@@ -378,9 +406,7 @@ void GatewayLoop::reopen_dead_buses() {
   for (std::size_t i = 0; i < setup_->buses.size(); ++i) {
     Bus& bus = setup_->buses[i];
     if (bus.is_open() || !bus.open() || !bus.is_open() || !poll_bus(i)) continue;
-    if (i != setup_->plan.output.bus) continue;
-    polls_writable_ = false;
-    queue_.on_writable();
+    setup_->outlets[i].begin_anew();
   }
 }
 
@@ -388,8 +414,7 @@ void GatewayLoop::look_whether_output_fits() {
   const Expected<void> fits = check_output(*setup_);
   const bool fitted = std::exchange(output_fits_, fits.has_value());
   if (fits || !fitted) return;
-  log_.tell(Severity::kError,
-            {.cause = "no_fd", .bus = setup_->buses[setup_->plan.output.bus].name()}, "{}",
+  log_.tell(Severity::kError, {.cause = "no_fd", .bus = fits.error().where}, "{}",
             fits.error().message());
 }
 
@@ -515,10 +540,10 @@ Expected<void> GatewayLoop::replace_setup(gateway::Plan plan, bool keep) {
   for (Bus& bus : next->buses)
     bus.discard();
   const std::string how = keep ? hand_over(*next) : begin_anew(*next);
+  next->outlets.take_over(std::move(setup_->outlets));
   setup_ = std::move(next);
   snapshot_.plan = nullptr;
-  polls_writable_ = false;
-  queue_.on_writable();
+  spoken_ = setup_->pipeline.spoken();
   log_.notice("{}", how);
   return poll_buses();
 }
@@ -547,7 +572,7 @@ std::string GatewayLoop::hand_over(Setup& next) {
 
 std::string GatewayLoop::begin_anew(Setup& next) {
   next.pipeline.count_on_from(setup_->pipeline);
-  next.reporter->start_from(queue_.counts());
+  next.reporter->start_from(setup_->outlets.counts());
   return "calibrating anew";
 }
 
@@ -577,7 +602,8 @@ int GatewayLoop::on_second(sd_event_source* source, std::uint64_t, void* self) {
 
 int GatewayLoop::on_watchdog(sd_event_source* source, std::uint64_t, void* self) {
   auto& loop = *static_cast<GatewayLoop*>(self);
-  if (loop.life_.has_moved(loop.clock_.steady(), loop.put_out_)) loop.notifier_.alive();
+  if (loop.life_.has_moved(loop.clock_.steady(), loop.setup_->pipeline.spoken()))
+    loop.notifier_.alive();
   sd_event_source_set_time_relative(source, loop.watchdog_half_usec_);
   return sd_event_source_set_enabled(source, SD_EVENT_ONESHOT);
 }

@@ -21,6 +21,7 @@
 #include "daemon/host_time.h"
 #include "daemon/log.h"
 #include "daemon/metrics.h"
+#include "daemon/outlets.h"
 #include "daemon/plan_loader.h"
 #include "daemon/reporter.h"
 #include "daemon/service.h"
@@ -59,14 +60,17 @@ class GatewayLoop final : private gateway::FrameSink {
     std::unique_ptr<Reporter> reporter;
     gateway::Pipeline pipeline;
     std::vector<Bus> buses;
+    Outlets outlets;
   };
 
   void put(const can::Frame& frame, TimePoint stamp) override;
+  void put_on(can::BusIndex bus, const can::Frame& frame, TimePoint stamp) override;
 
   void take_up_state();
   Expected<void> start_events();
   static Expected<void> open_buses(Setup& setup);
   static Expected<void> check_output(const Setup& setup);
+  static Expected<void> check_fd(const Bus& output, const std::string& wanted);
   Expected<void> poll_buses();
   bool poll_bus(std::size_t index);
   [[nodiscard]] bool poll_readable(int fd, std::uint32_t tag) const;
@@ -79,7 +83,7 @@ class GatewayLoop final : private gateway::FrameSink {
   void hand_on_arrivals();
   Bus* earliest(Arrival& arrival);
   void flush();
-  void poll_writable(bool wanted);
+  void poll_writable(std::size_t bus);
   void look_at_status();
   void second_passed();
   void reopen_dead_buses();
@@ -114,17 +118,16 @@ class GatewayLoop final : private gateway::FrameSink {
   Notifier notifier_;
   TurnClock clock_;
   std::unique_ptr<Setup> setup_;
-  can::TransmitQueue queue_;
   EventPointer events_{nullptr, &sd_event_unref};
   std::optional<Control> control_;
   Snapshot snapshot_;
   int epoll_fd_ = -1;
   DeadlineTimer timer_;
   Alarm alarm_;
-  bool rang_ = true;        ///< the timer, in this turn
-  TimePoint newest_stamp_;  ///< of the frame handed on last
-  bool polls_writable_ = false;
-  bool has_spoken_ = false;  ///< in this turn; no state changes without an output frame
+  bool rang_ = true;          ///< the timer, in this turn
+  TimePoint newest_stamp_;    ///< of the frame handed on last
+  bool has_spoken_ = false;   ///< a frame went out in this turn
+  std::uint64_t spoken_ = 0;  ///< what the pipeline counted at the end of the last turn
   bool stopping_ = false;
   bool reload_wanted_ = false;
   bool recalibration_wanted_ = false;
@@ -133,7 +136,6 @@ class GatewayLoop final : private gateway::FrameSink {
   bool output_fits_ = true;  ///< when last looked at
   std::uint64_t watchdog_half_usec_ = 0;
   LifeSign life_;
-  std::uint64_t put_out_ = 0;  ///< frames that the pipeline has put out
   std::uint64_t samples_ = 0;  ///< of both gyros, when last looked at
   Patience patience_;
   ForwardTime forward_;

@@ -6,10 +6,12 @@
 // Clock-free: the caller says when a second has passed.
 
 #include <algorithm>
-#include <array>
 #include <cstdint>
+#include <utility>
+#include <vector>
 
 #include "can/frame.h"
+#include "gateway/plan.h"
 
 namespace vgyro::daemon {
 
@@ -23,16 +25,16 @@ class IdentifierWatch {
 
   /// Nothing is sent to this bus.
   IdentifierWatch() = default;
-  explicit IdentifierWatch(const std::array<std::uint32_t, 3>& standard_ids)
-      : ids_(standard_ids), is_used_(true) {}
+  explicit IdentifierWatch(std::vector<gateway::FrameId> ids) : ids_(std::move(ids)) {}
 
   /// A socket was opened: echoes of an earlier one may come.
   void opened() { echoes_left_ = kEchoSeconds; }
 
   /// Has it one of our identifiers? Then it is no input. `local`: somebody on this host sent it.
   bool takes(const can::Frame& frame, bool local) {
-    if (!is_used_ || frame.has(can::kExtended) || frame.has(can::kRemote)) return false;
-    if (std::find(ids_.begin(), ids_.end(), frame.id) == ids_.end()) return false;
+    if (frame.has(can::kRemote) || frame.has(can::kError)) return false;
+    const gateway::FrameId id{frame.id, frame.has(can::kExtended)};
+    if (std::find(ids_.begin(), ids_.end(), id) == ids_.end()) return false;
     if (local && echoes_left_ > 0) return true;
     ++count_;
     contested_left_ = kContestedSeconds;
@@ -49,8 +51,7 @@ class IdentifierWatch {
   [[nodiscard]] bool is_contested() const { return contested_left_ > 0; }
 
  private:
-  std::array<std::uint32_t, 3> ids_{};
-  bool is_used_ = false;
+  std::vector<gateway::FrameId> ids_;
   int echoes_left_ = 0;
   int contested_left_ = 0;
   std::uint64_t count_ = 0;

@@ -79,6 +79,13 @@ void add_rate(Text& text, const Snapshot& now) {
   text.sample({}, status.bias_sigma_dps);
   text.family("vgyro_gyros_disagree", "gauge", "1 while the gyros contradict each other.");
   text.sample({}, status.disagree);
+  text.family("vgyro_pair_contradicted", "gauge",
+              "1 while the gyros cannot be of one platform, by why; no rate is valid then.");
+  for (std::size_t i = 1; i < fusion::kContradictions; ++i) {
+    const auto contradiction = static_cast<fusion::Contradiction>(i);
+    text.sample({{"why", gateway::to_string(contradiction)}},
+                status.pair.contradiction == contradiction);
+  }
   text.family("vgyro_ambiguous", "gauge",
               "1 while the data can be read in two ways; sigma spans both.");
   text.sample({}, status.ambiguous);
@@ -127,6 +134,34 @@ void add_counters(Text& text, const Snapshot& now) {
   text.family("vgyro_service_messages_lost_total", "counter",
               "Messages that the service manager did not take at once.");
   text.sample({}, now.service_messages_lost);
+}
+
+void add_layouts(Text& text, const Snapshot& now) {
+  const std::vector<gateway::OutputLayout>& layouts = now.plan->output.layouts;
+  if (layouts.empty()) return;
+  const auto each = [&](const auto& add) {
+    for (std::size_t i = 0; i < layouts.size(); ++i) {
+      const gateway::OutputLayout& layout = layouts[i];
+      const std::string id = gateway::to_string(gateway::FrameId{layout.id, layout.extended});
+      add(Labels{{"message", layout.message}, {"bus", now.plan->buses[layout.bus]}, {"id", id}},
+          now.status.layouts_out[i]);
+    }
+  };
+  using Counts = const gateway::LayoutCounts&;
+  text.family("vgyro_layout_frames_total", "counter",
+              "Frames of each [[output.layout]] made, by whether their rate was valid.");
+  each([&](Labels labels, Counts counts) {
+    labels.emplace_back("valid", "yes");
+    text.sample(labels, counts.valid);
+    labels.back().second = "no";
+    text.sample(labels, counts.frames - counts.valid);
+  });
+  text.family("vgyro_layout_out_of_range_total", "counter",
+              "Rates that the layout cannot carry, or whose standard deviation it cannot.");
+  each([&](const Labels& labels, Counts counts) { text.sample(labels, counts.out_of_range); });
+  text.family("vgyro_layout_withheld_total", "counter",
+              "Frames not sent because the layout cannot say that no rate is valid.");
+  each([&](const Labels& labels, Counts counts) { text.sample(labels, counts.withheld); });
 }
 
 void add_gyros(Text& text, const Snapshot& now) {
@@ -244,6 +279,7 @@ std::string metrics_text(const Snapshot& now) {
   Text text;
   add_rate(text, now);
   add_counters(text, now);
+  add_layouts(text, now);
   add_gyros(text, now);
   add_supply(text, now);
   add_buses(text, now);

@@ -147,6 +147,18 @@ void Reporter::fault_changed(std::size_t gyro, const gateway::Status& status) {
   }
 }
 
+void Reporter::contradiction_changed(const gateway::Status& status) {
+  contradiction_ = status.pair.contradiction;
+  disagree_ = status.disagree;  // it is of one piece with this
+  if (!health_lines_.take()) return;
+  if (contradiction_ == fusion::Contradiction::kNone) {
+    log_.notice("the gyros move together again as two of one platform do");
+    return;
+  }
+  log_.tell(Severity::kError, {.cause = gateway::to_string(contradiction_)}, "{}; {}",
+            gateway::contradiction_text(status.pair, names_), gateway::contradiction_advice());
+}
+
 void Reporter::disagreement_changed(const gateway::Status& status) {
   disagree_ = status.disagree;
   if (!health_lines_.take()) return;
@@ -196,6 +208,10 @@ std::string Reporter::second_passed(const gateway::Status& status, const Traffic
   }
   if (status.restored == gateway::Restored::kTakenUp) {
     doing += fmt::format(", on biases of {} before the start", age_text(status.restored_age_s));
+  }
+  if (const std::string contradiction = gateway::contradiction_text(status.pair, names_);
+      !contradiction.empty()) {
+    doing += ": " + contradiction;
   }
   if (status.ambiguous) {
     const std::string seems = gateway::hypotheses_text(status.probability, names_);
@@ -253,6 +269,10 @@ void Reporter::tell_pipeline(const gateway::Status& status) {
   }
   if (const std::uint64_t n = news(rates_out_of_range_, status.rates_out_of_range); n > 0) {
     log_.warning("{} virtual rates were beyond what VG_Rate can carry", n);
+  }
+  const std::uint64_t beyond = status.layouts_total().out_of_range;
+  if (const std::uint64_t n = news(layouts_out_of_range_, beyond); n > 0) {
+    log_.warning("{} times the virtual rate was beyond what an [[output.layout]] can carry", n);
   }
   if (const std::uint64_t n = news(reference_rejected_, status.reference_rejected); n > 0) {
     log_.warning("{} frames of the reference not used", n);
@@ -348,7 +368,7 @@ void Reporter::tell_bus(const BusStatus& bus, BusTold& told) {
         Severity::kWarning, {.cause = "foreign_frames", .bus = bus.name},
         "{}: {} frames with our identifiers came from somebody else: is there a second "
         "gateway, or does the vehicle use them? [output] rate_id, bias_id and model_id choose "
-        "others",
+        "others; a sensor that an [[output.layout]] takes the place of must be off the bus",
         bus.name, n);
   }
   for (std::size_t i = 0; i < can::kErrorCauseCount; ++i) {

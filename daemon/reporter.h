@@ -45,6 +45,7 @@ class Reporter {
     if (status.state != state_) state_changed(status);
     if (status.gyros[0].fault != faults_[0]) fault_changed(0, status);
     if (status.gyros[1].fault != faults_[1]) fault_changed(1, status);
+    if (status.pair.contradiction != contradiction_) contradiction_changed(status);
     if (status.disagree != disagree_) disagreement_changed(status);
     if (status.ambiguous != ambiguous_) ambiguity_changed(status);
   }
@@ -76,6 +77,7 @@ class Reporter {
 
   void state_changed(const gateway::Status& status);
   void fault_changed(std::size_t gyro, const gateway::Status& status);
+  void contradiction_changed(const gateway::Status& status);
   void disagreement_changed(const gateway::Status& status);
   void ambiguity_changed(const gateway::Status& status);
   std::uint64_t news(Told& told, std::uint64_t count) const;
@@ -95,13 +97,14 @@ class Reporter {
   gateway::State state_ = gateway::State::kWaiting;
   LineBudget state_lines_;
   std::array<std::optional<gateway::Fault>, 2> faults_;
+  fusion::Contradiction contradiction_ = fusion::Contradiction::kNone;
   bool disagree_ = false;
   bool ambiguous_ = false;
   LineBudget health_lines_;
   std::uint64_t second_ = 0;
   std::array<GyroTold, 2> gyros_;
-  Told clock_steps_, rates_out_of_range_, reference_rejected_, accelerometer_rejected_,
-      speed_rejected_, windows_skipped_, restarts_, estimate_restarts_;
+  Told clock_steps_, rates_out_of_range_, layouts_out_of_range_, reference_rejected_,
+      accelerometer_rejected_, speed_rejected_, windows_skipped_, restarts_, estimate_restarts_;
   Told stale_, overflow_, failed_;
   std::map<std::string, BusTold> buses_;
   bool told_of_motion_ = false;

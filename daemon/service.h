@@ -56,7 +56,7 @@ class LifeSign {
  public:
   static constexpr Duration kSilenceMost = std::chrono::seconds(1);
 
-  /// `put_out`: frames that the pipeline has put out so far. True when it has moved.
+  /// `put_out`: how often the pipeline had something to say so far. True when it has moved.
   bool has_moved(TimePoint now, std::uint64_t put_out) {
     if (put_out != put_out_) last_moved_ = now;
     put_out_ = put_out;

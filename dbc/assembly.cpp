@@ -1,6 +1,7 @@
 #include "dbc/assembly.h"
 
 #include <algorithm>
+#include <array>
 #include <optional>
 #include <set>
 #include <string_view>
@@ -17,6 +18,9 @@ namespace {
 
 constexpr std::string_view kJ1939Format = "J1939PG";
 constexpr std::uint32_t kJ1939FormatNumber = 3;
+constexpr std::string_view kFdFormatEnding = "_FD";  // of StandardCAN_FD and ExtendedCAN_FD
+constexpr std::array<std::uint32_t, 2> kFdFormatNumbers{14, 15};
+constexpr unsigned kClassicBytesMost = 8;
 constexpr std::string_view kJ1939Protocol = "J1939";
 
 // A large table named by very many signals must not fill the memory.
@@ -43,6 +47,7 @@ class Assembly {
   void multiplex();
   void simple_multiplex();
   void frame_formats();
+  void start_values();
   void check_layouts();
 
   std::optional<std::size_t> message_index(const Reference& at);
@@ -65,6 +70,7 @@ Database Assembly::run(std::string path) {
   floats();
   labels();
   frame_formats();
+  start_values();
   simple_multiplex();  // last: it may take signals out, which the index does not follow
   check_layouts();
   return {std::move(path), std::move(contents_.messages), contents_.diagnostics.take()};
@@ -239,26 +245,59 @@ void Assembly::leave_out(const SignalSet& signals) {
 }
 
 void Assembly::frame_formats() {
-  const auto is_j1939_format = [this](const AttributeValue& value) {
-    const auto& format_labels = contents_.frame_format_labels;
-    if (!value.number) return value.text == kJ1939Format;
-    if (format_labels.empty()) return *value.number == kJ1939FormatNumber;
-    return *value.number < format_labels.size() && format_labels[*value.number] == kJ1939Format;
+  const auto& labels = contents_.frame_format_labels;
+  const auto label_of = [&](const AttributeValue& value) -> std::string_view {
+    if (!value.number) return value.text;
+    return *value.number < labels.size() ? std::string_view(labels[*value.number]) : "";
+  };
+  const auto is_j1939_format = [&](const AttributeValue& value) {
+    if (value.number && labels.empty()) return *value.number == kJ1939FormatNumber;
+    return label_of(value) == kJ1939Format;
+  };
+  const auto is_fd_format = [&](const AttributeValue& value) {
+    if (!value.number || !labels.empty()) return label_of(value).ends_with(kFdFormatEnding);
+    return std::find(kFdFormatNumbers.begin(), kFdFormatNumbers.end(), *value.number) !=
+           kFdFormatNumbers.end();
   };
   const std::string& protocol =
       contents_.protocol.empty() ? contents_.protocol_default : contents_.protocol;
   const bool all_j1939 = protocol == kJ1939Protocol || names_nmea2000(protocol) ||
                          is_j1939_format(contents_.frame_format_default);
-  for (Message& message : contents_.messages)
+  const bool all_fd = is_fd_format(contents_.frame_format_default);
+  for (Message& message : contents_.messages) {
     message.is_j1939 = message.extended && all_j1939;
+    message.is_fd = all_fd;
+  }
   for (const FrameFormatStatement& statement : contents_.frame_formats) {
     const std::optional<std::size_t> index = message_index(statement.at);
     if (!index) continue;
     Message& message = contents_.messages[*index];
     message.is_j1939 = message.extended && is_j1939_format(statement.value);
+    message.is_fd = is_fd_format(statement.value);
   }
-  for (Message& message : contents_.messages)
+  for (Message& message : contents_.messages) {
     message.codes = code_rules_of(message.id, message.is_j1939, protocol);
+    // J1939 and NMEA 2000 send longer messages in several classic frames.
+    if (message.size_bytes > kClassicBytesMost && !message.is_j1939) message.is_fd = true;
+  }
+}
+
+void Assembly::start_values() {
+  if (contents_.start_value_default) {
+    for (Message& message : contents_.messages) {
+      for (Signal& signal : message.signals)
+        signal.start_raw = contents_.start_value_default;
+    }
+  }
+  for (const StartValueStatement& statement : contents_.start_values) {
+    // Many files have such values of signals that were taken out; nobody misses them.
+    const SplitId id = split_id(statement.at.id);
+    const auto message = message_index_.find({id.extended, id.id});
+    if (message == message_index_.end()) continue;
+    const auto found = signal_index_.find({message->second, statement.at.signal});
+    if (found == signal_index_.end()) continue;
+    contents_.messages[message->second].signals[found->second].start_raw = statement.raw;
+  }
 }
 
 void Assembly::check_layouts() {

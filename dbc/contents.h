@@ -88,6 +88,12 @@ struct SimpleMultiplex {
   std::uint64_t value = 0;
 };
 
+/// GenSigStartValue of a signal.
+struct StartValueStatement {
+  Reference at;
+  double raw = 0.0;
+};
+
 struct Contents {
   std::vector<Message> messages;
   std::vector<SimpleMultiplex> simple_multiplex;
@@ -97,9 +103,11 @@ struct Contents {
   std::vector<FloatStatement> floats;
   std::vector<MultiplexStatement> multiplex;
   std::vector<FrameFormatStatement> frame_formats;
+  std::vector<StartValueStatement> start_values;
   std::map<std::string, std::vector<ValueLabel>, std::less<>> label_tables;
   std::vector<std::string> frame_format_labels;
   AttributeValue frame_format_default;
+  std::optional<double> start_value_default;
   std::string protocol;
   std::string protocol_default;
   Diagnostics diagnostics;

@@ -47,6 +47,7 @@ struct Signal {
   bool is_multiplexor = false;
   std::optional<MultiplexCondition> condition;
   std::vector<ValueLabel> labels;
+  std::optional<double> start_raw;  ///< GenSigStartValue: the raw value before anybody knows better
   unsigned line = 0;
 
   [[nodiscard]] const std::string* label(std::int64_t raw) const;
@@ -61,6 +62,7 @@ struct Message {
   std::uint32_t id = 0;   ///< without flags
   bool extended = false;
   bool is_j1939 = false;  ///< compare by PGN, any source address
+  bool is_fd = false;     ///< CAN FD, by VFrameFormat or by its length
   CodeRules codes = CodeRules::kNone;
   std::uint16_t size_bytes = 0;
   std::string sender;

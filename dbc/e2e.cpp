@@ -148,6 +148,12 @@ std::size_t E2eProtection::header_bytes(E2eKind kind) {
   return kind == E2eKind::kCrc8J1850 || kind == E2eKind::kToyota ? 1 : 2;
 }
 
+E2eProtection E2eProtection::for_can_id(std::uint32_t can_id) const {
+  E2eProtection other = *this;
+  other.layout_.can_id = can_id;
+  return other;
+}
+
 std::uint8_t E2eProtection::header(Bytes payload) const {
   return payload[layout_.crc_byte + 1];
 }

@@ -52,6 +52,8 @@ class E2eProtection {
 
   [[nodiscard]] E2eKind kind() const { return layout_.kind; }
   [[nodiscard]] std::size_t bytes() const { return layout_.bytes; }
+  /// The same, of a frame with another identifier.
+  [[nodiscard]] E2eProtection for_can_id(std::uint32_t can_id) const;
   /// The check value that this payload should carry. Precondition, here and below: bytes().
   [[nodiscard]] std::uint16_t value(std::span<const std::uint8_t> payload) const;
   /// Check value and data ID nibble are right, and the counter is one that a sender can have.

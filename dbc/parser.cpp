@@ -23,6 +23,7 @@ constexpr std::uint32_t kUint16Max = std::numeric_limits<std::uint16_t>::max();
 constexpr std::uint32_t kUint32Max = std::numeric_limits<std::uint32_t>::max();
 constexpr std::string_view kFrameFormat = "VFrameFormat";
 constexpr std::string_view kProtocol = "ProtocolType";
+constexpr std::string_view kStartValue = "GenSigStartValue";
 // Names beyond 32 characters stand in attributes; the file itself shortens them.
 constexpr std::string_view kLongMessageName = "SystemMessageLongSymbol";
 constexpr std::string_view kLongSignalName = "SystemSignalLongSymbol";
@@ -55,6 +56,7 @@ class Parser {
   void signal_scaling(Signal& signal);
   std::vector<ValueLabel> labels();
   AttributeValue attribute_value();
+  std::optional<double> start_value();
   std::optional<Reference> attribute_target();
   FileId file_id() { return cursor_.integer("the identifier of a message", kUint32Max); }
   Reference signal_reference();
@@ -339,6 +341,10 @@ void Parser::attribute_definition() {
 /// BA_DEF_DEF_ "VFrameFormat" "J1939PG";
 void Parser::attribute_default() {
   const std::string name = cursor_.quoted("the name of an attribute", Cursor::Wrap::kNo);
+  if (name == kStartValue) {
+    contents_.start_value_default = start_value();
+    return end_of_statement();
+  }
   AttributeValue value = attribute_value();
   end_of_statement();
   if (cursor_.failed()) return;
@@ -352,6 +358,13 @@ void Parser::attribute_default() {
 /// BA_ "VFrameFormat" BO_ 2566844926 3;
 void Parser::attribute() {
   const std::string name = cursor_.quoted("the name of an attribute", Cursor::Wrap::kNo);
+  if (name == kStartValue && cursor_.accept_word("SG_")) {
+    Reference at = signal_reference();
+    const std::optional<double> raw = start_value();
+    end_of_statement();
+    if (raw && !cursor_.failed()) contents_.start_values.push_back({std::move(at), *raw});
+    return;
+  }
   std::optional<Reference> target = attribute_target();
   AttributeValue value = attribute_value();
   end_of_statement();
@@ -381,6 +394,24 @@ AttributeValue Parser::attribute_value() {
   const double number = cursor_.number("the value");
   if (!(number >= 0.0 && number <= kUint32Max)) return {};
   return {static_cast<std::uint32_t>(number), {}};
+}
+
+/// A number, perhaps in quotes; nothing where it is something else.
+std::optional<double> Parser::start_value() {
+  const auto number_in = [](Cursor& cursor) -> std::optional<double> {
+    if (!cursor.peek_number()) return std::nullopt;
+    const double number = cursor.number("the value");
+    if (cursor.failed() || !std::isfinite(number)) return std::nullopt;
+    return number;
+  };
+  if (cursor_.peek() == '"') {
+    const std::string text = cursor_.quoted("the value", Cursor::Wrap::kYes);
+    Cursor inside(text);
+    return number_in(inside);
+  }
+  const std::optional<double> number = number_in(cursor_);
+  if (!number && !cursor_.failed()) cursor_.word("the value");
+  return number;
 }
 
 Reference Parser::signal_reference() {

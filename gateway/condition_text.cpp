@@ -37,6 +37,43 @@ std::string with_doubt(double value, double sigma) {
   return fmt::format("{:+.{}f} ± {:.{}f}", rounded, decimals, sigma, decimals);
 }
 
+// Three digits or more, and two behind the point.
+std::string times(double slope) {
+  return std::abs(slope) < 0.1 ? fmt::format("{:.2g}", slope) : fmt::format("{:.2f}", slope);
+}
+
+struct UnitMistake {
+  double factor;
+  const char* units;
+};
+// Factors between the units in which rates come, and by which bytes are worth more.
+constexpr UnitMistake kMistakes[] = {{6.0, "rpm and deg/s"},
+                                     {10.0, "a factor of ten"},
+                                     {17.453292519943295, "mrad/s and deg/s"},
+                                     {57.29577951308232, "rad/s and deg/s"},
+                                     {100.0, "a factor of a hundred"},
+                                     {256.0, "a byte more or less"},
+                                     {360.0, "turns a second and deg/s"},
+                                     {1000.0, "a factor of a thousand"},
+                                     {3600.0, "deg/s and deg/h"},
+                                     {65536.0, "two bytes more or less"},
+                                     {206264.80624709636, "rad/s and deg/h"}};
+// Scale factors differ, and so do the slopes that motion shows.
+constexpr double kMistakeTolerance = 0.25;
+
+std::string unit_guess(double slope) {
+  const double factor = std::max(slope, 1.0 / slope);
+  const UnitMistake* nearest = nullptr;
+  double least = kMistakeTolerance;
+  for (const UnitMistake& mistake : kMistakes) {
+    const double away = std::abs(std::log(factor / mistake.factor));
+    if (away > least) continue;
+    least = away;
+    nearest = &mistake;
+  }
+  return nearest == nullptr ? "" : fmt::format("{}?", nearest->units);
+}
+
 }  // namespace
 
 SteadyStretches steady_stretches(const Status& status) {
@@ -129,6 +166,46 @@ std::string blind_advice() {
   return "is its axis parallel to the other one's, is it switched on and past its self-test, is "
          "its "
          "frame the right one?";
+}
+
+std::string contradiction_text(const fusion::PairVerdict& pair, const GyroNames& names) {
+  using fusion::Contradiction;
+  const std::string moves = names[1] + " moves " + times(pair.slope) + " times " + names[0];
+  switch (pair.contradiction) {
+    case Contradiction::kNone:
+      return {};
+    case Contradiction::kSign: {
+      const std::string unit = unit_guess(std::abs(pair.slope));
+      return moves + ": sign = -1?" + (unit.empty() ? "" : " And " + unit);
+    }
+    case Contradiction::kScale: {
+      const std::string unit = unit_guess(pair.slope);
+      return moves + ": " + (unit.empty() ? "is its unit, or its factor, right?" : unit);
+    }
+    case Contradiction::kLag: {
+      const std::size_t late = pair.lag_s > 0.0 ? 1 : 0;
+      return fmt::format(
+          "{} moves {:.1f} s later than {}: does one of them come from a queue, or from "
+          "another clock?",
+          names[late], std::abs(pair.lag_s), names[1 - late]);
+    }
+    case Contradiction::kUnrelated:
+      return fmt::format(
+          "{} and {} both move, and not together: the same axis, the same vehicle, the right "
+          "signal, the right byte order?",
+          names[0], names[1]);
+    case Contradiction::kErratic:
+      return fmt::format(
+          "the values of {} jump, or stand, where no gyro's do: byte order, start bit, "
+          "signed or unsigned?",
+          pair.gyro < names.size() ? names[pair.gyro] : "one gyro");
+  }
+  return {};
+}
+
+std::string contradiction_advice() {
+  return "nothing tells which of the two is wrong, so no rate is valid until they move together; "
+         "look at sign, unit, message and signal of both (`vgyro check` shows them)";
 }
 
 std::string rates_too_far_apart_text() {

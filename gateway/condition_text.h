@@ -46,6 +46,10 @@ std::string slopes_text(const std::array<double, 2>& slope_dps_s,
 /// What is wrong with a blind gyro, as the rest of a sentence about it, and what to look at.
 std::string blind_text();
 std::string blind_advice();
+/// What contradicts, "mems moves -1.00 times fog: sign = -1?", and what to do; empty without a
+/// contradiction.
+std::string contradiction_text(const fusion::PairVerdict& pair, const GyroNames& names);
+std::string contradiction_advice();
 std::string rates_too_far_apart_text();
 /// Of the estimate: a fault of our own.
 std::string restarts_text(std::uint64_t restarts);

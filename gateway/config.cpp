@@ -16,7 +16,9 @@
 #include "gateway/e2e_config.h"
 #include "gateway/input_conflicts.h"
 #include "gateway/model_plan.h"
+#include "gateway/output_layout_config.h"
 #include "gateway/signal_resolver.h"
+#include "gateway/valid_config.h"
 
 namespace vgyro::gateway {
 
@@ -35,42 +37,6 @@ struct Context {
   DatabaseCache cache{resolved.warnings};
   std::set<BusFile> bus_files = {};
 };
-
-// "Status == 0"
-struct ComparisonText {
-  std::string signal;
-  Comparison comparison = Comparison::kEqual;
-  double value = 0.0;
-};
-
-std::optional<ComparisonText> parse_comparison(std::string_view text) {
-  struct Operator {
-    std::string_view sign;
-    Comparison comparison;
-  };
-  // Two-character operators first: "<=" begins with "<".
-  constexpr Operator kOperators[] = {
-      {"==", Comparison::kEqual},     {"!=", Comparison::kNotEqual},
-      {"<=", Comparison::kLessEqual}, {">=", Comparison::kGreaterEqual},
-      {"<", Comparison::kLess},       {">", Comparison::kGreater}};
-  const auto trimmed = [](std::string_view part) {
-    const std::size_t first = part.find_first_not_of(" \t");
-    if (first == part.npos) return std::string();
-    return std::string(part.substr(first, part.find_last_not_of(" \t") - first + 1));
-  };
-  for (const Operator& op : kOperators) {
-    const std::size_t at = text.find(op.sign);
-    if (at == text.npos) continue;
-    ComparisonText result{trimmed(text.substr(0, at)), op.comparison, 0.0};
-    const std::string number = trimmed(text.substr(at + op.sign.size()));
-    char* end = nullptr;
-    result.value = std::strtod(number.c_str(), &end);
-    const bool whole = !number.empty() && end == number.c_str() + number.size();
-    if (result.signal.empty() || !whole || !std::isfinite(result.value)) return std::nullopt;
-    return result;
-  }
-  return std::nullopt;
-}
 
 struct Limits {
   double low = 0.0;
@@ -124,23 +90,6 @@ void read_source_address(TomlReader& reader, const dbc::Message& message, FrameM
   match.others.clear();
 }
 
-std::optional<ValidCondition> read_condition(TomlReader& reader, SignalResolver& resolver,
-                                             const dbc::Signal& rate) {
-  const auto text = reader.text("valid");
-  if (!text) return std::nullopt;
-  const auto parsed = parse_comparison(*text);
-  if (!parsed) {
-    reader.complain(reader.where("valid"), fmt::format("\"{}\" is no comparison", *text),
-                    "for example valid = \"Status == 0\"; ==, !=, <, <=, >, >= and a number");
-    return std::nullopt;
-  }
-  const dbc::Signal* signal = resolver.signal_named(parsed->signal, "valid");
-  if (signal == nullptr || !resolver.shares_page("valid", *signal, rate)) return std::nullopt;
-  const auto codec = resolver.codec(*signal);
-  if (!codec) return std::nullopt;
-  return ValidCondition{*codec, parsed->comparison, parsed->value, *text};
-}
-
 std::optional<GyroPlan> read_gyro(const toml::table& table, std::size_t index, Context& context) {
   TomlReader reader(table, context.file, "[[gyro]]", context.errors);
   const std::size_t errors_before = context.errors.size();
@@ -175,7 +124,8 @@ std::optional<GyroPlan> read_gyro(const toml::table& table, std::size_t index, C
     read_sign(reader, gyro->rate);
     read_source_address(reader, resolver.message(), gyro->match);
     gyro->e2e = read_e2e(reader, resolver, *rate_signal);
-    gyro->valid = read_condition(reader, resolver, *rate_signal);
+    if (const auto valid = read_condition(reader, resolver, *rate_signal))
+      gyro->valid = valid->condition;
     gyro->max_bias_dps = number_within(reader, "max_bias_dps", kMaxBias_dps, "deg/s");
     if (sign_signal != nullptr && resolver.shares_page("sign_signal", *sign_signal, *rate_signal)) {
       gyro->sign = resolver.codec(*sign_signal);
@@ -411,24 +361,6 @@ std::uint32_t read_output_id(TomlReader& reader, std::string_view key, std::uint
   return fallback;
 }
 
-void check_output_ids(TomlReader& reader, const Plan& plan) {
-  const OutputPlan& output = plan.output;
-  if (output.rate_id == output.bias_id || output.rate_id == output.model_id ||
-      output.bias_id == output.model_id) {
-    reader.complain(reader.where(), "two output frames have the same identifier");
-  }
-  for (const FrameMatch& input : plan.gyros.empty() ? std::vector<FrameMatch>{} : plan.inputs()) {
-    for (const std::uint32_t id : {output.rate_id, output.bias_id, output.model_id}) {
-      if (input.bus != output.bus || input.extended || ((id ^ input.id) & input.mask) != 0)
-        continue;
-      reader.complain(
-          reader.where(),
-          fmt::format("output identifier {:#x} is also an input on {}", id, plan.buses[input.bus]),
-          "choose rate_id, bias_id and model_id that nobody else sends");
-    }
-  }
-}
-
 void read_output(TomlReader& root, Context& context) {
   Plan& plan = context.resolved.plan;
   const toml::table* table = root.table("output");
@@ -446,7 +378,21 @@ void read_output(TomlReader& root, Context& context) {
   plan.output.bias_id = read_output_id(reader, "bias_id", plan.output.bias_id);
   plan.output.model_id = read_output_id(reader, "model_id", plan.output.model_id);
   plan.output.fd = reader.boolean("fd").value_or(false);
+  plan.output.vgyro_frames = reader.boolean("vgyro_frames").value_or(true);
+  if (bus.empty()) {
+    reader.forgive({"layout"});
+  } else {
+    read_output_layouts(
+        reader,
+        {context.file, context.folder, context.cache, context.errors, context.resolved.warnings},
+        plan);
+  }
   check_output_ids(reader, plan);
+  const bool failed = !context.errors.empty();
+  if (!plan.output.vgyro_frames && plan.output.layouts.empty() && !failed) {
+    reader.complain(reader.where("vgyro_frames"), "nothing would go out",
+                    "vgyro_frames = false needs an [[output.layout]]");
+  }
   reader.finish();
 }
 

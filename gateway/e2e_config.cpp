@@ -135,7 +135,7 @@ bool within(TomlReader& reader, std::int64_t id, std::int64_t most) {
 std::optional<DataIds> read_list(TomlReader& reader, const std::string& kind) {
   DataIds ids{};
   const bool there = reader.has("data_id");
-  const toml::array* list = reader.array("data_id");
+  const toml::array* list = reader.array("data_id", "a list of 16 numbers: [0x12, …]");
   if (list == nullptr && there) return std::nullopt;  // complained of
   if (list == nullptr || list->size() != ids.size()) {
     reader.complain(reader.where("data_id"),

@@ -128,6 +128,7 @@ Quality Estimator::quality(bool both_in_use) const {
 BiasMode Estimator::bias_mode(bool both_in_use, bool any_in_use) const {
   if (!corrector_->needs_calibration()) return BiasMode::kNone;
   if (!calibrated_) return both_in_use ? BiasMode::kCalibrating : BiasMode::kNone;
+  if (contradicted()) return BiasMode::kHold;
   if (condition_.ambiguous && any_in_use) return BiasMode::kAmbiguous;
   if (condition_.stopped && any_in_use) return BiasMode::kStop;
   return both_in_use ? BiasMode::kTracking : BiasMode::kHold;
@@ -156,6 +157,7 @@ void Estimator::begin(TimePoint t, TimePoint stamp) {
   restored_ = calibrated_ ? Restored::kTakenUp : Restored::kRefused;
   restored_age_s_ = age_is_known ? age_s : kNone;
   restored_bias_sigma_dps_ = corrector_->drift(seconds(t)).bias_sigma_dps;
+  if (calibrated_) relation_.resume(saved_->pair);
 }
 
 std::optional<SavedState> Estimator::memory(
@@ -171,7 +173,8 @@ std::optional<SavedState> Estimator::memory(
                     .rate_stamp = t - clock_offset,
                     .temperature_c = temperature_c,
                     .devices = {device_of(plan_.gyros[0]), device_of(plan_.gyros[1])},
-                    .rest_rate_dps = plan_.calibration.rate_dps};
+                    .rest_rate_dps = plan_.calibration.rate_dps,
+                    .pair = relation_.verdict()};
 }
 
 void Estimator::tell(Status& status) const {
@@ -184,6 +187,8 @@ void Estimator::tell(Status& status) const {
   status.windows = corrector_->windows().completed;
   status.windows_skipped = corrector_->windows().skipped;
   status.disagreements = condition_.disagreements;
+  status.pair = relation_.verdict();
+  status.contradictions = relation_.times();
   status.ambiguous = condition_.ambiguous;
   status.probability = condition_.probability;
   status.stops = condition_.stops;

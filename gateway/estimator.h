@@ -17,6 +17,7 @@
 #include "fusion/alignment.h"
 #include "fusion/calibration.h"
 #include "fusion/corrector.h"
+#include "fusion/pair_relation.h"
 #include "gateway/output_frames.h"
 #include "gateway/plan.h"
 #include "gateway/reference_calibration.h"
@@ -54,6 +55,13 @@ class Estimator {
   /// … and the smallest step that this gyro's values have shown, deg/s.
   void set_resolution(std::size_t gyro, double step_dps);
 
+  /// Every pair, calibrated or not: can the two be of one platform?
+  void compare(const fusion::AlignedPair& pair) { relation_.add(seconds(pair.t), pair.rate_dps); }
+  /// One of them is set aside.
+  void break_off_comparison() { relation_.break_off(); }
+  /// They cannot: nothing says which one is wrong, so no rate is valid, and nothing is learned.
+  [[nodiscard]] bool contradicted() const { return relation_.contradicts(); }
+
   /// A pair before calibrated().
   void calibrate(const fusion::AlignedPair& pair);
   /// A reference rate, which may complete the calibration.
@@ -68,8 +76,10 @@ class Estimator {
   [[nodiscard]] const fusion::Condition& condition() const { return condition_; }
   /// What is known of the drifts at `t`. Precondition: knows_gyros().
   [[nodiscard]] fusion::Drift drift(TimePoint t) const { return corrector_->drift(seconds(t)); }
-  /// Do the gyros contradict each other?
-  [[nodiscard]] bool disagree(bool both_in_use) const { return both_in_use && condition_.disagree; }
+  /// Do the gyros contradict each other, at present or altogether?
+  [[nodiscard]] bool disagree(bool both_in_use) const {
+    return (both_in_use && condition_.disagree) || contradicted();
+  }
   [[nodiscard]] Quality quality(bool both_in_use) const;
   [[nodiscard]] BiasMode bias_mode(bool both_in_use, bool any_in_use) const;
 
@@ -93,6 +103,7 @@ class Estimator {
   fusion::Calibrator calibrator_;
   ReferenceCalibration reference_;
   fusion::Condition condition_;
+  fusion::PairRelation relation_;
   TimePoint origin_;  ///< zero of the estimation's seconds: the first pair
   bool begun_ = false;
   bool calibrated_;

@@ -13,6 +13,10 @@ class FrameSink {
   virtual ~FrameSink() = default;
   /// The stamp is that of the input frame (or of the time-out) that caused the output.
   virtual void put(const can::Frame& frame, TimePoint stamp) = 0;
+  /// For another bus than the output's own. A sink that knows only one puts all there.
+  virtual void put_on(can::BusIndex /*bus*/, const can::Frame& frame, TimePoint stamp) {
+    put(frame, stamp);
+  }
 };
 
 }  // namespace vgyro::gateway

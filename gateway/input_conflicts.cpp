@@ -1,8 +1,10 @@
 #include "gateway/input_conflicts.h"
 
 #include <algorithm>
-#include <array>
+#include <cstdint>
+#include <string>
 #include <string_view>
+#include <vector>
 
 #include <fmt/core.h>
 
@@ -75,6 +77,49 @@ void check_apart(TomlReader& root, const Plan& plan) {
   }
 }
 
+namespace {
+
+struct Own {
+  std::string_view message;
+  FrameId id;
+  std::string remedy;
+};
+
+std::vector<Own> own_frames(const Plan& plan, const std::string& bus) {
+  const OutputPlan& output = plan.output;
+  std::vector<Own> own;
+  const auto add = [&](std::string_view message, std::string_view key, std::uint32_t id) {
+    own.push_back({message, {id, false}, fmt::format("[output] {} = another identifier", key)});
+  };
+  if (output.vgyro_frames && plan.buses[output.bus] == bus) {
+    add("VG_Rate", "rate_id", output.rate_id);
+    add("VG_Bias", "bias_id", output.bias_id);
+    add("VG_Model", "model_id", output.model_id);
+  }
+  for (const OutputLayout& layout : output.layouts) {
+    if (plan.buses[layout.bus] != bus) continue;
+    own.push_back({layout.message,
+                   {layout.id, layout.extended},
+                   "another id or bus for the [[output.layout]], if that message is sent there"});
+  }
+  return own;
+}
+
+void warn_of_others(const dbc::Database& database, const std::string& path, const std::string& bus,
+                    const Own& ours, std::vector<Error>& warnings) {
+  for (const dbc::Message& message : database.messages) {
+    const bool taken = FrameId{message.id, message.extended} == ours.id;
+    if (!taken || message.name == ours.message) continue;
+    warnings.push_back(
+        {at_line(path, message.line),
+         fmt::format("message {} has the identifier {:#x}, with which {} goes out on {}",
+                     message.name, ours.id.id, ours.message, bus),
+         ours.remedy});
+  }
+}
+
+}  // namespace
+
 void warn_of_conflicts(TomlReader& root, const Plan& plan, const DatabaseCache& cache,
                        const std::set<BusFile>& files, std::vector<Error>& warnings) {
   if (plan.gyros[0].name == plan.gyros[1].name) {
@@ -82,30 +127,11 @@ void warn_of_conflicts(TomlReader& root, const Plan& plan, const DatabaseCache& 
                         fmt::format("both gyros have the name \"{}\"", plan.gyros[0].name),
                         "a name for each: messages and summaries tell them apart by it"});
   }
-  struct Own {
-    std::string_view message;
-    std::string_view key;
-    std::uint32_t id;
-  };
-  const OutputPlan& output = plan.output;
-  const std::array<Own, 3> own{{{"VG_Rate", "rate_id", output.rate_id},
-                                {"VG_Bias", "bias_id", output.bias_id},
-                                {"VG_Model", "model_id", output.model_id}}};
   for (const auto& [bus, path] : files) {
     const dbc::Database* database = cache.loaded(path);
-    if (database == nullptr || bus != plan.buses[output.bus]) continue;
-    for (const dbc::Message& message : database->messages) {
-      for (const Own& ours : own) {
-        const bool taken = !message.extended && message.id == ours.id;
-        if (!taken || message.name == ours.message) continue;
-        warnings.push_back(
-            {at_line(path, message.line),
-             fmt::format("message {} has the identifier {:#x}, with which {} goes "
-                         "out on {}",
-                         message.name, ours.id, ours.message, plan.buses[output.bus]),
-             fmt::format("[output] {} = another identifier", ours.key)});
-      }
-    }
+    if (database == nullptr) continue;
+    for (const Own& ours : own_frames(plan, bus))
+      warn_of_others(*database, path, bus, ours, warnings);
   }
 }
 

@@ -20,6 +20,17 @@ double in_unit_of(const Quantity& quantity, double value) {
   return (value - quantity.shift) / quantity.scale;
 }
 
+}  // namespace
+
+can::Frame empty_frame(const FrameMatch& match) {
+  can::Frame frame;
+  frame.id = match.id;
+  if (match.extended) frame.flags |= can::kExtended;
+  if (match.bytes > can::kClassicBytesMax) frame.flags |= can::kFd;
+  frame.length = static_cast<std::uint8_t>(can::fd_padded_length(match.bytes));
+  return frame;
+}
+
 // What the bits are already, where that will do; otherwise the value compared with, one of its
 // neighbours, or an end of the signal's range.
 bool put_valid(const ValidCondition& condition, std::span<std::uint8_t> payload) {
@@ -31,17 +42,6 @@ bool put_valid(const ValidCondition& condition, std::span<std::uint8_t> payload)
     codec.encode(value, payload);
   }
   return fulfilled();
-}
-
-}  // namespace
-
-can::Frame empty_frame(const FrameMatch& match) {
-  can::Frame frame;
-  frame.id = match.id;
-  if (match.extended) frame.flags |= can::kExtended;
-  if (match.bytes > can::kClassicBytesMax) frame.flags |= can::kFd;
-  frame.length = static_cast<std::uint8_t>(can::fd_padded_length(match.bytes));
-  return frame;
 }
 
 void put_quantity(const Quantity& quantity, double value, can::Frame& frame) {

@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <span>
 
 #include "base/error.h"
 #include "can/frame.h"
@@ -20,6 +21,10 @@ void put_quantity(const Quantity& quantity, double value, can::Frame& frame);
 
 /// Rate with its sign, alive counter, validity. `count` is the number of the frame.
 void put_gyro(const GyroPlan& plan, double rate_dps, std::uint64_t count, can::Frame& frame);
+
+/// Writes a value for which the comparison holds, leaving the bits where it does already; false
+/// when there is none.
+bool put_valid(const ValidCondition& condition, std::span<std::uint8_t> payload);
 
 /// The alive counter of frame number `count`, where there is one.
 void put_counter(const E2ePlan& e2e, std::uint64_t count, can::Frame& frame);

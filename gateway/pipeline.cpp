@@ -207,6 +207,7 @@ void Pipeline::Impl::refuse(std::size_t gyro, Reject cause, TimePoint t) {
 // waited for this one. Beyond an interval it does not look back: VG_Age could not tell how old that
 // is.
 void Pipeline::Impl::carry_on_without(std::size_t gyro, TimePoint t) {
+  estimator.break_off_comparison();
   enter_state();
   const std::size_t other = 1 - gyro;
   if (!attendance.in_use(other) || !estimator.begun()) return;
@@ -261,7 +262,12 @@ void Pipeline::Impl::take_sample(std::size_t gyro, TimePoint t, double rate_dps)
 void Pipeline::Impl::take_pair(const fusion::AlignedPair& pair) {
   if (!estimator.begun()) estimator.begin(pair.t, pair.t - guard.offset());
   ++status.pairs;
-  if (attendance.hear_pair()) enter_state();
+  estimator.compare(pair);
+  const bool contradicted = estimator.contradicted();
+  const bool changed = contradicted != (status.state == State::kContradicted);
+  // What the corrector thought of either gyro was of a pair that is none.
+  if (changed && contradicted) attendance.set_opinion(pair.t, {});
+  if (attendance.hear_pair() || changed) enter_state();
   tell_estimator(pair.t);
   if (!estimator.calibrated()) {
     estimator.calibrate(pair);
@@ -270,7 +276,7 @@ void Pipeline::Impl::take_pair(const fusion::AlignedPair& pair) {
   // While one gyro was missing the other spoke alone, perhaps for later instants than this.
   if (pair.t <= newest) return;
   newest = pair.t;
-  const bool valid = estimator.calibrated();
+  const bool valid = estimator.calibrated() && !contradicted;
   fusion::VirtualRate rate;
   if (valid) {
     rate = estimator.update(pair);
@@ -283,8 +289,8 @@ void Pipeline::Impl::take_pair(const fusion::AlignedPair& pair) {
   // A silence came before the choice of who paces: what waited for it is no rate of now.
   const Duration age = pair.complete - pair.t;
   // What is known to come late does.
-  const bool too_late =
-      valid && age - known_effects.lag_most() > attendance.time_out(aligner.pacing_gyro());
+  const bool too_late = estimator.calibrated() &&
+                        age - known_effects.lag_most() > attendance.time_out(aligner.pacing_gyro());
   if (!too_late) publish(rate, valid, pair.t, age);
 }
 
@@ -292,7 +298,7 @@ void Pipeline::Impl::take_single(std::size_t gyro, TimePoint t, double rate_dps,
   if (t <= newest) return;
   newest = t;
   attendance.hear_alone(gyro);
-  bool valid = estimator.knows_gyros();
+  bool valid = estimator.knows_gyros() && !estimator.contradicted();
   fusion::VirtualRate rate;
   if (valid) {
     tell_estimator(t);
@@ -334,6 +340,7 @@ void Pipeline::Impl::note_condition(TimePoint t) {
 // --- states --------------------------------------------------------------------------------------
 
 State Pipeline::Impl::present_state() const {
+  if (attendance.pairing() && estimator.contradicted()) return State::kContradicted;
   if (!estimator.calibrated()) return attendance.pairing() ? State::kCalibrating : State::kWaiting;
   if (attendance.pairing()) return State::kRunning;
   if (!estimator.begun()) return State::kWaiting;
@@ -474,6 +481,10 @@ TimePoint Pipeline::next_deadline() const {
 
 const Status& Pipeline::status() const {
   return impl_->refreshed_status();
+}
+
+std::uint64_t Pipeline::spoken() const {
+  return impl_->sender.spoken();
 }
 
 std::optional<SavedState> Pipeline::memory() const {

@@ -69,6 +69,10 @@ class Pipeline {
 
   [[nodiscard]] const Status& status() const;
 
+  /// How often there was something to say so far, whether or not a frame went out for it. No state
+  /// changes without.
+  [[nodiscard]] std::uint64_t spoken() const;
+
   /// What to keep across a restart; nothing before there is anything worth it. What was given to
   /// resume() and not taken up yet is.
   [[nodiscard]] std::optional<SavedState> memory() const;

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include <fmt/core.h>
+
 namespace vgyro::gateway {
 
 bool FrameMatch::carries(std::uint32_t frame_id, bool frame_extended) const {
@@ -30,6 +32,22 @@ std::vector<FrameMatch> Plan::inputs() const {
   if (accelerometer) matches.push_back(accelerometer->match);
   if (speed) matches.push_back(speed->match);
   return matches;
+}
+
+std::string to_string(const FrameId& id) {
+  return id.extended ? fmt::format("{:08X}", id.id) : fmt::format("{:03X}", id.id);
+}
+
+std::vector<FrameId> output_ids(const OutputPlan& plan, can::BusIndex bus) {
+  std::vector<FrameId> ids;
+  if (plan.vgyro_frames && plan.bus == bus) {
+    for (const std::uint32_t id : {plan.rate_id, plan.bias_id, plan.model_id})
+      ids.push_back({id, false});
+  }
+  for (const OutputLayout& layout : plan.layouts) {
+    if (layout.bus == bus) ids.push_back({layout.id, layout.extended});
+  }
+  return ids;
 }
 
 // The names of the buses stand in what is read from them.

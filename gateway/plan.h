@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "base/time.h"
 #include "can/frame.h"
 #include "dbc/codec.h"
 #include "dbc/codes.h"
@@ -184,13 +185,90 @@ struct CorrectorPlan {
   friend bool operator==(const CorrectorPlan&, const CorrectorPlan&) = default;
 };
 
+/// A quantity on its way out: which values a signal can say, and what it says of the others.
+struct OutputField {
+  std::string name;       ///< of the signal
+  std::string unit = {};  ///< as in the DBC file
+  dbc::SignalCodec codec;
+  double scale = 1.0;  ///< value · scale + shift is in the product's unit, as of a Quantity
+  double shift = 0.0;
+  double minimum = 0.0;          ///< values that the signal can say, in the DBC's unit;
+  double maximum = 0.0;          ///< codes are not among them
+  std::uint64_t none_raw = 0;    ///< said of a value that there is not
+  std::uint64_t beyond_raw = 0;  ///< said of one beyond what the signal can say
+  bool has_code = false;         ///< no measurement looks like none_raw and beyond_raw
+  std::string code = {};         ///< for people: "0xFFFF, not available"
+  std::string layout = {};       ///< for people, as of a Quantity
+  double step = 0.0;             ///< as of a Quantity
+
+  friend bool operator==(const OutputField&, const OutputField&) = default;
+};
+
+/// The signal of `valid = "Status == 0"`, on its way out.
+struct OutputFlag {
+  std::string name;
+  dbc::SignalCodec codec;
+  std::uint64_t valid_raw = 0;
+  std::uint64_t invalid_raw = 0;
+  std::string text = {};  ///< as configured
+
+  friend bool operator==(const OutputFlag&, const OutputFlag&) = default;
+};
+
+/// A signal that nobody fills, for people: "AccX", "0xFFFF, not available".
+struct RestingSignal {
+  std::string name;
+  std::string says = {};
+
+  friend bool operator==(const RestingSignal&, const RestingSignal&) = default;
+};
+
+/// The virtual rate in a message that a vehicle already reads.
+struct OutputLayout {
+  can::BusIndex bus = 0;
+  std::string message = {};
+  std::uint32_t id = 0;
+  bool extended = false;
+  bool fd = false;
+  std::uint8_t bytes = can::kClassicBytesMax;          ///< of the frame
+  std::array<std::uint8_t, can::kFdBytesMax> blank{};  ///< all but what is filled in
+  OutputField rate;                                    ///< the sign is part of the scale
+  std::optional<dbc::SignalCodec> sign = {};           ///< of its own: 1 means negative
+  std::optional<OutputField> sigma = {};
+  std::optional<OutputFlag> valid = {};
+  E2ePlan e2e = {};
+  std::optional<Duration> every = {};  ///< at most one frame in this time; nothing: with every rate
+  std::vector<RestingSignal> resting = {};
+
+  /// Can its frames say that there is no valid rate? Where they cannot, none is sent then.
+  [[nodiscard]] bool can_say_invalid() const { return valid || rate.has_code; }
+
+  friend bool operator==(const OutputLayout&, const OutputLayout&) = default;
+};
+
 struct OutputPlan {
   can::BusIndex bus = 0;
   std::uint32_t rate_id = 0x610;
   std::uint32_t bias_id = 0x611;
   std::uint32_t model_id = 0x612;
   bool fd = false;
+  bool vgyro_frames = true;  ///< VG_Rate, VG_Bias and VG_Model
+  std::vector<OutputLayout> layouts = {};
 };
+
+/// Who sends what: an identifier on a bus.
+struct FrameId {
+  std::uint32_t id = 0;
+  bool extended = false;
+
+  friend bool operator==(const FrameId&, const FrameId&) = default;
+};
+
+/// As candump writes it: "174", "0CF02A31".
+std::string to_string(const FrameId& id);
+
+/// Everything that goes out on a bus.
+std::vector<FrameId> output_ids(const OutputPlan& plan, can::BusIndex bus);
 
 struct Plan {
   std::vector<std::string> buses;  ///< BusIndex → interface name, without repetition

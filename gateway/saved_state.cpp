@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <lzma.h>
 #include <numeric>
 #include <span>
@@ -10,6 +11,7 @@
 #include <fmt/format.h>
 
 #include "base/toml_reader.h"
+#include "gateway/status.h"
 
 namespace vgyro::gateway {
 
@@ -96,6 +98,17 @@ std::string kinds_and_slopes(const fusion::DriftMemory& drift) {
   }
   return text + fmt::format("coefficient_dps_k = {}\ncoefficient_sigma_dps_k = {}\n",
                             listed(drift.coefficient_dps_k), listed(drift.coefficient_sigma_dps_k));
+}
+
+// Only where there is one, so that the text of a sound pair is what it was.
+std::string contradiction(const fusion::PairVerdict& pair) {
+  if (pair.contradiction == fusion::Contradiction::kNone) return {};
+  std::string text = fmt::format("contradiction = \"{}\"\n", to_string(pair.contradiction));
+  if (std::isfinite(pair.slope))
+    text += fmt::format("contradiction_slope = {}\n", shortest(pair.slope));
+  if (pair.lag_s != 0.0) text += fmt::format("contradiction_lag_s = {}\n", shortest(pair.lag_s));
+  if (pair.gyro < 2) text += fmt::format("contradiction_gyro = {}\n", pair.gyro + 1);
+  return text;
 }
 
 // --- reading -------------------------------------------------------------------------------------
@@ -227,6 +240,30 @@ fusion::DriftMemory drift_from(Numbers& table) {
   return drift;
 }
 
+fusion::PairVerdict contradiction_from(Numbers& table) {
+  fusion::PairVerdict pair;
+  if (!table.has("contradiction")) return pair;
+  const std::string name = table.text("contradiction");
+  for (std::size_t i = 1; i < fusion::kContradictions; ++i) {
+    const auto one = static_cast<fusion::Contradiction>(i);
+    if (to_string(one) == name) pair.contradiction = one;
+  }
+  table.require(pair.contradiction != fusion::Contradiction::kNone, "contradiction",
+                "is none that is known");
+  constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+  pair.slope = table
+                   .optional_number("contradiction_slope", -kRateMax_dps * kRateMax_dps,
+                                    kRateMax_dps * kRateMax_dps)
+                   .value_or(kUnknown);
+  pair.slope_sigma = kUnknown;
+  pair.lag_s = table.optional_number("contradiction_lag_s", -kSkewMax_s * 1e3, kSkewMax_s * 1e3)
+                   .value_or(0.0);
+  if (table.has("contradiction_gyro"))
+    pair.gyro = table.number("contradiction_gyro", 1.0, 2.0) > 1.5 ? 1 : 0;
+  pair.probability = 1.0;
+  return pair;
+}
+
 Expected<std::string_view> unsealed(std::string_view text, const std::string& where) {
   if (text.size() > kSavedStateBytesMax) {
     return fail(
@@ -288,6 +325,7 @@ std::string to_text(const SavedState& state) {
       text += fmt::format("{} = {}\n", temperature_key(gyro), shortest(*state.temperature_c[gyro]));
     }
   }
+  text += contradiction(state.pair);
   text += fmt::format(
       "\n[drift]  # covariances: of gyro 1, of both, of gyro 2\n"
       "bias_dps = {}\nbias_covariance = {}\nwhite_density = {}\nsample_variance = {}\n"
@@ -325,6 +363,7 @@ Expected<SavedState> saved_state_from(std::string_view text, const std::string& 
     state.temperature_c[gyro] =
         top.optional_number(temperature_key(gyro), kTemperatureMin_c, kTemperatureMax_c);
   }
+  state.pair = contradiction_from(top);
   top.pass_over("drift");
   if (const std::optional<Error> error = top.finish()) return tl::unexpected(*error);
   Numbers table(*drift, where, "[drift]");

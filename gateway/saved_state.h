@@ -13,6 +13,7 @@
 #include "base/error.h"
 #include "base/time.h"
 #include "fusion/drift_memory.h"
+#include "fusion/pair_relation.h"
 #include "gateway/plan.h"
 
 namespace vgyro::gateway {
@@ -26,6 +27,7 @@ struct SavedState {
   std::array<std::optional<double>, 2> temperature_c;  ///< of the gyros, where they tell it
   std::array<std::string, 2> devices;                  ///< device_of() the gyros
   double rest_rate_dps = 0.0;                          ///< what the biases were learned against
+  fusion::PairVerdict pair;  ///< a contradiction, which only motion can take back
 };
 
 /// What must be the same for the biases of a gyro to mean the same: bus, identifier, signal, scale,

@@ -1,15 +1,19 @@
 #pragma once
 
-// What leaves the gateway: VG_Rate whenever there is one, VG_Bias with VG_Model on a grid of the
-// bus's time and whenever somebody wants them. Owns the frames with their counters, the grid, and
-// the count of what went out. Knows no estimation: it is told what the frames are to say, and
-// times on the axis of fusion::StampGuard. Reads no clock, allocates nothing.
+// What leaves the gateway: VG_Rate, and the rate in every foreign layout, whenever there is one,
+// VG_Bias with VG_Model on a grid of the bus's time and whenever somebody wants them. Owns the
+// frames with their counters, the grid, and the count of what went out. Knows no estimation: it is
+// told what the frames are to say, and times on the axis of fusion::StampGuard. Reads no clock,
+// allocates nothing.
 
+#include <cstddef>
 #include <cstdint>
+#include <vector>
 
 #include "base/time.h"
 #include "gateway/frame_sink.h"
 #include "gateway/output_frames.h"
+#include "gateway/output_layout.h"
 #include "gateway/plan.h"
 #include "gateway/status.h"
 
@@ -54,15 +58,25 @@ class Sender {
   [[nodiscard]] TimePoint grid_missed_at(Duration sample_interval) const;
 
   /// The counters of frames that both send go on where the other's stand.
-  void count_on_from(const Sender& before) { encoder_.count_on_from(before.encoder_); }
+  void count_on_from(const Sender& before);
   /// From now on as this plan says; counters, books and grid go on.
   void change_plan(const OutputPlan& plan);
+
+  /// How often there was something to say, whether or not a frame went out for it.
+  [[nodiscard]] std::uint64_t spoken() const { return rates_ + bias_times_; }
 
   /// The books, and what the last rate said.
   void tell(Status& status) const;
 
  private:
+  void send_layouts(const RateOutput& output);
+  /// The layout of `before` that the frame of our layout `index` was; null: there was none.
+  [[nodiscard]] const LayoutEncoder* predecessor(std::size_t index, const Sender& before) const;
+
   OutputEncoder encoder_;
+  std::vector<LayoutEncoder> layouts_;
+  can::BusIndex bus_;
+  bool vgyro_frames_;
   FrameSink* sink_ = nullptr;
   TimePoint stamp_;
   TimePoint next_bias_;  ///< the next point of the grid, or 0: at once
@@ -70,6 +84,7 @@ class Sender {
   std::uint64_t rates_valid_ = 0;
   std::uint64_t rates_out_of_range_ = 0;
   std::uint64_t biases_ = 0;
+  std::uint64_t bias_times_ = 0;
   double rate_dps_;   ///< of the last VG_Rate; NaN when that was invalid
   double sigma_dps_;  ///< likewise
   Quality quality_ = Quality::kUnusable;

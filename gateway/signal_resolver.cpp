@@ -100,9 +100,11 @@ std::vector<std::string> DatabaseCache::paths() const {
 
 SignalResolver::SignalResolver(TomlReader& reader, DatabaseCache& cache,
                                const std::string& config_folder, std::vector<std::string>& buses,
-                               std::vector<Error>& warnings)
+                               std::vector<Error>& warnings, const std::string& default_bus)
     : reader_(reader), warnings_(warnings) {
-  bus_ = required_bus(reader);
+  const bool is_default = !default_bus.empty() && !reader.has("bus");
+  bus_ = is_default ? default_bus : required_bus(reader);
+  if (is_default) reader.forgive({"bus"});
   const std::string dbc = reader.required_text("dbc", "bench.dbc");
   const std::string message = reader.required_text("message", "GYRO_A");
   const auto codes = read_code_rules();

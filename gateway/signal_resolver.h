@@ -35,14 +35,18 @@ class DatabaseCache {
 /// One message of one table of the configuration.
 class SignalResolver {
  public:
-  /// Reads the keys bus, dbc, message, codes of the table.
+  /// Reads the keys bus, dbc, message, codes of the table. With a `default_bus` the first may be
+  /// missing.
   SignalResolver(TomlReader& reader, DatabaseCache& cache, const std::string& config_folder,
-                 std::vector<std::string>& buses, std::vector<Error>& warnings);
+                 std::vector<std::string>& buses, std::vector<Error>& warnings,
+                 const std::string& default_bus = {});
 
   [[nodiscard]] bool usable() const { return message_ != nullptr; }
   [[nodiscard]] const std::string& bus() const { return bus_; }
   [[nodiscard]] const dbc::Message& message() const { return *message_; }
   [[nodiscard]] FrameMatch match() const;
+  /// Whose codes the message has, by its DBC file or the configuration.
+  [[nodiscard]] dbc::CodeRules rules() const { return rules_; }
   [[nodiscard]] const std::string& dbc_path() const { return dbc_path_; }
 
   /// The signal that `key` names; null after a complaint, or when the key is not there.

@@ -5,8 +5,8 @@
 namespace vgyro::gateway {
 
 std::string_view to_string(State state) {
-  constexpr std::array<std::string_view, 5> kNames{"waiting", "calibrating", "running", "degraded",
-                                                   "lost"};
+  constexpr std::array<std::string_view, kStateCount> kNames{
+      "waiting", "calibrating", "running", "degraded", "lost", "contradicted"};
   return kNames[static_cast<std::size_t>(state)];
 }
 
@@ -52,11 +52,32 @@ std::string_view to_string(Fault fault) {
   return kNames[static_cast<std::size_t>(fault)];
 }
 
+std::string_view to_string(fusion::Contradiction contradiction) {
+  constexpr std::array<std::string_view, fusion::kContradictions> kNames{
+      "none", "sign", "scale", "lag", "unrelated", "erratic"};
+  return kNames[static_cast<std::size_t>(contradiction)];
+}
+
 std::string_view to_string(fusion::Hypothesis hypothesis) {
   constexpr std::array<std::string_view, fusion::kHypotheses> kNames{
       "standing",     "turning",    "gyro_1_stepped", "gyro_2_stepped", "gyro_1_blind",
       "gyro_2_blind", "warming_up", "own_slopes",     "alike_slopes"};
   return kNames[static_cast<std::size_t>(hypothesis)];
+}
+
+LayoutCounts& LayoutCounts::operator+=(const LayoutCounts& other) {
+  frames += other.frames;
+  valid += other.valid;
+  out_of_range += other.out_of_range;
+  withheld += other.withheld;
+  return *this;
+}
+
+LayoutCounts Status::layouts_total() const {
+  LayoutCounts total;
+  for (const LayoutCounts& layout : layouts_out)
+    total += layout;
+  return total;
 }
 
 }  // namespace vgyro::gateway

@@ -10,6 +10,7 @@
 
 #include "base/time.h"
 #include "fusion/corrector.h"
+#include "fusion/pair_relation.h"
 
 namespace vgyro::gateway {
 
@@ -19,9 +20,10 @@ enum class State : std::uint8_t {
   kCalibrating = 1,  ///< both heard, initial calibration not complete
   kRunning = 2,      ///< both gyros in use
   kDegraded = 3,     ///< one gyro in use, the other timed out or was set aside
-  kLost = 4          ///< calibrated, but no gyro is in use
+  kLost = 4,         ///< calibrated, but no gyro is in use
+  kContradicted = 5  ///< both gyros in use, but not of one platform, as they are configured
 };
-inline constexpr int kStateCount = 5;
+inline constexpr int kStateCount = 6;
 std::string_view to_string(State state);
 
 /// VG_Quality on the wire.
@@ -85,6 +87,9 @@ enum class Fault : std::uint8_t {
 inline constexpr std::size_t kFaultCount = 9;
 std::string_view to_string(Fault fault);
 
+/// "none", "sign", "scale", "lag", "unrelated", "erratic".
+std::string_view to_string(fusion::Contradiction contradiction);
+
 /// For people: "standing", "turning", …
 std::string_view to_string(fusion::Hypothesis hypothesis);
 
@@ -110,6 +115,21 @@ struct GyroStatus {
   std::uint8_t waits_for = 0;
 };
 
+/// Layouts beside each other: more are a mistake, and the status has room for each.
+inline constexpr std::size_t kOutputLayoutsMost = 8;
+
+/// Frames of one [[output.layout]].
+struct LayoutCounts {
+  std::uint64_t frames = 0;
+  std::uint64_t valid = 0;  ///< of these, with a valid rate
+  std::uint64_t out_of_range =
+      0;                       ///< valid rates that the signal cannot carry, or whose σ it cannot
+  std::uint64_t withheld = 0;  ///< not sent: the layout cannot say that no rate is valid
+
+  LayoutCounts& operator+=(const LayoutCounts& other);
+  friend bool operator==(const LayoutCounts&, const LayoutCounts&) = default;
+};
+
 struct Status {
   State state = State::kWaiting;
   std::array<GyroStatus, 2> gyros;
@@ -126,7 +146,8 @@ struct Status {
   std::uint64_t rates_out_valid = 0;
   std::uint64_t rates_out_of_range = 0;  ///< virtual rate beyond what VG_Rate can carry
   std::uint64_t biases_out = 0;
-  std::uint64_t windows = 0;               ///< corrector windows completed
+  std::array<LayoutCounts, kOutputLayoutsMost> layouts_out{};  ///< in the order of the plan
+  std::uint64_t windows = 0;                                   ///< corrector windows completed
   std::uint64_t windows_skipped = 0;       ///< too few pairs in the window: drift held
   double rate_dps = 0.0;                   ///< last virtual rate; NaN when invalid
   double sigma_dps = 0.0;                  ///< its σ; NaN when invalid or not stated
@@ -140,6 +161,8 @@ struct Status {
   double restored_bias_sigma_dps = 0.0;  ///< of what was taken off the rate at first
   bool disagree = false;                 ///< the gyros contradict each other
   std::uint64_t disagreements = 0;       ///< times that this began
+  fusion::PairVerdict pair;              ///< whether the gyros can be of one platform
+  std::uint64_t contradictions = 0;      ///< times that this was found not to be so
   std::uint64_t stops = 0;               ///< stops learned from
   std::uint64_t stops_refused = 0;       ///< steady, but a turn was likelier
   std::uint64_t stops_open = 0;          ///< steady, and it could not be told which
@@ -147,6 +170,9 @@ struct Status {
   /// Of what may be the case, by fusion::Hypothesis.
   std::array<double, fusion::kHypotheses> probability{};
   std::uint64_t estimate_restarts = 0;  ///< times that the estimate was lost and began anew
+
+  /// Of all layouts.
+  [[nodiscard]] LayoutCounts layouts_total() const;
 };
 
 }  // namespace vgyro::gateway

@@ -40,18 +40,27 @@ constexpr can::BusIndex kForeignBus = 0xFF;
 // Frames of the pipeline → candump lines.
 class LineSink final : public gateway::FrameSink {
  public:
-  LineSink(OutputFile& file, std::string interface) : file_(file), lines_(std::move(interface)) {}
-  void put(const can::Frame& frame, TimePoint stamp) override {
-    char* room = file_.room(canlog::kLineBytesMax);
-    file_.commit(lines_.format(room, stamp, frame, fraction_digits));
-    ++frames;
+  LineSink(OutputFile& file, const gateway::Plan& plan)
+      : file_(file),
+        buses_(plan.buses.begin(), plan.buses.end()),
+        lines_(&buses_[plan.output.bus]) {}
+  void put(const can::Frame& frame, TimePoint stamp) override { put_line(*lines_, frame, stamp); }
+  void put_on(can::BusIndex bus, const can::Frame& frame, TimePoint stamp) override {
+    put_line(buses_[bus], frame, stamp);
   }
   unsigned fraction_digits = 6;
   std::uint64_t frames = 0;
 
  private:
+  void put_line(canlog::LineFormatter& lines, const can::Frame& frame, TimePoint stamp) {
+    char* room = file_.room(canlog::kLineBytesMax);
+    file_.commit(lines.format(room, stamp, frame, fraction_digits));
+    ++frames;
+  }
+
   OutputFile& file_;
-  canlog::LineFormatter lines_;
+  std::vector<canlog::LineFormatter> buses_;
+  canlog::LineFormatter* lines_;  ///< of the output's own bus
 };
 
 class Totals final : public gateway::RateObserver {
@@ -146,7 +155,7 @@ class Replay {
         output_(output),
         buses_(std::move(buses)),
         pipeline_(plan),
-        sink_(output, plan.buses[plan.output.bus]),
+        sink_(output, plan),
         totals_(summary_, options.plot.empty() ? nullptr : &plot_) {
     pipeline_.observe(&totals_);
   }
@@ -356,6 +365,24 @@ void warn_of_data(const ReplaySummary& summary, const gateway::Plan& plan) {
     warn({"estimate", gateway::restarts_text(status.estimate_restarts), ""});
 }
 
+// A pair that cannot be one is a mistake of the configuration: an error while it stands.
+std::optional<Error> explain_contradiction(const ReplaySummary& summary,
+                                           const gateway::Plan& plan) {
+  const gateway::Status& status = summary.status;
+  if (status.pair.contradiction != fusion::Contradiction::kNone) {
+    return Error{"gyros",
+                 gateway::contradiction_text(status.pair, {plan.gyros[0].name, plan.gyros[1].name}),
+                 gateway::contradiction_advice()};
+  }
+  if (status.contradictions > 0) {
+    warn({"gyros",
+          "for a while they did not move together as two gyros of one platform do, and no rate was "
+          "valid",
+          "--plot shows when"});
+  }
+  return std::nullopt;
+}
+
 // An input of which nothing came, while its J1939 parameter group came from other senders.
 void warn_of_senders_missed(const ReplaySummary& summary, const gateway::Plan& plan) {
   const auto look = [&](const std::string& title, const std::string& message,
@@ -379,16 +406,19 @@ void warn_of_senders_missed(const ReplaySummary& summary, const gateway::Plan& p
 
 // Two senders of one identifier: whoever reads VG_Rate would get both.
 void warn_of_other_senders(const ReplaySummary& summary, const gateway::Plan& plan) {
-  const gateway::OutputPlan& output = plan.output;
-  for (const IdCounts::Row& row : summary.ids.rows()) {
-    const bool ours =
-        row.id == output.rate_id || row.id == output.bias_id || row.id == output.model_id;
-    if (!ours || row.extended || summary.interfaces[row.bus] != plan.buses[output.bus]) continue;
-    warn(
-        {"output",
-         fmt::format("identifier {:03X} is on {} already, in {} frames of the log", row.id,
-                     plan.buses[output.bus], row.frames),
-         "if they are not an earlier run of the gateway, choose other rate_id, bias_id, model_id"});
+  for (std::size_t i = 0; i < plan.buses.size(); ++i) {
+    const auto bus = static_cast<can::BusIndex>(i);
+    const std::vector<gateway::FrameId> ours = gateway::output_ids(plan.output, bus);
+    for (const IdCounts::Row& row : summary.ids.rows()) {
+      const gateway::FrameId id{row.id, row.extended};
+      if (summary.interfaces[row.bus] != plan.buses[bus]) continue;
+      if (std::find(ours.begin(), ours.end(), id) == ours.end()) continue;
+      warn({"output",
+            fmt::format("identifier {} is on {} already, in {} frames of the log",
+                        gateway::to_string(id), plan.buses[bus], row.frames),
+            "if they are not an earlier run of the gateway, choose other rate_id, bias_id, "
+            "model_id; of a layout, another id or bus, or take the sensor off the bus"});
+    }
   }
 }
 
@@ -478,6 +508,7 @@ int run_replay(const ReplayOptions& options) {
   warn_of_data(summary, plan);
   warn_of_senders_missed(summary, plan);
   warn_of_other_senders(summary, plan);
+  if (!trouble) trouble = explain_contradiction(summary, plan);
   if (trouble) return report(*trouble);
   return written;
 }

@@ -120,12 +120,48 @@ Json hypotheses_json(const gateway::Status& status) {
   return hypotheses;
 }
 
+Json gaps_json(const ReplaySummary& summary) {
+  Json gaps = Json::array();
+  for (const Gap& gap : summary.longest_gaps) {
+    gaps.push_back({{"from_s", gap.from_s}, {"length_s", gap.length_s}});
+  }
+  return {{"longer_than_s", ReplaySummary::kGap_s}, {"count", summary.gaps}, {"longest", gaps}};
+}
+
+// As the recording ended; `contradiction` is "none" where the two can be of one platform.
+Json pair_json(const gateway::Status& status) {
+  const fusion::PairVerdict& pair = status.pair;
+  const bool any = pair.contradiction != fusion::Contradiction::kNone;
+  return {{"contradiction", gateway::to_string(pair.contradiction)},
+          {"contradictions", status.contradictions},
+          {"probability", any ? number(pair.probability) : Json(nullptr)},
+          {"slope", any ? number(pair.slope) : Json(nullptr)},
+          {"slope_sigma", any ? number(pair.slope_sigma) : Json(nullptr)},
+          {"lag_s", any ? number(pair.lag_s) : Json(nullptr)}};
+}
+
 const gateway::GyroPlan* gyro_of(const gateway::Plan& plan, const std::string& interface,
                                  const IdCounts::Row& row) {
   for (const gateway::GyroPlan& gyro : plan.gyros) {
     if (gyro.bus == interface && gyro.match.carries(row.id, row.extended)) return &gyro;
   }
   return nullptr;
+}
+
+Json layouts_json(const gateway::Status& status, const gateway::Plan& plan) {
+  Json layouts = Json::array();
+  for (std::size_t i = 0; i < plan.output.layouts.size(); ++i) {
+    const gateway::OutputLayout& layout = plan.output.layouts[i];
+    const gateway::LayoutCounts& counts = status.layouts_out[i];
+    layouts.push_back({{"bus", plan.buses[layout.bus]},
+                       {"id", layout.id},
+                       {"message", layout.message},
+                       {"frames", counts.frames},
+                       {"valid", counts.valid},
+                       {"out_of_range", counts.out_of_range},
+                       {"withheld", counts.withheld}});
+  }
+  return layouts;
 }
 
 }  // namespace
@@ -185,11 +221,7 @@ Json to_json(const ReplaySummary& summary, const gateway::Plan& plan) {
                    {"frames", row.frames},
                    {"gyro", gyro == nullptr ? Json(nullptr) : Json(gyro->name)}});
   }
-  Json gaps = Json::array();
-  for (const Gap& gap : summary.longest_gaps) {
-    gaps.push_back({{"from_s", gap.from_s}, {"length_s", gap.length_s}});
-  }
-  return {
+  Json all = {
       {"format", 1},
       {"method", gateway::to_string(plan.corrector.method)},
       {"model", model_json(summary, plan)},
@@ -205,8 +237,7 @@ Json to_json(const ReplaySummary& summary, const gateway::Plan& plan) {
       {"speed", {{"frames", status.speed_frames}, {"rejected", status.speed_rejected}}},
       {"pairs", status.pairs},
       {"clock_steps", status.clock_steps},
-      {"gaps",
-       {{"longer_than_s", ReplaySummary::kGap_s}, {"count", summary.gaps}, {"longest", gaps}}},
+      {"gaps", gaps_json(summary)},
       {"windows", {{"completed", status.windows}, {"skipped", status.windows_skipped}}},
       {"stops",
        {{"learned", status.stops}, {"refused", status.stops_refused}, {"open", status.stops_open}}},
@@ -215,6 +246,7 @@ Json to_json(const ReplaySummary& summary, const gateway::Plan& plan) {
       {"estimate_restarts", status.estimate_restarts},
       {"rates_too_far_apart", status.rates_too_far_apart},
       {"disagreements", status.disagreements},
+      {"pair", pair_json(status)},
       {"calibration",
        {{"covered_s", status.calibrated_s},
         {"restarts", status.calibration_restarts},
@@ -227,6 +259,8 @@ Json to_json(const ReplaySummary& summary, const gateway::Plan& plan) {
         {"biases", status.biases_out},
         {"mean_rate_dps", number(mean_of(summary.rate_sum_dps, summary.rates))}}},
       {"final_state", to_string(status.state)}};
+  if (!plan.output.layouts.empty()) all["out"]["layouts"] = layouts_json(status, plan);
+  return all;
 }
 
 namespace {
@@ -273,6 +307,7 @@ void put_opinion(fmt::memory_buffer& text, const ReplaySummary& summary,
   const auto line = [&](const char* title, const std::string& words) {
     if (!words.empty()) fmt::format_to(to, "\n{:<13} {}", title, words);
   };
+  line("pair", gateway::contradiction_text(status.pair, names));
   line("stops", gateway::stretches_text(gateway::steady_stretches(status)));
   line("at the end", status.ambiguous ? gateway::ambiguity_text(status.probability, names)
                                       : gateway::hypotheses_text(status.probability, names));
@@ -346,6 +381,20 @@ void put_virtual_gyro(fmt::memory_buffer& text, const ReplaySummary& summary) {
   put_plain_mean(text, summary);
 }
 
+void put_layouts(fmt::memory_buffer& text, const gateway::Status& status,
+                 const gateway::Plan& plan) {
+  auto to = std::back_inserter(text);
+  for (std::size_t i = 0; i < plan.output.layouts.size(); ++i) {
+    const gateway::LayoutCounts& counts = status.layouts_out[i];
+    fmt::format_to(to, "\nlayout        {}: {} frames, {} with a valid rate",
+                   plan.output.layouts[i].message, counts.frames, counts.valid);
+    if (counts.out_of_range > 0)
+      fmt::format_to(to, ", {} rates beyond what it can carry", counts.out_of_range);
+    if (counts.withheld > 0)
+      fmt::format_to(to, ", {} times silent: it cannot say \"not valid\"", counts.withheld);
+  }
+}
+
 void put_method(fmt::memory_buffer& text, const ReplaySummary& summary, const gateway::Plan& plan) {
   auto to = std::back_inserter(text);
   const gateway::Status& status = summary.status;
@@ -375,6 +424,7 @@ std::string to_text(const ReplaySummary& summary, const gateway::Plan& plan) {
     put_gyro(text, summary, plan, i);
   put_other_inputs(text, summary.status, plan);
   put_virtual_gyro(text, summary);
+  put_layouts(text, summary.status, plan);
   put_method(text, summary, plan);
   fmt::format_to(std::back_inserter(text), "\nended in state {}\n",
                  to_string(summary.status.state));

@@ -133,7 +133,7 @@ std::vector<Cell> header(std::initializer_list<const char*> names) {
 
 Mood mood_of_state(const std::string& state) {
   if (state == "running") return Mood::kGood;
-  return state == "lost" ? Mood::kBad : Mood::kDoubtful;
+  return state == "lost" || state == "contradicted" ? Mood::kBad : Mood::kDoubtful;
 }
 
 std::string gyros_table(const Json& status, const Paint& paint) {
@@ -288,7 +288,11 @@ std::string head(const Json& status, const ViewOptions& options, const Paint& pa
   };
   remark(text_of(status, "restored") == "taken_up", Mood::kDoubtful,
          "on biases of an earlier run, which no stop has confirmed");
-  remark(flag_of(status, "disagree"), Mood::kBad,
+  const std::string contradiction = text_of(status, "contradiction_text");
+  const bool contradicted = !contradiction.empty() && contradiction != kNothing;
+  remark(contradicted, Mood::kBad,
+         (contradiction + "; " + gateway::contradiction_advice()).c_str());
+  remark(!contradicted && flag_of(status, "disagree"), Mood::kBad,
          "the gyros disagree; which one is wrong cannot be told");
   text += troubles(status, paint);
   remark(flag_of(status, "config_refused"), Mood::kBad,
@@ -335,6 +339,19 @@ std::string unused_inputs(const Json& counters) {
   return text == kNothing ? std::string() : "frames not used: " + text + '\n';
 }
 
+/// What went out in foreign layouts; empty without any.
+std::string layouts_line(const Json& counters) {
+  const std::uint64_t frames = count_of(counters, "layout_frames");
+  const std::uint64_t withheld = count_of(counters, "layout_withheld");
+  if (frames == 0 && withheld == 0) return {};
+  std::string text = fmt::format("layouts: {} frames, {} with a valid rate", frames,
+                                 count_of(counters, "layout_frames_valid"));
+  if (const auto beyond = count_of(counters, "layout_out_of_range"); beyond > 0)
+    text += fmt::format(", {} rates beyond what they can carry", beyond);
+  if (withheld > 0) text += fmt::format(", {} times silent while no rate was valid", withheld);
+  return text + '\n';
+}
+
 std::string status_table(const Json& status, const ViewOptions& options) {
   const Paint paint(options.colour);
   const Json counters = at(status, "counters");
@@ -345,6 +362,7 @@ std::string status_table(const Json& status, const ViewOptions& options) {
       count_of(counters, "frames_sent"), count_of(counters, "rates_valid"),
       count_of(counters, "rates"), count_of(counters, "frames_stale"),
       count_of(counters, "frames_overflowed"), count_of(counters, "frames_refused"));
+  text += layouts_line(counters);
   text += unused_inputs(counters);
   text += paint(Mood::kQuiet, fmt::format("vgyrod {}, method {}, up {}", text_of(status, "version"),
                                           text_of(status, "method"),

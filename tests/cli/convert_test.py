@@ -29,6 +29,28 @@ class Convert(bench.Bench):
         self.assertTrue(self.read("out.asc").startswith("date Tue Nov 14 "))
         self.assertEqual(self.converted("out.asc"), LOG)
 
+    def test_goes_through_blf_and_back(self):
+        self.good("convert", "-q", "-o", "out.blf", "in.log")
+        self.assertEqual(self.converted("out.blf"), LOG)
+        blf = (self.folder / "out.blf").read_bytes()
+        self.assertEqual(self.converted("-", stdin=blf), LOG)
+        self.assertIn("packed in itself", self.bad("convert", "-o", "out.blf.gz", "in.log"))
+
+    def test_the_pipeline_makes_the_same_of_a_blf_file(self):
+        self.write("drive.log", "".join(bench.two_gyros(5)))
+        self.good("convert", "-q", "-o", "drive.blf", "drive.log")
+        of_log, of_blf = (self.good("replay", "--config", "vgyro.toml", "-o", "-", log).stdout for log in ("drive.log", "drive.blf"))
+        self.assertIn(b" 610#", of_log)
+        self.assertEqual(of_blf, of_log)
+
+    def test_says_what_is_in_a_log_without_frames(self):
+        self.good("convert", "-q", "-o", "out.blf", "in.log")
+        blf = bytearray((self.folder / "out.blf").read_bytes())
+        blf[156] = 11  # the container becomes an object of LIN
+        self.write("lin.blf", bytes(blf))
+        said = self.bad("convert", "-o", "out.asc", "lin.blf")
+        self.assertIn("lin.blf: 0 frames, 1 other object passed over\n", said)
+
     def test_digits_are_chosen(self):
         self.assertIn("(1700000000.270002) ", self.converted("--digits", "6", "in.log"))
         self.assertIn("(1700000000.250000000) ", self.converted("--digits", "9", "in.log"))

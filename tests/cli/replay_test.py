@@ -196,7 +196,7 @@ class Table(Replay):
         return [(row.split(","), stamp, word) for row, (stamp, word) in zip(rows, rates)]
 
     def test_a_row_says_what_its_frame_says(self):
-        states = ("waiting", "calibrating", "running", "degraded", "lost")
+        states = ("waiting", "calibrating", "running", "degraded", "lost", "contradicted")
         for method in ("optimal", "mutual", "mean"):
             with self.subTest(method):
                 valid_rows = 0

@@ -36,6 +36,8 @@ struct SampleGateway {
     now.status.pairs = 1ULL << 40U;
     now.status.accelerometer_rejected = 4;
     now.status.speed_rejected = 2;
+    now.status.layouts_out[0] = {.frames = 900, .valid = 800, .out_of_range = 3};
+    now.status.layouts_out[1] = {.frames = 100, .valid = 100, .withheld = 5};
     now.status.ambiguous = true;
     now.status.probability[static_cast<std::size_t>(fusion::Hypothesis::kStanding)] = 0.75;
     now.status.probability[static_cast<std::size_t>(fusion::Hypothesis::kTurning)] = 0.25;
@@ -45,6 +47,9 @@ struct SampleGateway {
     now.status.stops_refused = 5;
     now.status.stops_open = 1;
     now.status.estimate_restarts = 3;
+    now.status.pair.contradiction = fusion::Contradiction::kSign;
+    now.status.pair.slope = -1.0;
+    now.status.contradictions = 6;
     now.status.rates_too_far_apart = true;
     gateway::GyroStatus& left = now.status.gyros[0];
     left.heard = true;

@@ -130,7 +130,8 @@ class OnTheBus(Bench):
         members = {line.split()[0]: line.split()[1:3] for line in listed.stdout.splitlines() if line.startswith(".")}
         expected = {".Recalibrate": ["method", "-"], ".SaveState": ["method", "-"], ".Counters": ["property", "a{st}"],
                     ".Gyros": ["property", "aa{sv}"], ".Buses": ["property", "aa{sv}"]}
-        expected |= {f".{name}": ["property", "s"] for name in ("Version", "Method", "State", "Quality", "Restored")}
+        expected |= {f".{name}": ["property", "s"] for name in ("Version", "Method", "State", "Quality", "Restored", "Contradiction",
+                                                                "ContradictionText")}
         expected |= {f".{name}": ["property", "b"] for name in ("Valid", "Disagree", "Ambiguous", "RatesTooFarApart",
                                                                 "ConfigRefused")}
         expected |= {".Hypotheses": ["property", "a{sd}"]}
@@ -169,6 +170,17 @@ class OnTheBus(Bench):
         left, right = self.get("Gyros")
         self.assertEqual((left["slope_dps_s"]["data"], left["slope_sigma_dps_s"]["data"]), (1e-6, 2e-7))
         self.assertNotIsInstance(right["slope_dps_s"]["data"], (int, bool))
+
+    def test_properties_say_how_the_pair_contradicts_itself(self):
+        self.assertEqual(self.get("Contradiction"), "sign")
+        said = f"right moves -1.00 times {GYRO}: sign = -1?"
+        self.assertEqual(self.get("ContradictionText"), said)
+        self.assertEqual(self.get("Counters")["contradictions"], 6)
+        seen = json.loads(self.vgyro("status", "--json").stdout)
+        self.assertEqual((seen["contradiction"], seen["contradiction_text"]), ("sign", said))
+        shown = self.vgyro("status").stdout
+        self.assertIn("moves -1.00 times", shown)
+        self.assertIn("no rate is valid until they move together", shown)
 
     def test_changes_are_told_once_a_second(self):
         with subprocess.Popen(["busctl", f"--address={self.address}", "--json=short", "monitor", NAME],
@@ -242,6 +254,8 @@ class OnTheBus(Bench):
         self.assertRegex(done.stdout, r"(?m)^right +can1 +stuck +– ")
         self.assertRegex(done.stdout, r"(?m)^can0 +up +active +4321 +0 +0  bus off 3$")
         self.assertRegex(done.stdout, r"(?m)^can1 +not there ")
+        self.assertIn("layouts: 1000 frames, 900 with a valid rate, 3 rates beyond what they can carry, "
+                      "5 times silent while no rate was valid\n", done.stdout)
         self.assertRegex(done.stdout, r"(?m)^frames not used: accelerometer 4, speed 2$")
         # Columns stand under each other, also beside characters of several bytes.
         lines = done.stdout.splitlines()
@@ -401,7 +415,9 @@ class Metrics(Bench):
         self.assertTrue(all(name.startswith("vgyro_") for name in types))
         self.assertTrue(all((kind == "counter") == name.endswith("_total") for name, kind in types.items()), types)
         self.assertEqual({labels[0][1]: value for (name, labels), value in samples.items() if name == "vgyro_state"},
-                         {"waiting": 0, "calibrating": 0, "running": 1, "degraded": 0, "lost": 0})
+                         {"waiting": 0, "calibrating": 0, "running": 1, "degraded": 0, "lost": 0, "contradicted": 0})
+        self.assertEqual({labels[0][1]: value for (name, labels), value in samples.items() if name == "vgyro_pair_contradicted"},
+                         {"sign": 1, "scale": 0, "lag": 0, "unrelated": 0, "erratic": 0})
         self.assertEqual(samples["vgyro_gyro_bias_degrees_per_second", (("gyro", GYRO),)], 0.033)
         rate = samples["vgyro_gyro_bias_degrees_per_second", (("gyro", "right"),)]
         self.assertNotEqual(rate, rate, "not NaN")

@@ -21,7 +21,7 @@ class IdentifierWatchTest : public testing::Test {
       watch.second_passed();
   }
 
-  IdentifierWatch watch{{0x610, 0x611, 0x612}};
+  IdentifierWatch watch{{{0x610, false}, {0x611, false}, {0x612, false}}};
 };
 
 TEST_F(IdentifierWatchTest, CountsEveryFrameWithOneOfOurIdentifiersAndLeavesTheRest) {

@@ -4,6 +4,8 @@
 
 #include <chrono>
 #include <csignal>
+#include <set>
+#include <sstream>
 #include <string>
 #include <sys/resource.h>
 #include <thread>
@@ -63,6 +65,36 @@ TEST(MetricsFile, TellsWhyAFileWasCutShort) {
     std::this_thread::sleep_for(std::chrono::milliseconds(1));
   }
   EXPECT_NE(told().find("metrics cannot be written: File too large"), std::string::npos) << told();
+}
+
+// Prometheus refuses a file in which two samples have the same name and labels.
+TEST(Metrics, EveryLayoutHasASampleOfItsOwn) {
+  gateway::Plan plan = gateway::rig::two_gyros();
+  plan.buses = {"can0", "can1"};
+  using gateway::rig::codec_of;
+  using gateway::rig::signal_of;
+  const gateway::OutputLayout layout{
+      .bus = 0,
+      .message = "ARI",
+      .id = 0x0CF02A31,
+      .extended = true,
+      .rate = {.name = "Rate", .codec = codec_of(signal_of(0, 16, 0.01))}};
+  plan.output.layouts = {layout, layout, layout};
+  plan.output.layouts[1].bus = 1;
+  plan.output.layouts[2].id = 0x0CF02A32;
+  Snapshot now;
+  now.plan = &plan;
+  now.status.layouts_out[1].withheld = 7;
+  const std::string text = metrics_text(now);
+  std::istringstream lines(text);
+  std::set<std::string> seen;
+  for (std::string line; std::getline(lines, line);) {
+    if (line.starts_with('#')) continue;
+    EXPECT_TRUE(seen.insert(line.substr(0, line.rfind(' '))).second) << line;
+  }
+  EXPECT_TRUE(
+      seen.contains(R"(vgyro_layout_withheld_total{message="ARI",bus="can1",id="0CF02A31"})"))
+      << text;
 }
 
 }  // namespace

@@ -102,6 +102,32 @@ TEST_F(ReporterTest, TellsEachChangeOfHealthOnceWithItsCause) {
   EXPECT_EQ(count_of("the gyros disagree", said), 1U) << said;
 }
 
+TEST_F(ReporterTest, TellsOnceHowThePairContradictsItself) {
+  status.state = State::kRunning;
+  said_during([&] { reporter.check_state(status); });
+  status.state = State::kContradicted;
+  status.disagree = true;
+  status.pair.contradiction = fusion::Contradiction::kSign;
+  status.pair.slope = -1.0;
+  const auto look = [&] {
+    reporter.check_state(status);
+    reporter.check_state(status);
+  };
+  std::string said = said_during(look);
+  EXPECT_EQ(count_of("right moves -1.00 times left: sign = -1?", said), 1U) << said;
+  EXPECT_EQ(count_of("contradicted (was running)", said), 1U) << said;
+  EXPECT_EQ(count_of("\n", said), 2U) << said;
+  second();
+  EXPECT_NE(last_line.find("contradicted: right moves -1.00 times left"), std::string::npos)
+      << last_line;
+  status.state = State::kRunning;
+  status.disagree = false;
+  status.pair = {};
+  said = said_during(look);
+  EXPECT_EQ(count_of("the gyros move together again", said), 1U) << said;
+  EXPECT_EQ(count_of("\n", said), 2U) << said;
+}
+
 double& probability(gateway::Status& status, fusion::Hypothesis hypothesis) {
   return status.probability[static_cast<std::size_t>(hypothesis)];
 }

@@ -361,6 +361,28 @@ TEST(DbcParser, KnowsJ1939Groups) {
       << "the file's own labels count more than the usual numbers";
 }
 
+// CAN FD stands in the same attribute, with 11 and with 29 bits.
+TEST(DbcParser, KnowsCanFdFrames) {
+  const std::string messages = "BO_ 2364549858 A: 8 E\nBO_ 5 B: 8 E\nBO_ 6 C: 64 E\n";
+  const std::string format =
+      "BA_DEF_ BO_ \"VFrameFormat\" ENUM "
+      "\"StandardCAN\",\"ExtendedCAN\",\"StandardCAN_FD\",\"ExtendedCAN_FD\";\n";
+  const auto is_fd = [&](const std::string& attributes) {
+    const Database database = parse_clean(messages + attributes);
+    std::string flags;
+    for (const Message& message : database.messages)
+      flags += message.is_fd ? '1' : '0';
+    return flags;
+  };
+  EXPECT_EQ(is_fd(""), "001") << "no classic frame has 64 bytes";
+  EXPECT_EQ(is_fd(format + "BA_ \"VFrameFormat\" BO_ 5 2;\n"), "011");
+  EXPECT_EQ(is_fd("BA_ \"VFrameFormat\" BO_ 5 14;\nBA_ \"VFrameFormat\" BO_ 2364549858 15;\n"),
+            "111");
+  EXPECT_EQ(is_fd(format + "BA_DEF_DEF_ \"VFrameFormat\" \"ExtendedCAN_FD\";\n"
+                           "BA_ \"VFrameFormat\" BO_ 5 0;\n"),
+            "101");
+}
+
 // Sections that the product has no use for are passed over without a word.
 TEST(DbcParser, PassesOverUnusedSections) {
   const Database database = parse_clean(
@@ -470,6 +492,25 @@ TEST(DbcLoad, RefusesFilesWithoutMessages) {
   const auto empty = load(path);
   ASSERT_FALSE(empty);
   EXPECT_EQ(empty.error().where, path + ":2");
+}
+
+// The value before anybody knows better: the signal's own, or the default of the file. Values of
+// signals that were taken out of the file are nothing odd.
+TEST(DbcParser, ReadsStartValues) {
+  const std::string defined =
+      "BA_DEF_ SG_ \"GenSigStartValue\" FLOAT -1E9 1E9;\n"
+      "BA_DEF_DEF_ \"GenSigStartValue\" 7;\n";
+  const Database database = parse_clean(kGyro + defined +
+                                        "BA_ \"GenSigStartValue\" SG_ 291 Rate -32768;\n"
+                                        "BA_ \"GenSigStartValue\" SG_ 291 Gone 3;\n"
+                                        "BA_ \"GenSigStartValue\" SG_ 999 Rate 3;\n");
+  EXPECT_EQ(signal_in(database, "GYRO", "Rate").start_raw, -32768.0);
+  EXPECT_EQ(signal_in(database, "GYRO", "Status").start_raw, 7.0);
+  const Database without = parse_clean(kGyro + "BA_ \"GenSigStartValue\" SG_ 291 Status \"3\";\n");
+  EXPECT_EQ(signal_in(without, "GYRO", "Rate").start_raw, std::nullopt);
+  EXPECT_EQ(signal_in(without, "GYRO", "Status").start_raw, 3.0);
+  const Database words = parse_clean(kGyro + "BA_ \"GenSigStartValue\" SG_ 291 Status none;\n");
+  EXPECT_EQ(signal_in(words, "GYRO", "Status").start_raw, std::nullopt);
 }
 
 // --- Shift JIS -----------------------------------------------------------------------------------

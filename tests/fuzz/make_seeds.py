@@ -39,6 +39,10 @@ def logs_of_all_forms(lines):
         log = literal.encode("utf-8").decode("unicode_escape").encode("latin-1", "replace")
         if b"\n" in log:
             yield b"\x10" + log
+    golden = ROOT / "tests/canlog/golden"
+    for path in sorted(golden.iterdir()):
+        if path.suffix in (".blf", ".pcap", ".pcapng", ".mf4"):
+            yield b"\x40" + path.read_bytes()
     plain = "".join(lines[:100]).encode()
     for packed in (gzip.compress(plain, mtime=0), bz2.compress(plain), lzma.compress(plain)):
         yield b"\x40" + packed

@@ -90,5 +90,37 @@ TEST(ConditionText, TakesALostEstimateForAFaultOfOurOwn) {
   EXPECT_NE(restarts_text(2).find("began anew 2 times"), std::string::npos);
 }
 
+fusion::PairVerdict pair_of(fusion::Contradiction contradiction, double slope) {
+  fusion::PairVerdict pair;
+  pair.contradiction = contradiction;
+  pair.slope = slope;
+  return pair;
+}
+
+TEST(ConditionText, SaysHowAPairContradictsItself) {
+  using fusion::Contradiction;
+  const auto text = [](Contradiction contradiction, double slope) {
+    return contradiction_text(pair_of(contradiction, slope), kNames);
+  };
+  EXPECT_EQ(text(Contradiction::kNone, 1.0), "");
+  EXPECT_EQ(text(Contradiction::kSign, -0.998), "mems moves -1.00 times fog: sign = -1?");
+  EXPECT_EQ(text(Contradiction::kSign, -57.1),
+            "mems moves -57.10 times fog: sign = -1? And rad/s and deg/s?");
+  EXPECT_EQ(text(Contradiction::kScale, 57.4), "mems moves 57.40 times fog: rad/s and deg/s?");
+  EXPECT_EQ(text(Contradiction::kScale, 1.0 / 3600.0),
+            "mems moves 0.00028 times fog: deg/s and deg/h?");
+  EXPECT_EQ(text(Contradiction::kScale, 30.0),
+            "mems moves 30.00 times fog: is its unit, or its factor, right?");
+  EXPECT_NE(text(Contradiction::kUnrelated, NAN).find("fog and mems both move, and not together"),
+            std::string::npos);
+  fusion::PairVerdict late = pair_of(Contradiction::kLag, 1.0);
+  late.lag_s = -1.5;
+  EXPECT_NE(contradiction_text(late, kNames).find("fog moves 1.5 s later than mems"),
+            std::string::npos);
+  fusion::PairVerdict erratic = pair_of(Contradiction::kErratic, NAN);
+  erratic.gyro = 0;
+  EXPECT_NE(contradiction_text(erratic, kNames).find("the values of fog jump"), std::string::npos);
+}
+
 }  // namespace
 }  // namespace vgyro::gateway

@@ -72,5 +72,30 @@ TEST(PipelineAllocation, NeverHappensWithAReferenceAndFd) {
   EXPECT_GT(pipeline.status().rates_out_valid, 3'000U);
 }
 
+// The same with the rate in a foreign layout, on a bus of its own.
+TEST(PipelineAllocation, NeverHappensWithAForeignLayout) {
+  Plan plan = rig::two_gyros();
+  plan.output.vgyro_frames = false;
+  OutputLayout layout{.bus = 1,
+                      .message = "FOREIGN",
+                      .id = 0x123,
+                      .rate = {.name = "Rate",
+                               .codec = rig::codec_of(rig::signal_of(0, 16, 0.01)),
+                               .minimum = -327.0,
+                               .maximum = 327.0,
+                               .none_raw = 0x8000,
+                               .beyond_raw = 0x8000,
+                               .has_code = true}};
+  plan.output.layouts = {layout};
+  const rig::Recording recording =
+      rig::merge({rig::stream_a(ms(0), ms(35'000), rig::constant(0.1)),
+                  rig::stream_b(ms(0), ms(35'000), rig::constant(0.2))});
+  Pipeline pipeline(plan);
+  Counter out;
+  EXPECT_EQ(allocations_over(pipeline, recording, out), 0U);
+  EXPECT_GT(pipeline.status().layouts_out[0].valid, 3'000U);
+  EXPECT_EQ(out.frames, pipeline.status().layouts_out[0].frames);
+}
+
 }  // namespace
 }  // namespace vgyro::gateway

@@ -258,6 +258,150 @@ TEST_F(SenderTest, SinkThatThrowsEndsItsTurn) {
   EXPECT_EQ(out.frames[0].stamp, at_ms(2));
 }
 
+// --- foreign layouts -----------------------------------------------------------------------------
+
+constexpr std::uint32_t kLayoutId = 0x123;
+
+/// Rate: 16 bits from bit 0, 0.01 deg/s, 0x8000 is none; counter from bit 16 to 14.
+OutputLayout layout_on(can::BusIndex bus) {
+  const dbc::SignalCodec rate = rig::codec_of(rig::signal_of(0, 16, 0.01));
+  const dbc::SignalCodec counter =
+      rig::codec_of(rig::signal_of(16, 4, 1.0, 0.0, dbc::ValueType::kUnsigned));
+  OutputLayout layout{.bus = bus,
+                      .message = "FOREIGN",
+                      .id = kLayoutId,
+                      .rate = {.name = "Rate",
+                               .codec = rate,
+                               .minimum = -327.67,
+                               .maximum = 327.67,
+                               .none_raw = 0x8000,
+                               .beyond_raw = 0x8000,
+                               .has_code = true}};
+  layout.e2e.counter = AliveCounter{"Counter", counter, 15};
+  return layout;
+}
+
+/// Two buses: who sends what where.
+class TwoBuses final : public FrameSink {
+ public:
+  void put(const can::Frame& frame, TimePoint) override { own.push_back(frame); }
+  void put_on(can::BusIndex bus, const can::Frame& frame, TimePoint) override {
+    other_bus = bus;
+    other.push_back(frame);
+  }
+  std::vector<can::Frame> own;
+  std::vector<can::Frame> other;
+  can::BusIndex other_bus = 0;
+};
+
+// Beside VG_Rate, in the order of the configuration, each on its bus.
+TEST_F(SenderTest, LayoutsGoOutWithTheRateOnTheirBus) {
+  OutputPlan plan;
+  plan.layouts = {layout_on(0), layout_on(2)};
+  plan.layouts[0].id = 0x124;
+  Sender both{plan};
+  TwoBuses buses;
+  {
+    const Sender::Turn turn(both, buses, at_ms(1));
+    both.send_rate(rate_of(-1.0));
+    both.send_bias({}, {});
+  }
+  ASSERT_EQ(buses.own.size(), 4U);
+  EXPECT_EQ(buses.own[0].id, kRateId);
+  EXPECT_EQ(buses.own[1].id, 0x124U);
+  ASSERT_EQ(buses.other.size(), 1U);
+  EXPECT_EQ(buses.other_bus, 2);
+  EXPECT_EQ(rig::signed_bits(buses.other[0], 0, 16), -100);
+  EXPECT_EQ(buses.own[2].id, kBiasId);
+}
+
+// Alone: no VG_ frame, but a rate that only VG_Rate could not carry is valid, and whoever waits for
+// something to be said hears of it.
+TEST_F(SenderTest, LayoutsMayGoOutAlone) {
+  OutputPlan plan;
+  plan.vgyro_frames = false;
+  plan.layouts = {layout_on(0)};
+  plan.layouts[0].rate.scale = 10.0;
+  Sender alone{plan};
+  {
+    const Sender::Turn turn(alone, out, at_ms(1));
+    alone.send_rate(rate_of(500.0));
+    alone.send_bias({}, {});
+  }
+  ASSERT_EQ(out.frames.size(), 1U);
+  EXPECT_EQ(rig::signed_bits(out.frames[0].frame, 0, 16), 5000);
+  EXPECT_EQ(alone.spoken(), 2U);
+  Status told;
+  alone.tell(told);
+  EXPECT_EQ(told.rates_out_valid, 1U);
+  EXPECT_EQ(told.biases_out, 0U);
+  EXPECT_EQ(told.layouts_out[0], (LayoutCounts{.frames = 1, .valid = 1}));
+}
+
+// Another configuration: the same frame goes on counting and keeps its books, a new one begins.
+TEST_F(SenderTest, LayoutsGoOnWithAnotherPlan) {
+  OutputPlan plan;
+  plan.layouts = {layout_on(0)};
+  Sender going{plan};
+  const auto send = [&] {
+    const Sender::Turn turn(going, out, at_ms(1));
+    going.send_rate(rate_of(400.0));
+  };
+  for (int i = 0; i < 17; ++i)
+    send();
+  plan.layouts.insert(plan.layouts.begin(), layout_on(0));
+  plan.layouts[0].id = 0x200;
+  going.change_plan(plan);
+  send();
+  EXPECT_EQ(rig::bits(out.with_id(kLayoutId).back().frame, 16, 4), 17U % 15U);
+  EXPECT_EQ(rig::bits(out.with_id(0x200).back().frame, 16, 4), 0U);
+  Status told;
+  going.tell(told);
+  EXPECT_EQ(told.layouts_out[0], (LayoutCounts{.frames = 1, .out_of_range = 1}));
+  EXPECT_EQ(told.layouts_out[1], (LayoutCounts{.frames = 18, .out_of_range = 18}));
+  EXPECT_EQ(told.layouts_total().frames, 19U);
+}
+
+// One identifier on two buses is two frames, each with a counter and books of its own.
+TEST_F(SenderTest, OneIdentifierOnTwoBusesIsCountedApart) {
+  OutputPlan plan;
+  plan.layouts = {layout_on(0), layout_on(2)};
+  plan.layouts[1].every = ms(100);
+  Sender going{plan};
+  TwoBuses buses;
+  const auto send = [&](int at) {
+    const Sender::Turn turn(going, buses, at_ms(at));
+    going.send_rate(rate_of(1.0));
+  };
+  for (int i = 0; i < 7; ++i)
+    send(1000 + i);
+  going.change_plan(plan);
+  send(1007);
+  send(1200);
+  EXPECT_EQ(rig::bits(buses.own.back(), 16, 4), 8U);
+  EXPECT_EQ(rig::bits(buses.other.back(), 16, 4), 1U);
+  Status told;
+  going.tell(told);
+  EXPECT_EQ(told.layouts_out[0], (LayoutCounts{.frames = 9, .valid = 9}));
+  EXPECT_EQ(told.layouts_out[1], (LayoutCounts{.frames = 2, .valid = 2}));
+}
+
+// What is no number is no valid rate, even where no VG_Rate is asked what it can carry.
+TEST_F(SenderTest, NoNumberIsNoValidRateWithoutVgRate) {
+  OutputPlan plan;
+  plan.vgyro_frames = false;
+  plan.layouts = {layout_on(0)};
+  Sender alone{plan};
+  const Sender::Turn turn(alone, out, at_ms(1));
+  EXPECT_FALSE(alone.send_rate(rate_of(kNaN)));
+  EXPECT_FALSE(alone.send_rate(rate_of(std::numeric_limits<double>::infinity())));
+  EXPECT_TRUE(alone.send_rate(rate_of(1e6))) << "no VG_Rate that could not carry it";
+  Status told;
+  alone.tell(told);
+  EXPECT_EQ(told.rates_out_valid, 1U);
+  EXPECT_EQ(told.layouts_out[0], (LayoutCounts{.frames = 3, .out_of_range = 3}));
+}
+
 // --- another plan --------------------------------------------------------------------------------
 
 // Counters go on under the same identifier, and begin anew under another one; books and grid go on.

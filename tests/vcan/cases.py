@@ -899,6 +899,89 @@ class InheritedCase:
         return f"biases {biases} deg/s kept, {describe(run)}"
 
 
+class ForeignLayoutsCase:
+    """The rate in two layouts of others, read by a node on the kernel's own J1939 stack with its own arithmetic: the
+    angular rate of SAE J1939 beside VG_Rate, and NMEA 2000's rate of turn on a bus of its own."""
+
+    name = "foreign_layouts"
+    says = "J1939 and NMEA 2000 nodes read the rate in their own layouts"
+    ari = ("can0", 0x0CF02A31, 61482, 0x31)
+    boat = ("can1", 0x09F11332, 127251, 0x32)
+
+    def __init__(self):
+        self.twin = Twin(bus_b="can2")
+
+    def prepare(self, folder):
+        self.twin.prepare(folder)
+        with open(folder / "vgyro.toml", "a", encoding="utf-8") as config:
+            config.write(f"""
+[[output.layout]]
+dbc = "{SOURCE}/dbc/profiles/j1939_ari.dbc"
+message = "ARI"
+rate = "YawRate"
+valid = "YawRateMerit == 0"
+source_address = {self.ari[3]}
+
+[[output.layout]]
+bus = "can1"
+dbc = "{SOURCE}/dbc/profiles/nmea2000_rate_of_turn.dbc"
+message = "RateOfTurn"
+rate = "Rate"
+counter = "SID"
+source_address = {self.boat[3]}
+""")
+        links = self.twin.links() + [{"name": "can1", "mtu": 16}]
+        return {"links": links, "steps": [["play", str(folder / "played.log")]],
+                "beside": [sys.executable, str(Path(__file__).with_name("j1939_reader.py")), "{memory}/heard.txt",
+                           "can0", "can1"],
+                "command": [str(BIN / "vgyrod"), "--config", str(folder / "vgyro.toml")]}
+
+    def judge(self, folder, result):
+        run = read_run(folder, result)
+        foreign = [line for line in run.inputs if len(line.name) == 8]
+        run.inputs = [line for line in run.inputs if len(line.name) == 3]
+        check_service(run)
+        check_played(run)
+        replayed = run.replay()
+        _, rate_dps, _ = verdicts.rates_of(run.of(0x610), verdicts.Oracle(SOURCE / "dbc/vgyro.dbc"))
+        require(np.isfinite(rate_dps).sum() > 1000 and np.isnan(rate_dps).sum() > 500, "no good mixture of rates")
+        reader = "the kernel's J1939"
+        heard = (folder / "heard.txt").read_text(encoding="ascii").splitlines() if (folder / "heard.txt").exists() else []
+        if not heard:  # a host may have vcan without J1939
+            reader = "a raw reader, for this kernel has no J1939"
+            heard = [f"{line.bus} {int(line.name, 16) >> 8 & 0x3FFFF} {int(line.name, 16) & 0xFF} {line.data.hex()}"
+                     for line in foreign]
+        for bus, can_id, group, address in (self.ari, self.boat):
+            live = [line.data for line in foreign if int(line.name, 16) == can_id and line.bus == bus]
+            require(live == [line.data for line in replayed if int(line.name, 16) == can_id and line.bus == bus],
+                    f"{can_id:08X}: the replay sends others than the daemon")
+            node = [bytes.fromhex(data) for told in heard for words in [told.split()] for data in [words[3]]
+                    if words[:3] == [bus, str(group), str(address)]]
+            require(node == live, f"PGN {group}: {len(node)} frames heard, {len(live)} captured")
+        self.check_ari([line.data for line in foreign if int(line.name, 16) == self.ari[1]], rate_dps)
+        self.check_boat([line.data for line in foreign if int(line.name, 16) == self.boat[1]], rate_dps)
+        return f"{len(rate_dps)} rates in each, read by {reader}, {describe(run)}"
+
+    @staticmethod
+    def check_ari(frames, rate_dps):
+        """SAE J1939: 1/128 deg/s from -250, the topmost codes are none; merit 0 of 0 to 3 is good."""
+        raw = np.array([int.from_bytes(data[4:6], "little") for data in frames])
+        merit = np.array([data[6] >> 4 & 3 for data in frames])
+        value = np.where(merit == 0, raw / 128 - 250, np.nan)
+        require(np.array_equal(np.isnan(value), np.isnan(rate_dps)), "ARI and VG_Rate differ in what is valid")
+        require((raw[merit != 0] == 0xFFFF).all() and (raw[merit == 0] <= 0xFAFF).all(), "ARI: wrong codes")
+        require(np.nanmax(np.abs(value - rate_dps)) <= 0.5 / 128 + 2.6e-5, "ARI is not the nearest to VG_Rate")
+
+    @staticmethod
+    def check_boat(frames, rate_dps):
+        """NMEA 2000: 1/32 µrad/s, 0x7FFFFFFF is none; the sequence number runs from 0 to 252."""
+        raw = np.array([int.from_bytes(data[1:5], "little", signed=True) for data in frames])
+        value = np.where(raw == 0x7FFFFFFF, np.nan, raw / 32e6 * 180 / np.pi)
+        require(np.array_equal(np.isnan(value), np.isnan(rate_dps)), "the boat and VG_Rate differ in what is valid")
+        require(np.nanmax(np.abs(value - rate_dps)) <= 2.7e-5, "the boat's rate is not VG_Rate's")
+        require([data[0] for data in frames] == [number % 253 for number in range(len(frames))], "sequence numbers")
+
+
 class IdleCase:
     """No gyro is there: heartbeat, status, and a clean end."""
 
@@ -1015,6 +1098,7 @@ def all_cases(recordings):
         SharedCase(),
         RestartCase(),
         InheritedCase(),
+        ForeignLayoutsCase(),
         IdleCase(),
         CommandCase("no_can_interface", "an interface that is none of CAN: exit 1 and what to do",
                     [vgyrod, "--config", "{folder}/vgyro.toml"], 1,

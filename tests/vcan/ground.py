@@ -11,7 +11,7 @@ from pathlib import Path
 HERE = Path(__file__).resolve().parent
 PYTHON = os.path.realpath(sys.executable)
 UML_MODULES = Path("/usr/lib/uml/modules")
-MODULES = ("can", "can-raw", "can-dev", "vcan", "sch_tbf")
+MODULES = ("can", "can-raw", "can-dev", "can-j1939", "vcan", "sch_tbf")
 # What the tests need of a kernel, tried out in a namespace that vanishes at once.
 PROBE = "ip link add vgprobe0 type vcan && tc qdisc add dev vgprobe0 root tbf rate 100kbit burst 200 limit 400"
 

@@ -275,7 +275,7 @@ def take_steps(steps, daemon, folder):
 def keep_files(memory, folder):
     """What the daemon writes is in memory meanwhile: where the folder is the host's, the whole guest waits for its disk."""
     for name in os.listdir(memory):
-        if name.startswith(("state.toml", "vgyrod.err")):
+        if name.startswith(("state.toml", "vgyrod.err", "heard.txt")):
             run_program(["cp", "-p", os.path.join(memory, name), folder])
             os.unlink(os.path.join(memory, name))
 
@@ -283,11 +283,13 @@ def keep_files(memory, folder):
 def run_case(case, folder, memory, result):
     # A memory file system keeps the capture from waiting for a disk.
     capture_path = os.path.join(memory, "capture.tmp")
-    watch = dump = daemon = None
+    watch = dump = daemon = beside = None
     try:
         make_links(case)
         with open(capture_path, "wb") as capture, open(os.path.join(folder, "candump.err"), "wb") as errors:
             dump = subprocess.Popen(["candump", "-L", "-D", "-r", "8000000", "any"], stdout=capture, stderr=errors)
+            if "beside" in case:
+                beside = subprocess.Popen(case["beside"], stderr=errors)
             time.sleep(0.5)
             watch = StallWatch(os.path.join(memory, "stalls.tmp"))
             daemon = Daemon(case["command"], memory)
@@ -310,7 +312,7 @@ def run_case(case, folder, memory, result):
         if watch is not None:
             result["stalls_us"] = watch.stop()
             result["listened_us"] = daemon.listened_us if daemon else []
-        for process in (dump, daemon.process if daemon else None):
+        for process in (dump, beside, daemon.process if daemon else None):
             if process is not None and process.poll() is None:
                 process.kill()
                 process.wait()

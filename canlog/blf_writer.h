@@ -1,0 +1,45 @@
+#pragma once
+
+// Records → Vector's BLF, in the form that CANoe, python-can and Wireshark read. Stamps count from
+// the whole second in which the first frame was, in nanoseconds. What the form has no place for:
+// interface names (channel numbers, canlog/writer.h), the causes of error frames, CAN XL.
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "canlog/writer.h"
+
+namespace vgyro::canlog {
+
+class BlfWriter final : public LogWriter {
+ public:
+  BlfWriter(ByteSink& sink, const WriterOptions& options);
+
+  void put(const LogRecord& record, std::string_view bus, const XlFrame* xl) override;
+  /// Completes the head of the file.
+  void finish() override;
+  [[nodiscard]] const ChannelNumbers* channels() const override { return &channels_; }
+
+ private:
+  void add_object(std::uint32_t type, std::int64_t since_ns, std::size_t field_bytes);
+  void put_error(unsigned channel, std::int64_t since_ns);
+  void put_classic(const LogRecord& record, unsigned channel, std::int64_t since_ns);
+  void put_fd(const LogRecord& record, unsigned channel, std::int64_t since_ns);
+  void write_container();
+  [[nodiscard]] std::string head() const;
+
+  ByteSink& sink_;
+  WriterOptions options_;
+  ChannelNumbers channels_;
+  std::optional<std::int64_t> zero_ns_;
+  std::int64_t last_ns_ = 0;       ///< the latest stamp
+  std::uint64_t file_bytes_ = 0;   ///< written so far
+  std::uint64_t plain_bytes_ = 0;  ///< the same as if nothing were packed
+  std::uint32_t objects_ = 0;
+  std::string content_;     ///< of the container to come
+  std::string packed_;      ///< room for the container
+  char* fields_ = nullptr;  ///< of the object that add_object() added last, all zero
+};
+
+}  // namespace vgyro::canlog

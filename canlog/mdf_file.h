@@ -1,0 +1,96 @@
+#pragma once
+
+// The blocks of an MDF 4 file (ASAM MDF, .mf4), and the data that lists of blocks hold, unpacked.
+// No meaning of a record is known here.
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "base/error.h"
+#include "canlog/byte_source.h"
+
+namespace vgyro::canlog {
+
+/// One block: its links, and the beginning of its data.
+struct MdfBlock {
+  std::string kind;  ///< "##DG"
+  std::uint64_t at = 0;
+  std::uint64_t data_at = 0;
+  std::uint64_t data_bytes = 0;  ///< as the block says
+  std::vector<std::uint64_t> links;
+  std::string data;  ///< as much of it as was asked for
+  /// Zero where the block has no such link.
+  [[nodiscard]] std::uint64_t link(std::size_t index) const {
+    return index < links.size() ? links[index] : 0;
+  }
+};
+
+class MdfFile {
+ public:
+  /// The file's head. Error where it is none, or of a version that is not read.
+  static Expected<std::shared_ptr<MdfFile>> open(std::unique_ptr<ByteSource> bytes);
+
+  /// `kind` is what it has to be, or empty. Error where there is no such block. Reading a great
+  /// many of them is an error too: lists that go round in circles end like that.
+  Expected<MdfBlock> block(std::uint64_t at, std::string_view kind, std::size_t data_bytes);
+  /// The text that a block holds; empty where there is none.
+  std::string text(std::uint64_t at);
+  /// Fewer bytes only where the file ends.
+  Expected<std::size_t> read(std::uint64_t at, char* to, std::size_t size);
+
+  /// The writer has not come to complete what it knows at the end only.
+  [[nodiscard]] bool is_unfinished() const { return unfinished_ != 0; }
+  /// Counts of records are not there, or wrong.
+  [[nodiscard]] bool lacks_counts() const { return (unfinished_ & 1U) != 0; }
+  /// The last block of data goes on to the end of the file.
+  [[nodiscard]] bool lacks_data_size() const { return (unfinished_ & 4U) != 0; }
+  [[nodiscard]] const std::string& name() const { return bytes_->name(); }
+  [[nodiscard]] ByteSource& bytes() { return *bytes_; }
+  [[nodiscard]] const ByteSource& bytes() const { return *bytes_; }
+  [[nodiscard]] Error damage(std::uint64_t at, std::string_view what) const;
+
+ private:
+  explicit MdfFile(std::unique_ptr<ByteSource> bytes) : bytes_(std::move(bytes)) {}
+
+  std::unique_ptr<ByteSource> bytes_;
+  std::uint64_t at_ = 0;  ///< where bytes_ stands
+  unsigned unfinished_ = 0;
+  std::size_t blocks_read_ = 0;
+};
+
+/// What a link to data means: a block, packed or not, or a list of them, as one run of bytes.
+class MdfData final : public ByteSource {
+ public:
+  MdfData(std::shared_ptr<MdfFile> file, std::uint64_t link)
+      : file_(std::move(file)), list_(link) {}
+
+  Expected<std::size_t> read(char* to, std::size_t size) override;
+  [[nodiscard]] const std::string& name() const override { return file_->name(); }
+  [[nodiscard]] std::uint64_t bytes_read() const override { return file_->bytes().bytes_read(); }
+  [[nodiscard]] std::uint64_t bytes_total() const override { return file_->bytes().bytes_total(); }
+  void before_wait(std::function<void()> callback) override {
+    file_->bytes().before_wait(std::move(callback));
+  }
+  /// The file ended before the data did.
+  [[nodiscard]] bool is_cut_off() const { return cut_off_; }
+
+ private:
+  Expected<bool> next_part();
+  Expected<void> open_part(const MdfBlock& block);
+  Expected<void> unpack(const MdfBlock& block);
+
+  std::shared_ptr<MdfFile> file_;
+  std::uint64_t list_;  ///< the block or list to come; 0: none
+  std::vector<std::uint64_t> parts_;
+  std::size_t part_ = 0;
+  std::uint64_t at_ = 0;    ///< in the file, of the part that is read
+  std::uint64_t left_ = 0;  ///< of it
+  std::string plain_;       ///< of a packed part, all of it
+  std::size_t plain_at_ = 0;
+  bool cut_off_ = false;
+};
+
+}  // namespace vgyro::canlog

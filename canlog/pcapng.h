@@ -1,0 +1,58 @@
+#pragma once
+
+// pcapng: what Wireshark, tshark and dumpcap write, of one or several interfaces, which may have
+// names; also several files one behind the other. dumpcap writes the packets of several interfaces
+// some tenths of a second out of order: they come by stamp. Blocks of other kinds are passed over.
+
+#include <memory>
+#include <vector>
+
+#include "canlog/packet_reader.h"
+#include "canlog/stamp_order.h"
+
+namespace vgyro::canlog {
+
+bool is_pcapng(std::string_view head);
+
+class PcapngReader final : public PacketReader {
+ public:
+  static Expected<std::unique_ptr<LogReader>> open(std::unique_ptr<ByteSource> bytes);
+
+  bool next(LogRecord& record) override;
+
+ private:
+  explicit PcapngReader(std::unique_ptr<ByteWindow> bytes) : PacketReader(std::move(bytes)) {}
+
+  struct Clock {
+    unsigned exponent = 6;  ///< stamps count in 10^-exponent or 2^-exponent seconds
+    bool is_binary = false;
+    std::int64_t offset_s = 0;
+    /// None where it does not fit.
+    [[nodiscard]] std::optional<std::int64_t> to_ns(std::uint64_t count) const;
+  };
+  struct Described {
+    Interface interface;
+    Clock clock;
+  };
+  struct Block {
+    std::uint32_t type = 0;
+    std::uint32_t bytes = 0;   ///< all of it
+    std::string_view content;  ///< without head and tail, as much as is looked at
+  };
+
+  bool read(LogRecord& record);
+  std::optional<Block> next_block();
+  bool begin_section(std::string_view head);
+  void describe_interface(const Block& block);
+  bool read_packet_block(const Block& block, LogRecord& record);
+
+  std::endian order_ = std::endian::little;
+  std::vector<Described> interfaces_;
+  bool has_several_ = false;  ///< interfaces, in some section
+  // dumpcap is a fifth of a second late; whoever reads a live capture waits as long.
+  static constexpr std::int64_t kLateMax_ns = 1'000'000'000;
+  StampOrder by_stamp_{kLateMax_ns};  ///< used then
+  bool ended_ = false;
+};
+
+}  // namespace vgyro::canlog

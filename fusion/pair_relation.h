@@ -1,0 +1,230 @@
+#pragma once
+
+// Can these two streams be of gyros that turn together? Gyro 2 against gyro 1, from how their means
+// over tenths of a second change: a healthy pair moves alike, whatever their noise, biases, scale
+// factors, bandwidths and delays of some tenths of a second. Where one moves against the other,
+// many times as far, late by much more than that, or on its own, the two contradict each other: a
+// sign, a unit, an axis or the bits of a signal are not what they are taken for. Found on evidence
+// that is bounded block by block, so that neither a step, a drift nor an odd second is enough, and
+// taken back the same way.
+// It does not say which of the two is wrong: nothing in two streams does. A gyro that does not move
+// at all while the other one does is no business of it either (fusion/coherence).
+// Bounded memory, nothing is allocated; times are seconds on one monotone axis, rates deg/s.
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+
+#include "fusion/quadratic.h"
+
+namespace vgyro::fusion {
+
+enum class Contradiction : std::uint8_t {
+  kNone,
+  kSign,       ///< gyro 2 moves against gyro 1
+  kScale,      ///< it moves with gyro 1, many times as far, or a small part of it
+  kLag,        ///< it moves as gyro 1 does, but at another time
+  kUnrelated,  ///< both move, and have too little in common
+  kErratic     ///< the values of one jump, or stand, where no gyro's do
+};
+inline constexpr std::size_t kContradictions = 6;
+
+/// How gyro 2 follows gyro 1. Without a contradiction the figures say nothing.
+struct PairVerdict {
+  Contradiction contradiction = Contradiction::kNone;
+  double probability = 0.0;  ///< that they contradict each other
+  double slope = 0.0;        ///< gyro 2 moves so many times gyro 1; NaN where nothing is in common
+  double slope_sigma = 0.0;  ///< from how it differs between the blocks; NaN likewise
+  double lag_s = 0.0;        ///< gyro 2 is so much later; of kLag, else 0
+  std::size_t gyro = 2;      ///< whose values are erratic; of kErratic, else 2
+};
+
+class PairRelation {
+ public:
+  /// What healthy gyros may differ by: the slope and its reciprocal, and the time.
+  static constexpr double kSlopeMost = 2.5;
+  static constexpr double kLagMost_s = 0.6;
+
+  /// The next pair; t_s grows from call to call.
+  void add(double t_s, const std::array<double, 2>& rate_dps) {
+    if (samples_ > 0) {
+      const double step_s = t_s - newest_s_;
+      if (t_s - from_s_ >= kCell_s || step_s > kGap_s) close_cell(t_s, step_s);
+    }
+    if (samples_ == 0) {
+      from_s_ = t_s;
+      origin_ = rate_dps;
+    }
+    for (std::size_t gyro = 0; gyro < 2; ++gyro) {
+      const double away_dps = rate_dps[gyro] - origin_[gyro];
+      sum_[gyro] += away_dps;
+      square_[gyro] += away_dps * away_dps;
+      const double step_dps = rate_dps[gyro] - newest_dps_[gyro];
+      if (samples_ > 0) step_square_[gyro] += squared(step_dps);
+      if (std::abs(step_dps) > std::abs(step_most_[gyro])) step_most_[gyro] = step_dps;
+    }
+    newest_dps_ = rate_dps;
+    ++samples_;
+    newest_s_ = t_s;
+  }
+
+  /// One of them is found to be sick: what it said shortly before is no news of the pair.
+  void break_off() {
+    samples_ = 0;
+    sum_ = square_ = step_square_ = step_most_ = {};
+    count_ = 0;
+    since_block_ = since_long_block_ = 0;
+  }
+
+  /// Before the first pair: what was found in an earlier run. It stands until some blocks show a
+  /// pair, or something else is found.
+  void resume(const PairVerdict& verdict) { verdict_ = earlier_ = verdict; }
+
+  [[nodiscard]] const PairVerdict& verdict() const { return verdict_; }
+  [[nodiscard]] bool contradicts() const { return verdict_.contradiction != Contradiction::kNone; }
+  /// Times that a contradiction began.
+  [[nodiscard]] std::uint64_t times() const { return times_; }
+
+ private:
+  static constexpr double kCell_s = 0.1;
+  /// Behind a hole longer than this, and than four cells, everything begins anew but the evidence.
+  static constexpr double kGap_s = 0.5;
+  static constexpr std::size_t kBlock = 10;      ///< cells of a block
+  static constexpr std::size_t kLongBlock = 20;  ///< … of one that is compared over all lags
+  static constexpr std::size_t kLags = 30;       ///< cells to either side
+  static constexpr std::size_t kCells = 128;     ///< of the memory
+
+  struct RelationCell {
+    std::array<double, 2> mean_dps{};
+    std::array<double, 2> scatter{};  ///< variance of the samples about it; 0 of one sample
+    std::array<double, 2> leap{};     ///< its largest step from one sample to the next
+    std::array<double, 2> rough{};    ///< … as it were if they were white: from their steps
+    double samples = 0.0;
+    double length_s = 0.0;
+  };
+  /// A stretch of cells of one gyro.
+  struct Stretch {
+    double mean_dps = 0.0;
+    double squares = 0.0;  ///< about the mean
+    double bends = 0.0;    ///< variance of a cell's mean, from its bends
+    double noise = 0.0;    ///< variance of a cell's mean that is not smooth motion
+    double rough = 0.0;    ///< variance of a sample within its cell, from steps between samples
+  };
+  /// Sums of a stretch of gyro 1 and one of gyro 2, about their means.
+  struct Products {
+    double first = 0.0;
+    double second = 0.0;
+    double both = 0.0;
+  };
+  /// How one stretch follows another.
+  struct Fit {
+    double slope = 0.0;
+    double left = 1.0;  ///< share of the second's squares that it leaves
+    double own = 0.0;   ///< Σ of the first one's squares
+    double both = 0.0;  ///< Σ of the products
+  };
+  /// What the long blocks have shown at one lag, older ones fading.
+  struct AtLag {
+    double now = 0.0;          ///< share that a healthy slope leaves of the newest
+    double left = 0.0;         ///< Σ of that share
+    double blocks = 0.0;       ///< those that speak for this lag, against all healthy ones
+    double any_left = 0.0;     ///< Σ of the share that the slope leaves which fits best
+    double strong_left = 0.0;  ///< as `left`, of blocks in which both have moved far
+    double both = 0.0;         ///< Σ of the products
+  };
+  /// Slopes of blocks that speak for one contradiction.
+  struct Slopes {
+    double own = 0.0;
+    double both = 0.0;
+    double own_square = 0.0;
+    double both_square = 0.0;
+    double product = 0.0;
+    [[nodiscard]] double slope() const { return both / own; }
+    [[nodiscard]] double sigma() const;
+    void add(const Fit& fit);
+  };
+
+  void close_cell(double t_s, double step_s);
+  [[nodiscard]] const RelationCell& cell(std::size_t i) const {
+    return cells_[(head_ + i) % kCells];
+  }
+  [[nodiscard]] Stretch stretch(std::size_t gyro, std::size_t from, std::size_t length) const;
+  /// Less their trends too, where these may be drift; of gyro 2 half a cell later, if halfway.
+  [[nodiscard]] Products products(std::size_t from, std::size_t lagged_from, std::size_t length,
+                                  bool trends_off, bool halfway = false) const;
+  /// With a slope between these limits.
+  [[nodiscard]] static Fit fit(const Products& sums, double slope_least, double slope_most);
+  /// … with a healthy one, half a cell later.
+  [[nodiscard]] Fit halfway_fit(std::size_t from, std::size_t lagged_from, std::size_t length,
+                                bool trends_off) const;
+  [[nodiscard]] static bool moves(const Stretch& stretch, std::size_t length);
+  /// How far it has turned to and fro within the memory, deg.
+  [[nodiscard]] double swing_deg(std::size_t gyro) const;
+
+  void judge_block();
+  [[nodiscard]] double block_tells(std::size_t from, std::size_t lags,
+                                   const std::array<Stretch, 2>& both, Fit& contrary) const;
+  [[nodiscard]] static bool clear_of_noise(const Products& sums,
+                                           const std::array<Stretch, 2>& both);
+  void hear(double tells, const Fit& contrary);
+  void judge_values(std::size_t from, const std::array<Stretch, 2>& both);
+  [[nodiscard]] bool jumps(std::size_t gyro, std::size_t from, const std::array<Stretch, 2>& both,
+                           bool moving) const;
+  void look_for_leaps(std::size_t gyro, std::size_t from, bool moving);
+  [[nodiscard]] bool erratic(std::size_t gyro) const;
+  void judge_long_block();
+  void judge_following(const std::array<Stretch, 2>& both, double most_alike, double left);
+  void weigh_lags();
+  void judge_common(double left);
+  [[nodiscard]] std::size_t near_lags(std::size_t most) const;
+  void decide();
+
+  // The cell that is being filled.
+  std::size_t samples_ = 0;
+  double from_s_ = 0.0;
+  double newest_s_ = 0.0;
+  std::array<double, 2> origin_{};
+  std::array<double, 2> sum_{};
+  std::array<double, 2> square_{};
+  std::array<double, 2> step_square_{};
+  std::array<double, 2> step_most_{};
+  std::array<double, 2> newest_dps_{};
+
+  std::array<RelationCell, kCells> cells_;
+  std::size_t head_ = 0;
+  std::size_t count_ = 0;
+  double length_s_ = 0.0;             ///< of a cell, as a rule
+  std::size_t since_block_ = 0;       ///< cells since the last one was judged
+  std::size_t since_long_block_ = 0;  ///< likewise
+
+  double evidence_ = 0.0;  ///< of blocks: log odds above the prior
+  Slopes slopes_;
+  bool by_blocks_ = false;  ///< they have found a contradiction, and it stands
+  std::array<AtLag, 2 * kLags + 1> lags_{};
+  std::size_t lag_cells_ = 0;  ///< of these to either side, as long as the cells are what they were
+  double long_blocks_ = 0.0;
+  double strong_blocks_ = 0.0;
+  bool pooled_ = false;  ///< over these, they have too little in common
+  double pooled_probability_ = 0.0;
+  double own_ = 0.0;
+  PairVerdict late_;               ///< what the lags say
+  double best_any_left_ = 0.0;     ///< of any slope, at a healthy lag
+  std::array<double, 2> alone_{};  ///< log odds above the prior: this gyro moves by itself
+  bool unrelated_ = false;         ///< both do, as it was found
+  /// What the values of a gyro are like.
+  struct Values {
+    // While the other one stood still, and while it moved:
+    std::array<double, 2> erratic{};    ///< blocks in which they were no gyro's, less calm ones
+    std::array<std::size_t, 2> calm{};  ///< blocks in which they were
+    std::array<double, 2> leaps{};      ///< down, up; those of long ago fade
+  };
+  std::array<Values, 2> values_;
+  bool were_near_ = false;  ///< the two have been nearer to each other than any bias is large
+  PairVerdict earlier_;     ///< of an earlier run, while it stands
+  PairVerdict verdict_;
+  std::uint64_t times_ = 0;
+};
+
+}  // namespace vgyro::fusion

@@ -1,0 +1,573 @@
+#include "gateway/output_layout_config.h"
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <cmath>
+#include <iterator>
+#include <optional>
+#include <string_view>
+#include <utility>
+
+#include <fmt/core.h>
+
+#include "base/printable.h"
+#include "dbc/e2e.h"
+#include "dbc/layout.h"
+#include "gateway/config.h"
+#include "gateway/e2e_config.h"
+#include "gateway/gyro_input.h"
+#include "gateway/input_frames.h"
+#include "gateway/output_field.h"
+#include "gateway/status.h"
+#include "gateway/valid_config.h"
+
+namespace vgyro::gateway {
+
+namespace {
+
+// J1939-21: the address that nobody has, and the one that means everybody.
+constexpr std::uint32_t kNullAddress = 0xFE;
+constexpr std::uint32_t kGlobalAddress = 0xFF;
+// PDU formats below are sent to one address, which stands where others have part of their number.
+constexpr std::uint32_t kPdu2First = 240;
+// A day's worth of rounding of such steps is a degree; a car's own sensor has 0.01 to 0.06 deg/s.
+constexpr double kCoarse_dps = 0.1;
+// No road vehicle turns faster in normal driving; a boat has a third of it.
+constexpr double kNarrow_dps = 100.0;
+constexpr double kEveryMost_ms = 60'000.0;
+constexpr std::size_t kProfile1Values = 15;  // 15 itself is "invalid"
+constexpr unsigned kNibble = 4;
+
+// How people name what receivers check, in any case of letters.
+constexpr std::array<std::string_view, 4> kCrcNames{"crc", "checksum", "chksum", "chksm"};
+constexpr std::array<std::string_view, 4> kCounterNames{"counter", "alive", "cntr", "rolling"};
+
+using Payload = std::array<std::uint8_t, can::kFdBytesMax>;
+
+Payload mask_of(const dbc::SignalCodec& codec) {
+  Payload mask{};
+  codec.encode_raw(~std::uint64_t{0}, mask);
+  return mask;
+}
+
+// The bits that arrange() writes are those that come out alike whatever they were.
+Payload mask_of(const dbc::Presence& presence) {
+  Payload zeros{};
+  Payload ones;
+  ones.fill(0xFF);
+  presence.arrange(zeros);
+  presence.arrange(ones);
+  Payload mask{};
+  for (std::size_t i = 0; i < mask.size(); ++i)
+    mask[i] = static_cast<std::uint8_t>(~(zeros[i] ^ ones[i]));
+  return mask;
+}
+
+bool overlap(const Payload& a, const Payload& b) {
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    if ((a[i] & b[i]) != 0) return true;
+  }
+  return false;
+}
+
+void add(Payload& to, const Payload& mask) {
+  for (std::size_t i = 0; i < to.size(); ++i)
+    to[i] = static_cast<std::uint8_t>(to[i] | mask[i]);
+}
+
+/// One table.
+class LayoutReader {
+ public:
+  LayoutReader(const toml::table& table, LayoutContext context, Plan& plan)
+      : reader_(table, context.file, "[[output.layout]]", context.errors),
+        context_(context),
+        resolver_(reader_, context.cache, context.folder, plan.buses, context.warnings,
+                  plan.buses[plan.output.bus]),
+        method_(plan.corrector.method) {}
+
+  std::optional<OutputLayout> read();
+
+ private:
+  void read_rate(const dbc::Signal& signal);
+  void read_sign(const dbc::Signal* signal);
+  void read_sigma(const dbc::Signal& signal);
+  void read_valid();
+  void read_flag_raw(const NamedCondition& valid);
+  void read_protection();
+  void check_header(const CheckValue& crc);
+  bool read_fd();
+  void read_id();
+  void read_source_address();
+  void read_every();
+  void take(std::string_view key, const Payload& mask);
+  bool on_page(std::string_view key, const dbc::Signal& signal);
+  void fill_rest();
+  std::optional<RawValue> filled(const dbc::Signal& signal, const toml::table* fill);
+  void check_fill(const toml::table* fill);
+  void warn_of_resting(const dbc::Signal& signal, const RawValue& value);
+  void warn_of_rate();
+  void complain(std::string_view key, const Error& error) {
+    reader_.complain(reader_.where(key), error.what, error.remedy);
+  }
+
+  TomlReader reader_;
+  LayoutContext context_;
+  SignalResolver resolver_;
+  Method method_;
+  bool fd_ = false;
+  dbc::CodeRules rules_ = dbc::CodeRules::kNone;
+  const dbc::Signal* rate_ = nullptr;
+  std::optional<OutputLayout> layout_;  ///< as soon as the rate is known
+  Payload taken_{};                     ///< bits that a key has named, or that choose the page
+};
+
+std::optional<OutputLayout> LayoutReader::read() {
+  const std::size_t errors_before = context_.errors.size();
+  rate_ = resolver_.signal("rate", true);
+  const dbc::Signal* sign = resolver_.signal("sign_signal", false);
+  const dbc::Signal* sigma = resolver_.signal("sigma", false);
+  if (rate_ != nullptr) {
+    fd_ = read_fd();
+    rules_ = resolver_.rules();
+    read_rate(*rate_);
+  }
+  if (layout_ && context_.errors.size() == errors_before) {
+    read_id();
+    read_source_address();
+    read_sign(sign);
+    if (sigma != nullptr) read_sigma(*sigma);
+    read_valid();
+    read_protection();
+    read_every();
+    fill_rest();
+    warn_of_rate();
+  } else {
+    reader_.forgive({"unit", "sign", "rate_not_available", "id", "source_address", "valid",
+                     "invalid", "every_ms", "fd", "fill"});
+    forgive_e2e(reader_);
+  }
+  reader_.finish();
+  if (context_.errors.size() > errors_before) return std::nullopt;
+  return layout_;
+}
+
+void LayoutReader::take(std::string_view key, const Payload& mask) {
+  if (overlap(taken_, mask)) {
+    reader_.complain(reader_.where(key),
+                     fmt::format("{} shares bits of {} with another key", key, layout_->message),
+                     "every key needs a signal of its own");
+  }
+  add(taken_, mask);
+}
+
+// Precondition: the page of the rate is arranged.
+bool LayoutReader::on_page(std::string_view key, const dbc::Signal& signal) {
+  const auto presence = dbc::Presence::make(resolver_.message(), signal, {});
+  if (presence && presence->holds({layout_->blank.data(), layout_->bytes})) return true;
+  reader_.complain(reader_.where(key),
+                   fmt::format("{} is not on the page of {}", signal.name, rate_->name),
+                   "signals that stand in the frame of the rate");
+  return false;
+}
+
+void LayoutReader::read_rate(const dbc::Signal& signal) {
+  const auto quantity = resolver_.quantity(signal, "rate", Dimension::kRate, reader_.text("unit"));
+  const auto none_raw = reader_.integer("rate_not_available");
+  if (!quantity) return;
+  auto field = output_field(signal, *quantity, rules_, none_raw);
+  if (!field) return complain(none_raw ? "rate_not_available" : "rate", field.error());
+  const dbc::Message& message = resolver_.message();
+  layout_.emplace(OutputLayout{
+      .bus = resolver_.match().bus,
+      .message = message.name,
+      .fd = fd_,
+      .bytes = static_cast<std::uint8_t>(can::fd_padded_length(resolver_.match().bytes)),
+      .rate = std::move(*field)});
+  // What J1939 and NMEA 2000 do not use is all ones.
+  if (rules_ != dbc::CodeRules::kNone) layout_->blank.fill(0xFF);
+  quantity->presence.arrange(layout_->blank);
+  add(taken_, mask_of(quantity->presence));
+  take("rate", mask_of(layout_->rate.codec));
+}
+
+void LayoutReader::read_sign(const dbc::Signal* signal) {
+  const auto sign = reader_.integer("sign");
+  if (sign && *sign != 1 && *sign != -1) {
+    reader_.complain(reader_.where("sign"), fmt::format("sign is {}", *sign),
+                     "1, or -1 to flip the axis");
+  }
+  if (sign) layout_->rate.scale *= static_cast<double>(*sign);
+  if (signal == nullptr || !on_page("sign_signal", *signal)) return;
+  const auto codec = resolver_.codec(*signal);
+  if (!codec) return;
+  layout_->sign = *codec;
+  take("sign_signal", mask_of(*codec));
+}
+
+void LayoutReader::read_sigma(const dbc::Signal& signal) {
+  const auto quantity = resolver_.quantity(signal, "sigma", Dimension::kRate);
+  if (!quantity || !on_page("sigma", signal)) return;
+  auto field = output_field(signal, *quantity, rules_);
+  if (!field) return complain("sigma", field.error());
+  field->minimum = std::max(field->minimum, 0.0);
+  if (!field->has_code) {
+    if (method_ != Method::kOptimal) {
+      reader_.complain(reader_.where("sigma"),
+                       fmt::format("{} states no σ, and {} has no code for \"not available\"",
+                                   to_string(method_), signal.name),
+                       "leave sigma out, or method = \"optimal\"");
+    }
+    // Beside a rate that is not valid: as much as can be said.
+    Payload scratch{};
+    field->codec.encode(field->maximum, scratch);
+    field->none_raw = static_cast<std::uint64_t>(field->codec.decode(scratch).raw);
+  }
+  take("sigma", mask_of(field->codec));
+  layout_->sigma = std::move(*field);
+}
+
+void LayoutReader::read_valid() {
+  const auto valid = read_condition(reader_, resolver_, *rate_);
+  if (!valid) {
+    if (reader_.has("invalid") && !reader_.has("valid")) {
+      reader_.complain(reader_.where("invalid"), "invalid without valid",
+                       "valid = \"Status == 0\", which names the signal");
+    }
+    reader_.forgive({"invalid"});
+    return;
+  }
+  if (!on_page("valid", *valid->signal)) return;
+  take("valid", mask_of(valid->condition.codec));
+  read_flag_raw(*valid);
+}
+
+// What to write where the comparison shall hold, and where it must not.
+void LayoutReader::read_flag_raw(const NamedCondition& valid) {
+  const dbc::SignalCodec& codec = valid.condition.codec;
+  OutputFlag flag{.name = valid.signal->name, .codec = codec, .text = valid.condition.text};
+  Payload scratch{};
+  const auto says_valid = [&] { return holds(valid.condition, codec.decode(scratch).value); };
+  const auto raw = [&] { return static_cast<std::uint64_t>(codec.decode(scratch).raw); };
+  if (!put_valid(valid.condition, scratch)) {
+    reader_.complain(
+        reader_.where("valid"),
+        fmt::format("no value of the signal fulfils valid = \"{}\"", valid.condition.text));
+    return;
+  }
+  flag.valid_raw = raw();
+  bool found = false;
+  const auto offer = [&](std::uint64_t candidate) {
+    codec.encode_raw(candidate, scratch);
+    if (!found && !says_valid()) {
+      flag.invalid_raw = raw();
+      found = true;
+    }
+  };
+  if (const auto wanted = reader_.number("invalid")) {
+    codec.encode(*wanted, scratch);
+    if (says_valid() || codec.decode(scratch).value != *wanted) {
+      reader_.complain(reader_.where("invalid"),
+                       fmt::format("{} = {:g} {}", flag.name, *wanted,
+                                   says_valid() ? "is what `valid` calls valid" : "cannot be said"),
+                       "a value of the signal for which the comparison is false");
+      return;
+    }
+    flag.invalid_raw = raw();
+    found = true;
+  }
+  if (const auto none = not_available(*valid.signal, rules_)) offer(none->raw);
+  offer(~std::uint64_t{0});
+  offer(0);
+  for (const double near : {valid.condition.value + 1.0, valid.condition.value - 1.0}) {
+    codec.encode(near, scratch);
+    offer(raw());
+  }
+  if (!found) {
+    reader_.complain(reader_.where("valid"),
+                     fmt::format("every value fulfils valid = \"{}\"", flag.text),
+                     "a comparison that is false when the rate is not valid");
+  }
+  layout_->valid = flag;
+}
+
+void LayoutReader::read_protection() {
+  if (reader_.has("max_delta_counter")) {
+    reader_.complain(reader_.where("max_delta_counter"), "max_delta_counter is for inputs");
+  }
+  layout_->e2e = read_e2e(reader_, resolver_, *rate_);
+  const dbc::Message& message = resolver_.message();
+  if (std::optional<AliveCounter>& counter = layout_->e2e.counter) {
+    const dbc::Signal& signal = *message.find_signal(counter->name);
+    if (!on_page("counter", signal)) return;
+    take("counter", mask_of(counter->codec));
+    // The protocol's own "not available" is no number of a sequence.
+    const dbc::Codes codes = dbc::codes_of(signal, rules_);
+    if (!codes.empty() && codes.first < counter->modulus)
+      counter->modulus = static_cast<std::uint32_t>(codes.first);
+  }
+  if (!layout_->e2e.crc) return;
+  const dbc::Signal& signal = *message.find_signal(layout_->e2e.crc->name);
+  const auto codec = resolver_.codec(signal);
+  if (!codec || !on_page("crc", signal)) return;
+  take("crc", mask_of(*codec));
+  layout_->e2e.crc->protection = layout_->e2e.crc->protection.for_can_id(layout_->id);
+  check_header(*layout_->e2e.crc);
+}
+
+// Of AUTOSAR's profiles the counter has its place, and the receiver looks for it there.
+void LayoutReader::check_header(const CheckValue& crc) {
+  const dbc::E2eKind kind = *dbc::e2e_kind_from(crc.kind);
+  const std::size_t header = dbc::E2eProtection::header_bytes(kind);
+  if (header < 2) return;
+  const std::size_t byte = dbc::bit_place(*resolver_.message().find_signal(crc.name)).first_byte;
+  const bool whole_byte = kind == dbc::E2eKind::kProfile5;
+  Payload wanted{};
+  wanted[byte + header - 1] = whole_byte ? 0xFF : 0x0F;
+  std::optional<AliveCounter>& counter = layout_->e2e.counter;
+  if (!counter || mask_of(counter->codec) != wanted) {
+    reader_.complain(reader_.where(counter ? "counter" : "e2e"),
+                     fmt::format("{} has its counter in {} of byte {}", crc.kind,
+                                 whole_byte ? "all" : "the low nibble", byte + header - 1),
+                     "counter = \"NAME\", the signal that stands there");
+    return;
+  }
+  const bool is_1 = kind == dbc::E2eKind::kProfile1A || kind == dbc::E2eKind::kProfile1B ||
+                    kind == dbc::E2eKind::kProfile1C;
+  if (is_1) counter->modulus = kProfile1Values;
+  if (kind == dbc::E2eKind::kProfile2) counter->modulus = 1U << kNibble;
+  if (kind == dbc::E2eKind::kProfile1C) {
+    Payload nibble{};
+    nibble[byte + 1] = 0xF0;
+    take("e2e", nibble);
+  }
+}
+
+bool LayoutReader::read_fd() {
+  const dbc::Message& message = resolver_.message();
+  const bool fd = reader_.boolean("fd").value_or(message.is_fd);
+  const std::size_t most = fd ? can::kFdBytesMax : can::kClassicBytesMax;
+  if (message.size_bytes > most) {
+    const bool in_packets = message.is_j1939 && !fd;
+    reader_.complain(
+        reader_.where(reader_.has("fd") ? "fd" : "message"),
+        fmt::format("{} has {} bytes{}", message.name, message.size_bytes,
+                    in_packets ? ", which J1939 and NMEA 2000 send in several frames" : ""),
+        fmt::format("a message of one frame: {} holds {} bytes",
+                    fd ? "CAN FD" : "without fd = true it", most));
+  }
+  return fd;
+}
+
+void LayoutReader::read_id() {
+  const dbc::Message& message = resolver_.message();
+  layout_->id = message.id;
+  layout_->extended = message.extended;
+  const auto id = reader_.integer("id");
+  if (!id) return;
+  const std::uint32_t most = message.extended ? can::kExtendedIdMax : can::kStandardIdMax;
+  if (*id >= 0 && *id <= static_cast<std::int64_t>(most)) {
+    layout_->id = static_cast<std::uint32_t>(*id);
+    return;
+  }
+  reader_.complain(
+      reader_.where("id"), fmt::format("id is {:#x}", *id),
+      fmt::format("up to {:#x}: {} has {} bits", most, message.name, message.extended ? 29 : 11));
+}
+
+void LayoutReader::read_source_address() {
+  const auto address = reader_.integer("source_address");
+  const bool is_j1939 = resolver_.message().is_j1939;
+  const bool wrong =
+      address && (!is_j1939 || *address < 0 || *address >= static_cast<std::int64_t>(kNullAddress));
+  if (wrong) {
+    reader_.complain(reader_.where("source_address"),
+                     "source_address is 0 to 253, for a J1939 message",
+                     "a message is J1939 when its DBC attribute VFrameFormat is J1939PG");
+    return;
+  }
+  if (!is_j1939) return;
+  if (address) layout_->id = (layout_->id & ~0xFFU) | static_cast<std::uint32_t>(*address);
+  // A DBC file's receiver is a placeholder, as its sender is; one that the configuration names is
+  // meant.
+  const bool to_one = (layout_->id >> 16U & 0xFFU) < kPdu2First;
+  if (to_one && !reader_.has("id")) layout_->id |= kGlobalAddress << 8U;
+  if ((layout_->id & 0xFFU) >= kNullAddress) {
+    reader_.complain(reader_.where("message"),
+                     fmt::format("{} is sent from an address, and the DBC file has none",
+                                 resolver_.message().name),
+                     "source_address = N, 0 to 253, that nobody else on the bus has");
+  }
+}
+
+void LayoutReader::read_every() {
+  const auto every_ms = reader_.number("every_ms");
+  if (!every_ms) return;
+  if (!(*every_ms >= 1.0 && *every_ms <= kEveryMost_ms)) {
+    reader_.complain(reader_.where("every_ms"), fmt::format("every_ms is {:g}", *every_ms),
+                     fmt::format("1 to {:g}", kEveryMost_ms));
+    return;
+  }
+  layout_->every = std::chrono::microseconds(std::llround(*every_ms * 1000.0));
+}
+
+// --- what nobody fills ---------------------------------------------------------------------------
+
+// Signals of the rate's page that no key names.
+void LayoutReader::fill_rest() {
+  const toml::table* fill = reader_.table("fill");
+  check_fill(fill);
+  const dbc::Message& message = resolver_.message();
+  const std::span<std::uint8_t> payload{layout_->blank.data(), layout_->bytes};
+  for (const dbc::Signal& signal : message.signals) {
+    const auto codec = dbc::SignalCodec::make(signal, message.size_bytes, {});
+    const auto presence = dbc::Presence::make(message, signal, {});
+    if (!codec || !presence || !presence->holds(payload)) continue;
+    const Payload mask = mask_of(*codec);
+    if (overlap(mask, taken_)) continue;
+    const auto value = filled(signal, fill);
+    if (!value) return;
+    if (fill == nullptr || !fill->contains(signal.name)) warn_of_resting(signal, *value);
+    codec->encode_raw(value->raw, payload);
+    add(taken_, mask);
+    layout_->resting.push_back({signal.name, value->text});
+  }
+}
+
+void LayoutReader::check_fill(const toml::table* fill) {
+  if (fill == nullptr) return;
+  const dbc::Message& message = resolver_.message();
+  for (const auto& [key, node] : *fill) {
+    const dbc::Signal* signal = resolver_.signal_named(key.str(), "fill");
+    if (signal == nullptr) continue;
+    const auto codec = dbc::SignalCodec::make(*signal, message.size_bytes, {});
+    const auto presence = dbc::Presence::make(message, *signal, {});
+    const bool there =
+        codec && presence && presence->holds({layout_->blank.data(), layout_->bytes});
+    if (there && !overlap(mask_of(*codec), taken_)) continue;
+    reader_.complain(
+        reader_.where("fill"),
+        fmt::format("{} {}", signal->name,
+                    there ? "is written by another key" : "is not in the frame of the rate"),
+        "signals of the frame that no other key names");
+  }
+}
+
+std::optional<RawValue> LayoutReader::filled(const dbc::Signal& signal, const toml::table* fill) {
+  const toml::node* node = fill == nullptr ? nullptr : fill->get(signal.name);
+  if (node == nullptr) return resting_value(signal, rules_);
+  const auto number = node->value<double>();
+  const auto codec = dbc::SignalCodec::make(signal, resolver_.message().size_bytes, {});
+  const bool fits = number && node->is_number() && *number >= codec->representable_min() &&
+                    *number <= codec->representable_max();
+  if (!fits) {
+    reader_.complain(reader_.where("fill"), fmt::format("{} cannot say this value", signal.name),
+                     fmt::format("a number, {:g} to {:g}", codec->representable_min(),
+                                 codec->representable_max()));
+    return std::nullopt;
+  }
+  Payload scratch{};
+  codec->encode(*number, scratch);
+  return RawValue{static_cast<std::uint64_t>(codec->decode(scratch).raw),
+                  fmt::format("{:g} {}", *number, printable(signal.unit))};
+}
+
+// Its readers take no frame whose counter stands still or whose check value is wrong.
+void LayoutReader::warn_of_resting(const dbc::Signal& signal, const RawValue& value) {
+  std::string name = signal.name;
+  std::transform(name.begin(), name.end(), name.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  const auto named = [&](const auto& parts) {
+    return std::any_of(parts.begin(), parts.end(),
+                       [&](std::string_view part) { return name.find(part) != name.npos; });
+  };
+  const bool is_crc = named(kCrcNames);
+  if (!is_crc && !named(kCounterNames)) return;
+  context_.warnings.push_back(
+      {reader_.where("message"),
+       fmt::format("{} of {} is always {}: whoever checks it takes no frame", signal.name,
+                   layout_->message, value.text),
+       is_crc ? fmt::format("crc = \"{}\" and e2e, or fill", signal.name)
+              : fmt::format("counter = \"{}\", or fill", signal.name)});
+}
+
+void LayoutReader::warn_of_rate() {
+  const OutputField& rate = layout_->rate;
+  const auto warn = [&](std::string what, std::string remedy) {
+    context_.warnings.push_back({reader_.where("rate"), std::move(what), std::move(remedy)});
+  };
+  if (rate.step > kCoarse_dps) {
+    warn(fmt::format("one step of {} is {:.3g} deg/s: its readers see little of what the virtual "
+                     "gyro is better at",
+                     rate.name, rate.step),
+         "");
+  }
+  const double most = std::max(std::abs(rate.minimum), std::abs(rate.maximum));
+  const double least = std::min(std::abs(rate.minimum), std::abs(rate.maximum));
+  const double reach_dps = (layout_->sign ? most : least) * std::abs(rate.scale);
+  if (reach_dps < kNarrow_dps) {
+    warn(fmt::format("{} carries rates up to {:.4g} deg/s only{}; faster ones go out as not valid",
+                     rate.name, reach_dps, reach_dps == 0.0 ? " in one direction" : ""),
+         layout_->sign || rate.minimum < 0.0
+             ? ""
+             : "if the sign has a signal of its own, name it: sign_signal = \"NAME\"");
+  }
+}
+
+bool reads(const FrameMatch& input, can::BusIndex bus, const FrameId& id) {
+  return input.bus == bus && input.extended == id.extended &&
+         ((id.id ^ input.id) & input.mask) == 0;
+}
+
+std::string id_text(const FrameId& id) {
+  return id.extended ? fmt::format("{:#010x}", id.id) : fmt::format("{:#x}", id.id);
+}
+
+}  // namespace
+
+void read_output_layouts(TomlReader& output, LayoutContext context, Plan& plan) {
+  const toml::array* tables = output.array("layout", "a list of tables: [[output.layout]]");
+  if (tables == nullptr) return;
+  if (tables->size() > kOutputLayoutsMost) {
+    output.complain(output.where("layout"),
+                    fmt::format("there are {} [[output.layout]] tables", tables->size()),
+                    fmt::format("at most {}", kOutputLayoutsMost));
+    return;
+  }
+  for (const toml::node& node : *tables) {
+    const toml::table* table = node.as_table();
+    if (table == nullptr) {
+      output.complain(output.where("layout"), "layout must be written as [[output.layout]] tables");
+      return;
+    }
+    auto layout = LayoutReader(*table, context, plan).read();
+    if (layout) plan.output.layouts.push_back(std::move(*layout));
+  }
+}
+
+void check_output_ids(TomlReader& output, const Plan& plan) {
+  for (std::size_t i = 0; i < plan.buses.size(); ++i) {
+    const auto bus = static_cast<can::BusIndex>(i);
+    const std::vector<FrameId> ids = output_ids(plan.output, bus);
+    for (auto id = ids.begin(); id != ids.end(); ++id) {
+      if (std::find(std::next(id), ids.end(), *id) == ids.end()) continue;
+      output.complain(output.where(), "two output frames have the same identifier",
+                      fmt::format("{} on {}", id_text(*id), plan.buses[bus]));
+    }
+    if (plan.gyros.empty()) continue;
+    for (const FrameMatch& input : plan.inputs()) {
+      for (const FrameId& id : ids) {
+        if (!reads(input, bus, id)) continue;
+        output.complain(output.where(),
+                        fmt::format("output identifier {} is also an input on {}", id_text(id),
+                                    plan.buses[bus]),
+                        id.extended ? "another bus, another id, or source_address of the input: "
+                                      "the gateway would read what it sends"
+                                    : "choose rate_id, bias_id and model_id that nobody else "
+                                      "sends; a layout takes another id, or another bus");
+      }
+    }
+  }
+}
+
+}  // namespace vgyro::gateway
