@@ -81,6 +81,7 @@ std::vector<analysis::ChangeShape> shapes_of(const std::vector<Candidate>& candi
     end_s = std::max(end_s, candidates[i].series.t_s.back());
   }
   std::vector<analysis::ChangeShape> shapes;
+  shapes.reserve(judged.size());
   for (const std::size_t i : judged)
     shapes.push_back(analysis::change_shape(candidates[i].series, begin_s, end_s - begin_s));
   return shapes;
