@@ -1,6 +1,7 @@
 #!/usr/bin/python3
 """How fast `vgyro replay` goes through a log of 2.4 million frames, beside programs that do less with
-it, all in one run, each pinned to one core; and how much memory each takes. Prints Markdown.
+it, all in one run, each pinned to one core; and how much memory each takes. And through a car's log, in
+which one frame in twenty is a gyro's. With --former, beside another build in the same run. Prints Markdown.
 Needs Debian's packages time, can-utils, python3-can and python3-numpy."""
 
 import argparse
@@ -8,6 +9,7 @@ import dataclasses
 import math
 import os
 import platform
+import random
 import shutil
 import subprocess
 import sys
@@ -21,6 +23,9 @@ SOURCE = Path(__file__).resolve().parents[1]
 CONFIG = SOURCE / "examples/twin.toml"
 FRAMES_LONG, FRAMES_SHORT = 2_400_000, 240_000
 SECONDS_PER_FRAME = 1.0 / 1000.0  # two gyros at 500 Hz
+FOREIGN_PER_GYRO_FRAME = 19
+FOREIGN_IDENTIFIERS = 60
+CAR_SEED = 3
 
 
 @dataclasses.dataclass
@@ -31,6 +36,7 @@ class Row:
     frames: int
     from_pipe: bool = False
     prints_seconds: bool = False  # of its loop, which then count instead of the process's
+    former: "Row | None" = None  # the same with the former build
     times_s: list = dataclasses.field(default_factory=list)
     cpu_s: float = math.inf
     rss_max_kb: int = 0
@@ -53,6 +59,31 @@ def make_log(path, frames):
          "--turn", "20", "--seed", "1", "-o", part],
         check=True,
     )
+    part.rename(path)
+    return path
+
+
+def make_car_log(path, gyro_log):
+    """The gyros' frames of the long log's beginning, with 19 other ones behind each: 60 identifiers on both
+    buses, most with 8 bytes. FRAMES_LONG in all. Cached likewise."""
+    if path.exists():
+        return path
+    print(f"making {path.name} …", file=sys.stderr)
+    draw = random.Random(CAR_SEED)
+    foreign = [(draw.choice(("can0", "can1")), identifier, draw.choice((2, 4, 7, 8, 8, 8, 8, 8)))
+               for identifier in draw.sample([i for i in range(0x110, 0x600)], FOREIGN_IDENTIFIERS)]
+    part = path.with_suffix(".part")
+    step_us = round(SECONDS_PER_FRAME / (1 + FOREIGN_PER_GYRO_FRAME) * 1e6)
+    with gyro_log.open(encoding="ascii") as gyro_lines, part.open("w", encoding="ascii") as to:
+        for _, line in zip(range(FRAMES_LONG // (1 + FOREIGN_PER_GYRO_FRAME)), gyro_lines):
+            to.write(line)
+            seconds, fraction = line[1 : line.index(")")].split(".")
+            stamp_us = int(seconds) * 1_000_000 + int(fraction)
+            for place, (bus, identifier, length) in enumerate(draw.choices(foreign, k=FOREIGN_PER_GYRO_FRAME)):
+                # All of them before gyro 2's frame, 300 us behind gyro 1's.
+                at_us = stamp_us + (place + 1) * step_us // 4
+                to.write(f"({at_us // 1_000_000}.{at_us % 1_000_000:06}) {bus} {identifier:03X}#"
+                         f"{draw.randbytes(length).hex().upper()}\n")
     part.rename(path)
     return path
 
@@ -84,17 +115,29 @@ def measure(row, core, other_core, usage_file):
     row.cpu_s = min(row.cpu_s, float(user_s) + float(system_s))
 
 
-def rows(bin_dir, long_log, short_log, out):
-    vgyro = bin_dir / "vgyro"
+def replay_rows(vgyro, long_log, short_log, car_log, out):
     replay = [vgyro, "replay", "--config", CONFIG]
+    silent = [*replay, "-o", "/dev/null"]
+    return [
+        Row("`vgyro replay -o /dev/null`", [*silent, long_log], long_log, FRAMES_LONG),
+        Row("the same, `--method mutual`", [*silent, "--method", "mutual", long_log], long_log, FRAMES_LONG),
+        Row("`vgyro replay -o FILE` on tmpfs", [*replay, "-o", out, long_log], long_log, FRAMES_LONG),
+        Row("a car's log, `-o /dev/null`", [*silent, car_log], car_log, FRAMES_LONG),
+        Row("`cat LOG \\| vgyro replay -o /dev/null -`", [*silent, "-"], long_log, FRAMES_LONG, from_pipe=True),
+        Row("the same, a tenth of the log", [*silent, "-"], short_log, FRAMES_SHORT, from_pipe=True),
+    ]
+
+
+def rows(bin_dir, former, long_log, short_log, car_log, out):
+    ours = replay_rows(bin_dir / "vgyro", long_log, short_log, car_log, out)
+    if former:
+        for row, other in zip(ours, replay_rows(former, long_log, short_log, car_log, out), strict=True):
+            row.former = other
     python_loop = [sys.executable, SOURCE / "bench/python_can_loop.py", short_log]
     found = [
         Row("`wc -l`", ["wc", "-l", long_log], long_log, FRAMES_LONG),
         Row("bare parsing (`vgyro_parse_log`)", [bin_dir / "vgyro_parse_log", long_log], long_log, FRAMES_LONG),
-        Row("`vgyro replay -o /dev/null`", [*replay, "-o", "/dev/null", long_log], long_log, FRAMES_LONG),
-        Row("`vgyro replay -o FILE` on tmpfs", [*replay, "-o", out, long_log], long_log, FRAMES_LONG),
-        Row("`cat LOG \\| vgyro replay -o /dev/null -`", [*replay, "-o", "/dev/null", "-"], long_log, FRAMES_LONG, from_pipe=True),
-        Row("the same, a tenth of the log", [*replay, "-o", "/dev/null", "-"], short_log, FRAMES_SHORT, from_pipe=True),
+        *ours,
         Row("python-can and struct, a loop¹", python_loop, short_log, FRAMES_SHORT, prints_seconds=True),
     ]
     if shutil.which("log2asc"):
@@ -107,12 +150,19 @@ def print_table(measured, rounds, core):
     reference = measured[0].frames_per_s
     print(f"{FRAMES_LONG / 1e6:g} million frames ({measured[0].log.stat().st_size / 1e6:.0f} MB), best of {rounds}, "
           f"pinned to core {core} of {os.cpu_count()}, {cpu_name()}, Linux {platform.release()}.\n")
-    print("| program | million frames/s | seconds | of these, CPU | of `wc -l` | peak memory, MB |")
-    print("|---|---:|---:|---:|---:|---:|")
+    print("| program | million frames/s | seconds | of these, CPU | of `wc -l` | peak memory, MB | former build : this one |")
+    print("|---|---:|---:|---:|---:|---:|---:|")
     for row in measured:
         print(f"| {row.name} | {row.frames_per_s / 1e6:.3g} | {min(row.times_s):.3f} | {row.cpu_s:.2f} | "
-              f"{row.frames_per_s / reference:.2g} | {row.rss_max_kb / 1024:.1f} |")
+              f"{row.frames_per_s / reference:.2g} | {row.rss_max_kb / 1024:.1f} | {gain(row)} |")
     print(f"\n¹ on {FRAMES_SHORT / 1e6:g} million frames, time of the loop alone.")
+
+
+def gain(row):
+    """Of the best times, wall and CPU."""
+    if row.former is None:
+        return ""
+    return f"{min(row.former.times_s) / min(row.times_s):.2f} (CPU {row.former.cpu_s / max(row.cpu_s, 0.01):.2f})"
 
 
 def cpu_name():
@@ -125,6 +175,7 @@ def cpu_name():
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--bin", type=command_line.file_name, default=SOURCE / "build/release/bin", help="where the programs are")
+    parser.add_argument("--former", type=command_line.file_name, help="another build's vgyro, to be measured beside this one")
     parser.add_argument("--cache", type=command_line.file_name, default=SOURCE / "build/bench", help="where the logs are kept")
     parser.add_argument("--rounds", type=command_line.whole(1, 1000), default=5)
     parser.add_argument("--core", type=command_line.whole(0, 4095), help="default: the last one")
@@ -135,16 +186,18 @@ def main():
 
     long_log = make_log(a.cache / "long.log", FRAMES_LONG)
     short_log = make_log(a.cache / "short.log", FRAMES_SHORT)
+    car_log = make_car_log(a.cache / "car.log", long_log)
     tmpfs = "/dev/shm" if os.access("/dev/shm", os.W_OK) else None
     with tempfile.TemporaryDirectory(prefix="vgyro-", dir=tmpfs) as folder:
-        measured = rows(a.bin, long_log, short_log, Path(folder) / "out.log")
-        for log in (long_log, short_log):
+        measured = rows(a.bin, a.former, long_log, short_log, car_log, Path(folder) / "out.log")
+        for log in (long_log, short_log, car_log):
             subprocess.run(["wc", "-l", log], check=True, stdout=subprocess.DEVNULL)  # into the page cache
         # Rounds over all rows, not rows one by one: a disturbance then spares somebody's best time.
         for number in range(a.rounds):
             for row in measured:
                 print(f"round {number + 1} of {a.rounds}: {row.name}", file=sys.stderr)
-                measure(row, core, other_core, Path(folder) / "usage")
+                for one in filter(None, (row, row.former)):
+                    measure(one, core, other_core, Path(folder) / "usage")
     print_table(measured, a.rounds, core)
 
 

@@ -71,6 +71,12 @@ std::uint64_t load_word(const char* p) {
   return word;
 }
 
+std::uint32_t load_half_word(const char* p) {
+  std::uint32_t word = 0;
+  std::memcpy(&word, p, sizeof word);
+  return word;
+}
+
 // Eight ASCII digits, the first in the lowest byte.
 bool all_digits(std::uint64_t word) {
   return (((word + 0x4646464646464646U) | (word - 0x3030303030303030U)) & 0x8080808080808080U) == 0;
@@ -84,18 +90,22 @@ std::uint64_t digits_value(std::uint64_t word) {
 #if defined(__SSE2__)
 // Packs the hex digits at `p` (16 characters are readable) into bytes at `out`; returns how many
 // leading characters are hex digits.
-unsigned unpack_hex16(const char* p, std::uint8_t* out) {
+[[gnu::always_inline]] inline unsigned unpack_hex16(const char* p, std::uint8_t* out) {
   const __m128i text = _mm_loadu_si128(reinterpret_cast<const __m128i*>(p));
-  const __m128i digit = _mm_sub_epi8(text, _mm_set1_epi8('0'));
-  const __m128i letter = _mm_sub_epi8(_mm_or_si128(text, _mm_set1_epi8(0x20)), _mm_set1_epi8('a'));
-  const __m128i is_dec = _mm_cmpeq_epi8(_mm_min_epu8(digit, _mm_set1_epi8(9)), digit);
-  const __m128i is_hex = _mm_cmpeq_epi8(_mm_min_epu8(letter, _mm_set1_epi8(5)), letter);
-  const __m128i nibble = _mm_or_si128(
-      _mm_and_si128(is_dec, digit), _mm_and_si128(is_hex, _mm_add_epi8(letter, _mm_set1_epi8(10))));
+  // Moved so that what is wanted lies at the bottom of the signed numbers: one comparison does.
+  const auto first_of = [](__m128i characters, char first, char count) {
+    const __m128i moved = _mm_add_epi8(characters, _mm_set1_epi8(static_cast<char>(-128 - first)));
+    return _mm_cmplt_epi8(moved, _mm_set1_epi8(static_cast<char>(-128 + count)));
+  };
+  const __m128i decimal = first_of(text, '0', 10);
+  const __m128i letter = first_of(_mm_or_si128(text, _mm_set1_epi8(0x20)), 'a', 6);
+  // 'A' and 'a' end with a 1.
+  const __m128i nibble = _mm_add_epi8(_mm_and_si128(text, _mm_set1_epi8(0x0F)),
+                                      _mm_and_si128(letter, _mm_set1_epi8(9)));
   const __m128i pairs = _mm_and_si128(
       _mm_or_si128(_mm_slli_epi16(nibble, 4), _mm_srli_epi16(nibble, 8)), _mm_set1_epi16(0xFF));
   _mm_storel_epi64(reinterpret_cast<__m128i*>(out), _mm_packus_epi16(pairs, pairs));
-  const auto valid = static_cast<unsigned>(_mm_movemask_epi8(_mm_or_si128(is_dec, is_hex)));
+  const auto valid = static_cast<unsigned>(_mm_movemask_epi8(_mm_or_si128(decimal, letter)));
   return static_cast<unsigned>(std::countr_one(valid));
 }
 #else
@@ -343,17 +353,23 @@ void CandumpReader::before_wait(std::function<void()> callback) {
   if (source_ != nullptr) source_->before_wait(std::move(callback));
 }
 
-const CandumpReader::KnownInterface* CandumpReader::known_interface(std::uint64_t word) const {
-  for (std::size_t i = 0; i < known_count_; ++i) {
-    if ((word & known_[i].mask) == known_[i].word) return &known_[i];
-  }
-  return nullptr;
+// All are compared, without a branch: two buses take turns in no order that a processor foresees.
+inline const CandumpReader::KnownInterface& CandumpReader::known_interface(
+    std::uint64_t word) const {
+  const auto is = [&](std::size_t i) { return (word & known_[i].mask) == known_[i].word; };
+  static_assert(kKnownMax == 4);
+  std::size_t found = kKnownMax;
+  found = is(3) ? 3 : found;
+  found = is(2) ? 2 : found;
+  found = is(1) ? 1 : found;
+  found = is(0) ? 0 : found;
+  return known_[found];
 }
 
 void CandumpReader::remember_interface(can::BusIndex bus) {
   const std::string& name = interfaces_.name(bus);
   // Only the first few names of up to seven characters take the quick way.
-  if (known_count_ == known_.size() || name.size() > 7) return;
+  if (known_count_ == kKnownMax || name.size() > 7) return;
   KnownInterface& known = known_[known_count_++];
   char text[8] = {};
   std::copy(name.begin(), name.end(), text);
@@ -364,29 +380,38 @@ void CandumpReader::remember_interface(can::BusIndex bus) {
   known.bus = bus;
 }
 
+// "(SSSSSSSSSS." of a second that is not the one before.
+bool CandumpReader::read_second(const char* p) {
+  if (p[0] != '(' || p[11] != '.') return false;
+  const std::uint64_t high = load_word(p + 1);
+  const std::uint64_t low = load_word(p + 3);
+  if (!all_digits(high) || !all_digits(low)) return false;
+  const auto seconds =
+      static_cast<std::int64_t>(digits_value(high) * 100 + digits_value(low) % 100);
+  if (seconds > kSecondsMax) return false;
+  second_ns_ = seconds * 1'000'000'000;
+  std::memcpy(second_text_.data(), p, second_text_.size());
+  return true;
+}
+
 // "(SSSSSSSSSS.FFFFFF) IFACE ID#HEX\n" as candump writes it nearly always. Returns the start of
 // the next line, or null where the line is of another form, which is for parse_line() to judge.
 // Precondition: kLookaheadBytes are readable at `p`.
-const char* CandumpReader::parse_usual(const char* p, LogRecord& record) {
+inline const char* CandumpReader::parse_usual(const char* p, LogRecord& record) {
   if constexpr (std::endian::native != std::endian::little) return nullptr;
-  if (p[0] != '(' || p[11] != '.' || p[18] != ')' || p[19] != ' ') return nullptr;
-  const std::uint64_t high = load_word(p + 1);
-  const std::uint64_t low = load_word(p + 3);
-  if (high != seconds_text_[0] || low != seconds_text_[1]) {
-    if (!all_digits(high) || !all_digits(low)) return nullptr;
-    const auto seconds =
-        static_cast<std::int64_t>(digits_value(high) * 100 + digits_value(low) % 100);
-    if (seconds > kSecondsMax) return nullptr;
-    seconds_ns_ = seconds * 1'000'000'000;
-    seconds_text_[0] = high;
-    seconds_text_[1] = low;
-  }
-  const std::uint64_t fraction = load_word(p + 12) << 16U | 0x3030U;
-  const KnownInterface* known = known_interface(load_word(p + 20));
-  if (!all_digits(fraction) || known == nullptr) return nullptr;
+  const bool same_second = load_word(p) == load_word(second_text_.data()) &&
+                           load_half_word(p + 8) == load_half_word(second_text_.data() + 8);
+  if (!same_second && !read_second(p)) return nullptr;
+  // Digits become 0…9, and what stands behind them 0.
+  constexpr std::uint64_t kZeros = 0x2029'3030'3030'3030U;       // "000000) "
+  constexpr std::uint64_t kBeyondMost = 0x7F7F'7676'7676'7676U;  // 9 in a digit, 0 behind it
+  const std::uint64_t fraction = load_word(p + 12) ^ kZeros;
+  if (((fraction | (fraction + kBeyondMost)) & 0x8080808080808080U) != 0) return nullptr;
+  const KnownInterface& known = known_interface(load_word(p + 20));
+  if (known.length == 0) return nullptr;
 
   can::Frame& frame = record.frame;
-  p += 20 + known->length;
+  p += 20 + known.length;
   if (p[3] == '#') {
     const int a = hex_value(p[0]);
     const int b = hex_value(p[1]);
@@ -411,8 +436,8 @@ const char* CandumpReader::parse_usual(const char* p, LogRecord& record) {
   frame.length = static_cast<std::uint8_t>(digits / 2);
   frame.raw_dlc = 0;
   record.stamp =
-      time_from_ns(seconds_ns_ + static_cast<std::int64_t>(digits_value(fraction)) * 1000);
-  record.bus = known->bus;
+      time_from_ns(second_ns_ + static_cast<std::int64_t>(digits_value(fraction << 16U)) * 1000);
+  record.bus = known.bus;
   record.fraction_digits = 6;
   record.direction = Direction::kUnknown;
   record.is_xl = false;
@@ -453,41 +478,67 @@ bool CandumpReader::refill() {
 }
 
 bool CandumpReader::next(LogRecord& record) {
-  while (true) {
-    if (at_ == end_ && !refill()) return false;
-    ++counts_.lines;
-    if (end_ - at_ >= kLookaheadBytes) {
-      if (const char* next_line = parse_usual(at_, record)) {
-        at_ = next_line;
-        ++counts_.frames;
-        return true;
-      }
-    }
-    const auto* newline =
-        static_cast<const char*>(std::memchr(at_, '\n', static_cast<std::size_t>(end_ - at_)));
-    const std::string_view line =
-        clean_line({at_, static_cast<std::size_t>(newline - at_)}, counts_.skipped_bytes);
-    at_ = newline + 1;
-    const std::size_t interfaces_before = interfaces_.names().size();
-    const LineResult result = parse_line(line, interfaces_, record, *xl_);
-    if (interfaces_.names().size() > interfaces_before) {
-      remember_interface(static_cast<can::BusIndex>(interfaces_before));
-    }
-    switch (result.kind) {
-      case LineKind::kFrame:
-        ++counts_.frames;
-        return true;
-      case LineKind::kXl:
-        ++counts_.xl_frames;
-        return true;
-      case LineKind::kOther:
-        ++counts_.other_lines;
-        break;
-      case LineKind::kMalformed:
-        count_malformed(result.why);
-        break;
-    }
+  return next_batch({&record, 1}) == 1;
+}
+
+std::size_t CandumpReader::next_batch(std::span<LogRecord> room) {
+  std::size_t count = 0;
+  while (count == 0) {
+    if (at_ == end_ && !refill()) return 0;
+    count = take_from_block(room);
   }
+  return count;
+}
+
+// As many records as there is room for, or all that are left of the block, which may be none.
+std::size_t CandumpReader::take_from_block(std::span<LogRecord> room) {
+  std::size_t count = 0;
+  while (count < room.size() && at_ != end_) {
+    const std::size_t before = count;
+    if (end_ - at_ >= kLookaheadBytes) {
+      while (count < room.size()) {
+        const char* const next_line = parse_usual(at_, room[count]);
+        if (next_line == nullptr) break;
+        at_ = next_line;
+        ++count;
+        if (end_ - at_ < kLookaheadBytes) break;
+      }
+      counts_.lines += count - before;
+      counts_.frames += count - before;
+    }
+    if (count < room.size() && at_ != end_ && take_line(room[count])) ++count;
+  }
+  return count;
+}
+
+// One line of any form. False when it is no record.
+bool CandumpReader::take_line(LogRecord& record) {
+  ++counts_.lines;
+  const auto* newline =
+      static_cast<const char*>(std::memchr(at_, '\n', static_cast<std::size_t>(end_ - at_)));
+  const std::string_view line =
+      clean_line({at_, static_cast<std::size_t>(newline - at_)}, counts_.skipped_bytes);
+  at_ = newline + 1;
+  const std::size_t interfaces_before = interfaces_.names().size();
+  const LineResult result = parse_line(line, interfaces_, record, *xl_);
+  if (interfaces_.names().size() > interfaces_before) {
+    remember_interface(static_cast<can::BusIndex>(interfaces_before));
+  }
+  switch (result.kind) {
+    case LineKind::kFrame:
+      ++counts_.frames;
+      return true;
+    case LineKind::kXl:
+      ++counts_.xl_frames;
+      return true;
+    case LineKind::kOther:
+      ++counts_.other_lines;
+      break;
+    case LineKind::kMalformed:
+      count_malformed(result.why);
+      break;
+  }
+  return false;
 }
 
 namespace {
@@ -501,6 +552,12 @@ char* put_decimal(char* out, std::uint32_t value) {
   }
   if constexpr (digits % 2 != 0) out[0] = static_cast<char>('0' + value % 10);
   return out + digits;
+}
+
+char* put_standard_id(char* out, std::uint32_t id) {
+  *out++ = kHexPairs[2 * std::size_t{id >> 8U & 15U} + 1];
+  std::memcpy(out, &kHexPairs[2 * std::size_t{id & 0xFFU}], 2);
+  return out + 2;
 }
 
 char* put_hex(char* out, std::uint32_t value, unsigned digits) {
@@ -576,8 +633,10 @@ char* put_frame(char* out, const can::Frame& frame) {
   constexpr std::uint32_t kErrorBit = 0x20000000U;
   if (frame.has(can::kError)) {
     out = put_hex(out, frame.id | kErrorBit, 8);
+  } else if (frame.has(can::kExtended)) {
+    out = put_hex(out, frame.id, 8);
   } else {
-    out = put_hex(out, frame.id, frame.has(can::kExtended) ? 8 : 3);
+    out = put_standard_id(out, frame.id);
   }
   *out++ = '#';
   if (frame.has(can::kFd)) {
@@ -618,6 +677,15 @@ std::size_t format_line(char* out, TimePoint stamp, std::string_view interface,
   return static_cast<std::size_t>(at - out);
 }
 
+LineFormatter::LineFormatter(std::string_view interface) {
+  char* end = middle_.data();
+  *end++ = ')';
+  *end++ = ' ';
+  end = std::copy_n(interface.data(), std::min(interface.size(), kInterfaceNameMax), end);
+  *end++ = ' ';
+  middle_bytes_ = static_cast<std::size_t>(end - middle_.data());
+}
+
 std::size_t LineFormatter::format(char* out, TimePoint stamp, const can::Frame& frame,
                                   unsigned fraction_digits) {
   const std::int64_t ns = std::max<std::int64_t>(to_ns(stamp), 0);
@@ -625,10 +693,14 @@ std::size_t LineFormatter::format(char* out, TimePoint stamp, const can::Frame& 
     second_ns_ = ns - ns % kSecond_ns;
     put_seconds(prefix_.data(), second_ns_);
   }
-  std::memcpy(out, prefix_.data(), kSecondsTextBytes);
-  char* at = put_fraction(out + kSecondsTextBytes, static_cast<std::uint32_t>(ns - second_ns_),
-                          interface_, fraction_digits);
-  at = put_frame(at, frame);
+  // Copies of a fixed size, beyond the text where that is shorter: what follows writes over them.
+  std::memcpy(out, prefix_.data(), prefix_.size());
+  const auto fraction_ns = static_cast<std::uint32_t>(ns - second_ns_);
+  char* at = out + kSecondsTextBytes;
+  at = fraction_digits == 9 ? put_decimal<9>(at, fraction_ns)
+                            : put_decimal<6>(at, fraction_ns / 1000);
+  std::memcpy(at, middle_.data(), middle_.size());
+  at = put_frame(at + middle_bytes_, frame);
   *at++ = '\n';
   return static_cast<std::size_t>(at - out);
 }

@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -43,6 +44,7 @@ class CandumpReader final : public LogReader {
   explicit CandumpReader(std::unique_ptr<LogSource> source);
 
   bool next(LogRecord& record) override;
+  std::size_t next_batch(std::span<LogRecord> room) override;
 
   [[nodiscard]] const LogCounts& counts() const override { return counts_; }
   [[nodiscard]] const InterfaceTable& interfaces() const override { return interfaces_; }
@@ -57,14 +59,17 @@ class CandumpReader final : public LogReader {
 
  private:
   struct KnownInterface {
-    std::uint64_t word = 0;  ///< name and the blank behind it, first byte lowest
-    std::uint64_t mask = 0;
+    std::uint64_t word = 1;  ///< name and the blank behind it, first byte lowest
+    std::uint64_t mask = 0;  ///< no text is `word` as long as it is 0
     std::uint8_t length = 0;
     can::BusIndex bus = 0;
   };
 
+  std::size_t take_from_block(std::span<LogRecord> room);
+  bool take_line(LogRecord& record);
   const char* parse_usual(const char* p, LogRecord& record);
-  const KnownInterface* known_interface(std::uint64_t word) const;
+  bool read_second(const char* p);
+  const KnownInterface& known_interface(std::uint64_t word) const;
   void remember_interface(can::BusIndex bus);
   bool refill();
   void count_malformed(const char* why);
@@ -72,9 +77,11 @@ class CandumpReader final : public LogReader {
   std::unique_ptr<LogSource> source_;
   const char* at_ = nullptr;
   const char* end_ = nullptr;
-  std::uint64_t seconds_text_[2] = {0x3030303030303030U, 0x3030303030303030U};  ///< "0000000000"
-  std::int64_t seconds_ns_ = 0;
-  std::array<KnownInterface, 4> known_{};
+  /// "(SSSSSSSSSS." of the newest line of the usual form, and that second.
+  std::array<char, 12> second_text_{'(', '0', '0', '0', '0', '0', '0', '0', '0', '0', '0', '.'};
+  std::int64_t second_ns_ = 0;
+  static constexpr std::size_t kKnownMax = 4;
+  std::array<KnownInterface, kKnownMax + 1> known_{};  ///< the last one stays unknown, length 0
   std::size_t known_count_ = 0;
   InterfaceTable interfaces_;
   std::unique_ptr<XlFrame> xl_;
@@ -96,14 +103,15 @@ std::size_t format_line(char* out, TimePoint stamp, std::string_view interface,
 /// Many lines for one interface: remembers the text that stays the same from line to line.
 class LineFormatter {
  public:
-  explicit LineFormatter(std::string interface) : interface_(std::move(interface)) {}
+  explicit LineFormatter(std::string_view interface);
   /// As format_line().
   std::size_t format(char* out, TimePoint stamp, const can::Frame& frame, unsigned fraction_digits);
 
  private:
-  std::string interface_;
   std::int64_t second_ns_ = -1;    ///< start of the second that prefix_ shows
   std::array<char, 16> prefix_{};  ///< "(SSSSSSSSSS."
+  std::array<char, 40> middle_{};  ///< ") INTERFACE "
+  std::size_t middle_bytes_ = 0;
 };
 
 std::string format_xl_line(TimePoint stamp, std::string_view interface, const XlFrame& frame,

@@ -7,6 +7,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -25,6 +26,9 @@ class LogReader {
 
   /// False at the end of the log, or where it can be read no further: see error().
   virtual bool next(LogRecord& record) = 0;
+  /// Some records at once, for who reads millions: 1 to room.size() of them, never waiting for more
+  /// once there is one; 0 where next() is false. A record that is_xl is only told of.
+  virtual std::size_t next_batch(std::span<LogRecord> room) { return next(room.front()) ? 1 : 0; }
 
   [[nodiscard]] virtual const LogCounts& counts() const = 0;
   /// Of each log, where this reads several (canlog/merged_reader.h), in the order of the arguments.

@@ -126,7 +126,8 @@ class Recorder {
 
   // Nothing asks for the speed; its frames lengthen the recording.
   void take_speed(const canlog::LogRecord& record) {
-    const auto stamp = gateway::judge_stamp(gateway::kSpeedStream, record.stamp, guard_);
+    gateway::StampResult stamp;
+    gateway::judge_stamp(gateway::kSpeedStream, record.stamp, guard_, stamp);
     if (stamp.believed()) reach(stamp.t);
   }
 

@@ -36,6 +36,8 @@ class SignalCodec {
 
   /// Precondition: fits(payload.size()).
   [[nodiscard]] Reading decode(std::span<const std::uint8_t> payload) const;
+  /// Reading::raw alone. Precondition: fits(payload.size()).
+  [[nodiscard]] std::int64_t decode_raw(std::span<const std::uint8_t> payload) const;
 
   /// Rounds to the nearest raw value and saturates at the signal's range of raw values; NaN is an
   /// error of the caller (it encodes as the smallest raw value). Precondition:
@@ -107,13 +109,16 @@ inline double SignalCodec::number(std::int64_t raw) const {
   return std::bit_cast<double>(raw);
 }
 
-inline Reading SignalCodec::decode(std::span<const std::uint8_t> payload) const {
+inline std::int64_t SignalCodec::decode_raw(std::span<const std::uint8_t> payload) const {
   const std::uint64_t top = payload.size() >= std::size_t{window_byte_} + kWindowBytes
                                 ? load_window(payload.data()) << shift_up_
                                 : gather(payload.data()) << shift_down_;
-  const std::int64_t raw = type_ == ValueType::kSigned
-                               ? static_cast<std::int64_t>(top) >> shift_down_
-                               : static_cast<std::int64_t>(top >> shift_down_);
+  return type_ == ValueType::kSigned ? static_cast<std::int64_t>(top) >> shift_down_
+                                     : static_cast<std::int64_t>(top >> shift_down_);
+}
+
+inline Reading SignalCodec::decode(std::span<const std::uint8_t> payload) const {
+  const std::int64_t raw = decode_raw(payload);
   return {raw, value_of(raw)};
 }
 

@@ -25,8 +25,21 @@ constexpr std::array<W, 256> crc_table(unsigned polynomial) {
   return table;
 }
 
-constexpr auto kCrc8 = crc_table<std::uint8_t>(0x1D);
-constexpr auto kCrc8H2f = crc_table<std::uint8_t>(0x2F);
+/// What a byte adds to a CRC-8 once some more bytes have come, at most seven. The shares of eight
+/// bytes are looked up side by side, where byte by byte each one waits for the one before.
+using Crc8Shares = std::array<std::array<std::uint8_t, 256>, 8>;
+constexpr Crc8Shares crc8_shares(unsigned polynomial) {
+  Crc8Shares shares{};
+  shares[0] = crc_table<std::uint8_t>(polynomial);
+  for (std::size_t behind = 1; behind < shares.size(); ++behind) {
+    for (std::size_t byte = 0; byte < 256; ++byte)
+      shares[behind][byte] = shares[0][shares[behind - 1][byte]];
+  }
+  return shares;
+}
+
+constexpr Crc8Shares kCrc8 = crc8_shares(0x1D);
+constexpr Crc8Shares kCrc8H2f = crc8_shares(0x2F);
 constexpr auto kCrc16 = crc_table<std::uint16_t>(0x1021);
 
 using Bytes = std::span<const std::uint8_t>;
@@ -39,19 +52,30 @@ struct Data {
 
 class Crc8 {
  public:
-  Crc8(const std::array<std::uint8_t, 256>& table, std::uint8_t begin)
-      : table_(table), crc_(begin) {}
-  void add(unsigned byte) { crc_ = table_[(crc_ ^ byte) & 0xFFU]; }
+  Crc8(const Crc8Shares& shares, std::uint8_t begin) : shares_(shares), crc_(begin) {}
+  void add(unsigned byte) { crc_ = shares_[0][(crc_ ^ byte) & 0xFFU]; }
   void add(const Data& data) {
-    for (const Bytes part : {data.before, data.after}) {
-      for (const std::uint8_t byte : part)
-        add(byte);
-    }
+    add(data.before);
+    add(data.after);
+  }
+  void add(Bytes bytes) {
+    for (; bytes.size() > shares_.size(); bytes = bytes.subspan(shares_.size()))
+      add_some(bytes.first(shares_.size()));
+    if (!bytes.empty()) add_some(bytes);
   }
   [[nodiscard]] std::uint8_t value() const { return crc_; }
 
  private:
-  const std::array<std::uint8_t, 256>& table_;
+  // One to eight bytes.
+  void add_some(Bytes bytes) {
+    const std::size_t last = bytes.size() - 1;
+    std::uint8_t sum = shares_[last][bytes[0] ^ crc_];
+    for (std::size_t i = 1; i <= last; ++i)
+      sum ^= shares_[last - i][bytes[i]];
+    crc_ = sum;
+  }
+
+  const Crc8Shares& shares_;
   std::uint8_t crc_;
 };
 
@@ -210,11 +234,16 @@ void E2eProtection::seal(std::span<std::uint8_t> payload) const {
 // --- senders -------------------------------------------------------------------------------------
 
 E2eProfile11C::E2eProfile11C(std::uint16_t data_id)
-    : protection_({.kind = E2eKind::kProfile1C, .data_ids = {data_id}}) {}
+    : protection_({.kind = E2eKind::kProfile1C, .data_ids = {data_id}}),
+      nibble_(static_cast<std::uint8_t>((high_byte(data_id) & 0x0FU) << 4U)),
+      crc_of_id_(profile_1({low_byte(data_id), 0U}, {})) {}
 
+// As E2eProtection::seal() for this one layout, in fewer steps.
 void E2eProfile11C::protect(std::span<std::uint8_t, 8> payload) {
-  payload[1] = counter_;
-  protection_.seal(payload);
+  payload[1] = static_cast<std::uint8_t>(nibble_ | counter_);
+  payload[0] = static_cast<std::uint8_t>(
+      kCrc8[6][payload[1] ^ crc_of_id_] ^ kCrc8[5][payload[2]] ^ kCrc8[4][payload[3]] ^
+      kCrc8[3][payload[4]] ^ kCrc8[2][payload[5]] ^ kCrc8[1][payload[6]] ^ kCrc8[0][payload[7]]);
   counter_ = static_cast<std::uint8_t>(counter_ == kCounterMax1 ? 0 : counter_ + 1);
 }
 

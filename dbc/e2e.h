@@ -83,6 +83,8 @@ class E2eProfile11C {
 
  private:
   E2eProtection protection_;
+  std::uint8_t nibble_;     ///< of the data ID, in its place
+  std::uint8_t crc_of_id_;  ///< of what stands before the payload
   std::uint8_t counter_ = 0;
 };
 

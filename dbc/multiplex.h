@@ -29,7 +29,7 @@ class Presence {
   static Expected<Presence> make(const Message& message, const Signal& signal,
                                  const std::string& where);
 
-  [[nodiscard]] bool holds(std::span<const std::uint8_t> payload) const;
+  [[nodiscard]] [[gnu::noinline]] bool holds(std::span<const std::uint8_t> payload) const;
   /// Writes the multiplexors so that holds(). Precondition: they fit.
   void arrange(std::span<std::uint8_t> payload) const;
   [[nodiscard]] bool always() const { return last_ == nullptr; }

@@ -69,7 +69,8 @@ bool Aligner::push(std::size_t gyro, TimePoint t, double rate_dps) {
   Ring& ring = rings_[gyro];
   t -= lag_[gyro];
   if (any_used_[gyro] && t <= used_until_[gyro]) return false;
-  if (!ring.empty() && t <= ring.back().t && ring.contains(t)) return false;
+  const bool in_order = ring.is_behind_all(t);
+  if (!in_order && ring.contains(t)) return false;
   if (ring.size() == kCapacity) {
     // Of the gyro that does not pace, old samples are only kept in case the other one is late.
     if (!chosen_ || gyro == pace_) ++counts_.unpaired[gyro];
@@ -78,7 +79,11 @@ bool Aligner::push(std::size_t gyro, TimePoint t, double rate_dps) {
     ring.pop_front();
     if (t <= used_until_[gyro]) return false;
   }
-  ring.insert({t, rate_dps});
+  if (in_order) {
+    ring.append(t, rate_dps);
+  } else {
+    ring.insert({t, rate_dps});
+  }
   if (!chosen_) {
     choose_pace();
   } else {
@@ -87,19 +92,9 @@ bool Aligner::push(std::size_t gyro, TimePoint t, double rate_dps) {
   return true;
 }
 
-// Of one stream alone, so that it makes no difference how the two of them interleave.
-void Aligner::review(std::size_t gyro, TimePoint t) {
+// Reviews are of one stream alone, so that it makes no difference how the two of them interleave.
+void Aligner::close_review(std::size_t gyro, TimePoint t) {
   Review& review = reviews_[gyro];
-  if (review.begun && t <= review.newest) return;
-  if (review.begun) {
-    const Duration interval = std::min<Duration>(t - review.newest, kIntervalMax);
-    review.sum += interval;
-    review.longest = std::max(review.longest, interval);
-    ++review.intervals;
-  }
-  review.begun = true;
-  review.newest = t;
-  if (review.intervals < kReviewSamples || review.sum < kReview) return;
   // One hole is no pace.
   const Duration pace = (review.sum - review.longest) / (review.intervals - 1);
   const bool other_pace = !alike(pace, interval_[gyro]);
@@ -191,8 +186,7 @@ void Aligner::drop_before(TimePoint needed, std::size_t gyro) {
   ring.pop_front(stale);
 }
 
-bool Aligner::pop(AlignedPair& pair) {
-  if (!chosen_) return false;
+bool Aligner::pop_next(AlignedPair& pair) {
   Ring& own = rings_[pace_];
   const Ring& other = rings_[1 - pace_];
   while (!own.empty()) {
@@ -209,7 +203,7 @@ bool Aligner::pop(AlignedPair& pair) {
     own.pop_front();
     if (paired) {
       pair.complete =
-          std::max({pair.complete + lag_[1 - pace_], pair.t + lag_[pace_], burst_until_});
+          std::max(std::max(pair.complete + lag_[1 - pace_], pair.t + lag_[pace_]), burst_until_);
       return true;
     }
     ++counts_.unpaired[pace_];

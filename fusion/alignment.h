@@ -9,6 +9,7 @@
 // samples, and made again when a gyro keeps another pace than was found then.
 // Buffers are bounded; a sample that can no longer be paired is counted, never used.
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -53,7 +54,7 @@ class Aligner {
   bool push(std::size_t gyro, TimePoint t, double rate_dps);
 
   /// The next complete pair; t grows from pair to pair.
-  bool pop(AlignedPair& pair);
+  bool pop(AlignedPair& pair) { return can_pair() && pop_next(pair); }
 
   /// The oldest buffered sample of this gyro behind `t`: for when it will find no partner. False
   /// when there is none.
@@ -97,8 +98,15 @@ class Aligner {
       size_ -= count;
     }
     void clear() { size_ = 0; }
+    [[nodiscard]] bool is_behind_all(TimePoint t) const { return size_ == 0 || back().t < t; }
+    /// Precondition: size() < kCapacity, is_behind_all().
+    void append(TimePoint t, double rate_dps) {
+      RateSample& sample = samples_[(head_ + size_++) & (kCapacity - 1)];
+      sample.t = t;
+      sample.rate_dps = rate_dps;
+    }
     /// Keeps the stamps ascending. Precondition: size() < kCapacity, no equal stamp inside.
-    void insert(const RateSample& sample);
+    [[gnu::cold, gnu::noinline]] void insert(const RateSample& sample);
     [[nodiscard]] bool contains(TimePoint t) const;
     /// Of the samples at or before `until`: their usual interval, and one more than the last index.
     [[nodiscard]] Duration usual_interval(TimePoint until) const;
@@ -121,13 +129,34 @@ class Aligner {
     Duration odd_pace{0};  ///< of the review before, if it was another one than was found; else 0
   };
 
-  void choose_pace();
-  void review(std::size_t gyro, TimePoint t);
+  /// Is there a sample to pair, and one of the other gyro at or behind it?
+  [[nodiscard]] bool can_pair() const {
+    const Ring& own = rings_[pace_];
+    const Ring& other = rings_[1 - pace_];
+    return chosen_ && !own.empty() && !other.empty() && other.back().t >= own[0].t + half_window_;
+  }
+  bool pop_next(AlignedPair& pair);
+  [[gnu::cold, gnu::noinline]] void choose_pace();
+  void review(std::size_t gyro, TimePoint t) {
+    Review& review = reviews_[gyro];
+    if (review.begun && t <= review.newest) return;
+    if (review.begun) {
+      const Duration interval = std::min<Duration>(t - review.newest, kIntervalMax);
+      review.sum += interval;
+      review.longest = std::max(review.longest, interval);
+      ++review.intervals;
+    }
+    review.begun = true;
+    review.newest = t;
+    if (review.sum >= kReview && review.intervals >= kReviewSamples) close_review(gyro, t);
+  }
+  [[gnu::cold, gnu::noinline]] void close_review(std::size_t gyro, TimePoint t);
   void choose_again(std::size_t gyro, Duration interval, TimePoint behind);
   [[nodiscard]] Duration mean_wait(std::size_t pace, TimePoint until) const;
   void drop_before(TimePoint needed, std::size_t gyro);
   bool interpolate(const Ring& other, AlignedPair& pair, std::size_t other_index);
-  bool average(const Ring& other, AlignedPair& pair, std::size_t other_index);
+  [[gnu::cold, gnu::noinline]] bool average(const Ring& other, AlignedPair& pair,
+                                            std::size_t other_index);
 
   std::array<Duration, 2> lag_;
   std::array<Ring, 2> rings_;  ///< at the instants of the rates

@@ -107,6 +107,8 @@ class Corrector {
   [[nodiscard]] virtual Drift drift(double t_s) const = 0;
   [[nodiscard]] virtual WindowCounts windows() const = 0;
   [[nodiscard]] virtual Condition condition() const { return {}; }
+  /// Another number means that condition() may have changed; it does so some times a second.
+  [[nodiscard]] virtual std::uint64_t condition_edition() const { return 0; }
   /// To be kept across a restart; nothing before there is anything to keep.
   [[nodiscard]] virtual std::optional<DriftMemory> memory(double /*t_s*/) const {
     return std::nullopt;

@@ -195,6 +195,7 @@ class DriftFilter::SizedUpdate {
   using RowVector = Eigen::Matrix<double, Rows, 1>;
 
   void see(const DriftFilter& filter, const DriftMeasurement& measurement);
+  [[nodiscard]] StateSquare wandered_covariance(const StateSquare& walked) const;
 
   int slopes_at_;
   Transition window_;
@@ -249,7 +250,19 @@ double DriftFilter::SizedUpdate<States, Rows>::correct(const DriftMeasurement::V
   innovation_covariance.noalias() += h_lead_ * led;
 
   const Eigen::LLT<RowSquare> factor(innovation_covariance);
-  gain_ = factor.solve(cross.transpose()).transpose();
+  // gain · L · Lᵀ = cross, column by column: what the general solver does, without its blocks.
+  const RowSquare& lower = factor.matrixLLT();
+  gain_ = cross;
+  for (int row = 0; row < Rows; ++row) {
+    gain_.col(row) *= 1.0 / lower(row, row);
+    for (int below = row + 1; below < Rows; ++below)
+      gain_.col(below) -= gain_.col(row) * lower(below, row);
+  }
+  for (int row = Rows - 1; row >= 0; --row) {
+    for (int below = row + 1; below < Rows; ++below)
+      gain_.col(row) -= gain_.col(below) * lower(below, row);
+    gain_.col(row) *= 1.0 / lower(row, row);
+  }
   const RowVector innovation = values - h_mean_ * state_;
   state = end_ + gain_ * innovation;
   const RowVector white = factor.matrixL().solve(innovation);
@@ -267,14 +280,41 @@ void DriftFilter::SizedUpdate<States, Rows>::spread(Square& covariance) const {
   }
   StateSquare walked = -gain_ * h_lead_;
   walked.diagonal().array() += 1.0;
-  const StateSquare started = start * before_;
-  StateSquare next = started * start.transpose();
-  StateSquare scaled = walked * end_variance_.asDiagonal();
-  if (slopes_at_ >= 0) scaled.noalias() = walked * walk_covariance_;
-  next.noalias() += scaled * walked.transpose();
+  // Of sizes that are known, term by term: the general product, which packs its operands first,
+  // takes several times as long.
+  const StateSquare started = start.lazyProduct(before_);
+  StateSquare next = started.lazyProduct(start.transpose());
+  next += wandered_covariance(walked);
   const Gain noisy = gain_ * noise_;
   next.noalias() += noisy * gain_.transpose();
   covariance = 0.5 * (next + next.transpose());
+}
+
+// walked · (covariance of w) · walkedᵀ, less the products that are exact zeros: of the states
+// behind the observables only slopes wander, Gauss–Markov terms apart, and no measurement sees
+// their w.
+template <int States, int Rows>
+auto DriftFilter::SizedUpdate<States, Rows>::wandered_covariance(const StateSquare& walked) const
+    -> StateSquare {
+  StateSquare scaled = walked * end_variance_.asDiagonal();
+  if constexpr (States == Eigen::Dynamic) {
+    if (slopes_at_ >= 0) scaled.noalias() = walked.lazyProduct(walk_covariance_);
+    return scaled.lazyProduct(walked.transpose());
+  }
+  for (int slope = 0; slopes_at_ >= 0 && slope < 2; ++slope) {
+    for (const int to : {kBias1 + slope, slopes_at_ + slope}) {
+      scaled.col(to) = walked.col(kBias1) * walk_covariance_(kBias1, to) +
+                       walked.col(kBias2) * walk_covariance_(kBias2, to);
+      for (int from = slopes_at_; from < slopes_at_ + 2; ++from)
+        scaled(from, to) += walk_covariance_(from, to);
+    }
+  }
+  StateSquare wandered = scaled.template leftCols<kObservables>().lazyProduct(
+      walked.template leftCols<kObservables>().transpose());
+  if (slopes_at_ >= 0) {
+    wandered.template middleCols<2>(slopes_at_) += scaled.template middleCols<2>(slopes_at_);
+  }
+  return wandered;
 }
 
 // Without Gauss–Markov terms, as always where the parameters are estimated, all sizes are known to
@@ -339,14 +379,35 @@ void DriftFilter::set_coefficient(std::size_t gyro, double mean_dps_k, double va
   covariance_(at, at) = variance;
 }
 
+// In sizes that the compiler knows, where update() has them.
+template <int States>
+DriftFilter::Covariance DriftFilter::covariance_of() const {
+  using Sees = Eigen::Matrix<double, kObservables, States>;
+  const Eigen::Map<const Sees> observe(observe_.data());
+  const Eigen::Map<const Eigen::Matrix<double, States, States>> covariance(covariance_.data());
+  const Sees seen = observe.lazyProduct(covariance);
+  return seen.lazyProduct(observe.transpose());
+}
+
+DriftFilter::Covariance DriftFilter::covariance() const {
+  switch (state_.size()) {
+    case kObservables:
+      return covariance_of<kObservables>();
+    case kObservables + 2:
+      return covariance_of<kObservables + 2>();
+    case kObservables + 4:
+      return covariance_of<kObservables + 4>();
+    default:
+      return observe_ * covariance_ * observe_.transpose();
+  }
+}
+
 DriftFilter::Slopes DriftFilter::slopes() const {
   Slopes found;
   if (slopes_at_ < 0) return found;
   found.mean = state_.segment<2>(slopes_at_);
   found.covariance = covariance_.block<2, 2>(slopes_at_, slopes_at_);
-  const Eigen::Matrix<double, kObservables, 2> with =
-      observe_ * covariance_.middleCols<2>(slopes_at_);
-  found.with_drift = with.topRows<2>();
+  found.with_drift = observe_.topRows<2>().lazyProduct(covariance_.middleCols<2>(slopes_at_));
   return found;
 }
 

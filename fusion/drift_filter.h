@@ -94,9 +94,7 @@ class DriftFilter {
   [[nodiscard]] bool has_slopes() const { return slopes_at_ >= 0; }
   [[nodiscard]] bool has_temperature() const { return temperature_at_ >= 0; }
   [[nodiscard]] Observables mean() const { return observe_ * state_; }
-  [[nodiscard]] Covariance covariance() const {
-    return observe_ * covariance_ * observe_.transpose();
-  }
+  [[nodiscard]] Covariance covariance() const;
   /// The slopes' mean and covariance, and their covariance with the drifts (row: drift, column:
   /// slope). Zero where the model has none.
   struct Slopes {
@@ -130,6 +128,8 @@ class DriftFilter {
   void add_slope_noise(double length_s, Square& walked) const;
   template <int States, int Rows>
   class SizedUpdate;
+  template <int States>
+  [[nodiscard]] Covariance covariance_of() const;
   template <int States>
   double update_of(double length_s, const DriftMeasurement& measurement);
 

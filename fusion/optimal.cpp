@@ -183,6 +183,7 @@ class OptimalCorrector final : public Corrector {
   }
 
   void restart_calibration() override {
+    ++edition_;
     cells_.clear();
     calibration_.clear();
     noise_.clear();
@@ -192,7 +193,8 @@ class OptimalCorrector final : public Corrector {
 
   void start(const Calibration& calibration) override;
   bool resume(const DriftMemory& memory, double age_s, double t_s) override;
-  VirtualRate update(const RatePair& pair) override;
+  /// In one piece, as Pipeline::Impl::receive_gyro().
+  [[gnu::flatten]] VirtualRate update(const RatePair& pair) override;
   VirtualRate update_alone(std::size_t gyro, const RatePair& pair) override;
   void set_wheels(Wheels wheels) override { wheels_ = wheels; }
   void set_temperature(const std::array<double, 2>& temperature_c) override {
@@ -212,6 +214,7 @@ class OptimalCorrector final : public Corrector {
   }
   [[nodiscard]] WindowCounts windows() const override { return windows_; }
   [[nodiscard]] Condition condition() const override;
+  [[nodiscard]] std::uint64_t condition_edition() const override { return edition_; }
   [[nodiscard]] std::optional<DriftMemory> memory(double t_s) const override;
 
  private:
@@ -237,7 +240,7 @@ class OptimalCorrector final : public Corrector {
   void run(double t_s);
 
   // Blocks.
-  void close_block(const CellBlock& block);
+  [[gnu::noinline]] void close_block(const CellBlock& block);
   bool is_spiked(const CellBlock& block);
   void judge_coherence(const CellBlock& block);
   [[nodiscard]] Present trusted(Present present) const;
@@ -271,7 +274,7 @@ class OptimalCorrector final : public Corrector {
   // What samples need.
   void refresh();
   void begin_anew();
-  void set_weights(Present present);
+  [[gnu::noinline]] void set_weights(Present present);
   [[nodiscard]] BlockLevel level_of(const CellBlock& block) const;
   [[nodiscard]] double cell_rate(const Cell& cell, double t_s, Present present) const;
   [[nodiscard]] double bias(std::size_t gyro, double t_s) const {
@@ -293,9 +296,9 @@ class OptimalCorrector final : public Corrector {
   [[nodiscard]] double suspicion_of_first() const {
     return std::clamp(estimate_.drift_share[0], kShareMin, 1.0 - kShareMin);
   }
-  [[nodiscard]] VirtualRate with_blindness(const VirtualRate& rate,
-                                           const std::array<double, 2>& noise) const;
-  double acceleration_square(double rate_dps, double t_s);
+  [[nodiscard]] [[gnu::cold, gnu::noinline]] VirtualRate with_blindness(
+      const VirtualRate& rate, const std::array<double, 2>& noise) const;
+  [[gnu::noinline]] double acceleration_square(double rate_dps, double t_s);
   void apply_temperature();
   void follow_still_vibration();
   [[nodiscard]] double log_turning_by_vibration() const;
@@ -360,6 +363,7 @@ class OptimalCorrector final : public Corrector {
 
   WindowCounts windows_;
   Condition condition_;
+  std::uint64_t edition_ = 1;  ///< of condition(): moved on by whatever does more than weigh a pair
 };
 
 // --- calibration ---------------------------------------------------------------------------------
@@ -473,6 +477,7 @@ std::optional<DriftMemory> OptimalCorrector::memory(double t_s) const {
 }
 
 void OptimalCorrector::run(double t_s) {
+  ++edition_;
   learned_until_s_ = t_s;
   cells_.clear();
   held_count_ = 0;
@@ -565,6 +570,7 @@ VirtualRate OptimalCorrector::update_alone(std::size_t gyro, const RatePair& pai
   alone.rate_dps[1 - gyro] = 0.0;
   if (cells_.add(alone.t_s, alone.rate_dps, alone.noise_gain, present)) close_block(cells_.last());
   if (weights_for_ != present) {
+    ++edition_;
     readings_.suspect(1 - gyro);
     // A rise was told by comparison: a gyro that falls out may have made the other one look noisy.
     noise_.forget_rise();
@@ -662,6 +668,7 @@ bool OptimalCorrector::is_spiked(const CellBlock& block) {
 
 // A block is used when the next one has been judged: motion begins before it is seen.
 void OptimalCorrector::close_block(const CellBlock& block) {
+  ++edition_;
   if (is_spiked(block)) return;
   judge_coherence(block);
   const Present present = trusted(block.present);

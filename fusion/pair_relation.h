@@ -146,7 +146,7 @@ class PairRelation {
     void add(const Fit& fit);
   };
 
-  void close_cell(double t_s, double step_s);
+  [[gnu::noinline]] void close_cell(double t_s, double step_s);
   [[nodiscard]] const RelationCell& cell(std::size_t i) const {
     return cells_[(head_ + i) % kCells];
   }

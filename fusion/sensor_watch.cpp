@@ -72,21 +72,14 @@ Movement::Level Movement::MovementBlock::level() const {
   return {mean_dps(), kSigmas * mean_sigma_dps() + 2.0 * std::abs(last_dps - first_dps)};
 }
 
-void Movement::add(TimePoint t, double rate_dps) {
+void Movement::begin_block(TimePoint t, double rate_dps) {
   if (open_.count > 0 && t < open_.begin) return;
-  if (open_.count == 0 || t - open_.begin >= length_) {
-    if (open_.count >= kSamplesMin) {
-      done_[next_] = open_;
-      next_ = (next_ + 1) % kBlocks;
-      ++closed_;
-    }
-    open_ = {t, 1, rate_dps, 0.0, rate_dps, 0.0};
-    return;
+  if (open_.count >= kSamplesMin) {
+    done_[next_] = open_;
+    next_ = (next_ + 1) % kBlocks;
+    ++closed_;
   }
-  ++open_.count;
-  open_.sum_dps += rate_dps - open_.first_dps;
-  open_.squares += (rate_dps - open_.last_dps) * (rate_dps - open_.last_dps);
-  open_.last_dps = rate_dps;
+  open_ = {t, 1, rate_dps, 0.0, rate_dps, 0.0};
 }
 
 double Movement::between(TimePoint from, TimePoint until) const {
@@ -118,9 +111,10 @@ std::optional<Movement::Level> Movement::behind(TimePoint t) const {
 }
 
 bool Movement::is_leap(double step_dps) const {
-  const MovementBlock& newest = past(0);
   const double beyond_dps = std::abs(step_dps) - kMovement_dps;
-  if (newest.count == 0 || beyond_dps <= 0.0) return false;
+  if (beyond_dps <= 0.0) return false;
+  const MovementBlock& newest = past(0);
+  if (newest.count == 0) return false;
   return beyond_dps * beyond_dps > kSigmas * kSigmas * newest.squares / (newest.count - 1);
 }
 
@@ -131,15 +125,19 @@ void ValueStep::change(double from_dps, double to_dps) {
   constexpr double kRounding = 1e-9;
   const double size_dps = std::abs(to_dps - from_dps);
   if (size_dps <= kRounding * std::max(std::abs(from_dps), std::abs(to_dps))) return;
+  const bool news = seen_ < kEnough || size_dps < smallest_dps_;
   seen_ = std::min(seen_ + 1, kEnough);
   smallest_dps_ = std::min(smallest_dps_, size_dps);
-  if (++in_bucket_ < kBucket) return;
-  smallest_before_dps_ = smallest_dps_;
-  smallest_dps_ = std::numeric_limits<double>::infinity();
-  in_bucket_ = 0;
+  const bool full = ++in_bucket_ == kBucket;
+  if (full) {
+    smallest_before_dps_ = smallest_dps_;
+    smallest_dps_ = std::numeric_limits<double>::infinity();
+    in_bucket_ = 0;
+  }
+  if (news || full) dps_ = worked_out_dps();
 }
 
-double ValueStep::dps() const {
+double ValueStep::worked_out_dps() const {
   double step_dps = std::min(smallest_dps_, smallest_before_dps_);
   if (seen_ < kEnough) step_dps = std::min(step_dps, std::max(kUnknown_dps, lattice_dps_));
   if (lattice_dps_ == 0.0) return step_dps;
@@ -225,14 +223,16 @@ SensorWatch::Finding SensorWatch::judge(TimePoint t, double rate_dps, const Sens
     run_is_fault_ = true;
     return Finding::kSaturated;
   }
-  const bool behind = other != nullptr && stays_behind(t, rate_dps, *other);
+  // What no short run can be is asked only of a long one: of a sensor that is well, hardly ever.
+  const bool behind =
+      run_ >= kUnmovedSamples && other != nullptr && stays_behind(t, rate_dps, *other);
   if (behind && !step_.any()) unproven_ = true;
   if (unproven_ && other != nullptr && moves_with(t, *other)) unproven_ = false;
-  if (behind || unproven_ || repeats_too_long(t)) {
+  if (behind || unproven_ || (run_ >= kStuckSamples && repeats_too_long(t))) {
     run_is_fault_ = true;
     return Finding::kStuck;
   }
-  const bool no_chance = !run_is_fault_ && is_no_chance(t, other);
+  const bool no_chance = run_ >= kRunMin && !run_is_fault_ && is_no_chance(t, other);
   if (no_chance && at_the_top(rate_dps)) {
     run_is_fault_ = true;
     clip_dps_ = std::abs(rate_dps);
@@ -260,16 +260,7 @@ void SensorWatch::follow(TimePoint t, double rate_dps) {
 }
 
 void SensorWatch::begin_run(TimePoint t, double rate_dps, bool paused) {
-  if (any_ && !run_is_fault_) {
-    habit_.repeated(run_);
-    longest_run_time_ = std::max(longest_run_time_, last_ - run_begin_);
-  }
-  if (any_) peak_dps_ = std::max(peak_dps_, std::abs(last_dps_));
-  if (any_ && rate_dps != last_dps_) {
-    if (!step_.any()) alive_since_ = t;
-    step_.change(last_dps_, rate_dps);
-    if (!paused) habit_.change(last_dps_, rate_dps);
-  }
+  if (any_) end_run(t, rate_dps, paused);
   leapt_ = any_ && !paused && quick_.is_leap(rate_dps - last_dps_);
   habit_.begins_run(leapt_);
   run_ = 1;
@@ -277,13 +268,25 @@ void SensorWatch::begin_run(TimePoint t, double rate_dps, bool paused) {
   run_is_fault_ = false;
 }
 
+// This sample is another value than those before, or comes behind a pause.
+void SensorWatch::end_run(TimePoint t, double rate_dps, bool paused) {
+  if (!run_is_fault_) {
+    habit_.repeated(run_);
+    longest_run_time_ = std::max(longest_run_time_, last_ - run_begin_);
+  }
+  peak_dps_ = std::max(peak_dps_, std::abs(last_dps_));
+  if (rate_dps == last_dps_) return;
+  if (!step_.any()) alive_since_ = t;
+  step_.change(last_dps_, rate_dps);
+  if (!paused) habit_.change(last_dps_, rate_dps);
+}
+
 bool SensorWatch::at_the_top(double rate_dps) const {
   return std::abs(rate_dps) >= std::max(peak_dps_, kClipMin_dps);
 }
 
 bool SensorWatch::clipped(double rate_dps) const {
-  return at_the_top(rate_dps) && habit_.fine() &&
-         run_ >= std::max(kClipSamples, kClipRunFactor * habit_.longest_run());
+  return at_the_top(rate_dps) && habit_.fine() && run_ >= kClipRunFactor * habit_.longest_run();
 }
 
 bool SensorWatch::at_a_limit(double rate_dps) {
@@ -293,13 +296,12 @@ bool SensorWatch::at_a_limit(double rate_dps) {
   if (std::abs(rate_dps) * kLimitShare > clip_dps_) {
     clip_dps_ = std::numeric_limits<double>::infinity();  // it can say more: it was stuck there
   }
-  if (clipped(rate_dps)) clip_dps_ = std::abs(rate_dps);
+  if (run_ >= kClipSamples && clipped(rate_dps)) clip_dps_ = std::abs(rate_dps);
   return std::abs(rate_dps) >= kLimitShare * clip_dps_;
 }
 
 bool SensorWatch::repeats_too_long(TimePoint t) const {
-  return habit_.fine() && run_ >= std::max(kStuckSamples, kRunFactor * habit_.longest_run()) &&
-         run_time(t) >= kStuckTime;
+  return habit_.fine() && run_ >= kRunFactor * habit_.longest_run() && run_time(t) >= kStuckTime;
 }
 
 // How far the other one may go before this one must have seen it.
@@ -310,7 +312,6 @@ double SensorWatch::unseen_dps(double rate_dps) const {
 
 // The other one moves and this one does not. Its movement changes no more often than its blocks.
 bool SensorWatch::stays_behind(TimePoint t, double rate_dps, const SensorWatch& other) {
-  if (run_ < kUnmovedSamples) return false;
   if (other.quick_.blocks() != asked_quick_) {
     asked_quick_ = other.quick_.blocks();
     const bool dead = !step_.any();
@@ -339,7 +340,7 @@ bool SensorWatch::left_the_other(double rate_dps, const SensorWatch& other) cons
 
 // Too many equal values for chance while something moves. At rest a sensor may fall quiet.
 bool SensorWatch::is_no_chance(TimePoint t, const SensorWatch* other) const {
-  if (run_ < kRunMin || !habit_.fine()) return false;
+  if (!habit_.fine()) return false;
   const bool leapt = leapt_ && habit_.leaps_are_rare();
   if (habit_.chance_of_run(run_) > (leapt ? kChance / kLeapChance : kChance)) return false;
   const TimePoint from = run_begin_ - kMovedLately;

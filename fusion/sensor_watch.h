@@ -37,7 +37,17 @@ class Movement {
 
   explicit Movement(Duration block) : length_(block) {}
 
-  void add(TimePoint t, double rate_dps);
+  /// A sample from before the open block is passed over.
+  void add(TimePoint t, double rate_dps) {
+    const Duration since = t - open_.begin;
+    const bool inside = open_.count > 0 && since >= Duration::zero() && since < length_;
+    if (!inside) return begin_block(t, rate_dps);
+    const double step_dps = rate_dps - open_.last_dps;
+    ++open_.count;
+    open_.sum_dps += rate_dps - open_.first_dps;
+    open_.squares += step_dps * step_dps;
+    open_.last_dps = rate_dps;
+  }
   /// By how much the means of the blocks inside [from, until] differ at least, six sigma taken off.
   [[nodiscard]] double between(TimePoint from, TimePoint until) const;
   /// The newest block that ended at or before `t`, unless that was long ago.
@@ -63,6 +73,7 @@ class Movement {
     [[nodiscard]] double mean_sigma_dps() const;
     [[nodiscard]] Level level() const;
   };
+  [[gnu::cold, gnu::noinline]] void begin_block(TimePoint t, double rate_dps);
   /// 0: the newest.
   [[nodiscard]] const MovementBlock& past(std::size_t i) const {
     return done_[(next_ + 2 * kBlocks - 1 - i) % kBlocks];
@@ -82,13 +93,14 @@ class ValueStep {
   /// Coarser than any sensor worth the name: what counts until values tell.
   static constexpr double kUnknown_dps = 0.5;
 
-  explicit ValueStep(double lattice_dps) : lattice_dps_(lattice_dps) {}
+  explicit ValueStep(double lattice_dps) : lattice_dps_(lattice_dps), dps_(worked_out_dps()) {}
 
   void change(double from_dps, double to_dps);
   [[nodiscard]] bool any() const { return seen_ > 0; }
-  [[nodiscard]] double dps() const;
+  [[nodiscard]] double dps() const { return dps_; }
 
  private:
+  [[nodiscard]] double worked_out_dps() const;
   /// Two buckets make the memory: the last 2048 to 4096 changes.
   static constexpr std::uint32_t kBucket = 2048;
   /// So few changes may all be large ones.
@@ -99,6 +111,7 @@ class ValueStep {
   double smallest_before_dps_ = std::numeric_limits<double>::infinity();
   std::uint32_t in_bucket_ = 0;
   std::uint32_t seen_ = 0;  ///< up to kEnough
+  double dps_;              ///< worked_out_dps(): asked for at every pair, and seldom another one
 };
 
 /// How a sensor's values follow each other while it is well.
@@ -124,7 +137,7 @@ class Habit {
  private:
   static constexpr int kChangesPerBlock = 32;
   static constexpr std::uint64_t kBucket = 256;  ///< samples
-  void close_block();
+  [[gnu::cold, gnu::noinline]] void close_block();
 
   int changes_ = 0;
   double step_before_ = 0.0;
@@ -169,14 +182,19 @@ class SensorWatch {
  private:
   void follow(TimePoint t, double rate_dps);
   void begin_run(TimePoint t, double rate_dps, bool paused);
+  void end_run(TimePoint t, double rate_dps, bool paused);
   [[nodiscard]] bool at_a_limit(double rate_dps);
   [[nodiscard]] bool at_the_top(double rate_dps) const;
-  [[nodiscard]] bool clipped(double rate_dps) const;
-  [[nodiscard]] bool repeats_too_long(TimePoint t) const;
-  [[nodiscard]] bool stays_behind(TimePoint t, double rate_dps, const SensorWatch& other);
+  // Of runs that are long enough for it.
+  [[nodiscard]] [[gnu::cold, gnu::noinline]] bool clipped(double rate_dps) const;
+  [[nodiscard]] [[gnu::cold, gnu::noinline]] bool repeats_too_long(TimePoint t) const;
+  [[nodiscard]] [[gnu::cold, gnu::noinline]] bool stays_behind(TimePoint t, double rate_dps,
+                                                               const SensorWatch& other);
   [[nodiscard]] bool left_the_other(double rate_dps, const SensorWatch& other) const;
-  [[nodiscard]] bool is_no_chance(TimePoint t, const SensorWatch* other) const;
-  [[nodiscard]] bool moves_with(TimePoint t, const SensorWatch& other) const;
+  [[nodiscard]] [[gnu::cold, gnu::noinline]] bool is_no_chance(TimePoint t,
+                                                               const SensorWatch* other) const;
+  [[nodiscard]] [[gnu::cold, gnu::noinline]] bool moves_with(TimePoint t,
+                                                             const SensorWatch& other) const;
   [[nodiscard]] double unseen_dps(double rate_dps) const;
   [[nodiscard]] Duration run_time(TimePoint t) const { return t - run_begin_; }
 

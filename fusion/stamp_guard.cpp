@@ -8,23 +8,15 @@ namespace {
 
 // A slow stream may lose a frame or two without a wait for confirmations.
 constexpr int kForwardIntervals = 3;
-// Share of a new interval in what is known of them.
-constexpr int kIntervalShare = 8;
 // Even spacing: to a quarter.
 constexpr int kSpacingShare = 4;
 // Nobody records for longer, but computers without a battery begin in 1970 and are set later.
 constexpr Duration kClockWasSet = std::chrono::hours(24) * 365 * 10;
-// The end of the monotone axis, in 2261: no stamp of a log is later than 2255, and a stamp less
-// another one stays a number.
-constexpr TimePoint kEndOfTime = time_from_ns(9'200'000'000'000'000'000);
 
 }  // namespace
 
-StampGuard::StampVerdict StampGuard::check(std::size_t stream_index, TimePoint raw,
-                                           TimePoint& time) {
+StampGuard::StampVerdict StampGuard::consider_all(std::size_t stream_index, TimePoint& time) {
   Stream& stream = streams_[stream_index];
-  if (!can_be_time(raw)) return StampVerdict::kUnconfirmed;
-  time = raw + offset_;
   const Duration step = span(stream.last, time);
   if (stream.seen && step == Duration::zero()) return StampVerdict::kRepeated;
   const bool usual =
@@ -34,8 +26,9 @@ StampGuard::StampVerdict StampGuard::check(std::size_t stream_index, TimePoint r
   return StampVerdict::kAccepted;
 }
 
-bool StampGuard::can_be_time(TimePoint raw) const {
-  return raw >= TimePoint{} && raw <= kEndOfTime - std::max(offset_, Duration::zero());
+void StampGuard::set_offset(Duration offset) {
+  offset_ = offset;
+  end_ = kEndOfTime - std::max(offset_, Duration::zero());
 }
 
 Duration StampGuard::forward_most(const Stream& stream) {
@@ -112,7 +105,7 @@ StampGuard::StampVerdict StampGuard::step_clock(std::size_t stream_index, TimePo
   // Nobody knows how long the step took; one microsecond keeps the order.
   const TimePoint next = newest + std::chrono::microseconds(1);
   const TimePoint raw = time - offset_;
-  offset_ = next - raw;
+  set_offset(next - raw);
   time = next;
   for (Stream& other : streams_) {
     other.confirmations = 0;

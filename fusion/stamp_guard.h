@@ -26,21 +26,33 @@ class StampGuard {
   static constexpr int kSlowConfirmations = 4;
   /// No stream that says less is worth listening to.
   static constexpr Duration kSlowest = std::chrono::seconds(5);
+  /// The end of the monotone axis, in 2261: no stamp of a log is later than 2255, and a stamp less
+  /// another one stays a number.
+  static constexpr TimePoint kEndOfTime = time_from_ns(9'200'000'000'000'000'000);
 
   enum class StampVerdict : std::uint8_t { kAccepted, kRepeated, kUnconfirmed, kClockStep };
 
   /// The stamp on the monotone axis goes to `time` unless the verdict is kUnconfirmed.
   /// kClockStep: accepted, and all streams' earlier samples are of the time before the step.
-  StampVerdict check(std::size_t stream, TimePoint raw, TimePoint& time);
+  StampVerdict check(std::size_t stream, TimePoint raw, TimePoint& time) {
+    if (!can_be_time(raw)) return StampVerdict::kUnconfirmed;
+    time = raw + offset_;
+    return follows_closely(streams_[stream], time) ? StampVerdict::kAccepted
+                                                   : consider_all(stream, time);
+  }
 
   /// Neither before the epoch nor beyond what the monotone axis can hold.
-  [[nodiscard]] bool can_be_time(TimePoint raw) const;
+  [[nodiscard]] bool can_be_time(TimePoint raw) const { return raw >= TimePoint{} && raw <= end_; }
   /// monotone = raw + offset
   [[nodiscard]] Duration offset() const { return offset_; }
   /// Between the stream's stamps of late; 0 before there were two.
   [[nodiscard]] Duration interval(std::size_t stream) const { return streams_[stream].interval; }
 
  private:
+  /// Share of a new interval in what is known of them.
+  static constexpr int kIntervalShare = 8;
+  static_assert(kForwardMax <= kSlowest);
+
   struct Stream {
     bool seen = false;
     TimePoint last;        ///< newest accepted, monotone
@@ -50,6 +62,18 @@ class StampGuard {
     int confirmations = 0;
     bool close_by = true;  ///< all of these within kConfirmWithin of each other
   };
+  /// The usual stamp, a little later than the one before, which is taken note of.
+  static bool follows_closely(Stream& stream, TimePoint time) {
+    const Duration step = span(stream.last, time);
+    const bool usual = stream.seen && step > Duration::zero() && step <= kForwardMax &&
+                       stream.interval > Duration::zero();
+    if (!usual) return false;
+    stream.interval += (step - stream.interval) / kIntervalShare;
+    stream.last = time;
+    stream.confirmations = 0;
+    return true;
+  }
+  [[gnu::cold, gnu::noinline]] StampVerdict consider_all(std::size_t stream_index, TimePoint& time);
   [[nodiscard]] static Duration forward_most(const Stream& stream);
   static void follow(Stream& stream, TimePoint time);
   static bool confirm(Stream& stream, TimePoint time);
@@ -57,8 +81,11 @@ class StampGuard {
   StampVerdict step_clock(std::size_t stream_index, TimePoint& time);
   [[nodiscard]] bool near_a_leader(TimePoint time) const;
 
+  void set_offset(Duration offset);
+
   std::array<Stream, kStreams> streams_;
   Duration offset_{0};
+  TimePoint end_ = kEndOfTime;  ///< no raw stamp is later
 };
 
 }  // namespace vgyro::fusion

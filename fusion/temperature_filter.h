@@ -6,6 +6,9 @@
 // step: a coarse sensor needs a longer one. During the first few memories the slope is being
 // learned.
 
+#include <array>
+#include <cstddef>
+
 #include "base/time.h"
 
 namespace vgyro::fusion {
@@ -32,7 +35,19 @@ class TemperatureFilter {
   [[nodiscard]] double memory_s() const { return memory_s_; }
 
  private:
-  void begin(double temperature_c);
+  /// Intervals of which the gains are kept: those of a regular sender with some jitter.
+  static constexpr std::size_t kGainsKept = 32;
+  static constexpr Duration kStampStep = std::chrono::microseconds(1);
+  /// What a surprise of 1 K does, after an interval of `dt`.
+  struct Gains {
+    Duration dt{0};  ///< 0: none yet
+    double temperature = 0.0;
+    double slope_per_s = 0.0;
+    double curvature_per_s2 = 0.0;
+  };
+
+  [[gnu::cold, gnu::noinline]] void begin(double temperature_c);
+  const Gains& gains_for(Duration dt, double dt_s);
 
   double memory_s_;
   bool known_ = false;
@@ -40,6 +55,7 @@ class TemperatureFilter {
   double temperature_c_;
   double slope_c_s_;
   double curvature_c_s2_ = 0.0;
+  std::array<Gains, kGainsKept> gains_{};
 };
 
 }  // namespace vgyro::fusion

@@ -6,19 +6,11 @@ namespace vgyro::gateway {
 
 const E2ePlan E2eCheck::kNothing;
 
-std::optional<Reject> E2eCheck::verify(const can::Frame& frame) const {
-  if (!frame.is_data()) return Reject::kNotData;
-  if (!plan_->crc) return std::nullopt;
+std::optional<Reject> E2eCheck::verify_check_value(const can::Frame& frame) const {
   const dbc::E2eProtection& protection = plan_->crc->protection;
   if (frame.length < protection.bytes()) return Reject::kTruncated;
   if (!protection.check(frame.payload())) return Reject::kCrcWrong;
   return std::nullopt;
-}
-
-// The bits of a signed signal are a number without sign, too.
-std::uint64_t E2eCheck::bits(std::span<const std::uint8_t> payload) const {
-  const dbc::SignalCodec& codec = plan_->counter->codec;
-  return static_cast<std::uint64_t>(codec.decode(payload).raw) & codec.raw_mask();
 }
 
 bool E2eCheck::is_beyond(std::span<const std::uint8_t> payload) const {
@@ -62,10 +54,8 @@ std::optional<Reject> E2eCheck::follow(std::uint32_t now, std::uint32_t& missing
   return std::nullopt;
 }
 
-std::optional<Reject> E2eCheck::count(std::span<const std::uint8_t> payload, std::uint32_t& missing,
-                                      Page page) {
-  missing = 0;
-  if (!plan_->counter) return std::nullopt;
+std::optional<Reject> E2eCheck::count_any(std::span<const std::uint8_t> payload,
+                                          std::uint32_t& missing, Page page) {
   const AliveCounter& counter = *plan_->counter;
   const bool is_there = counter.codec.fits(payload.size()) &&
                         (counter.presence.always() || counter.presence.holds(payload));

@@ -21,7 +21,10 @@ class E2eCheck {
 
   /// Is it a data frame with the right check value? Nothing when it is, else the cause. A frame
   /// that fails must not be counted.
-  [[nodiscard]] std::optional<Reject> verify(const can::Frame& frame) const;
+  [[nodiscard]] std::optional<Reject> verify(const can::Frame& frame) const {
+    if (!frame.is_data()) return Reject::kNotData;
+    return plan_->crc ? verify_check_value(frame) : std::nullopt;
+  }
 
   /// Whose frame of a multiplexed message it is: of the page that is read, or of another one.
   enum class Page : std::uint8_t { kOwn, kOther };
@@ -32,7 +35,11 @@ class E2eCheck {
   /// of the own page is new when it differs from the one before. Precondition: on the own page the
   /// counter fits the payload.
   std::optional<Reject> count(std::span<const std::uint8_t> payload, std::uint32_t& missing,
-                              Page page = Page::kOwn);
+                              Page page = Page::kOwn) {
+    missing = 0;
+    if (!plan_->counter || (page == Page::kOwn && takes_as_next(payload))) return std::nullopt;
+    return count_any(payload, missing, page);
+  }
 
   /// Both, for a message of which only that is asked.
   std::optional<Reject> judge(const can::Frame& frame, Page page = Page::kOwn);
@@ -46,7 +53,29 @@ class E2eCheck {
   [[nodiscard]] std::uint32_t counter() const { return counter_; }
 
  private:
-  [[nodiscard]] std::uint64_t bits(std::span<const std::uint8_t> payload) const;
+  [[nodiscard]] [[gnu::noinline]] std::optional<Reject> verify_check_value(
+      const can::Frame& frame) const;
+  /// The usual frame: the counter stands on every page and is one more than that of the frame
+  /// before, which was in order.
+  bool takes_as_next(std::span<const std::uint8_t> payload) {
+    const AliveCounter& counter = *plan_->counter;
+    const bool in_order =
+        known_ && counts_missing_ && page_ == Page::kOwn && !out_of_sequence_.has_value();
+    if (!in_order || !counter.presence.always() || !counter.codec.fits(payload.size()))
+      return false;
+    const std::uint32_t next = counter_ + 1 == counter.modulus ? 0 : counter_ + 1;
+    if (next == counter_ || bits(payload) != next) return false;
+    counter_ = next;
+    own_counter_ = next;
+    return true;
+  }
+  [[gnu::cold, gnu::noinline]] std::optional<Reject> count_any(
+      std::span<const std::uint8_t> payload, std::uint32_t& missing, Page page);
+  /// The bits of a signed signal are a number without sign, too.
+  [[nodiscard]] std::uint64_t bits(std::span<const std::uint8_t> payload) const {
+    const dbc::SignalCodec& codec = plan_->counter->codec;
+    return static_cast<std::uint64_t>(codec.decode_raw(payload)) & codec.raw_mask();
+  }
   [[nodiscard]] bool is_beyond(std::span<const std::uint8_t> payload) const;
   [[nodiscard]] std::uint32_t read(std::span<const std::uint8_t> payload) const;
   [[nodiscard]] std::uint32_t step(std::uint32_t from, std::uint32_t to) const;

@@ -101,11 +101,19 @@ fusion::VirtualRate Estimator::update(const fusion::AlignedPair& pair) {
   assert(calibrated_);
   const fusion::VirtualRate rate =
       corrector_->update({seconds(pair.t), pair.rate_dps, pair.noise_gain});
-  condition_ = corrector_->condition();
+  read_condition();
   // A stop measures each gyro against the known rate, as a calibration does; that is why none runs
   // beside restored biases.
   if (restored_ == Restored::kTakenUp && condition_.stops > 0) restored_ = Restored::kConfirmed;
   return rate;
+}
+
+// To ask for it costs as much as a rate, and it says the same for some hundred pairs.
+void Estimator::read_condition() {
+  const std::uint64_t edition = corrector_->condition_edition();
+  if (edition == condition_edition_) return;
+  condition_edition_ = edition;
+  condition_ = corrector_->condition();
 }
 
 fusion::VirtualRate Estimator::update_alone(std::size_t gyro, TimePoint t, double rate_dps) {
@@ -113,7 +121,7 @@ fusion::VirtualRate Estimator::update_alone(std::size_t gyro, TimePoint t, doubl
   fusion::RatePair single{.t_s = seconds(t)};
   single.rate_dps[gyro] = rate_dps;
   const fusion::VirtualRate rate = corrector_->update_alone(gyro, single);
-  condition_ = corrector_->condition();
+  read_condition();
   return rate;
 }
 

@@ -43,7 +43,7 @@ class Estimator {
   Expected<void> offer(const SavedState& state);
   /// The first pair stands at `t`, which is `stamp` on the clock of the frames. The estimation's
   /// seconds count from here.
-  void begin(TimePoint t, TimePoint stamp);
+  [[gnu::cold, gnu::noinline]] void begin(TimePoint t, TimePoint stamp);
   [[nodiscard]] bool begun() const { return begun_; }
   [[nodiscard]] bool calibrated() const { return calibrated_; }
   /// Can a rate of one gyro alone be believed? Not of one that was never compared with the other,
@@ -63,7 +63,7 @@ class Estimator {
   [[nodiscard]] bool contradicted() const { return relation_.contradicts(); }
 
   /// A pair before calibrated().
-  void calibrate(const fusion::AlignedPair& pair);
+  [[gnu::noinline]] void calibrate(const fusion::AlignedPair& pair);
   /// A reference rate, which may complete the calibration.
   void add_reference(TimePoint t, double rate_dps);
 
@@ -94,6 +94,7 @@ class Estimator {
 
  private:
   void calibrate_with_reference();
+  void read_condition();
   void calibrate_with(const fusion::AlignedPair& pair, double true_rate_dps);
   [[nodiscard]] bool result_can_be() const;
   [[nodiscard]] double seconds(TimePoint t) const { return to_seconds(t - origin_); }
@@ -103,6 +104,7 @@ class Estimator {
   fusion::Calibrator calibrator_;
   ReferenceCalibration reference_;
   fusion::Condition condition_;
+  std::uint64_t condition_edition_ = 0;
   fusion::PairRelation relation_;
   TimePoint origin_;  ///< zero of the estimation's seconds: the first pair
   bool begun_ = false;

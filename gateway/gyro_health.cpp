@@ -76,6 +76,12 @@ std::optional<Reject> GyroHealth::judge(TimePoint t, double rate_dps, const Gyro
                                         bool can_spare) {
   unusable_in_row_ = 0;
   const auto finding = watch_.judge(t, rate_dps, other != nullptr ? &other->watch_ : nullptr);
+  const bool well = finding == fusion::SensorWatch::Finding::kSound && !fault_;
+  return well ? std::nullopt : judge_finding(t, finding, can_spare);
+}
+
+std::optional<Reject> GyroHealth::judge_finding(TimePoint t, fusion::SensorWatch::Finding finding,
+                                                bool can_spare) {
   if (const auto found = fault_in(finding, can_spare)) {
     hasty_ = finding == fusion::SensorWatch::Finding::kStanding && (hasty_ || !fault_);
     bad(t, *found);

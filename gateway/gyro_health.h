@@ -50,9 +50,12 @@ class GyroHealth {
   [[nodiscard]] const std::array<FaultRecord, kFaultCount>& records() const { return records_; }
 
  private:
+  /// Of a finding that is not kSound, or of one that may end a fault.
+  [[gnu::cold, gnu::noinline]] std::optional<Reject> judge_finding(
+      TimePoint t, fusion::SensorWatch::Finding finding, bool can_spare);
   [[nodiscard]] std::optional<Fault> fault_in(fusion::SensorWatch::Finding finding,
                                               bool can_spare) const;
-  void bad(TimePoint t, Fault fault);
+  [[gnu::cold, gnu::noinline]] void bad(TimePoint t, Fault fault);
   void note(TimePoint t, Fault fault, bool begins);
   [[nodiscard]] bool recovered(TimePoint t) const;
 

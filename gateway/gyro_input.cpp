@@ -22,8 +22,8 @@ std::size_t bytes_of(const GyroPlan& plan) {
 }
 
 // Precondition: the signal is there and fits.
-std::optional<Reject> convert(const Quantity& quantity, std::span<const std::uint8_t> payload,
-                              double& value) {
+inline std::optional<Reject> convert(const Quantity& quantity,
+                                     std::span<const std::uint8_t> payload, double& value) {
   const dbc::Reading reading = quantity.codec.decode(payload);
   value = reading.value * quantity.scale + quantity.shift;
   if (reading.value >= quantity.minimum && reading.value <= quantity.maximum) return std::nullopt;
@@ -70,50 +70,40 @@ GyroInput::GyroInput(const GyroPlan& plan)
       supply_voltage_(plan.supply_voltage),
       e2e_(plan.e2e) {}
 
-double Beside::value() const {
-  double value = 0.0;
-  const bool known =
-      quantity_ && newest_.length > 0 && !decode_quantity(*quantity_, newest_, value);
-  return known ? value : std::numeric_limits<double>::quiet_NaN();
-}
-
 void Beside::keep(const can::Frame& frame) {
-  if (!quantity_) return;
-  const dbc::Presence& presence = quantity_->presence;
-  if (presence.always() || presence.holds(frame.payload())) newest_ = frame;
+  const std::optional<Reject> reject = decode_quantity(*quantity_, frame, value_);
+  if (reject && reject != Reject::kOtherPage) value_ = std::numeric_limits<double>::quiet_NaN();
 }
 
 void GyroInput::keep_besides(const can::Frame& frame) {
-  temperature_.keep(frame);
-  supply_voltage_.keep(frame);
+  if (temperature_.wanted()) temperature_.keep(frame);
+  if (supply_voltage_.wanted()) supply_voltage_.keep(frame);
 }
 
-GyroInput::Result GyroInput::decode(const can::Frame& frame) {
-  Result result;
+void GyroInput::decode(const can::Frame& frame, Result& result) {
   result.reject = e2e_.verify(frame);
-  if (result.reject) return result;
+  if (result.reject) return;
   const auto payload = frame.payload();
   if (!plan_.rate.presence.always() && !plan_.rate.presence.holds(payload)) {
     keep_besides(frame);
     (void)e2e_.count(payload, result.missing, E2eCheck::Page::kOther);
     result.reject = Reject::kOtherPage;
-    return result;
+    return;
   }
   if (frame.length < bytes_needed_) {
     result.reject = Reject::kTruncated;
-    return result;
+    return;
   }
   result.reject = e2e_.count(payload, result.missing);
-  if (result.reject) return result;
+  if (result.reject) return;
   if (plan_.valid && !holds(*plan_.valid, plan_.valid->codec.decode(payload).value)) {
     result.reject = Reject::kFlaggedInvalid;
-    return result;
+    return;
   }
   result.reject = convert(plan_.rate, payload, result.rate_dps);
-  if (result.reject) return result;
+  if (result.reject) return;
   if (plan_.sign && plan_.sign->decode(payload).raw != 0) result.rate_dps = -result.rate_dps;
   keep_besides(frame);
-  return result;
 }
 
 }  // namespace vgyro::gateway

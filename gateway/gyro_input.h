@@ -5,6 +5,7 @@
 // Stamps are judged elsewhere.
 
 #include <cstdint>
+#include <limits>
 #include <optional>
 
 #include "can/frame.h"
@@ -15,18 +16,20 @@
 namespace vgyro::gateway {
 
 /// What a gyro's message tells besides the rate, perhaps on a page of its own: of the newest frame
-/// that carried it. Decoded when asked for.
+/// that carried it.
 class Beside {
  public:
   /// The plan's part must live as long.
   explicit Beside(const std::optional<Quantity>& quantity) : quantity_(quantity) {}
+  [[nodiscard]] bool wanted() const { return quantity_.has_value(); }
+  /// Precondition: wanted(); a data frame.
   void keep(const can::Frame& frame);
   /// In the product's unit; NaN where there is none.
-  [[nodiscard]] double value() const;
+  [[nodiscard]] double value() const { return value_; }
 
  private:
   const std::optional<Quantity>& quantity_;
-  can::Frame newest_;  ///< length 0 before the first
+  double value_ = std::numeric_limits<double>::quiet_NaN();
 };
 
 class GyroInput {
@@ -38,7 +41,13 @@ class GyroInput {
     double rate_dps = 0.0;
     std::uint32_t missing = 0;  ///< frames that the alive counter says were lost before this one
   };
-  Result decode(const can::Frame& frame);
+  /// `result` is a new one.
+  void decode(const can::Frame& frame, Result& result);
+  Result decode(const can::Frame& frame) {
+    Result result;
+    decode(frame, result);
+    return result;
+  }
 
   /// What the counter tells begins anew.
   void fall_silent() { e2e_.fall_silent(); }

@@ -37,12 +37,23 @@ struct StampResult {
 
   [[nodiscard]] bool believed() const { return judged && !reject; }
 };
-StampResult judge_stamp(std::size_t stream, TimePoint stamp, fusion::StampGuard& guard);
+/// `result` is a new one. It is filled in where it stands, as the results of frames are, because a
+/// processor waits when it copies what was written in smaller parts a moment ago.
+inline void judge_stamp(std::size_t stream, TimePoint stamp, fusion::StampGuard& guard,
+                        StampResult& result) {
+  using Verdict = fusion::StampGuard::StampVerdict;
+  result.judged = true;
+  const Verdict verdict = guard.check(stream, stamp, result.t);
+  if (verdict == Verdict::kAccepted) return;
+  if (verdict == Verdict::kRepeated) result.reject = Reject::kStampRepeated;
+  if (verdict == Verdict::kUnconfirmed) result.reject = Reject::kStampJump;
+  result.clock_step = verdict == Verdict::kClockStep;
+}
 
 /// Whose stamps are judged besides those of values: nobody's, or those of frames that are their
 /// sender's own and say that the sensor is sick (GyroHealth wants their time).
 enum class Timed : std::uint8_t { kValues, kSickToo };
-[[nodiscard]] bool is_timed(const std::optional<Reject>& reject, Timed timed);
+[[nodiscard]] bool is_timed(Reject reject, Timed timed);
 
 /// N quantities of one message, all or none, with the message's E2E check.
 template <std::size_t N>
@@ -56,15 +67,14 @@ class QuantityInput {
     std::optional<Reject> reject;   ///< set: the frame is not used
     std::array<double, N> value{};  ///< in the product's units
   };
-  Result decode(const can::Frame& frame) {
-    Result result;
+  /// `result` is a new one.
+  void decode(const can::Frame& frame, Result& result) {
     const bool own = std::all_of(quantities_.begin(), quantities_.end(), [&](const Quantity* q) {
       return q->presence.always() || q->presence.holds(frame.payload());
     });
     result.reject = e2e_.judge(frame, own ? E2eCheck::Page::kOwn : E2eCheck::Page::kOther);
     for (std::size_t i = 0; i < N && !result.reject; ++i)
       result.reject = decode_quantity(*quantities_[i], frame, result.value[i]);
-    return result;
   }
 
  private:
@@ -85,10 +95,11 @@ class Intake {
     StampResult stamp;
   };
   Result take(const can::Frame& frame, TimePoint stamp, fusion::StampGuard& guard) {
-    Result result{input_.decode(frame), {}};
-    if (!is_timed(result.reject, timed_)) return result;
-    result.stamp = judge_stamp(stream_, stamp, guard);
-    if (!result.reject) result.reject = result.stamp.reject;
+    Result result;
+    input_.decode(frame, result);
+    if (result.reject && !is_timed(*result.reject, timed_)) return result;
+    judge_stamp(stream_, stamp, guard, result.stamp);
+    if (!result.reject && result.stamp.reject) result.reject = result.stamp.reject;
     return result;
   }
 

@@ -13,22 +13,18 @@ KnownEffects::KnownEffects(const Plan& plan) {
     compensations_[gyro] = fusion::Compensation(effects);
     for (const model::Effect& effect : effects)
       needs_[gyro] |= model::info(effect.kind).needs;
+    lag_most_ = std::max(lag_most_, lag(gyro));
   }
 }
 
-double KnownEffects::take_off(std::size_t gyro, double reading_dps,
-                              const Surroundings& surroundings, TimePoint t) const {
-  if (!take_any(gyro)) return reading_dps;  // and asks for no surroundings: most have no model
+double KnownEffects::take_off_any(std::size_t gyro, double reading_dps,
+                                  const Surroundings& surroundings, TimePoint t) const {
   return compensations_[gyro].correct(reading_dps, surroundings.at(gyro, t));
 }
 
 double KnownEffects::zero_offset_dps(std::size_t gyro, const Surroundings& surroundings,
                                      TimePoint t) const {
   return compensations_[gyro].zero_offset_dps(surroundings.at(gyro, t));
-}
-
-Duration KnownEffects::lag_most() const {
-  return std::max({lag(0), lag(1), Duration::zero()});
 }
 
 }  // namespace vgyro::gateway

@@ -24,7 +24,10 @@ class KnownEffects {
 
   /// The reading at `t` less what is known of it, deg/s.
   [[nodiscard]] double take_off(std::size_t gyro, double reading_dps,
-                                const Surroundings& surroundings, TimePoint t) const;
+                                const Surroundings& surroundings, TimePoint t) const {
+    // Most have no model, and ask for no surroundings.
+    return take_any(gyro) ? take_off_any(gyro, reading_dps, surroundings, t) : reading_dps;
+  }
   /// What of it is the gyro's zero offset at `t`, deg/s.
   [[nodiscard]] double zero_offset_dps(std::size_t gyro, const Surroundings& surroundings,
                                        TimePoint t) const;
@@ -32,11 +35,16 @@ class KnownEffects {
   /// A sample stamped t is of the rate at t − lag.
   [[nodiscard]] Duration lag(std::size_t gyro) const { return compensations_[gyro].lag(); }
   /// What the bus has reached when a rate dated back comes out.
-  [[nodiscard]] Duration lag_most() const;
+  [[nodiscard]] Duration lag_most() const { return lag_most_; }
 
  private:
+  [[nodiscard]] [[gnu::noinline]] double take_off_any(std::size_t gyro, double reading_dps,
+                                                      const Surroundings& surroundings,
+                                                      TimePoint t) const;
+
   std::array<fusion::Compensation, 2> compensations_;
   std::array<std::uint8_t, 2> needs_{};
+  Duration lag_most_{0};
 };
 
 }  // namespace vgyro::gateway

@@ -36,6 +36,10 @@ std::uint64_t sigma_field(double scaled, unsigned bits) {
 }
 
 void store_word(std::uint8_t* to, std::uint64_t word) {
+  if constexpr (std::endian::native == std::endian::little) {
+    std::memcpy(to, &word, sizeof word);
+    return;
+  }
   for (unsigned i = 0; i < 8; ++i)
     to[i] = static_cast<std::uint8_t>(word >> (8U * i));
 }

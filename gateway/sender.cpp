@@ -39,17 +39,17 @@ bool Sender::send_rate(const RateOutput& output) {
   assert(sink_ != nullptr);
   const bool in_range =
       vgyro_frames_ ? encoder_.can_carry(output.rate_dps) : std::isfinite(output.rate_dps);
-  RateOutput carried = output;
-  carried.valid = output.valid && in_range;
+  const bool valid = output.valid && in_range;
   ++rates_;
-  if (carried.valid) ++rates_valid_;
+  if (valid) ++rates_valid_;
   if (output.valid && !in_range) ++rates_out_of_range_;
-  rate_dps_ = carried.valid ? output.rate_dps : kNone;
-  sigma_dps_ = carried.valid ? output.sigma_dps : kNone;
-  quality_ = carried.valid ? output.quality : Quality::kUnusable;
-  if (vgyro_frames_) sink_->put(encoder_.rate(carried), stamp_);
-  send_layouts(output);
-  return carried.valid;
+  rate_dps_ = valid ? output.rate_dps : kNone;
+  sigma_dps_ = valid ? output.sigma_dps : kNone;
+  quality_ = valid ? output.quality : Quality::kUnusable;
+  // The encoder, too, makes one that it cannot carry invalid.
+  if (vgyro_frames_) sink_->put(encoder_.rate(output), stamp_);
+  if (!layouts_.empty()) send_layouts(output);
+  return valid;
 }
 
 void Sender::send_layouts(const RateOutput& output) {

@@ -69,7 +69,7 @@ class Sender {
   void tell(Status& status) const;
 
  private:
-  void send_layouts(const RateOutput& output);
+  [[gnu::noinline]] void send_layouts(const RateOutput& output);
   /// The layout of `before` that the frame of our layout `index` was; null: there was none.
   [[nodiscard]] const LayoutEncoder* predecessor(std::size_t index, const Sender& before) const;
 

@@ -56,7 +56,8 @@ void Surroundings::set_zero(TimePoint t) {
   angle_at_ = t;
 }
 
-void Surroundings::reach(TimePoint t) {
+// Time that does not just go on.
+void Surroundings::leap(TimePoint t) {
   if (!begun_ || t < zero_) {
     // The first frame's stamp was garbage, or it came on the slower of two buses.
     set_zero(t);
@@ -70,12 +71,23 @@ void Surroundings::reach(TimePoint t) {
   angle_at_ += step;
 }
 
+// Of every sample: the compiler sees each source by itself, and calls it directly.
+template <std::size_t... places>
+void Surroundings::hear_from(std::index_sequence<places...> /*all*/, std::size_t gyro, TimePoint t,
+                             const GyroInput& input, std::uint8_t needs) {
+  const auto hear = [&]<std::size_t place>() {
+    constexpr Source kSource = kSources[place];
+    if constexpr (kSource.from_gyro != nullptr) {
+      if ((needs & kSource.need) != 0) kSource.from_gyro(*this, gyro, t, input);
+    }
+  };
+  (hear.template operator()<places>(), ...);
+}
+
 void Surroundings::hear_gyro(std::size_t gyro, TimePoint t, const GyroInput& input,
                              std::uint8_t needs) {
-  for (const Source& source : kSources) {
-    if ((needs & source.need) != 0 && source.from_gyro != nullptr)
-      source.from_gyro(*this, gyro, t, input);
-  }
+  if (needs == 0) return;
+  hear_from(std::make_index_sequence<model::kNeedCount>(), gyro, t, input, needs);
 }
 
 void Surroundings::add_supply(std::size_t gyro, double supply_v) {
@@ -111,7 +123,10 @@ bool Surroundings::receive_speed(const can::Frame& frame, TimePoint raw,
 void Surroundings::add_rate(TimePoint t, double rate_dps) {
   if (!std::isfinite(rate_dps) || t <= angle_at_ || t - newest_ > kLeap) return;
   const double turned_deg = 0.5 * (rate_dps_ + rate_dps) * to_seconds(t - angle_at_);
-  angle_rad_ = std::remainder(angle_rad_ + turned_deg * kRadPerDeg, kTurn_rad);
+  angle_rad_ += turned_deg * kRadPerDeg;
+  // Within half a turn it is its own remainder.
+  if (!(std::abs(angle_rad_) < std::numbers::pi))
+    angle_rad_ = std::remainder(angle_rad_, kTurn_rad);
   angle_at_ = t;
   rate_dps_ = rate_dps;
 }

@@ -8,6 +8,7 @@
 
 #include <array>
 #include <optional>
+#include <utility>
 
 #include "base/time.h"
 #include "can/frame.h"
@@ -40,7 +41,11 @@ class Surroundings {
     if (!begun_) set_zero(t);
   }
   /// A sample was accepted: its time is believed.
-  void reach(TimePoint t);
+  void reach(TimePoint t) {
+    const bool goes_on = begun_ && t >= zero_ && t >= newest_ && span(newest_, t) <= kLeap;
+    if (!goes_on) return leap(t);
+    newest_ = t;
+  }
 
   /// What the gyro itself tells of its surroundings, as far as it is in `needs` (model::Need).
   void hear_gyro(std::size_t gyro, TimePoint t, const GyroInput& input, std::uint8_t needs);
@@ -69,7 +74,11 @@ class Surroundings {
   struct Source;
   static const std::array<Source, model::kNeedCount> kSources;
 
+  template <std::size_t... places>
+  void hear_from(std::index_sequence<places...> all, std::size_t gyro, TimePoint t,
+                 const GyroInput& input, std::uint8_t needs);
   void set_zero(TimePoint t);
+  [[gnu::cold, gnu::noinline]] void leap(TimePoint t);
 
   bool begun_ = false;
   TimePoint zero_;

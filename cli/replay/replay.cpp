@@ -1,6 +1,8 @@
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <limits>
+#include <span>
 #include <sys/stat.h>
 
 #include <fmt/core.h>
@@ -35,6 +37,8 @@ namespace vgyro::cli {
 namespace {
 
 constexpr std::uint64_t kFramesPerProgress = 1U << 16U;
+// As many as stay in the first cache between the parser and the pipeline.
+constexpr std::size_t kRecordsAtOnce = 64;
 constexpr can::BusIndex kForeignBus = 0xFF;
 
 // Frames of the pipeline → candump lines.
@@ -44,7 +48,9 @@ class LineSink final : public gateway::FrameSink {
       : file_(file),
         buses_(plan.buses.begin(), plan.buses.end()),
         lines_(&buses_[plan.output.bus]) {}
-  void put(const can::Frame& frame, TimePoint stamp) override { put_line(*lines_, frame, stamp); }
+  [[gnu::flatten]] void put(const can::Frame& frame, TimePoint stamp) override {
+    put_line(*lines_, frame, stamp);
+  }
   void put_on(can::BusIndex bus, const can::Frame& frame, TimePoint stamp) override {
     put_line(buses_[bus], frame, stamp);
   }
@@ -123,9 +129,9 @@ class BusMap {
     can::BusIndex all = 0;             ///< index in interfaces(), over all logs
   };
   Buses look_up(can::BusIndex log_bus, const canlog::InterfaceTable& of_log) {
-    while (known_.size() <= log_bus) {
-      const std::string& name = of_log.name(static_cast<can::BusIndex>(known_.size()));
-      known_.push_back({plan_index(name), interfaces_.index_of(name).value_or(0)});
+    while (known_count_ <= log_bus) {
+      const std::string& name = of_log.name(static_cast<can::BusIndex>(known_count_));
+      known_[known_count_++] = {plan_index(name), interfaces_.index_of(name).value_or(0)};
     }
     return known_[log_bus];
   }
@@ -144,7 +150,8 @@ class BusMap {
   }
   const gateway::Plan* plan_;
   std::vector<std::pair<std::string, std::string>> entries_;
-  std::vector<Buses> known_;  ///< by the log's own index
+  std::array<Buses, canlog::InterfaceTable::kMax> known_;  ///< by the log's own index
+  std::size_t known_count_ = 0;
   canlog::InterfaceTable interfaces_;
 };
 
@@ -152,6 +159,7 @@ class Replay {
  public:
   Replay(const ReplayOptions& options, const gateway::Plan& plan, OutputFile& output, BusMap buses)
       : options_(options),
+        is_drawn_(!options.plot.empty()),
         output_(output),
         buses_(std::move(buses)),
         pipeline_(plan),
@@ -198,39 +206,47 @@ class Replay {
  private:
   void run_records(const std::string& name, canlog::LogReader& reader) {
     Progress progress("replay " + name);
-    canlog::LogRecord record;
+    std::array<canlog::LogRecord, kRecordsAtOnce> room;
+    const canlog::InterfaceTable& interfaces = reader.interfaces();
     std::uint64_t until_progress = kFramesPerProgress;
-    std::uint64_t biases = 0;
-    while (reader.next(record)) {
-      if (record.is_xl) continue;
-      if (first_) summary_.first_s = to_seconds(record.stamp.time_since_epoch());
-      first_ = false;
-      last_ = record.stamp;
-      const BusMap::Buses buses = buses_.look_up(record.bus, reader.interfaces());
-      summary_.ids.add(buses.all, record.frame);
-      sink_.fraction_digits =
-          options_.digits != 0 ? options_.digits : unsigned{record.fraction_digits};
-      pipeline_.receive(buses.plan, record.frame, record.stamp, sink_);
-      if (--until_progress == 0) {
-        until_progress = kFramesPerProgress;
-        progress.update(reader.bytes_read(), reader.bytes_total(), reader.counts().frames);
+    while (const std::size_t count = reader.next_batch(room)) {
+      for (const canlog::LogRecord& record : std::span(room).first(count)) {
+        if (!record.is_xl) take(record, interfaces);
       }
-      if (!options_.plot.empty()) follow_drift(record.stamp, biases);
+      if (until_progress > count) {
+        until_progress -= count;
+        continue;
+      }
+      until_progress = kFramesPerProgress;
+      progress.update(reader.bytes_read(), reader.bytes_total(), reader.counts().frames);
     }
     summary_.last_s = to_seconds(last_.time_since_epoch());
   }
 
+  void take(const canlog::LogRecord& record, const canlog::InterfaceTable& interfaces) {
+    if (first_) summary_.first_s = to_seconds(record.stamp.time_since_epoch());
+    first_ = false;
+    last_ = record.stamp;
+    const BusMap::Buses buses = buses_.look_up(record.bus, interfaces);
+    summary_.ids.add(buses.all, record.frame);
+    sink_.fraction_digits =
+        options_.digits != 0 ? options_.digits : unsigned{record.fraction_digits};
+    pipeline_.receive(buses.plan, record.frame, record.stamp, sink_);
+    if (is_drawn_) follow_drift(record.stamp);
+  }
+
   // Looks at the drift whenever the pipeline has published it.
-  void follow_drift(TimePoint stamp, std::uint64_t& biases) {
+  void follow_drift(TimePoint stamp) {
     if (sink_.frames == frames_seen_) return;
     frames_seen_ = sink_.frames;
     const gateway::Status& status = pipeline_.status();
-    if (status.biases_out == biases) return;
-    biases = status.biases_out;
+    if (status.biases_out == biases_seen_) return;
+    biases_seen_ = status.biases_out;
     plot_.add_bias(stamp, {status.gyros[0].bias_dps, status.gyros[1].bias_dps});
   }
 
   const ReplayOptions& options_;
+  bool is_drawn_;
   OutputFile& output_;
   BusMap buses_;
   gateway::Pipeline pipeline_;
@@ -241,6 +257,7 @@ class Replay {
   bool first_ = true;
   TimePoint last_;
   std::uint64_t frames_seen_ = 0;
+  std::uint64_t biases_seen_ = 0;
 };
 
 std::string causes_of_rejection(const gateway::GyroStatus& gyro) {

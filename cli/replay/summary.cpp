@@ -1,6 +1,7 @@
 #include "cli/replay/summary.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 #include <fmt/format.h>
@@ -172,12 +173,19 @@ void IdCounts::add_extended(can::BusIndex bus, const can::Frame& frame) {
     return;
   }
   const std::uint64_t key = static_cast<std::uint64_t>(bus) << 32U | frame.id;
-  const auto known = extended_.find(key);
-  if (known != extended_.end()) {
-    ++known->second;
-  } else if (extended_.size() < kExtendedMax) {
-    extended_.emplace(key, 1);
+  if (extended_.empty()) extended_.resize(kPlaces);
+  // Identifiers differ in any of their bits; the product's top bits depend on all of them.
+  constexpr std::uint64_t kScatter = 0x9E3779B97F4A7C15U;
+  std::size_t at = (key * kScatter) >> (64U - std::bit_width(kPlaces - 1));
+  while (extended_[at].frames > 0 && extended_[at].key != key)
+    at = (at + 1) % kPlaces;
+  Place& place = extended_[at];
+  if (place.frames == 0) {
+    if (extended_count_ == kExtendedMax) return;
+    ++extended_count_;
+    place.key = key;
   }
+  ++place.frames;
 }
 
 std::vector<IdCounts::Row> IdCounts::rows() const {
@@ -189,6 +197,7 @@ std::vector<IdCounts::Row> IdCounts::rows() const {
     }
   }
   for (const auto& [key, frames] : extended_) {
+    if (frames == 0) continue;
     rows.push_back(
         {static_cast<can::BusIndex>(key >> 32U), static_cast<std::uint32_t>(key), true, frames});
   }

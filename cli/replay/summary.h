@@ -6,7 +6,6 @@
 #include <array>
 #include <cstdint>
 #include <string>
-#include <unordered_map>
 #include <vector>
 
 #include <nlohmann/json_fwd.hpp>
@@ -42,9 +41,16 @@ class IdCounts {
 
  private:
   static constexpr std::size_t kExtendedMax = 4096;
+  /// Twice as many places, so that what is looked for is found in the next ones.
+  static constexpr std::size_t kPlaces = 2 * kExtendedMax;
+  struct Place {
+    std::uint64_t key = 0;     ///< interface and identifier
+    std::uint64_t frames = 0;  ///< 0: free
+  };
   void add_extended(can::BusIndex bus, const can::Frame& frame);
   std::vector<std::array<std::uint64_t, can::kStandardIdMax + 1>> standard_;
-  std::unordered_map<std::uint64_t, std::uint64_t> extended_;
+  std::vector<Place> extended_;  ///< kPlaces, from the first such identifier on
+  std::size_t extended_count_ = 0;
   std::uint64_t error_frames_ = 0;
 };
 

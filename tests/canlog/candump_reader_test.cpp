@@ -1,5 +1,10 @@
 // Whole logs: nothing lost around damage, and never a difference by how the bytes arrive.
 
+#include <array>
+#include <random>
+#include <span>
+#include <vector>
+
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -256,6 +261,53 @@ TEST(CandumpReader, ReadsTheSameInChunksOfAnySize) {
   }
 }
 
+// However many records are asked for at once, and wherever a block ends among them.
+TEST(CandumpReader, HandsOutTheSameRecordsInBatches) {
+  SCOPED_TRACE(::testing::Message() << "seed " << kSeed);
+  LineMaker lines(kSeed);
+  std::string text;
+  for (int i = 0; i < 2000; ++i)
+    text += lines.line();
+  const ReadLog one_by_one = read_text(text);
+  for (const std::size_t at_once : {1U, 2U, 3U, 64U, 5000U}) {
+    for (const std::size_t chunk : {1U, 97U, 4096U, 1'000'000U}) {
+      SCOPED_TRACE(::testing::Message() << at_once << " at once, chunk " << chunk);
+      CandumpReader reader(log_from_text(text, chunk));
+      std::vector<LogRecord> room(at_once);
+      std::size_t read = 0;
+      while (const std::size_t count = reader.next_batch(room)) {
+        ASSERT_LE(count, at_once);
+        for (const LogRecord& record : std::span(room).first(count)) {
+          ASSERT_LT(read, one_by_one.records.size());
+          const ReadRecord& expected = one_by_one.records[read++];
+          ASSERT_EQ(record.is_xl, !expected.xl.empty()) << "record " << read;
+          ASSERT_EQ(to_ns(record.stamp), expected.stamp_ns);
+          ASSERT_EQ(reader.interfaces().name(record.bus), expected.interface);
+          if (record.is_xl) continue;
+          ASSERT_EQ(record.frame, expected.frame) << "record " << read;
+        }
+      }
+      EXPECT_EQ(read, one_by_one.records.size());
+      EXPECT_EQ(told(reader.counts()), told(one_by_one.counts));
+    }
+  }
+}
+
+// Who follows a live log writes out what a line has brought before the next one is waited for: a
+// batch holds no more than has arrived.
+TEST(CandumpReader, NeverWaitsForTheRestOfABatch) {
+  const std::string line = "(1700000000.000000) can0 123#11\n";
+  CandumpReader reader(log_from_text(line + line + line, line.size()));
+  std::vector<LogRecord> room(64);
+  std::size_t waits = 0;
+  reader.before_wait([&] { ++waits; });
+  for (std::size_t arrived = 1; arrived <= 3; ++arrived) {
+    EXPECT_EQ(reader.next_batch(room), 1U);
+    EXPECT_EQ(waits, arrived);
+  }
+  EXPECT_EQ(reader.next_batch(room), 0U);
+}
+
 // The quick path judges usual lines by other means than parse_line(); they may never disagree.
 TEST(CandumpReader, AgreesWithParseLineOnRandomAndDamagedLines) {
   for (std::uint64_t seed = kSeed; seed < kSeed + 10; ++seed) {
@@ -290,6 +342,26 @@ TEST(CandumpReader, AgreesWithParseLineOnEveryChangeOfOneByte) {
   }
 }
 
+// Few names are compared quickly, and one may begin as another one does.
+TEST(CandumpReader, TellsManyInterfacesApart) {
+  SCOPED_TRACE(::testing::Message() << "seed " << kSeed);
+  constexpr std::array kNames{"c",       "can",      "can0",  "can01", "can1",
+                              "vcan123", "vcan1234", "canal", "x",     "can0x"};
+  std::mt19937_64 random(kSeed);
+  for (int round = 0; round < 20; ++round) {
+    std::string text;
+    std::vector<std::string> expected;
+    for (int i = 0; i < 200; ++i) {
+      expected.emplace_back(kNames[random() % kNames.size()]);
+      text += fmt::format("(1700000000.{:06}) {} {:03X}#11\n", i, expected.back(), i);
+    }
+    const ReadLog log = read_text(text);
+    ASSERT_EQ(log.records.size(), expected.size());
+    for (std::size_t i = 0; i < expected.size(); ++i)
+      ASSERT_EQ(log.records[i].interface, expected[i]) << "line " << i + 1;
+  }
+}
+
 // Before any second was read, ten NUL bytes must not pass for a second that is already known.
 TEST(CandumpReader, TakesNulBytesForNoSecond) {
   // Blank lines behind it: the quick path only looks where there is room to look.
@@ -298,6 +370,9 @@ TEST(CandumpReader, TakesNulBytesForNoSecond) {
   EXPECT_EQ(log.counts.frames, 1U);
   EXPECT_EQ(log.counts.skipped_bytes, 11U);
   EXPECT_EQ(log.counts.other_lines, 1U + 200U);
+  const ReadLog bare = read_text(fmt::format("(1.5) can0 123#\n{}123456) can0 123#11\n{}",
+                                             std::string(12, '\0'), std::string(200, '\n')));
+  EXPECT_EQ(bare.counts.frames, 1U);
 }
 
 // A power cut leaves NUL bytes where a file had grown but its bytes were not written: the frame

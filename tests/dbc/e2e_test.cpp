@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <random>
 #include <set>
 #include <vector>
 
@@ -9,6 +10,8 @@
 
 namespace vgyro::dbc {
 namespace {
+
+constexpr std::uint64_t kSeed = 20'261'129;
 
 using Bytes8 = std::array<std::uint8_t, 8>;
 
@@ -32,6 +35,24 @@ TEST(E2eProfile11C, AgreesWithThePublishedVectors) {
   payload = {};
   profile.protect(payload);
   EXPECT_EQ(payload, (Bytes8{0x77, 0x11}));
+}
+
+// What the sender writes is what a receiver with the general check expects.
+TEST(E2eProfile11C, WritesWhatTheGeneralProtectionExpects) {
+  std::mt19937_64 random(kSeed);
+  SCOPED_TRACE(::testing::Message() << "seed " << kSeed);
+  for (int round = 0; round < 2000; ++round) {
+    const auto data_id = static_cast<std::uint16_t>(random());
+    E2eProfile11C sender(data_id);
+    const E2eProtection receiver({.kind = E2eKind::kProfile1C, .data_ids = {data_id}});
+    Bytes8 payload{};
+    for (std::uint8_t& byte : payload)
+      byte = static_cast<std::uint8_t>(random());
+    const Bytes8 before = payload;
+    sender.protect(payload);
+    ASSERT_TRUE(receiver.check(payload)) << "data ID " << data_id;
+    ASSERT_TRUE(std::equal(before.begin() + 2, before.end(), payload.begin() + 2));
+  }
 }
 
 // The counter runs from 0 to 14: 15 would mean an error and never appears.
@@ -156,6 +177,29 @@ TEST(E2eProtection, AgreesWithTheCatalogueOfCrcs) {
 }
 
 // By hand: 0x24 + 8 + 1 + 2 + … + 7 = 0x48, and a carry falls away.
+// Bit by bit, as SAE J1850 has it, for every length and place of the check value.
+TEST(E2eProtection, DividesPayloadsOfAnyLength) {
+  std::mt19937_64 random(kSeed);
+  SCOPED_TRACE(::testing::Message() << "seed " << kSeed);
+  for (std::size_t length = 1; length <= 64; ++length) {
+    for (std::size_t crc_byte = 0; crc_byte < length; ++crc_byte) {
+      std::vector<std::uint8_t> payload(length);
+      unsigned crc = 0xFF;
+      for (std::size_t i = 0; i < length; ++i) {
+        payload[i] = static_cast<std::uint8_t>(random());
+        if (i == crc_byte) continue;
+        for (unsigned bit = 8; bit-- > 0;) {
+          const bool divides = (crc >> 7U & 1U) != (static_cast<unsigned>(payload[i]) >> bit & 1U);
+          crc = (crc << 1U & 0xFFU) ^ (divides ? 0x1DU : 0U);
+        }
+      }
+      const E2eProtection protection(
+          {.kind = E2eKind::kCrc8J1850, .crc_byte = crc_byte, .bytes = length});
+      ASSERT_EQ(protection.value(payload), crc ^ 0xFFU) << length << " bytes, byte " << crc_byte;
+    }
+  }
+}
+
 TEST(E2eProtection, AddsUpAsToyotaDoes) {
   const E2eProtection how = protection(E2eKind::kToyota, {}, 7, 8, 0x024);
   EXPECT_EQ(how.value(Payload{1, 2, 3, 4, 5, 6, 7, 0}), 0x48);

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <functional>
 #include <numbers>
+#include <random>
 
 #include <gtest/gtest.h>
 
@@ -105,6 +106,40 @@ TEST(TemperatureFilter, GivesTheSameAtAnyRateOfValues) {
   for (int i = 0; i < 200; ++i)
     slow.add(at(0.1 * i), swing(0.1 * i));
   EXPECT_NEAR(slow.slope_c_s(), fast.slope_c_s(), 1e-3);
+}
+
+// What was worked out for one interval is not used for another: a filter that has seen thousands of
+// different ones goes on as one that begins there, but for what it knows.
+TEST(TemperatureFilter, TakesEachIntervalForWhatItIs) {
+  constexpr std::uint64_t kSeed = 7;
+  std::mt19937_64 random(kSeed);
+  SCOPED_TRACE(::testing::Message() << "seed " << kSeed);
+  TemperatureFilter filter(0.01);
+  const double memory_s = filter.memory_s();
+  TimePoint t = at(1.0);
+  filter.add(t, 20.0);
+  double temperature_c = 20.0;
+  double slope_c_s = 0.0;
+  double curvature_c_s2 = 0.0;
+  for (int i = 0; i < 20'000; ++i) {
+    const Duration step(random() % 4 == 0
+                            ? static_cast<std::int64_t>(1 + random() % 50'000'000)
+                            : 2'000'000 + 1000 * static_cast<std::int64_t>(random() % 40));
+    t += step;
+    const double value_c = 20.0 + 0.01 * static_cast<double>(random() % 200);
+    filter.add(t, value_c);
+    // Three poles at −1/memory, written out.
+    const double dt_s = to_seconds(step);
+    const double keep = std::exp(-dt_s / memory_s);
+    const double lose = -std::expm1(-dt_s / memory_s);
+    const double foretold_c = temperature_c + dt_s * (slope_c_s + 0.5 * dt_s * curvature_c_s2);
+    const double surprise_c = value_c - foretold_c;
+    temperature_c = foretold_c + (1.0 - keep * keep * keep) * surprise_c;
+    slope_c_s += dt_s * curvature_c_s2 + 1.5 * lose * lose * (1.0 + keep) / dt_s * surprise_c;
+    curvature_c_s2 += lose * lose * lose / (dt_s * dt_s) * surprise_c;
+    ASSERT_EQ(filter.temperature_c(), temperature_c) << "value " << i;
+    ASSERT_EQ(filter.slope_c_s(), slope_c_s) << "value " << i;
+  }
 }
 
 TEST(TemperatureFilter, BeginsAnewAfterASilence) {

@@ -1,5 +1,6 @@
 // Any bytes are a log, and arrive in any pieces: reading stays inside its memory, the quick path
-// and parse_line() agree, and what was read is written and read back as it was.
+// and parse_line() agree, batches hold the same, and what was read is written and read back as it
+// was.
 
 #include <algorithm>
 #include <cstddef>
@@ -51,6 +52,25 @@ void require(bool holds, const char* what) {
   std::abort();
 }
 
+/// The same records, some at a time.
+void require_same_in_batches(const ReadLog& log, const std::string& text,
+                             const std::vector<std::uint8_t>& sizes) {
+  vgyro::canlog::CandumpReader reader(std::make_unique<PiecesSource>(text, sizes));
+  std::vector<vgyro::canlog::LogRecord> room(1U + sizes.front() % 8U);
+  std::size_t read = 0;
+  while (const std::size_t count = reader.next_batch(room)) {
+    for (std::size_t i = 0; i < count; ++i, ++read) {
+      require(read < log.records.size(), "a batch holds more");
+      const ReadRecord& expected = log.records[read];
+      require(room[i].is_xl == !expected.xl.empty(), "a batch holds another kind of frame");
+      require(to_ns(room[i].stamp) == expected.stamp_ns, "a batch holds another stamp");
+      require(room[i].is_xl || room[i].frame == expected.frame, "a batch holds another frame");
+    }
+  }
+  require(read == log.records.size(), "the batches hold less");
+  require(told(reader.counts()) == told(log.counts), "the batches' counts differ");
+}
+
 std::string written(const ReadRecord& record) {
   const vgyro::TimePoint stamp = vgyro::time_from_ns(record.stamp_ns);
   const auto digits = static_cast<unsigned>(record.fraction_digits);
@@ -79,6 +99,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   require(told(quick.counts) == told(slow.counts), "the counts differ");
   require(quick.interfaces == slow.interfaces, "the interfaces differ");
   require(quick.records == slow.records, "the records differ");
+
+  require_same_in_batches(quick, text, sizes);
 
   std::string again;
   for (const ReadRecord& record : quick.records)

@@ -28,6 +28,12 @@ def candump_logs(lines):
     yield b"\x01\x07\x3f\xff" + "".join(forms).encode()
     yield b"\xff\xff\xff\xff" + "".join(lines[:200]).encode()
     yield b"\x00\x00\x00\x00" + "".join(lines[5000:5040] + forms).encode()
+    # The usual form: more interfaces than are compared quickly, all widths, seconds that pass; and among it what is not quite so.
+    usual = [f"(17000000{i // 8:02}.{i * 111111 % 1000000:06}) {('can0', 'can1', 'c', 'vcan123', 'can01', 'vcan1234')[i % 6]} "
+             f"{i * 37 % 2048:03X}#{'0123456789abcDEF'[: 2 * (i % 9)]}\n" for i in range(60)]
+    yield b"\x40\x21\x05\xff" + "".join(usual).encode()
+    yield b"\x17\xff\x40\x02" + "".join(usual[:20] + ["(1700000002.12345/) can0 123#11\n", "(170000000:.000000) can0 123#11\n",
+                                                       "(1700000002.000000) can0 12G#11\n", "(1700000002.000000) can0 123#1\n"] + usual[20:]).encode()
 
 
 def logs_of_all_forms(lines):

@@ -1,5 +1,7 @@
 #include "gateway/e2e_check.h"
 
+#include <random>
+
 #include <gtest/gtest.h>
 
 #include "tests/gateway/rig.h"
@@ -192,6 +194,49 @@ TEST(E2eCheck, RefusesNumbersBeyondTheConfiguredHighest) {
   std::uint32_t missing = 7;
   EXPECT_FALSE(check.count(counted(0).payload(), missing));
   EXPECT_EQ(missing, 0U);
+}
+
+// The next frame in order takes a short way; whatever comes before it, it must be judged as any
+// other. The rules are written out once more, over numbers that only grow.
+TEST(E2eCheck, JudgesEveryOrderOfFramesByTheSameRules) {
+  constexpr std::uint64_t kSeed = 20'261'201;
+  SCOPED_TRACE(::testing::Message() << "seed " << kSeed);
+  std::mt19937_64 random(kSeed);
+  for (const std::uint32_t modulus : {2U, 10U, 15U}) {
+    for (const std::uint32_t most : {0U, 1U, 3U}) {
+      E2ePlan plan = plan_of(most, false);
+      plan.counter->modulus = modulus;
+      E2eCheck check(plan);
+      std::uint64_t sent = random() % modulus;
+      std::uint64_t newest = sent;
+      std::optional<std::uint64_t> odd_one;
+      ASSERT_FALSE(judge(check, static_cast<unsigned>(sent)));
+      for (int i = 0; i < 5000; ++i) {
+        sent += random() % 4 == 0 ? random() % modulus : 1;
+        const auto shown = static_cast<unsigned>(sent % modulus);
+        const std::uint64_t moved = (sent - newest) % modulus;
+        std::optional<Reject> expected;
+        std::uint32_t lost = 0;
+        if (moved == 0) {
+          expected = Reject::kCounterRepeated;
+        } else if (most == 0 || moved <= most) {
+          lost = static_cast<std::uint32_t>(moved - 1);
+        } else {
+          const std::uint64_t since = odd_one ? (sent - *odd_one) % modulus : 0;
+          if (since == 0 || since > most) expected = Reject::kWrongSequence;
+          odd_one = sent;
+        }
+        if (!expected) {
+          newest = sent;
+          odd_one.reset();
+        }
+        std::uint32_t missing = 99;
+        ASSERT_EQ(check.count(counted(shown).payload(), missing), expected) << "frame " << i;
+        ASSERT_EQ(missing, lost) << "frame " << i;
+        ASSERT_EQ(check.counter(), newest % modulus) << "frame " << i;
+      }
+    }
+  }
 }
 
 }  // namespace

@@ -56,6 +56,7 @@ class Stub final : public fusion::Corrector {
     condition.stops = seen_.stops;
     return condition;
   }
+  [[nodiscard]] std::uint64_t condition_edition() const override { return 1 + seen_.stops; }
   [[nodiscard]] std::optional<fusion::DriftMemory> memory(double t_s) const override {
     seen_.memory_t_s = t_s;
     fusion::DriftMemory memory;
