@@ -12,11 +12,10 @@ namespace vgyro::canlog {
 
 template <std::unsigned_integral T>
 T swapped(T value) {
-  T out = 0;
+  std::uint64_t out = 0;
   for (std::size_t i = 0; i < sizeof(T); ++i)
-    out = static_cast<T>(out | static_cast<T>((value >> (8 * i)) & 0xFFU)
-                                   << (8 * (sizeof(T) - 1 - i)));
-  return out;
+    out |= (std::uint64_t{value} >> (8 * i) & 0xFFU) << (8 * (sizeof(T) - 1 - i));
+  return static_cast<T>(out);
 }
 
 /// Of sizeof(T) bytes at `from`.
