@@ -12,11 +12,9 @@ namespace vgyro::canlog {
 
 template <std::unsigned_integral T>
 T swapped(T value) {
-  // A type that nothing promotes to a signed one.
-  const std::uint64_t wide = value;
   std::uint64_t out = 0;
   for (std::size_t i = 0; i < sizeof(T); ++i)
-    out |= (wide >> (8 * i) & 0xFFU) << (8 * (sizeof(T) - 1 - i));
+    out |= (std::uint64_t{value} >> (8 * i) & 0xFFU) << (8 * (sizeof(T) - 1 - i));
   return static_cast<T>(out);
 }
 

@@ -30,7 +30,7 @@ Expected<void> check_new(const std::string& path, bool force) {
 Expected<void> check_inputs(const InitOptions& options) {
   std::vector<std::string> inputs = options.logs;
   inputs.insert(inputs.end(), options.dbc_files.begin(), options.dbc_files.end());
-  if (const auto good = check_outputs(inputs, {options.output}); !good) return good;
+  if (auto good = check_outputs(inputs, {options.output}); !good) return good;
   return check_new(options.output, options.force);
 }
 
@@ -58,7 +58,7 @@ Expected<void> read(const InitOptions& options, Material& all) {
     all.databases.push_back(std::move(*loaded));
   }
   all.traffic.only(options.ids);
-  if (const auto read = all.traffic.read(options.logs); !read) return read;
+  if (auto read = all.traffic.read(options.logs); !read) return read;
   const Traffic& traffic = all.traffic;
   tell("{}", printable_lines(traffic.notes()));
   tell("{} frames of {} identifiers in {:.0f} s{}\n", traffic.frames(), traffic.streams().size(),
@@ -102,10 +102,11 @@ void print_candidates(const std::vector<Candidate>& candidates, const Choice& ch
          one.figures.noise, figures);
     if (!one.why_not.empty()) tell("    left out: {}\n", printable(one.why_not));
   }
-  if (!candidates.empty())
+  if (!candidates.empty()) {
     tell("Steps and noise in deg/s{}; correlation, scale and lag against {}.\n\n",
          candidates.back().guessed ? ", without a DBC file in raw numbers" : "",
          printable(candidates[base].place()));
+  }
 }
 
 Expected<void> write(const std::string& path, const std::string& text) {
@@ -152,8 +153,8 @@ Expected<void> write_all(const InitOptions& options, Material& all) {
       return fail("-o -", "layouts were guessed, and the DBC file that describes them has no place",
                   "-o vgyro.toml writes it beside the configuration");
     }
-    if (const auto good = check_new(path, options.force); !good) return good;
-    if (const auto written = write(path, all.described->text); !written) return written;
+    if (auto good = check_new(path, options.force); !good) return good;
+    if (auto written = write(path, all.described->text); !written) return written;
     tell("{} describes what was found by trial.\n", path);
   }
   const Circumstances circumstances =

@@ -188,6 +188,7 @@ std::vector<dbc::Signal> find_fields(const Stream& stream) {
     if (!taken) chosen.push_back(std::move(one));
   }
   std::vector<dbc::Signal> signals;
+  signals.reserve(chosen.size());
   for (Judged& one : chosen)
     signals.push_back(std::move(one.signal));
   return signals;
