@@ -36,9 +36,10 @@ std::string by_rows(const std::string& columns, std::size_t width) {
   if (width <= 1) return columns;
   std::string rows = columns;
   const std::size_t height = columns.size() / width;
-  for (std::size_t column = 0; column < width; ++column)
+  for (std::size_t column = 0; column < width; ++column) {
     for (std::size_t row = 0; row < height; ++row)
       rows[row * width + column] = columns[column * height + row];
+  }
   return rows;
 }
 
@@ -133,7 +134,7 @@ Expected<std::size_t> MdfData::read(char* to, std::size_t size) {
       return count;
     }
     if (left_ > 0) {
-      const auto got = file_->read(at_, to, std::min<std::uint64_t>(size, left_));
+      auto got = file_->read(at_, to, std::min<std::uint64_t>(size, left_));
       if (!got) return got;
       at_ += *got;
       left_ -= *got;

@@ -14,7 +14,10 @@ namespace {
 constexpr double kCorrelationLeast = 0.6;   // coarse or noisy ones on a straight road
 constexpr double kSignificanceLeast = 6.0;  // hundreds of pairs and lags are looked at
 constexpr double kCopyCorrelation = 0.9;
-constexpr std::size_t kJudgedMost = 60;
+constexpr std::size_t kJudgedMost = 300;
+constexpr std::size_t kAllCompared =
+    12;  // beyond it only pairs of which a quick look says so much:
+constexpr double kQuickLeast = 0.4;
 
 /// A signal that repeats another one is later, or is what cannot be undone: filtered, rounded.
 void mark_copies(std::vector<Candidate>& candidates, const std::vector<PairFigures>& pairs) {
@@ -53,6 +56,61 @@ bool usable(const Candidate& candidate) {
   return candidate.why_not.empty();
 }
 
+/// The likeliest by their names, where there are too many; in the candidates' order.
+std::vector<std::size_t> to_judge(const std::vector<Candidate>& candidates) {
+  std::vector<std::size_t> judged;
+  for (std::size_t i = 0; i < candidates.size(); ++i) {
+    if (usable(candidates[i])) judged.push_back(i);
+  }
+  if (judged.size() > kJudgedMost) {
+    std::stable_sort(judged.begin(), judged.end(), [&](std::size_t a, std::size_t b) {
+      return candidates[a].name_score > candidates[b].name_score;
+    });
+    judged.resize(kJudgedMost);
+    std::sort(judged.begin(), judged.end());
+  }
+  return judged;
+}
+
+std::vector<analysis::ChangeShape> shapes_of(const std::vector<Candidate>& candidates,
+                                             const std::vector<std::size_t>& judged) {
+  double begin_s = 1e300;
+  double end_s = -1e300;
+  for (const std::size_t i : judged) {
+    begin_s = std::min(begin_s, candidates[i].series.t_s.front());
+    end_s = std::max(end_s, candidates[i].series.t_s.back());
+  }
+  std::vector<analysis::ChangeShape> shapes;
+  shapes.reserve(judged.size());
+  for (const std::size_t i : judged)
+    shapes.push_back(analysis::change_shape(candidates[i].series, begin_s, end_s - begin_s));
+  return shapes;
+}
+
+/// Figures of all pairs; of many signals only where a quick look shows that it is worth it.
+std::vector<PairFigures> compare(const std::vector<Candidate>& candidates,
+                                 const std::vector<std::size_t>& judged) {
+  std::vector<analysis::ChangeShape> shapes;
+  if (judged.size() > kAllCompared) shapes = shapes_of(candidates, judged);
+  std::vector<PairFigures> pairs;
+  Progress progress("comparing");
+  for (std::size_t i = 0; i < judged.size(); ++i) {
+    progress.update("signals", static_cast<double>(i) / static_cast<double>(judged.size()));
+    const Candidate& a = candidates[judged[i]];
+    for (std::size_t k = i + 1; k < judged.size(); ++k) {
+      const Candidate& b = candidates[judged[k]];
+      if (!shapes.empty() && analysis::quick_correlation(shapes[i], shapes[k]) < kQuickLeast)
+        continue;
+      const auto found = analysis::likeness(a.series, b.series);
+      if (!found) continue;
+      PairFigures pair{judged[i], judged[k], *found};
+      if (a.guessed || b.guessed) pair.likeness.scale = pair.likeness.ratio;
+      pairs.push_back(pair);
+    }
+  }
+  return pairs;
+}
+
 }  // namespace
 
 bool PairFigures::alike() const {
@@ -62,23 +120,8 @@ bool PairFigures::alike() const {
 
 Choice choose(std::vector<Candidate>& candidates) {
   Choice choice;
-  std::vector<std::size_t> judged;
-  for (std::size_t i = 0; i < candidates.size() && judged.size() < kJudgedMost; ++i) {
-    if (usable(candidates[i])) judged.push_back(i);
-  }
-  Progress progress("comparing");
-  for (std::size_t i = 0; i < judged.size(); ++i) {
-    progress.update("signals", static_cast<double>(i) / static_cast<double>(judged.size()));
-    for (std::size_t k = i + 1; k < judged.size(); ++k) {
-      const auto found =
-          analysis::likeness(candidates[judged[i]].series, candidates[judged[k]].series);
-      if (!found) continue;
-      PairFigures pair{judged[i], judged[k], *found};
-      const bool raw = candidates[judged[i]].guessed || candidates[judged[k]].guessed;
-      if (raw) pair.likeness.scale = pair.likeness.ratio;
-      choice.pairs.push_back(pair);
-    }
-  }
+  const std::vector<std::size_t> judged = to_judge(candidates);
+  choice.pairs = compare(candidates, judged);
   mark_copies(candidates, choice.pairs);
   std::vector<std::pair<double, PairFigures>> alike;
   for (const PairFigures& pair : choice.pairs) {

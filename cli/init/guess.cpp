@@ -314,6 +314,7 @@ Span span_of(const std::vector<Candidate>& candidates) {
 std::vector<double> best_correlations(const std::vector<Candidate>& candidates) {
   const Span span = span_of(candidates);
   std::vector<analysis::ChangeShape> shapes;
+  shapes.reserve(candidates.size());
   for (const Candidate& candidate : candidates)
     shapes.push_back(analysis::change_shape(series_of(candidate), span.begin_s, span.seconds));
   std::vector<double> best(candidates.size());
@@ -385,6 +386,7 @@ void add_guessed(std::vector<Candidate>& candidates, const Guess& guess) {
   kept.resize(std::min(kept.size(), kGuessedMost));
   std::sort(kept.begin(), kept.end());
   std::vector<Candidate> fields;
+  fields.reserve(kept.size());
   for (const std::size_t i : kept) {
     Candidate& field = fields.emplace_back(std::move(candidates[i]));
     field.series = series_of(field);

@@ -196,7 +196,7 @@ class InitProfiles(bench.Bench):
         return np.sqrt(np.mean(np.square(errors))), len(errors) / max(frames, 1)
 
     def test_every_profile_beside_a_mems(self):
-        for seed, profile in enumerate(ALL):
+        for seed, profile in enumerate(ALL[:3] if bench.SANITIZED else ALL):
             with self.subTest(profile=profile.file, seed=seed):
                 drive, said, text = self.propose(profile, seed)
                 gyros = [gyro.split("\n[c")[0] for gyro in text.split("[[gyro]]")[1:]]
