@@ -276,43 +276,48 @@ const char* BlfReader::read_message(const Object& object, LogRecord& record, boo
   namespace at = blf::message;
   if (object.field_bytes() < at::kBytes) return kTooShort;
   const char* fields = object.fields();
-  const unsigned flags = load_byte(fields + at::kFlags);
-  is_frame = (flags & at::kDirection) != blf::kTransmitRequest;
-  record.direction = direction_of(flags);
   can::Frame& frame = record.frame;
-  if ((flags & at::kRemote) != 0) frame.flags |= can::kRemote;
-  if (const char* why = set_blf_id(load_little<std::uint32_t>(fields + at::kId), frame)) return why;
+  if (const char* why = read_start(fields, record, is_frame)) return why;
   if (const char* why = set_dlc(load_byte(fields + at::kDlc), frame)) return why;
   if (!frame.has(can::kRemote)) {
     std::memcpy(frame.data.data(), fields + at::kData, can::kClassicBytesMax);
   }
-  return set_channel(load_little<std::uint16_t>(fields + at::kChannel), record) ? nullptr
-                                                                                : kTooManyBuses;
+  return set_message_channel(fields, record);
 }
 
 const char* BlfReader::read_fd(const Object& object, LogRecord& record, bool& is_frame) {
-  namespace at = blf::message;
   if (object.field_bytes() < blf::fd::kData) return kTooShort;
   const char* fields = object.fields();
-  const unsigned flags = load_byte(fields + at::kFlags);
-  is_frame = (flags & at::kDirection) != blf::kTransmitRequest;
-  record.direction = direction_of(flags);
   can::Frame& frame = record.frame;
-  if ((flags & at::kRemote) != 0) frame.flags |= can::kRemote;
   const unsigned fd_flags = load_byte(fields + blf::fd::kFdFlags);
   if ((fd_flags & blf::fd::kFormat) != 0) {
     frame.flags |= can::kFd;
     if ((fd_flags & blf::fd::kRateSwitch) != 0) frame.flags |= can::kBitRateSwitch;
     if ((fd_flags & blf::fd::kErrorState) != 0) frame.flags |= can::kErrorStateIndicator;
   }
-  if (const char* why = set_blf_id(load_little<std::uint32_t>(fields + at::kId), frame)) return why;
-  if (const char* why =
-          set_fd_content(load_byte(fields + at::kDlc), load_byte(fields + blf::fd::kLength),
-                         fields + blf::fd::kData, object.field_bytes() - blf::fd::kData, frame)) {
+  if (const char* why = read_start(fields, record, is_frame)) return why;
+  if (const char* why = set_fd_content(
+          load_byte(fields + blf::message::kDlc), load_byte(fields + blf::fd::kLength),
+          fields + blf::fd::kData, object.field_bytes() - blf::fd::kData, frame)) {
     return why;
   }
-  return set_channel(load_little<std::uint16_t>(fields + at::kChannel), record) ? nullptr
-                                                                                : kTooManyBuses;
+  return set_message_channel(fields, record);
+}
+
+// What the classic object and the older FD one begin with alike.
+const char* BlfReader::read_start(const char* fields, LogRecord& record, bool& is_frame) {
+  namespace at = blf::message;
+  const unsigned flags = load_byte(fields + at::kFlags);
+  is_frame = (flags & at::kDirection) != blf::kTransmitRequest;
+  record.direction = direction_of(flags);
+  if ((flags & at::kRemote) != 0) record.frame.flags |= can::kRemote;
+  const auto id = load_little<std::uint32_t>(fields + at::kId);
+  return set_blf_id(id, record.frame);
+}
+
+const char* BlfReader::set_message_channel(const char* fields, LogRecord& record) {
+  const auto channel = load_little<std::uint16_t>(fields + blf::message::kChannel);
+  return set_channel(channel, record) ? nullptr : kTooManyBuses;
 }
 
 const char* BlfReader::read_fd64(const Object& object, LogRecord& record, bool& is_frame) {

@@ -52,6 +52,8 @@ class BlfReader final : public BinaryReader {
   const char* read_event(const Object& object, LogRecord& record, bool& is_frame);
   const char* read_message(const Object& object, LogRecord& record, bool& is_frame);
   const char* read_fd(const Object& object, LogRecord& record, bool& is_frame);
+  static const char* read_start(const char* fields, LogRecord& record, bool& is_frame);
+  const char* set_message_channel(const char* fields, LogRecord& record);
   const char* read_fd64(const Object& object, LogRecord& record, bool& is_frame);
 
   /// Objects that are read are smaller than this.

@@ -345,13 +345,7 @@ LineResult parse_line(std::string_view line, InterfaceTable& interfaces, LogReco
 }
 
 CandumpReader::CandumpReader(std::unique_ptr<LogSource> source)
-    : source_(std::move(source)),
-      xl_(std::make_unique<XlFrame>()),
-      bytes_total_(source_->bytes_total()) {}
-
-void CandumpReader::before_wait(std::function<void()> callback) {
-  if (source_ != nullptr) source_->before_wait(std::move(callback));
-}
+    : blocks_(std::move(source)), xl_(std::make_unique<XlFrame>()) {}
 
 // All are compared, without a branch: two buses take turns in no order that a processor foresees.
 inline const CandumpReader::KnownInterface& CandumpReader::known_interface(
@@ -444,37 +438,11 @@ inline const char* CandumpReader::parse_usual(const char* p, LogRecord& record) 
   return p + digits + 1;
 }
 
-void CandumpReader::count_malformed(const char* why) {
-  ++counts_.malformed_lines;
-  if (counts_.first_malformed.size() < LogCounts::kFirstMalformedMax) {
-    counts_.first_malformed.push_back({counts_.lines, why});
-  }
-}
-
 bool CandumpReader::refill() {
-  while (at_ == end_) {
-    if (source_ == nullptr) return false;
-    const auto block = source_->next();
-    bytes_read_ = source_->bytes_read();
-    if (!block) {
-      error_ = block.error();
-      source_.reset();
-      return false;
-    }
-    if (block->overlong) {
-      ++counts_.lines;
-      count_malformed("the line is longer than any frame");
-    }
-    at_ = block->text.data();
-    end_ = at_ + block->text.size();
-    if (block->cut_off) ++counts_.cut_off_lines;
-    // The block lives in the source's buffer, so the source stays until it has been used up.
-    if (block->end && at_ == end_) {
-      source_.reset();
-      return false;
-    }
-  }
-  return true;
+  const std::string_view block = blocks_.next(counts_);
+  at_ = block.data();
+  end_ = at_ + block.size();
+  return !block.empty();
 }
 
 bool CandumpReader::next(LogRecord& record) {
@@ -535,7 +503,7 @@ bool CandumpReader::take_line(LogRecord& record) {
       ++counts_.other_lines;
       break;
     case LineKind::kMalformed:
-      count_malformed(result.why);
+      counts_.add_malformed(result.why);
       break;
   }
   return false;

@@ -48,10 +48,12 @@ class CandumpReader final : public LogReader {
 
   [[nodiscard]] const LogCounts& counts() const override { return counts_; }
   [[nodiscard]] const InterfaceTable& interfaces() const override { return interfaces_; }
-  [[nodiscard]] const std::optional<Error>& error() const override { return error_; }
-  [[nodiscard]] std::uint64_t bytes_read() const override { return bytes_read_; }
-  [[nodiscard]] std::uint64_t bytes_total() const override { return bytes_total_; }
-  void before_wait(std::function<void()> callback) override;
+  [[nodiscard]] const std::optional<Error>& error() const override { return blocks_.error(); }
+  [[nodiscard]] std::uint64_t bytes_read() const override { return blocks_.bytes_read(); }
+  [[nodiscard]] std::uint64_t bytes_total() const override { return blocks_.bytes_total(); }
+  void before_wait(std::function<void()> callback) override {
+    blocks_.before_wait(std::move(callback));
+  }
 
   [[nodiscard]] const XlFrame* xl_frame() const override { return xl_.get(); }
   /// The frame of the record read last, where that is_xl.
@@ -72,9 +74,8 @@ class CandumpReader final : public LogReader {
   const KnownInterface& known_interface(std::uint64_t word) const;
   void remember_interface(can::BusIndex bus);
   bool refill();
-  void count_malformed(const char* why);
 
-  std::unique_ptr<LogSource> source_;
+  LineBlocks blocks_;
   const char* at_ = nullptr;
   const char* end_ = nullptr;
   /// "(SSSSSSSSSS." of the newest line of the usual form, and that second.
@@ -86,9 +87,6 @@ class CandumpReader final : public LogReader {
   InterfaceTable interfaces_;
   std::unique_ptr<XlFrame> xl_;
   LogCounts counts_;
-  std::uint64_t bytes_read_ = 0;
-  std::uint64_t bytes_total_ = 0;
-  std::optional<Error> error_;
 };
 
 /// Longest text of a line that format_line writes, newline included.

@@ -5,39 +5,12 @@
 namespace vgyro::canlog {
 
 LineReader::LineReader(std::unique_ptr<ByteSource> bytes)
-    : source_(std::make_unique<LogSource>(std::move(bytes))),
-      bytes_total_(source_->bytes_total()) {}
-
-void LineReader::before_wait(std::function<void()> callback) {
-  if (source_ != nullptr) source_->before_wait(std::move(callback));
-}
-
-bool LineReader::refill() {
-  while (block_.empty()) {
-    if (source_ == nullptr) return false;
-    const auto block = source_->next();
-    bytes_read_ = source_->bytes_read();
-    if (!block) {
-      error_ = block.error();
-      source_.reset();
-      return false;
-    }
-    if (block->overlong) {
-      ++counts_.lines;
-      counts_.add_malformed("the line is longer than any frame");
-    }
-    block_ = block->text;
-    if (block->cut_off) ++counts_.cut_off_lines;
-    if (block->end && block_.empty()) {
-      source_.reset();
-      return false;
-    }
-  }
-  return true;
-}
+    : blocks_(std::make_unique<LogSource>(std::move(bytes))) {}
 
 bool LineReader::next(LogRecord& record) {
-  while (refill()) {
+  while (true) {
+    if (block_.empty()) block_ = blocks_.next(counts_);
+    if (block_.empty()) return false;
     ++counts_.lines;
     const std::size_t end = block_.find('\n');
     const std::string_view line = clean_line(block_.substr(0, end), counts_.skipped_bytes);
@@ -51,7 +24,6 @@ bool LineReader::next(LogRecord& record) {
     if (result.verdict == Verdict::kMalformed) counts_.add_malformed(result.why);
     if (result.verdict == Verdict::kOther) ++counts_.other_lines;
   }
-  return false;
 }
 
 bool LineReader::set_bus(std::string_view name, LogRecord& record) {

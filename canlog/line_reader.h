@@ -30,10 +30,12 @@ class LineReader : public LogReader {
   bool next(LogRecord& record) final;
   [[nodiscard]] const LogCounts& counts() const final { return counts_; }
   [[nodiscard]] const InterfaceTable& interfaces() const final { return interfaces_; }
-  [[nodiscard]] const std::optional<Error>& error() const final { return error_; }
-  [[nodiscard]] std::uint64_t bytes_read() const final { return bytes_read_; }
-  [[nodiscard]] std::uint64_t bytes_total() const final { return bytes_total_; }
-  void before_wait(std::function<void()> callback) final;
+  [[nodiscard]] const std::optional<Error>& error() const final { return blocks_.error(); }
+  [[nodiscard]] std::uint64_t bytes_read() const final { return blocks_.bytes_read(); }
+  [[nodiscard]] std::uint64_t bytes_total() const final { return blocks_.bytes_total(); }
+  void before_wait(std::function<void()> callback) final {
+    blocks_.before_wait(std::move(callback));
+  }
 
  protected:
   explicit LineReader(std::unique_ptr<ByteSource> bytes);
@@ -53,15 +55,10 @@ class LineReader : public LogReader {
   static constexpr const char* kTooManyBuses = "more than 64 different interfaces";
 
  private:
-  bool refill();
-
-  std::unique_ptr<LogSource> source_;
+  LineBlocks blocks_;
   std::string_view block_;
   InterfaceTable interfaces_;
   LogCounts counts_;
-  std::uint64_t bytes_read_ = 0;
-  std::uint64_t bytes_total_ = 0;
-  std::optional<Error> error_;
 };
 
 /// Payload bytes from words, as many as the frame's length says, in the given base. Null, or why it

@@ -46,6 +46,30 @@ Expected<LogBlock> LogSource::next() {
   }
 }
 
+std::string_view LineBlocks::next(LogCounts& counts) {
+  while (source_ != nullptr) {
+    const Expected<LogBlock> block = source_->next();
+    bytes_read_ = source_->bytes_read();
+    if (!block) {
+      error_ = block.error();
+      source_.reset();
+      break;
+    }
+    if (block->overlong) {
+      ++counts.lines;
+      counts.add_malformed("the line is longer than any frame");
+    }
+    if (block->cut_off) ++counts.cut_off_lines;
+    if (!block->text.empty()) return block->text;  // it lives in the source's buffer
+    if (block->end) source_.reset();
+  }
+  return {};
+}
+
+void LineBlocks::before_wait(std::function<void()> callback) {
+  if (source_ != nullptr) source_->before_wait(std::move(callback));
+}
+
 Expected<std::unique_ptr<LogSource>> open_source(const std::string& path) {
   auto bytes = open_bytes(path);
   if (!bytes) return tl::unexpected(bytes.error());

@@ -6,11 +6,13 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 
 #include "base/error.h"
 #include "canlog/byte_source.h"
+#include "canlog/record.h"
 
 namespace vgyro::canlog {
 
@@ -40,6 +42,27 @@ class LogSource {
   std::size_t used_ = 0;    ///< bytes in the buffer
   std::size_t handed_ = 0;  ///< of these, in the block handed out last
   bool skipping_ = false;   ///< inside an overlong line
+};
+
+/// A source until it ends or fails, with what is no whole line counted.
+class LineBlocks {
+ public:
+  explicit LineBlocks(std::unique_ptr<LogSource> source)
+      : source_(std::move(source)), bytes_total_(source_->bytes_total()) {}
+
+  /// The next block that has lines, valid until the next call; empty at the end and after an error.
+  std::string_view next(LogCounts& counts);
+
+  void before_wait(std::function<void()> callback);
+  [[nodiscard]] const std::optional<Error>& error() const { return error_; }
+  [[nodiscard]] std::uint64_t bytes_read() const { return bytes_read_; }
+  [[nodiscard]] std::uint64_t bytes_total() const { return bytes_total_; }
+
+ private:
+  std::unique_ptr<LogSource> source_;  ///< null when nothing follows
+  std::uint64_t bytes_read_ = 0;
+  std::uint64_t bytes_total_ = 0;
+  std::optional<Error> error_;
 };
 
 /// "-" is standard input; what is packed is unpacked.
