@@ -247,6 +247,10 @@ void Reporter::tell_gyro(const std::string& name, const gateway::GyroStatus& gyr
     log_.tell(Severity::kWarning, {.gyro = name, .cause = "missing"},
               "gyro {}: {} frames missing by its counter", name, n);
   }
+  const std::string counter = gateway::counter_text(gyro);
+  if (!counter.empty() && !std::exchange(told.counter, true)) {
+    log_.tell(Severity::kWarning, {.gyro = name, .cause = "counter"}, "gyro {}: {}", name, counter);
+  }
   if (const std::uint64_t n = news(told.unpaired, gyro.unpaired); n > 0) {
     log_.tell(Severity::kInfo, {.gyro = name, .cause = "unpaired"},
               "gyro {}: {} samples found no partner: the other gyro had a gap", name, n);

@@ -67,6 +67,7 @@ class Reporter {
     std::array<Told, gateway::kRejectCount> rejected;
     Told missing, unpaired;
     bool waiting = false;
+    bool counter = false;
   };
   struct BusTold {
     std::array<Told, can::kErrorCauseCount> errors;

@@ -208,6 +208,12 @@ std::string contradiction_advice() {
          "look at sign, unit, message and signal of both (`vgyro check` shows them)";
 }
 
+std::string counter_text(const GyroStatus& gyro) {
+  if (!gyro.counter_turns_at) return {};
+  return fmt::format("its counter always goes from {0} back to 0: counter_max = {0}?",
+                     *gyro.counter_turns_at);
+}
+
 std::string rates_too_far_apart_text() {
   return "one gyro speaks so much more often than the other that no pairs can be made of them; up "
          "to "

@@ -50,6 +50,8 @@ std::string blind_advice();
 /// contradiction.
 std::string contradiction_text(const fusion::PairVerdict& pair, const GyroNames& names);
 std::string contradiction_advice();
+/// "its counter always goes from 14 back to 0: counter_max = 14?"; empty where it does not.
+std::string counter_text(const GyroStatus& gyro);
 std::string rates_too_far_apart_text();
 /// Of the estimate: a fault of our own.
 std::string restarts_text(std::uint64_t restarts);

@@ -33,10 +33,19 @@ bool E2eCheck::is_new_round(std::uint32_t now, Page page) const {
   return page_ == Page::kOther && own_counter_ != now;
 }
 
+// A sender that counts by two, or loses frames there, comes to its last value by a jump.
+void E2eCheck::note_early_turn() {
+  if (jumped_to_ == counter_) return;
+  if (counter_ != early_turn_) early_turns_ = 0;
+  early_turn_ = counter_;
+  ++early_turns_;
+}
+
 std::optional<Reject> E2eCheck::follow(std::uint32_t now, std::uint32_t& missing) {
   const std::uint32_t most = plan_->counter->max_delta;
   const std::uint32_t moved = step(counter_, now);
   if (known_ && counts_missing_ && moved > 0) {
+    if (now == 0 && moved > 1) note_early_turn();
     if (most == 0 || moved <= most) {
       missing = moved - 1;
     } else {
@@ -47,6 +56,7 @@ std::optional<Reject> E2eCheck::follow(std::uint32_t now, std::uint32_t& missing
       if (since == 0 || since > most) return Reject::kWrongSequence;
     }
   }
+  if (moved != 1) jumped_to_ = now;
   counter_ = now;
   known_ = true;
   counts_missing_ = true;

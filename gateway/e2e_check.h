@@ -52,6 +52,12 @@ class E2eCheck {
   /// As the newest frame that was accepted carried it.
   [[nodiscard]] std::uint32_t counter() const { return counter_; }
 
+  /// The value from which the sender's counter always goes back to 0, where the configuration says
+  /// that it goes on: what `counter_max` should be.
+  [[nodiscard]] std::optional<std::uint32_t> early_turn() const {
+    return early_turns_ < kTurnsToTell ? std::nullopt : std::optional(early_turn_);
+  }
+
  private:
   [[nodiscard]] [[gnu::noinline]] std::optional<Reject> verify_check_value(
       const can::Frame& frame) const;
@@ -65,6 +71,7 @@ class E2eCheck {
       return false;
     const std::uint32_t next = counter_ + 1 == counter.modulus ? 0 : counter_ + 1;
     if (next == counter_ || bits(payload) != next) return false;
+    if (next == 0) early_turns_ = 0;  // it does reach its end
     counter_ = next;
     own_counter_ = next;
     return true;
@@ -79,10 +86,13 @@ class E2eCheck {
   [[nodiscard]] bool is_beyond(std::span<const std::uint8_t> payload) const;
   [[nodiscard]] std::uint32_t read(std::span<const std::uint8_t> payload) const;
   [[nodiscard]] std::uint32_t step(std::uint32_t from, std::uint32_t to) const;
+  void note_early_turn();
   std::optional<Reject> follow(std::uint32_t now, std::uint32_t& missing);
   [[nodiscard]] bool is_new_round(std::uint32_t now, Page page) const;
 
   static const E2ePlan kNothing;
+  // Frames lost just there, so many times without one full turn between, are no chance.
+  static constexpr std::uint32_t kTurnsToTell = 20;
 
   const E2ePlan* plan_;
   std::uint32_t counter_ = 0;  ///< of the newest frame of any page
@@ -91,6 +101,9 @@ class E2eCheck {
   std::optional<std::uint32_t> own_counter_;      ///< of the newest frame of the own page
   bool counts_missing_ = false;                   ///< the counter has not been interrupted since
   std::optional<std::uint32_t> out_of_sequence_;  ///< of the frame before, refused
+  std::optional<std::uint32_t> jumped_to_;        ///< the newest value that was not one more
+  std::uint32_t early_turn_ = 0;   ///< the value from which the counter went to 0 …
+  std::uint32_t early_turns_ = 0;  ///< … so many times one after the other
 };
 
 }  // namespace vgyro::gateway

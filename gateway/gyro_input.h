@@ -54,6 +54,7 @@ class GyroInput {
 
   /// As the newest frame that was used carried it.
   [[nodiscard]] std::uint32_t counter() const { return e2e_.counter(); }
+  [[nodiscard]] std::optional<std::uint32_t> early_turn() const { return e2e_.early_turn(); }
 
   /// Of the newest frame that was used or told nothing else; NaN when there is none.
   [[nodiscard]] double temperature_c() const { return temperature_.value(); }

@@ -446,6 +446,7 @@ const Status& Pipeline::Impl::refreshed_status() {
     own.bias_dps = drift.bias_dps[gyro];
     own.temperature_c = inputs[gyro].input().temperature_c();
     own.supply_v = inputs[gyro].input().supply_v();
+    own.counter_turns_at = inputs[gyro].input().early_turn();
     own.waits_for = surroundings.missing(gyro, known_effects.needs(gyro));
     own.unpaired = aligner.counts().unpaired[gyro];
   }

@@ -102,6 +102,8 @@ struct GyroStatus {
   std::uint64_t frames = 0;   ///< received with the gyro's identifier
   std::uint64_t samples = 0;  ///< of these, handed to the alignment
   std::uint64_t missing = 0;  ///< frames lost on the way, by the alive counter
+  /// From here its counter always goes back to 0, earlier than the configuration says.
+  std::optional<std::uint32_t> counter_turns_at;
   std::array<std::uint64_t, kRejectCount> rejected{};
   std::uint64_t unpaired = 0;  ///< samples that found no partner: the other gyro had a gap
   bool heard = false;          ///< in use: a sample that may be used arrived within the time-out

@@ -89,6 +89,7 @@ Json gyro_json(const ReplaySummary& summary, const gateway::Plan& plan, std::siz
             {"slope_dps_s", number(summary.slope_dps_s[index])},
             {"slope_sigma_dps_s", number(summary.slope_sigma_dps_s[index])},
             {"temperature_c", number(gyro.temperature_c)}};
+  if (gyro.counter_turns_at) json["counter_turns_at"] = *gyro.counter_turns_at;
   if (plan.gyros[index].supply_voltage) json["supply_v"] = number(gyro.supply_v);
   return json;
 }
@@ -349,6 +350,9 @@ void put_gyro(fmt::memory_buffer& text, const ReplaySummary& summary, const gate
       if (gyro.rejected[k] == 0) continue;
       fmt::format_to(to, " {} {}", gyro.rejected[k], to_string(static_cast<gateway::Reject>(k)));
     }
+  }
+  if (const std::string counter = gateway::counter_text(gyro); !counter.empty()) {
+    fmt::format_to(to, "\n  {}", counter);
   }
   put_faults(text, gyro, summary.first_s);
   fmt::format_to(to, "\n");

@@ -332,6 +332,7 @@ class Summary(Replay):
         lines = [l for i, l in enumerate(self.lines) if not (" 101#" in l and 500 <= i < 508)]
         found = self.summary(lines=lines)
         self.assertEqual(found["gyros"][0]["missing_by_counter"], 4)
+        self.assertNotIn("counter_turns_at", found["gyros"][0])
         lines = [l for l in bench.two_gyros(8) if not 1700000003.0 <= float(l[1:18]) < 1700000005.0]
         found = self.summary(lines=lines)
         self.assertEqual(found["gaps"]["count"], 1)

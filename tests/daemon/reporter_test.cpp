@@ -213,6 +213,15 @@ TEST_F(ReporterTest, TellsOnceThatTheGyrosRatesAreTooFarApart) {
   EXPECT_EQ(second(), "");
 }
 
+TEST_F(ReporterTest, TellsOnceWhatCounterMaxShouldBe) {
+  status.gyros[1].counter_turns_at = 14;
+  const std::string said = second() + second();
+  EXPECT_EQ(
+      count_of("gyro right: its counter always goes from 14 back to 0: counter_max = 14?", said),
+      1U)
+      << said;
+}
+
 TEST_F(ReporterTest, SumsUpTheSteadyStretchesAtTheEnd) {
   std::string said = said_during([&] { reporter.summarize(status, traffic); });
   EXPECT_EQ(count_of("steady stretch", said), 0U) << said;

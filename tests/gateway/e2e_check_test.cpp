@@ -239,5 +239,41 @@ TEST(E2eCheck, JudgesEveryOrderOfFramesByTheSameRules) {
   }
 }
 
+// --- what counter_max should be ------------------------------------------------------------------
+
+TEST(E2eCheck, SaysWhereACounterTurnsEarly) {
+  for (const std::uint32_t max_delta : {0U, 1U}) {
+    SCOPED_TRACE(max_delta);
+    const E2ePlan plan = plan_of(max_delta, false);
+    E2eCheck check(plan);
+    for (unsigned i = 0; i < 12 * 15; ++i)
+      (void)judge(check, i % 12);
+    EXPECT_FALSE(check.early_turn()) << "14 turns may be chance";
+    for (unsigned i = 0; i < 12 * 10; ++i)
+      (void)judge(check, i % 12);
+    EXPECT_EQ(check.early_turn(), 11U);
+    for (unsigned i = 0; i < 16; ++i)
+      (void)judge(check, i % 15);
+    EXPECT_FALSE(check.early_turn()) << "it does go on";
+  }
+}
+
+TEST(E2eCheck, TakesNoLostFramesAndNoOtherPaceForAnEarlyTurn) {
+  constexpr unsigned kSeed = 77;
+  std::mt19937 random(kSeed);
+  for (const unsigned pace : {1U, 2U, 3U, 4U, 7U}) {
+    for (const double lost : {0.0, 0.05, 0.3, 0.6}) {
+      SCOPED_TRACE(::testing::Message() << pace << " a frame, " << lost << " lost, seed " << kSeed);
+      const E2ePlan plan = plan_of(0, false);
+      E2eCheck check(plan);
+      for (unsigned i = 0; i < 20'000; ++i) {
+        if (std::uniform_real_distribution<double>()(random) < lost) continue;
+        (void)judge(check, pace * i % 15);
+        ASSERT_FALSE(check.early_turn());
+      }
+    }
+  }
+}
+
 }  // namespace
 }  // namespace vgyro::gateway
