@@ -257,8 +257,8 @@ void tell_counts(const std::vector<std::string>& logs, const canlog::LogReader& 
     not_understood += counts.malformed_lines + counts.cut_off_lines;
     passed_over += passed_over_text(counts);
   }
-  tell("{} of {} frames decoded, {} {}s not understood{}\n", decoded, reader.counts().frames,
-       not_understood, parts.front()->item, passed_over);
+  tell("{} of {} frames decoded, {} not understood{}\n", decoded, reader.counts().frames,
+       count_of(not_understood, parts.front()->item), passed_over);
 }
 
 }  // namespace

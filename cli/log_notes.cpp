@@ -31,7 +31,7 @@ std::string log_text(const std::string& path, const canlog::LogCounts& counts, b
     fmt::format_to(to, ", {} CAN XL frames{}", counts.xl_frames, xl_used ? "" : " passed over");
   }
   if (counts.malformed_lines > 0) {
-    fmt::format_to(to, ", {} {}s not understood", counts.malformed_lines, counts.item);
+    fmt::format_to(to, ", {} not understood", count_of(counts.malformed_lines, counts.item));
   }
   text += passed_over_text(counts);
   if (counts.cut_off_lines > 0) {

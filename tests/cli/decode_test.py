@@ -152,7 +152,7 @@ class Decode(bench.Bench):
         done = self.good("decode", "--dbc", "bench.dbc", "in.log")
         self.assertEqual(len(done.stdout.splitlines()), 2)
         self.assertIn("in.log:2: ", done.stderr.decode())
-        self.assertIn("2 of 2 frames decoded, 1 lines not understood", done.stderr.decode())
+        self.assertIn("2 of 2 frames decoded, 1 line not understood", done.stderr.decode())
 
     def test_bad_input_is_told(self):
         # Each with what is wrong; exit code 1.
