@@ -55,7 +55,8 @@ void require(bool holds, const char* what) {
 /// The same records, some at a time.
 void require_same_in_batches(const ReadLog& log, const std::string& text,
                              const std::vector<std::uint8_t>& sizes) {
-  vgyro::canlog::CandumpReader reader(std::make_unique<PiecesSource>(text, sizes));
+  vgyro::canlog::CandumpReader reader(
+      std::make_unique<vgyro::canlog::LogSource>(std::make_unique<PiecesSource>(text, sizes)));
   std::vector<vgyro::canlog::LogRecord> room(1U + sizes.front() % 8U);
   std::size_t read = 0;
   while (const std::size_t count = reader.next_batch(room)) {
