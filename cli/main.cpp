@@ -73,11 +73,12 @@ void read_ids(const std::vector<std::string>& words, std::vector<std::uint32_t>&
     std::uint32_t id = 0;
     const char* end = digits.data() + digits.size();
     const auto [at, code] = std::from_chars(digits.data(), end, id, 16);
-    if (code != std::errc() || at != end || id > vgyro::can::kExtendedIdMax)
+    if (code != std::errc() || at != end || id > vgyro::can::kExtendedIdMax) {
       throw CLI::ValidationError("--id",
                                  fmt::format("\"{}\" is no identifier in hexadecimal digits, "
                                              "such as 1A4 or 18F02A0B",
                                              vgyro::printable(word)));
+    }
     ids.push_back(id);
   }
 }

@@ -98,13 +98,13 @@ Expected<void> GatewayLoop::open_buses(Setup& setup) {
 Expected<void> GatewayLoop::check_output(const Setup& setup) {
   const gateway::OutputPlan& output = setup.plan.output;
   if (output.fd && output.vgyro_frames) {
-    const Expected<void> fits =
+    Expected<void> fits =
         check_fd(setup.buses[output.bus], "but the config says `[output] fd = true`");
     if (!fits) return fits;
   }
   for (const gateway::OutputLayout& layout : output.layouts) {
     if (!layout.fd) continue;
-    const Expected<void> fits =
+    Expected<void> fits =
         check_fd(setup.buses[layout.bus], "which " + layout.message + " of [[output.layout]] is");
     if (!fits) return fits;
   }
