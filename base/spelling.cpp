@@ -1,7 +1,6 @@
 #include "base/spelling.h"
 
 #include <algorithm>
-#include <cctype>
 
 #include <fmt/core.h>
 #include <fmt/ranges.h>
@@ -11,13 +10,20 @@ namespace vgyro {
 namespace {
 
 char lower(char c) {
-  return static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
 }
 
 // A list longer than this helps nobody on a terminal.
 constexpr std::size_t kListedMax = 12;
 
 }  // namespace
+
+std::string lower(std::string_view text) {
+  std::string result(text);
+  for (char& c : result)
+    c = lower(c);
+  return result;
+}
 
 std::size_t edit_distance(std::string_view a, std::string_view b) {
   std::vector<std::size_t> before(b.size() + 1);

@@ -1,6 +1,6 @@
 #pragma once
 
-// The valid name that a mistyped one most likely meant.
+// Letter case, and the valid name that a mistyped one most likely meant.
 
 #include <optional>
 #include <string>
@@ -8,6 +8,9 @@
 #include <vector>
 
 namespace vgyro {
+
+/// ASCII letters alone are changed.
+std::string lower(std::string_view text);
 
 /// Edits (insert, delete, replace, swap of neighbours) that turn `a` into `b`, letter case ignored.
 std::size_t edit_distance(std::string_view a, std::string_view b);

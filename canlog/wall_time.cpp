@@ -5,6 +5,7 @@
 
 #include <fmt/core.h>
 
+#include "base/spelling.h"
 #include "canlog/text_line.h"
 
 namespace vgyro::canlog {
@@ -25,13 +26,6 @@ struct MonthName {
 constexpr std::array kGermanMonths{MonthName{"m\xC3\xA4r", 3}, MonthName{"m\xE4r", 3},
                                    MonthName{"mrz", 3},        MonthName{"mai", 5},
                                    MonthName{"okt", 10},       MonthName{"dez", 12}};
-
-std::string lower(std::string_view text) {
-  std::string out(text);
-  for (char& c : out)
-    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
-  return out;
-}
 
 // Zero where it is none.
 unsigned month_of(const std::string& word) {

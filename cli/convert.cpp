@@ -10,18 +10,16 @@
 #include "cli/commands.h"
 #include "cli/exit_code.h"
 #include "cli/log_notes.h"
+#include "cli/log_progress.h"
 #include "cli/output/errors.h"
 #include "cli/output/output_file.h"
 #include "cli/output/overwrite.h"
-#include "cli/output/progress.h"
 #include "cli/output/terminal.h"
 #include "cli/output/unfinished.h"
 
 namespace vgyro::cli {
 
 namespace {
-
-constexpr std::uint64_t kFramesPerProgress = 1U << 16U;
 
 class FileSink final : public canlog::ByteSink {
  public:
@@ -64,14 +62,11 @@ Expected<Target> target_of(const std::string& path) {
 }
 
 void copy_records(canlog::LogReader& reader, canlog::LogWriter& writer, const std::string& name) {
-  Progress progress("convert " + name);
+  LogProgress progress("convert " + name, reader);
   canlog::LogRecord record;
-  std::uint64_t until_progress = kFramesPerProgress;
   while (reader.next(record)) {
     writer.put(record, reader.interfaces().name(record.bus), reader.xl_frame());
-    if (--until_progress > 0) continue;
-    until_progress = kFramesPerProgress;
-    progress.update(reader.bytes_read(), reader.bytes_total(), reader.counts().frames);
+    progress.add();
   }
   writer.finish();
 }

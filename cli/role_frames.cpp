@@ -6,30 +6,23 @@
 
 #include "canlog/merged_reader.h"
 #include "cli/log_notes.h"
-#include "cli/output/progress.h"
+#include "cli/log_progress.h"
 
 namespace vgyro::cli {
-
-namespace {
-constexpr std::uint64_t kFramesPerProgress = 1U << 16U;
-}
 
 Expected<void> RoleFrames::read(const std::vector<std::string>& logs, const std::string& doing,
                                 const Take& take) {
   const auto opened = canlog::open_logs(logs);
   if (!opened) return tl::unexpected(opened.error());
   canlog::LogReader& reader = **opened;
-  Progress progress(doing + " " + name_of(logs));
+  LogProgress progress(doing + " " + name_of(logs), reader);
   canlog::LogRecord record;
-  std::uint64_t until_progress = kFramesPerProgress;
   while (reader.next(record)) {
     if (record.is_xl) continue;
     if (const std::uint8_t found = roles(record, reader.interfaces()); found != 0) {
       take(found, record);
     }
-    if (--until_progress > 0) continue;
-    until_progress = kFramesPerProgress;
-    progress.update(reader.bytes_read(), reader.bytes_total(), reader.counts().frames);
+    progress.add();
   }
   if (reader.error()) return tl::unexpected(*reader.error());
   interfaces_ = reader.interfaces().names();

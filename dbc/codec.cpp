@@ -134,4 +134,10 @@ double SignalCodec::representable_max() const {
   return (factor_ < 0.0 ? number_min() : number_max()) * factor_ + offset_;
 }
 
+bool has_reachable_range(const Signal& signal, const SignalCodec& codec) {
+  const double step = std::abs(signal.factor);
+  return signal.minimum < signal.maximum && signal.minimum >= codec.representable_min() - step &&
+         signal.maximum <= codec.representable_max() + step;
+}
+
 }  // namespace vgyro::dbc

@@ -91,6 +91,10 @@ class SignalCodec {
   ValueType type_ = ValueType::kUnsigned;
 };
 
+/// Does the signal have a range, and one that its own scale can reach, to a step? Files in the wild
+/// carry others. `codec`: of the same signal.
+bool has_reachable_range(const Signal& signal, const SignalCodec& codec);
+
 inline std::uint64_t SignalCodec::load_window(const std::uint8_t* payload) const {
   std::uint64_t word = 0;
   std::memcpy(&word, payload + window_byte_, sizeof word);

@@ -24,16 +24,9 @@ std::uint64_t bits_of(const dbc::Signal& signal, std::int64_t raw) {
   return static_cast<std::uint64_t>(raw) & (~std::uint64_t{0} >> (64U - signal.length_bits));
 }
 
-RawRange type_range(const dbc::Signal& signal) {
-  if (signal.type == dbc::ValueType::kSigned) {
-    const std::int64_t half = std::int64_t{1} << (signal.length_bits - 1U);
-    return {-half, half - 1};
-  }
-  return {0, (std::int64_t{1} << signal.length_bits) - 1};
-}
-
-double physical(const dbc::Signal& signal, std::int64_t raw) {
-  return static_cast<double>(raw) * signal.factor + signal.offset;
+RawRange type_range(const dbc::SignalCodec& codec) {
+  const std::int64_t low = codec.raw_min();
+  return {low, low + static_cast<std::int64_t>(codec.raw_mask())};
 }
 
 // The raw values whose physical ones lie inside what is accepted of the signal.
@@ -68,9 +61,9 @@ std::string hex(const dbc::Signal& signal, std::uint64_t raw) {
 }
 
 // The bit pattern that the configuration names as a code, which is then no value of the range.
-Expected<std::uint64_t> code_in(const dbc::Signal& signal, std::int64_t raw,
-                                const std::string& unit, RawRange& range) {
-  const RawRange all = type_range(signal);
+Expected<std::uint64_t> code_in(const dbc::Signal& signal, const Quantity& quantity,
+                                std::int64_t raw, RawRange& range) {
+  const RawRange all = type_range(quantity.codec);
   // People write the bit pattern of a negative number, too.
   const std::int64_t patterns = all.high - all.low + 1;
   const std::int64_t code = raw > all.high && raw < patterns ? raw - patterns : raw;
@@ -79,7 +72,7 @@ Expected<std::uint64_t> code_in(const dbc::Signal& signal, std::int64_t raw,
   if (code > range.low && code < range.high) {
     return fail({},
                 fmt::format("raw value {:#x} of {} is {:g} {}: it would be read as a measurement",
-                            raw, signal.name, physical(signal, code), unit),
+                            raw, signal.name, quantity.codec.value_of(code), quantity.unit),
                 "a raw value at an end of the signal's range, or outside of it");
   }
   if (code == range.high) --range.high;
@@ -131,9 +124,10 @@ Expected<OutputField> output_field(const dbc::Signal& signal, const Quantity& qu
                             signal.length_bits, signal.factor),
                 fmt::format("at most {} bits, and a scale that is not 0", kBitsMost));
   }
-  RawRange range = without_codes(signal, rules, inside(signal, quantity, type_range(signal)));
+  RawRange range =
+      without_codes(signal, rules, inside(signal, quantity, type_range(quantity.codec)));
   if (none_raw) {
-    const auto code = code_in(signal, *none_raw, quantity.unit, range);
+    const auto code = code_in(signal, quantity, *none_raw, range);
     if (!code) return tl::unexpected(code.error());
     field.none_raw = field.beyond_raw = *code;
     field.has_code = true;
@@ -147,8 +141,8 @@ Expected<OutputField> output_field(const dbc::Signal& signal, const Quantity& qu
     field.none_raw = field.beyond_raw = raw_of_zero(field);
   }
   if (range.low > range.high) return fail({}, signal.name + " can say no value");
-  field.minimum = physical(signal, range.low);
-  field.maximum = physical(signal, range.high);
+  field.minimum = quantity.codec.value_of(range.low);
+  field.maximum = quantity.codec.value_of(range.high);
   if (field.minimum > field.maximum) std::swap(field.minimum, field.maximum);
   return field;
 }

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <cmath>
 #include <iterator>
 #include <optional>
@@ -12,6 +11,7 @@
 #include <fmt/core.h>
 
 #include "base/printable.h"
+#include "base/spelling.h"
 #include "dbc/e2e.h"
 #include "dbc/layout.h"
 #include "gateway/config.h"
@@ -474,9 +474,7 @@ std::optional<RawValue> LayoutReader::filled(const dbc::Signal& signal, const to
 
 // Its readers take no frame whose counter stands still or whose check value is wrong.
 void LayoutReader::warn_of_resting(const dbc::Signal& signal, const RawValue& value) {
-  std::string name = signal.name;
-  std::transform(name.begin(), name.end(), name.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  const std::string name = lower(signal.name);
   const auto named = [&](const auto& parts) {
     return std::any_of(parts.begin(), parts.end(),
                        [&](std::string_view part) { return name.find(part) != name.npos; });

@@ -249,9 +249,7 @@ void SignalResolver::set_limits(Quantity& quantity, const dbc::Signal& signal,
   if (signal.minimum == signal.maximum) return;
   const double lowest = quantity.codec.representable_min();
   const double highest = quantity.codec.representable_max();
-  const double slack = std::abs(signal.factor);
-  const bool plausible = signal.minimum < signal.maximum && signal.minimum >= lowest - slack &&
-                         signal.maximum <= highest + slack;
+  const bool plausible = dbc::has_reachable_range(signal, quantity.codec);
   // A gyro turns both ways: [0|100] is what its author thought of, no limit of the sensor.
   const bool one_direction = dimension == Dimension::kRate && lowest < 0.0 && highest > 0.0 &&
                              (signal.minimum >= 0.0 || signal.maximum <= 0.0);

@@ -5,6 +5,7 @@
 
 #include <fmt/core.h>
 
+#include "base/spelling.h"
 #include "cli/init/words.h"
 #include "dbc/codec.h"
 #include "dbc/codes.h"
@@ -133,9 +134,7 @@ analysis::StampedSignal series_of(const Found& found, const dbc::Signal& signal,
     if (auto made = dbc::SignalCodec::make(*sign, found.message->size_bytes, ""))
       sign_codec = *made;
   }
-  const bool limited = signal.minimum < signal.maximum &&
-                       signal.minimum >= codec->representable_min() - std::abs(signal.factor) &&
-                       signal.maximum <= codec->representable_max() + std::abs(signal.factor);
+  const bool limited = dbc::has_reachable_range(signal, *codec);
   if (signal.is_integer()) series.step = std::abs(signal.factor * scale);
   const dbc::NoValues no_values(signal, found.message->codes);
   double newest_s = -1e300;

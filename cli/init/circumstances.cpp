@@ -7,7 +7,9 @@
 #include <fmt/core.h>
 
 #include "base/printable.h"
+#include "base/spelling.h"
 #include "cli/init/words.h"
+#include "gateway/surroundings.h"
 #include "gateway/units.h"
 
 namespace vgyro::cli {
@@ -20,8 +22,8 @@ constexpr double kGapMost_s = 0.5;          // nothing is interpolated across mo
 constexpr double kSpeedRateLeast_hz = 2.0;  // the gateway forgets a speed after 1 s
 constexpr double kAccRateLeast_hz = 5.0;
 constexpr double kSpeedMost_m_s = 150.0;
-constexpr double kSameSpeed = 0.03;     // the wheels of a car in bends
-constexpr double kStanding_m_s = 0.05;  // what the gateway takes for standing
+constexpr double kSameSpeed = 0.03;  // the wheels of a car in bends
+constexpr double kStanding_m_s = gateway::Surroundings::kStandingBelow_m_s;
 
 double median(std::vector<double> values) {
   if (values.empty()) return 0.0;

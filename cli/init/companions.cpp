@@ -8,6 +8,7 @@
 
 #include <fmt/core.h>
 
+#include "base/spelling.h"
 #include "cli/init/candidates.h"
 #include "cli/init/words.h"
 #include "dbc/codec.h"

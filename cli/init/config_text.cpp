@@ -8,7 +8,7 @@
 #include <fmt/core.h>
 
 #include "base/printable.h"
-#include "gateway/units.h"
+#include "gateway/surroundings.h"
 
 namespace vgyro::cli {
 
@@ -141,7 +141,7 @@ std::string followers_text(const Proposal& proposal) {
 std::string speed_text(const Proposal& proposal) {
   if (!proposal.circumstances.speed) return "";
   const SpeedFound& speed = *proposal.circumstances.speed;
-  constexpr double kStanding_m_s = 0.05;  // as the gateway has it
+  constexpr double kStanding_m_s = gateway::Surroundings::kStandingBelow_m_s;
   std::string why = "CHECK: is it 0 when the vehicle stands? This log has no rest";
   if (speed.resting_m_s && *speed.resting_m_s < kStanding_m_s) {
     why = "0 while the gyros rest in this log";

@@ -4,7 +4,7 @@
 
 #include "canlog/merged_reader.h"
 #include "cli/log_notes.h"
-#include "cli/output/progress.h"
+#include "cli/log_progress.h"
 
 namespace vgyro::cli {
 
@@ -14,17 +14,15 @@ double Stream::frames_per_s() const {
 }
 
 Expected<void> Traffic::read(const std::vector<std::string>& logs) {
-  constexpr std::uint64_t kFramesPerProgress = 1U << 15U;
   const auto opened = canlog::open_logs(logs);
   if (!opened) return tl::unexpected(opened.error());
   canlog::LogReader& reader = **opened;
-  Progress progress("reading " + name_of(logs));
+  LogProgress progress("reading " + name_of(logs), reader);
   canlog::LogRecord record;
   while (reader.next(record)) {
     if (record.is_xl || !record.frame.is_data()) continue;
     add(reader.interfaces().name(record.bus), record);
-    if (frames_ % kFramesPerProgress == 0)
-      progress.update(reader.bytes_read(), reader.bytes_total(), frames_);
+    progress.add();
   }
   if (reader.error()) return tl::unexpected(*reader.error());
   if (frames_ == 0) return fail(name_of(logs), kNoFrame, kLogsRemedy);

@@ -8,9 +8,6 @@
 
 namespace vgyro::cli {
 
-/// ASCII letters alone are changed.
-std::string lower(std::string_view text);
-
 /// Does one of the words stand in the text?
 bool has_any(std::string_view text, std::initializer_list<std::string_view> words);
 

@@ -15,13 +15,13 @@
 #include "cli/commands.h"
 #include "cli/exit_code.h"
 #include "cli/log_notes.h"
+#include "cli/log_progress.h"
 #include "cli/other_senders.h"
 #include "cli/output/errors.h"
 #include "cli/output/gnuplot.h"
 #include "cli/output/json_text.h"
 #include "cli/output/output_file.h"
 #include "cli/output/overwrite.h"
-#include "cli/output/progress.h"
 #include "cli/output/terminal.h"
 #include "cli/output/unfinished.h"
 #include "cli/replay/plot.h"
@@ -36,7 +36,6 @@ namespace vgyro::cli {
 
 namespace {
 
-constexpr std::uint64_t kFramesPerProgress = 1U << 16U;
 // As many as stay in the first cache between the parser and the pipeline.
 constexpr std::size_t kRecordsAtOnce = 64;
 constexpr can::BusIndex kForeignBus = 0xFF;
@@ -205,20 +204,14 @@ class Replay {
 
  private:
   void run_records(const std::string& name, canlog::LogReader& reader) {
-    Progress progress("replay " + name);
+    LogProgress progress("replay " + name, reader);
     std::array<canlog::LogRecord, kRecordsAtOnce> room;
     const canlog::InterfaceTable& interfaces = reader.interfaces();
-    std::uint64_t until_progress = kFramesPerProgress;
     while (const std::size_t count = reader.next_batch(room)) {
       for (const canlog::LogRecord& record : std::span(room).first(count)) {
         if (!record.is_xl) take(record, interfaces);
       }
-      if (until_progress > count) {
-        until_progress -= count;
-        continue;
-      }
-      until_progress = kFramesPerProgress;
-      progress.update(reader.bytes_read(), reader.bytes_total(), reader.counts().frames);
+      progress.add(count);
     }
     summary_.last_s = to_seconds(last_.time_since_epoch());
   }
