@@ -15,6 +15,7 @@
 #include "gap/kinds.h"
 #include "gap/noise.h"
 #include "gap/signals.h"
+#include "gap/unseen_motion.h"
 #include "model/effect.h"
 
 namespace vgyro::gap {
@@ -88,6 +89,8 @@ class Observations {
   /// d contribution / d parameter beside `others`.
   [[nodiscard]] Eigen::VectorXd derivative(const Effects& others, const model::Effect& effect,
                                            const Free& free) const;
+  /// Learns what motion between the samples adds to the noise, from what `effects` leave.
+  void learn_unseen_motion(const FastMotion& motion, const Effects& effects);
   /// With these seconds for the fit. `spans`: all such.
   [[nodiscard]] Observations with_for_fit(const std::vector<Span>& spans) const;
 
