@@ -67,27 +67,6 @@ Effects of_gyro(const Effects& effects, std::size_t gyro) {
   return mine;
 }
 
-// White noise of a smooth quantity, from its fourth differences in the quieter half of the seconds.
-double noise_variance(const ScalarSeries& series) {
-  std::vector<double> seconds;
-  double sum = 0.0;
-  double count = 0.0;
-  double begin_s = series.t_s.empty() ? 0.0 : series.t_s.front();
-  for (std::size_t i = 4; i < series.value.size(); ++i) {
-    const double* v = &series.value[i - 4];
-    const double fourth = v[0] - 4.0 * v[1] + 6.0 * v[2] - 4.0 * v[3] + v[4];
-    sum += fourth * fourth / 70.0;
-    count += 1.0;
-    if (series.t_s[i] - begin_s < 1.0) continue;
-    seconds.push_back(sum / count);
-    begin_s = series.t_s[i];
-    sum = count = 0.0;
-  }
-  if (seconds.size() < 10) return 0.0;
-  std::sort(seconds.begin(), seconds.end());
-  return seconds[seconds.size() / 4];
-}
-
 std::string span_text(const GyroSeries& gyro) {
   return fmt::format("{} from {:.1f} to {:.1f} s", gyro.name, gyro.t_s.front(), gyro.t_s.back());
 }
@@ -356,7 +335,7 @@ Observations Study::against_reference(std::size_t gyro) const {
                        motion.rate(t_s).value});
   }
   return make_observations(std::move(samples), circumstances(), {gyro == 0, gyro == 1},
-                           {&reference, 2}, noise_variance(recording().reference_dps), for_fit_);
+                           {&reference, 2}, facts_->quiet[2], for_fit_);
 }
 
 // Each gyro at rest, the difference elsewhere.

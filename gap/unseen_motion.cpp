@@ -3,9 +3,14 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <complex>
 #include <map>
+#include <numbers>
+#include <numeric>
+#include <span>
 
 #include <Eigen/QR>
+#include <unsupported/Eigen/FFT>
 
 namespace vgyro::gap {
 
@@ -14,15 +19,18 @@ namespace {
 // Sixth differences: sin¹² of half the angle, which passes a fortieth of the power at a quarter of
 // the sampling rate and a half at two fifths.
 constexpr std::array kDifference{1.0, -6.0, 15.0, -20.0, 15.0, -6.0, 1.0};
-constexpr double kDifferenceNoise = 924.0;  // Σ of their squares
-constexpr double kDifferencePeak = 64.0;    // their gain at half the sampling rate
+constexpr double kDifferencePeak = 64.0;  // their gain at half the sampling rate
 constexpr double kUneven = 0.1;
-// Long enough to tell a power to a seventh at 100 Hz, short enough for a bump of the road.
-constexpr double kCell_s = 0.5;
-// Of all cells this share is quiet for sure, wherever there is any rest; what is above that by less
-// than this share is chance.
+// Short enough for a stretch of bad road.
+constexpr double kCell_s = 1.0;
+// Of all cells this share is quiet for sure, wherever there is any rest.
 constexpr double kQuietShare = 0.15;
-constexpr double kChanceShare = 0.3;
+constexpr double kQuietSigmas = -1.04;  // what that share of a Gaussian lies below
+// A cell is above the noise by so many standard errors, in both streams.
+constexpr double kAboveSigmas = 2.5;
+// Independent values in a cell and its neighbours, over the samples in it: sixth differences depend
+// on each other.
+constexpr double kFreedomShare = 0.8;
 // Streams are alike in pace up to this ratio.
 constexpr double kAlike = 1.5;
 
@@ -61,36 +69,156 @@ double quiet_of(std::vector<double> squares) {
 }
 
 // What is above the quiet cells, as the power that the differences pass whole.
-std::vector<double> above_noise(const std::vector<double>& squares) {
+std::vector<double> above_noise(const std::vector<double>& squares, double interval_s) {
+  const double freedom = std::max(2.0, kFreedomShare * kCell_s / interval_s);
+  const double sigma = std::sqrt(2.0 / freedom);
   std::vector<double> smooth(squares.size());
   for (std::size_t i = 0; i < squares.size(); ++i) {
     const double before = squares[i > 0 ? i - 1 : i];
     const double behind = squares[std::min(i + 1, squares.size() - 1)];
     smooth[i] = (before + 2.0 * squares[i] + behind) / 4.0;
   }
-  const double quiet = quiet_of(smooth);
+  const double noise = quiet_of(smooth) / std::max(0.1, 1.0 + kQuietSigmas * sigma);
   for (double& one : smooth) {
-    one = one > (1.0 + kChanceShare) * quiet ? (one - quiet) / (kDifferencePeak * kDifferencePeak)
-                                             : 0.0;
+    one = one > (1.0 + kAboveSigmas * sigma) * noise
+              ? (one - noise) / (kDifferencePeak * kDifferencePeak)
+              : 0.0;
   }
   return smooth;
 }
 
 }  // namespace
 
-double quiet_variance(const SampledCurve& curve) {
-  return curve.empty() ? 0.0 : quiet_of(fast_squares(curve)) / kDifferenceNoise;
+namespace {
+
+// Stretches of so many samples, half overlapping, have a spectrum each.
+constexpr std::size_t kStretch = 128;
+// Of the quietest of the stretches, the lowest frequencies are noise: both are shares. What is
+// chosen by one half of the frequencies, or of the stretches, is measured in the other half, or
+// the choice would make it smaller. The lowest bins, which drift and motion fill whatever the
+// window, are left out.
+constexpr double kQuieter = 0.25;
+constexpr double kLowest = 0.25;
+constexpr std::size_t kSlowBins = 4;
+// Neighbouring bins depend on each other: the halves are of such groups in turn.
+constexpr std::size_t kGroup = 10;
+
+// Power of a stretch by frequency, that of white noise being its variance.
+std::vector<double> power_of(std::span<const double> values, Eigen::FFT<double>& transform) {
+  std::vector<double> windowed(kStretch);
+  double squares = 0.0;
+  const double origin = values[0];
+  const double slope = (values[kStretch - 1] - origin) / (kStretch - 1.0);
+  for (std::size_t i = 0; i < kStretch; ++i) {
+    const auto at = static_cast<double>(i);
+    const double window = std::pow(std::sin(std::numbers::pi * (at + 0.5) / kStretch), 4);
+    windowed[i] = window * (values[i] - origin - slope * at);
+    squares += window * window;
+  }
+  std::vector<std::complex<double>> spectrum;
+  transform.fwd(spectrum, windowed);
+  std::vector<double> power;
+  for (std::size_t i = kSlowBins; i < kStretch / 2; ++i)
+    power.push_back(std::norm(spectrum[i]) / squares);
+  return power;
 }
+
+using Spectra = std::vector<std::vector<double>>;
+
+// The quietest stretches by the groups of one parity.
+Spectra quietest(Spectra spectra, std::size_t parity) {
+  const auto level = [&](const std::vector<double>& power) {
+    double sum = 0.0;
+    for (std::size_t i = 0; i < power.size(); ++i)
+      sum += (i / kGroup) % 2 == parity ? power[i] : 0.0;
+    return sum;
+  };
+  std::stable_sort(spectra.begin(), spectra.end(),
+                   [&](const auto& a, const auto& b) { return level(a) < level(b); });
+  spectra.resize(2 + static_cast<std::size_t>(kQuieter * static_cast<double>(spectra.size() - 2)));
+  return spectra;
+}
+
+// Mean of the groups of the other parity, over every second stretch.
+std::vector<double> mean_of(const Spectra& spectra, std::size_t parity, std::size_t first) {
+  std::vector<double> mean;
+  for (std::size_t i = 0; i < spectra.front().size(); ++i) {
+    if ((i / kGroup) % 2 == parity) continue;
+    double sum = 0.0;
+    double count = 0.0;
+    for (std::size_t k = first; k < spectra.size(); k += 2, count += 1.0)
+      sum += spectra[k][i];
+    mean.push_back(sum / count);
+  }
+  return mean;
+}
+
+// Mean of `values` where `by` is lowest.
+double lowest(const std::vector<double>& values, const std::vector<double>& by) {
+  std::vector<std::size_t> order(values.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::size_t a, std::size_t b) { return by[a] < by[b]; });
+  order.resize(1 + static_cast<std::size_t>(kLowest * static_cast<double>(order.size() - 1)));
+  double sum = 0.0;
+  for (const std::size_t i : order)
+    sum += values[i] / static_cast<double>(order.size());
+  return sum;
+}
+
+}  // namespace
+
+double quiet_variance(const SampledCurve& curve) {
+  if (curve.times_s().size() < kStretch) return 0.0;
+  Eigen::FFT<double> transform;
+  Spectra spectra;
+  const double span_s = curve.interval_s() * (kStretch - 1);
+  for (std::size_t i = 0; i + kStretch <= curve.times_s().size(); i += kStretch / 2) {
+    const double lasts_s = curve.times_s()[i + kStretch - 1] - curve.times_s()[i];
+    if (std::abs(lasts_s - span_s) < curve.interval_s())
+      spectra.push_back(power_of(curve.values().subspan(i, kStretch), transform));
+  }
+  if (spectra.size() < 2) return 0.0;
+  double variance = 0.0;
+  for (std::size_t parity = 0; parity < 2; ++parity) {
+    const Spectra quiet = quietest(spectra, parity);
+    const std::array halves{mean_of(quiet, parity, 0), mean_of(quiet, parity, 1)};
+    variance += 0.25 * (lowest(halves[0], halves[1]) + lowest(halves[1], halves[0]));
+  }
+  return variance;
+}
+
+namespace {
+
+// The curve at the instants of a slower one, where it has samples: what folds there folds here.
+SampledCurve at_instants(const SampledCurve& curve, const SampledCurve& slower) {
+  std::vector<double> t_s;
+  std::vector<double> value;
+  for (const double t : slower.times_s()) {
+    if (curve.hole_at(t, kAlike * curve.interval_s())) continue;
+    t_s.push_back(t);
+    value.push_back(curve.at(t).value);
+  }
+  return {t_s, value};
+}
+
+}  // namespace
 
 FastMotion::FastMotion(const SampledCurve& a, const SampledCurve& b) {
   if (a.empty() || b.empty()) return;
   if (b.interval_s() > kAlike * a.interval_s()) {
-    power_ = above_noise(fast_squares(b));
-    return;
+    set(at_instants(a, b), b);
+  } else if (a.interval_s() > kAlike * b.interval_s()) {
+    set(a, at_instants(b, a));
+  } else {
+    set(a, b);
   }
-  power_ = above_noise(fast_squares(a));
-  if (a.interval_s() > kAlike * b.interval_s()) return;
-  const std::vector<double> other = above_noise(fast_squares(b));
+}
+
+void FastMotion::set(const SampledCurve& a, const SampledCurve& b) {
+  if (a.empty() || b.empty()) return;
+  power_ = above_noise(fast_squares(a), a.interval_s());
+  const std::vector<double> other = above_noise(fast_squares(b), b.interval_s());
   power_.resize(std::min(power_.size(), other.size()));
   for (std::size_t i = 0; i < power_.size(); ++i)
     power_[i] = std::min(power_[i], other[i]);

@@ -20,19 +20,21 @@ namespace vgyro::gap {
 class FastMotion {
  public:
   FastMotion() = default;
-  /// What only one of them shows is its noise. Of streams of different pace the slower one tells,
-  /// because it is the one that is interpolated or that folds more.
+  /// What only one of them shows is its noise. Of streams of different pace the faster one is
+  /// looked at where the slower one has samples.
   FastMotion(const SampledCurve& a, const SampledCurve& b);
 
   /// (deg/s)²; 0 where there is none.
   [[nodiscard]] double power(double t_s) const;
 
  private:
+  void set(const SampledCurve& a, const SampledCurve& b);
+
   std::vector<double> power_;  ///< of cells from time 0 on
 };
 
-/// Of one sample where nothing moves, (deg/s)²: the quietest stretches' scatter from sample to
-/// sample.
+/// White noise of one sample, (deg/s)²: the least of the spectrum, of the quieter stretches. Motion
+/// that fills a stretch's whole band counts with it.
 double quiet_variance(const SampledCurve& curve);
 
 /// Learns what the motion between the samples does to blocks whose `motion_power` is known, and
