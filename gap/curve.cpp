@@ -96,6 +96,19 @@ const Table& table() {
   return kTable;
 }
 
+// Lagrange's weights 1/Π (x_i − x_j) of the points at `x`.
+std::array<double, SampledCurve::kPoints> lagrange_weights(
+    const std::array<double, SampledCurve::kPoints>& x, std::size_t count) {
+  std::array<double, SampledCurve::kPoints> weights{};
+  for (std::size_t i = 0; i < count; ++i) {
+    double product = 1.0;
+    for (std::size_t j = 0; j < count; ++j)
+      if (j != i) product *= x[j] - x[i];
+    weights[i] = 1.0 / product;
+  }
+  return weights;
+}
+
 // Between two rows of the table.
 struct Place {
   std::size_t row = 0;
@@ -133,7 +146,6 @@ SampledCurve::SampledCurve(std::span<const double> t_s, std::span<const double> 
     steps_s[i] = t_s_[i + 1] - t_s_[i];
   interval_s_ = median_of(steps_s);
   set_even_steps();
-  set_weights();
 }
 
 std::size_t SampledCurve::index_before(double t_s) const {
@@ -189,7 +201,7 @@ SampledCurve::Point SampledCurve::polynomial_at(double t_s) const {
   std::array<double, kPoints> x{};
   for (std::size_t i = 0; i < count; ++i)
     x[i] = (t_s - t_s_[first + i]) / interval_s_;
-  const double* weight = &weights_[kPoints * first];
+  const auto weight = lagrange_weights(x, count);
   Point point{0.0, 0.0};
   for (std::size_t i = 0; i < count; ++i) {
     double product = weight[i];
@@ -230,29 +242,17 @@ SampledCurve::Weights SampledCurve::weights_at(double t_s) const {
     return weights;
   }
   weights.first = first_about(t_s);
+  std::array<double, kPoints> x{};
+  for (std::size_t i = 0; i < count; ++i)
+    x[i] = (t_s - t_s_[weights.first + i]) / interval_s_;
+  const auto polynomial = lagrange_weights(x, count);
   for (std::size_t i = 0; i < count; ++i) {
-    weights.value[i] = weights_[kPoints * weights.first + i];
+    weights.value[i] = polynomial[i];
     for (std::size_t j = 0; j < count; ++j) {
-      if (j != i) weights.value[i] *= (t_s - t_s_[weights.first + j]) / interval_s_;
+      if (j != i) weights.value[i] *= x[j];
     }
   }
   return weights;
-}
-
-// 1/Π (x_i − x_j) of the points from each place on.
-void SampledCurve::set_weights() {
-  const std::size_t count = std::min(kPoints, t_s_.size());
-  const std::size_t places = t_s_.size() - count + 1;
-  weights_.assign(kPoints * places, 0.0);
-  for (std::size_t first = 0; first < places; ++first) {
-    for (std::size_t i = 0; i < count; ++i) {
-      double product = 1.0;
-      for (std::size_t j = 0; j < count; ++j) {
-        if (j != i) product *= (t_s_[first + i] - t_s_[first + j]) / interval_s_;
-      }
-      weights_[kPoints * first + i] = 1.0 / product;
-    }
-  }
 }
 
 double SampledCurve::linear(double t_s) const {

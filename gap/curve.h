@@ -52,7 +52,6 @@ class SampledCurve {
   /// The samples about the interval behind `before` are evenly spaced.
   [[nodiscard]] bool is_even_about(std::size_t before) const;
   void set_even_steps();
-  void set_weights();
 
   std::vector<double> t_s_;
   std::vector<double> value_;

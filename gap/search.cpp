@@ -254,7 +254,7 @@ Fit Search::fit_with_motion(Effects terms) const {
   Fit fitted;
   fitted.terms = std::move(terms);
   for (int turn = 0; turn < kMotionTurns; ++turn) {
-    const auto trial = study_->with_motion(regressions_.front().with_known(fitted.terms));
+    const auto trial = study_->with_motion_on_trial(regressions_.front().with_known(fitted.terms));
     const Regression regression(trial->observations().front(), known_, Part::kFit);
     fitted = regression.fit(fitted.terms, noise_);
   }

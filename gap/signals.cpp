@@ -122,12 +122,11 @@ Motion::Motion(SampledCurve rate_dps) : rate_dps_(std::move(rate_dps)) {
   const std::span<const double> rate = rate_dps_.values();
   angle_deg_.resize(t_s.size());
   if (t_s.empty()) return;
-  quarters_dps_ = quarters_of(rate_dps_);
   double angle_deg = rate[0] * t_s[0];
   angle_deg_[0] = angle_deg;
   for (std::size_t i = 1; i < t_s.size(); ++i) {
     const double step_s = t_s[i] - t_s[i - 1];
-    const double middle = quarters_dps_[kQuarters * (i - 1) + 2];
+    const double middle = rate_dps_.at(0.5 * (t_s[i - 1] + t_s[i])).value;
     angle_deg += step_s * (rate[i - 1] + 4.0 * middle + rate[i]) / 6.0;
     angle_deg_[i] = angle_deg;
   }
@@ -146,10 +145,16 @@ double Motion::angle_rad(double t_s) const {
 }
 
 SampledCurve Motion::low_passed(double cutoff_hz) const {
-  return low_pass(rate_dps_, quarters_dps_, cutoff_hz);
+  return low_pass(rate_dps_, quarters_of(rate_dps_), cutoff_hz);
 }
 
 model::Surroundings Signals::at(double t_s) const {
+  model::Surroundings s = without_motion_at(t_s);
+  s.angle_rad = motion.angle_rad(t_s);
+  return s;
+}
+
+model::Surroundings Signals::without_motion_at(double t_s) const {
   model::Surroundings s;
   s.t_s = t_s;
   if (!temperature_c.empty()) {
@@ -163,7 +168,6 @@ model::Surroundings Signals::at(double t_s) const {
     s.vibration_g2 = vibration_g2.linear(t_s);
   }
   if (!supply_v.empty()) s.supply_v = supply_v.linear(t_s);
-  s.angle_rad = motion.angle_rad(t_s);
   return s;
 }
 

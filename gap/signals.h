@@ -29,8 +29,7 @@ class Motion {
 
  private:
   SampledCurve rate_dps_;
-  std::vector<double> quarters_dps_;  ///< between the curve's samples
-  std::vector<double> angle_deg_;     ///< at the curve's samples, from time 0
+  std::vector<double> angle_deg_;  ///< at the curve's samples, from time 0
 };
 
 struct Signals {
@@ -42,6 +41,8 @@ struct Signals {
   SampledCurve supply_v;
 
   [[nodiscard]] model::Surroundings at(double t_s) const;
+  /// The same with an angle of 0.
+  [[nodiscard]] model::Surroundings without_motion_at(double t_s) const;
 };
 
 /// Temperature smoothed by local parabolas over `reach_s` to both sides, with its slope.

@@ -19,6 +19,7 @@ struct Study::Facts {
   const Recording& recording;
   std::array<Transport, 2> transports;
   std::array<SampledCurve, 2> readings;  ///< samples that are not masked
+  std::vector<double> second_dps;        ///< gyro 2 at the instants of gyro 1
   SampledCurve reference;                ///< as it was sampled
   std::array<double, 3> quiet{};         ///< variance of a sample of each gyro and of the reference
   std::array<FastMotion, 2> fast;        ///< as each gyro is compared; without a reference alike
@@ -29,6 +30,8 @@ struct Study::Facts {
   void learn_fast_motion() {
     quiet = {quiet_variance(readings[0]), quiet_variance(readings[1]), quiet_variance(reference)};
     if (!recording.has_reference) {
+      for (const double t_s : readings[0].times_s())
+        second_dps.push_back(readings[1].at(t_s).value);
       fast[0] = FastMotion(readings[0], readings[1]);
       return;
     }
@@ -54,6 +57,7 @@ constexpr double kCoarseRepeats = 0.2;
 // Late readings converge by half their phase a round.
 constexpr int kMotionRounds = 16;
 constexpr double kMotionSame_dps = 2e-6;
+constexpr double kMotionSameShare = 0.01;  // of the noise of a sample
 // Of samples a curve may lack before what lies between is not known: a reference is smooth, a gyro
 // is not.
 constexpr double kReferenceHole = 3.0;
@@ -243,6 +247,17 @@ std::shared_ptr<const Study> Study::with_motion(const Effects& effects) const {
   return study;
 }
 
+std::shared_ptr<const Study> Study::with_motion_on_trial(const Effects& effects) const {
+  const std::shared_ptr<Study> study(new Study(*this));
+  study->learn_motion(effects);
+  std::vector<Observations> list = study->observed();
+  for (std::size_t place = 0; place < list.size(); ++place) {
+    list[place].layout = observations_[place]->layout;
+    study->observations_[place] = std::make_shared<Observations>(std::move(list[place]));
+  }
+  return study;
+}
+
 std::shared_ptr<const Study> Study::with_used_for_fit(Span span) const {
   const std::shared_ptr<Study> study(new Study(*this));
   study->for_fit_.push_back(span);
@@ -251,64 +266,103 @@ std::shared_ptr<const Study> Study::with_used_for_fit(Span span) const {
   return study;
 }
 
-// The readings less what the effects say at the last motion, by their weights.
-std::vector<double> Study::mean_rate(const std::array<double, 2>& weight,
-                                     const std::array<Effects, 2>& taken_off) const {
-  const std::span<const double> t_s = facts_->readings[0].times_s();
-  std::vector<double> rate_dps(t_s.size(), 0.0);
-  for (std::size_t gyro = 0; gyro < 2; ++gyro) {
-    const SampledCurve& readings = facts_->readings[gyro];
-    std::optional<Prediction> prediction;
-    if (!signals_[gyro]->motion.curve().empty())
-      prediction.emplace(taken_off[gyro], *signals_[gyro]);
-    for (std::size_t i = 0; i < t_s.size(); ++i) {
-      double value_dps = gyro == 0 ? readings.values()[i] : readings.at(t_s[i]).value;
-      if (prediction)
-        value_dps -= prediction->at(t_s[i]) - signals_[gyro]->motion.rate(t_s[i]).value;
-      rate_dps[i] += weight[gyro] * value_dps;
+namespace {
+
+// What one gyro's effects add to the rate, at the same instants again and again while the motion is
+// being learned.
+class Beside {
+ public:
+  Beside(const Effects& effects, const Signals& signals, std::span<const double> t_s)
+      : effects_(effects), equation_(effects), t_s_(t_s) {
+    if (!equation_.adds()) return;
+    surroundings_.reserve(t_s.size());
+    for (const double at_s : t_s)
+      surroundings_.push_back(signals.without_motion_at(equation_.true_time_s(at_s)));
+  }
+
+  // Takes `weight` times it off the values. Of the first guess, which knows no motion, the offsets.
+  void take_off(const Motion& motion, const Signals& signals, double weight,
+                std::vector<double>& values) {
+    if (effects_.empty()) return;
+    if (motion.curve().empty()) {
+      for (std::size_t i = 0; i < surroundings_.size(); ++i)
+        values[i] -= weight * equation_.offset_dps(surroundings_[i]);
+      return;
+    }
+    const Prediction prediction(effects_, signals);
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      const double rate_dps = motion.rate(t_s_[i]).value;
+      const double late_dps = equation_.is_late() ? prediction.late_dps(t_s_[i]) : rate_dps;
+      double added_dps = late_dps - rate_dps;
+      if (equation_.adds()) {
+        surroundings_[i].angle_rad = motion.angle_rad(equation_.true_time_s(t_s_[i]));
+        added_dps += equation_.added_dps(late_dps, surroundings_[i]);
+      }
+      values[i] -= weight * added_dps;
     }
   }
-  for (std::size_t i = 0; i < t_s.size(); ++i) {
-    if (facts_->rest.at(t_s[i])) rate_dps[i] = recording().rest_rate_dps;
+
+ private:
+  const Effects& effects_;
+  model::Equation equation_;
+  std::span<const double> t_s_;
+  std::vector<model::Surroundings> surroundings_;
+};
+
+}  // namespace
+
+// Noise of the reference must not pass for motion, or a low-pass would seem to take it off.
+void Study::learn_motion_of_reference() {
+  const Motion motion{without_noise(facts_->reference, facts_->quiet[2])};
+  for (auto& its : signals_) {
+    const auto signals = std::make_shared<Signals>(*its);
+    signals->motion = motion;
+    its = signals;
   }
-  return rate_dps;
 }
 
-// The first guess knows no errors; each further one takes off what the effects say at the last,
+// The first guess knows no lateness; each further one takes off what the effects say at the last,
 // until nothing changes.
-void Study::learn_motion(const Effects& effects) {
-  if (recording().has_reference) {
-    // Noise of the reference must not pass for motion, or a low-pass would seem to take it off.
-    const Motion motion{without_noise(facts_->reference, facts_->quiet[2])};
-    for (auto& its : signals_) {
-      const auto signals = std::make_shared<Signals>(*its);
-      signals->motion = motion;
-      its = signals;
-    }
-    return;
-  }
+void Study::learn_motion_of_pair(const Effects& effects) {
   const std::array<double, 2> weight = weights(noise_of(effects));
   const std::array<Effects, 2> mine{of_gyro(effects, 0), of_gyro(effects, 1)};
+  const std::span<const double> t_s = facts_->readings[0].times_s();
   std::array<std::shared_ptr<Signals>, 2> signals;
+  std::vector<Beside> beside;
+  double quiet = 0.0;
   for (std::size_t gyro = 0; gyro < 2; ++gyro) {
     signals[gyro] = std::make_shared<Signals>(*signals_[gyro]);
     signals[gyro]->motion = Motion();
     signals_[gyro] = signals[gyro];
-  }
-  double quiet = 0.0;
-  for (std::size_t gyro = 0; gyro < 2; ++gyro)
+    beside.emplace_back(mine[gyro], *signals[gyro], t_s);
     quiet += weight[gyro] * weight[gyro] * facts_->quiet[gyro];
+  }
+  const double same_dps = std::max(kMotionSame_dps, kMotionSameShare * std::sqrt(quiet));
   std::vector<double> rate_dps;
   for (int round = 0; round < kMotionRounds; ++round) {
-    std::vector<double> next_dps = mean_rate(weight, mine);
-    const bool settled = round > 0 && greatest_change(next_dps, rate_dps) < kMotionSame_dps;
+    std::vector<double> next_dps(t_s.size());
+    for (std::size_t i = 0; i < t_s.size(); ++i)
+      next_dps[i] = weight[0] * facts_->readings[0].values()[i] + weight[1] * facts_->second_dps[i];
+    for (std::size_t gyro = 0; gyro < 2; ++gyro)
+      beside[gyro].take_off(signals[gyro]->motion, *signals[gyro], weight[gyro], next_dps);
+    for (std::size_t i = 0; i < t_s.size(); ++i) {
+      if (facts_->rest.at(t_s[i])) next_dps[i] = recording().rest_rate_dps;
+    }
+    const bool settled = round > 0 && greatest_change(next_dps, rate_dps) < same_dps;
     rate_dps = std::move(next_dps);
     // Noise must not pass for motion, or what the effects make of it would come on top.
-    const Motion motion{
-        without_noise(SampledCurve(facts_->readings[0].times_s(), rate_dps), quiet)};
+    const Motion motion{without_noise(SampledCurve(t_s, rate_dps), quiet)};
     for (const auto& its : signals)
       its->motion = motion;
     if (settled) break;
+  }
+}
+
+void Study::learn_motion(const Effects& effects) {
+  if (recording().has_reference) {
+    learn_motion_of_reference();
+  } else {
+    learn_motion_of_pair(effects);
   }
 }
 
@@ -356,21 +410,20 @@ Observations Study::of_pair() const {
   for (std::size_t i = 0; i < t_s.size(); ++i) {
     if (facts_->rest.at(t_s[i]) || readings[1].hole_at(t_s[i], reach_s)) continue;
     samples.push_back({t_s[i], Channel::kDifference,
-                       readings[0].values()[i] - readings[1].at(t_s[i]).value,
+                       readings[0].values()[i] - facts_->second_dps[i],
                        signals_[0]->motion.rate(t_s[i]).value});
   }
   return make_observations(std::move(samples), circumstances(), {true, true}, {&readings[1], 1},
                            0.0, for_fit_);
 }
 
+std::vector<Observations> Study::observed() const {
+  if (!recording().has_reference) return {of_pair()};
+  return {against_reference(0), against_reference(1)};
+}
+
 void Study::observe(const Effects& effects) {
-  std::vector<Observations> list;
-  if (recording().has_reference) {
-    for (std::size_t gyro = 0; gyro < 2; ++gyro)
-      list.push_back(against_reference(gyro));
-  } else {
-    list.push_back(of_pair());
-  }
+  std::vector<Observations> list = observed();
   observations_.clear();
   for (std::size_t place = 0; place < list.size(); ++place) {
     list[place].learn_unseen_motion(facts_->fast[place], effects);

@@ -47,6 +47,10 @@ class Study {
   /// effects alone, not on the motion of this one.
   [[nodiscard]] std::shared_ptr<const Study> with_motion(const Effects& effects) const;
 
+  /// The same to try effects by: what is known of the motion between the samples stays, so that
+  /// trials can be compared.
+  [[nodiscard]] std::shared_ptr<const Study> with_motion_on_trial(const Effects& effects) const;
+
   /// What was set aside of these seconds is no longer.
   [[nodiscard]] std::shared_ptr<const Study> with_used_for_fit(Span span) const;
 
@@ -55,9 +59,10 @@ class Study {
 
   Study() = default;
   void observe(const Effects& effects);
+  [[nodiscard]] std::vector<Observations> observed() const;
   void learn_motion(const Effects& effects);
-  [[nodiscard]] std::vector<double> mean_rate(const std::array<double, 2>& weight,
-                                              const std::array<Effects, 2>& taken_off) const;
+  void learn_motion_of_reference();
+  void learn_motion_of_pair(const Effects& effects);
   [[nodiscard]] Observations against_reference(std::size_t gyro) const;
   [[nodiscard]] Observations of_pair() const;
   [[nodiscard]] Circumstances circumstances() const;

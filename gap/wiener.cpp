@@ -57,6 +57,7 @@ SampledCurve without_noise(const SampledCurve& curve, double noise_variance) {
   }
   close_circle(value, n, step_s);
   Eigen::FFT<double> transform;
+  transform.SetFlag(Eigen::FFT<double>::HalfSpectrum);
   std::vector<std::complex<double>> spectrum;
   transform.fwd(spectrum, value);
   const std::size_t half = length / 2;
@@ -78,9 +79,8 @@ SampledCurve without_noise(const SampledCurve& curve, double noise_variance) {
     const double level = power[i] > kLine * noise ? power[i] : mean;
     const double weight = level > noise ? 1.0 - noise / level : 0.0;
     spectrum[i] *= weight;
-    if (i > 0 && i < half) spectrum[length - i] *= weight;
   }
-  transform.inv(value, spectrum);
+  transform.inv(value, spectrum, static_cast<Eigen::Index>(length));
   value.resize(n);
   return {t_s, value};
 }
