@@ -421,6 +421,39 @@ int octave_class(double value) {
 
 }  // namespace
 
+template <class Columns>
+void turn_within(Columns& columns, const Layout& layout) {
+  Cosines cosines;
+  for (const Block& block : layout.blocks) {
+    auto rows = columns.middleRows(block.first, block.count);
+    if (is_all_kept(block)) {
+      const auto mean = rows.colwise().mean().eval();
+      rows = rows.rowwise() - mean;
+      continue;
+    }
+    const auto slow = (cosines.of(block).template cast<typename Columns::Scalar>() * rows).eval();
+    rows.setZero();
+    rows.topRows(block.kept) = slow;
+  }
+}
+template void turn_within(Matrix& columns, const Layout& layout);
+template void turn_within(FloatMatrix& columns, const Layout& layout);
+
+Eigen::VectorXd within_weights(const Layout& layout, const PairNoise& noise, Part part) {
+  Eigen::VectorXd weights = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(layout.samples));
+  for (const Block& block : layout.blocks) {
+    if (!counts(block, part)) continue;
+    auto rows = weights.segment(block.first, block.count);
+    if (is_all_kept(block)) {
+      rows.setConstant(1.0 / within_variance(block, noise, layout));
+      continue;
+    }
+    for (std::uint32_t k = 0; k < block.kept; ++k)
+      rows[k] = 1.0 / cosine_variance(block, k + 1, noise, layout);
+  }
+  return weights;
+}
+
 namespace {
 
 // Sums by classes of about the same variance.

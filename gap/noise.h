@@ -18,6 +18,9 @@ namespace vgyro::gap {
 
 using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
+/// Of what is only ranked: half the memory.
+using FloatMatrix = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
 struct MarkovTerm {
   double sigma_dps = 0.0;
   double tau_s = 1.0;
@@ -126,6 +129,12 @@ double whiten_means(Matrix& means, const Layout& layout, const PairNoise& noise,
 /// Samples → deviations from their block's mean in units of the noise, in place; likewise. Of a
 /// block in fast motion the first rows are the cosines that are kept, the others zero.
 double whiten_within(Matrix& columns, const Layout& layout, const PairNoise& noise, Part part);
+
+/// Samples → what whiten_within makes of them, but for the noise, which weighs rows.
+template <class Columns>
+void turn_within(Columns& columns, const Layout& layout);
+/// 1/variance of each row of these; 0 where it does not count.
+Eigen::VectorXd within_weights(const Layout& layout, const PairNoise& noise, Part part);
 
 /// What is needed of a residual to fit white noise: sums of squares within blocks, by channel and
 /// rate.

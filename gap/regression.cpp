@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "model/equation.h"
+
 namespace vgyro::gap {
 
 namespace {
@@ -27,6 +29,21 @@ bool is_linear(const Effects& terms) {
     const auto free = *row(term.kind).free;
     return std::all_of(free.begin(), free.end(), [](const Free& one) { return one.linear; });
   });
+}
+
+bool any_moves(const Effects& terms) {
+  return std::any_of(terms.begin(), terms.end(),
+                     [](const Effect& term) { return model::moves_in_time(term.kind); });
+}
+
+// Solution x of the free parameters, taken up.
+Effects moved(Effects terms, const Eigen::VectorXd& x, double scale) {
+  Eigen::Index place = 0;
+  for (Effect& term : terms) {
+    for (const Free& free : *row(term.kind).free)
+      term.parameters[free.parameter] += scale * x[place++];
+  }
+  return terms;
 }
 
 }  // namespace
@@ -85,7 +102,12 @@ Effects Regression::with_known(const Effects& terms) const {
 }
 
 Eigen::VectorXd Regression::residual(const Effects& terms) const {
-  return data_->residual(with_known(terms));
+  if (any_moves(terms)) return data_->residual(with_known(terms));
+  if (known_residual_.size() == 0) known_residual_ = data_->residual(known_);
+  Eigen::VectorXd residual = known_residual_;
+  for (const Effect& term : terms)
+    residual -= data_->contribution_beside(known_, term);
+  return residual;
 }
 
 Matrix Regression::derivatives(const Effects& terms, std::size_t index) const {
@@ -129,25 +151,32 @@ bool Regression::step(Fit& fit, double& square) const {
   fit.covariance = solution.covariance;
   double scale = 1.0;
   for (int shorter = 0; shorter < kShorterMax; ++shorter, scale *= kShorter) {
-    Effects trial = fit.terms;
-    Eigen::Index place = 0;
-    for (Effect& term : trial) {
-      for (const Free& free : *row(term.kind).free)
-        term.parameters[free.parameter] += scale * solution.x[place++];
+    Effects trial = moved(fit.terms, solution.x, scale);
+    for (Effect& term : trial)
       keep_in_bounds(term);
-    }
     const double now = whitened(Matrix(residual(trial)), fit.noise).squaredNorm();
     if (now > square + kSame) continue;
     const double gained = square - now;
     fit.terms = std::move(trial);
     square = now;
-    return gained >= kSettledGain && !is_linear(fit.terms);
+    return gained >= kSettledGain;
   }
   return false;
 }
 
+// One step is all.
+void Regression::solve_linear(Fit& fit) const {
+  const Matrix white = whitened(columns(fit.terms), fit.noise);
+  const Solution solution = explain_first(white.transpose() * white);
+  fit.covariance = solution.covariance;
+  fit.terms = moved(fit.terms, solution.x, 1.0);
+  for (Effect& term : fit.terms)
+    keep_in_bounds(term);
+}
+
 void Regression::improve(Fit& fit) const {
   if (fit.terms.empty()) return;
+  if (is_linear(fit.terms)) return solve_linear(fit);
   double square = whitened(Matrix(residual(fit.terms)), fit.noise).squaredNorm();
   for (int i = 0; i < kStepsMax; ++i) {
     if (!step(fit, square)) return;
@@ -181,7 +210,7 @@ void Regression::allow_drift(Fit& fit, std::size_t gyro) const {
   if (richer.log_likelihood > fit.log_likelihood) fit = std::move(richer);
 }
 
-Fit Regression::fit(Effects terms, const PairNoise& start) const {
+Fit Regression::fit_in_turns(Effects terms, const PairNoise& start) const {
   Fit fit{std::move(terms), start, 0.0, {}};
   const int turns = fit.terms.empty() ? 1 : kTurns;
   for (int turn = 0; turn < turns; ++turn) {
@@ -190,8 +219,26 @@ Fit Regression::fit(Effects terms, const PairNoise& start) const {
     fit_noise(fit);
     if (turn > 0 && std::abs(fit.log_likelihood - before) < kSettledLikelihood) break;
   }
+  return fit;
+}
+
+Fit Regression::fit(Effects terms, const PairNoise& start) const {
+  Fit fit = fit_in_turns(std::move(terms), start);
   for (std::size_t gyro = 0; gyro < 2; ++gyro)
     allow_drift(fit, gyro);
+  return fit;
+}
+
+// More drift than the model has.
+bool Regression::needs_drift(const Fit& fit, std::size_t gyro) const {
+  return fit.noise[gyro].markov.size() > known_noise_[gyro].markov.size();
+}
+
+Fit Regression::fit_beside(Effects terms, const PairNoise& start, const Fit& null) const {
+  Fit fit = fit_in_turns(std::move(terms), start);
+  for (std::size_t gyro = 0; gyro < 2; ++gyro) {
+    if (needs_drift(null, gyro)) allow_drift(fit, gyro);
+  }
   return fit;
 }
 

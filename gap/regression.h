@@ -58,12 +58,18 @@ class Regression {
   /// Terms and noise by maximum likelihood. Where an exponentially correlated drift makes what is
   /// left likelier, it stays in the fit's noise beside the walk.
   [[nodiscard]] Fit fit(Effects terms, const PairNoise& start) const;
+  /// The same beside what `null` is without them, to see what they gain: where that needs no
+  /// correlated drift of its own, they need none.
+  [[nodiscard]] Fit fit_beside(Effects terms, const PairNoise& start, const Fit& null) const;
 
   /// Into the limits of its kind; nothing reads ahead of time.
   void keep_in_bounds(model::Effect& effect) const;
 
  private:
   bool step(Fit& fit, double& square) const;
+  void solve_linear(Fit& fit) const;
+  [[nodiscard]] Fit fit_in_turns(Effects terms, const PairNoise& start) const;
+  [[nodiscard]] bool needs_drift(const Fit& fit, std::size_t gyro) const;
   void fit_noise(Fit& fit) const;
   void allow_drift(Fit& fit, std::size_t gyro) const;
 
@@ -71,6 +77,7 @@ class Regression {
   Effects known_;
   PairNoise known_noise_;
   Part part_;
+  mutable Eigen::VectorXd known_residual_;  ///< once asked for: most terms leave it as it is
 };
 
 /// Free parameters of all terms.

@@ -130,9 +130,13 @@ Scan::Scan(const Regression& regression, const Effects& beside) : regression_(re
   const Effects others = regression.with_known(beside);
   const Eigen::Index width = shapes_.empty() ? 0 : shapes_.back().first + shapes_.back().width;
   columns_.resize(data.size(), width);
-  for (const Shape& shape : shapes_)
-    columns_.middleCols(shape.first, shape.width) = columns_of(shape.effect, others);
-  means_ = block_means(columns_, data.layout);
+  means_.resize(static_cast<Eigen::Index>(data.layout.blocks.size()), width);
+  for (const Shape& shape : shapes_) {
+    Matrix columns = columns_of(shape.effect, others);
+    means_.middleCols(shape.first, shape.width) = block_means(columns, data.layout);
+    turn_within(columns, data.layout);
+    columns_.middleCols(shape.first, shape.width) = columns.cast<float>();
+  }
 }
 
 void Scan::add_shapes(std::size_t gyro) {
@@ -186,12 +190,23 @@ std::vector<Score> Scan::scores(const Fit& null, const PairNoise& noise) const {
 void Scan::score_shapes(const Base& base, const PairNoise& noise,
                         std::vector<Score>& scores) const {
   const Layout& layout = regression_.data().layout;
-  const Matrix white = whitened(columns_, means_, layout, noise, regression_.part());
-  const Eigen::MatrixXd cross = base.white.transpose() * white;
+  Matrix means = means_;
+  whiten_means(means, layout, noise, regression_.part());
+  Matrix weighted = base.columns;
+  turn_within(weighted, layout);
+  const Eigen::VectorXd weights = within_weights(layout, noise, regression_.part());
+  weighted.array().colwise() *= weights.array();
+  const FloatMatrix light = weighted.cast<float>();
+  const Eigen::MatrixXd cross = (light.transpose() * columns_).cast<double>() +
+                                base.white.bottomRows(means.rows()).transpose() * means;
+  const Eigen::VectorXf light_weights = weights.cast<float>();
   const Solution nuisance = explain_first(base.gram);
   for (const Shape& shape : shapes_) {
-    const auto columns = white.middleCols(shape.first, shape.width);
-    const Eigen::MatrixXd own = columns.transpose() * columns;
+    const auto columns = columns_.middleCols(shape.first, shape.width);
+    const auto of_means = means.middleCols(shape.first, shape.width);
+    const Eigen::MatrixXd own =
+        (columns.transpose() * light_weights.asDiagonal() * columns).cast<double>() +
+        of_means.transpose() * of_means;
     const Reduced reduced =
         reduce(own, cross.middleCols(shape.first, shape.width), base.gram, nuisance.covariance);
     if (reduced.gram.diagonal().minCoeff() <= kOwnShareMin * own.diagonal().maxCoeff()) continue;

@@ -48,7 +48,7 @@ class Scan {
     Eigen::Index width = 1;
   };
   std::vector<Shape> shapes_;
-  Matrix columns_;
+  FloatMatrix columns_;  ///< turned as whitening turns them
   Matrix means_;
 };
 

@@ -37,6 +37,8 @@ constexpr double kWorthAFit = 8.0;
 constexpr double kRivalShare = 0.5;
 constexpr double kRivalMargin = 10.0;
 constexpr double kTimingRivalShare = 0.2;
+// Nor is one that the linear look gives less than this share of the best.
+constexpr double kHopeShare = 0.3;
 // Replacing one name by another that is as good would go on for ever.
 constexpr double kBetter = 0.5;
 // A name that fell this far below what it needs is deleted; less is the noise's doubt.
@@ -148,12 +150,16 @@ PairNoise Search::modelled(const PairNoise& fitted) const {
   return noise;
 }
 
+bool Search::knows_no_noise(std::size_t place) const {
+  const auto& holds = regressions_[place].data().holds;
+  return (holds[0] && model_noise_[0].white_dps_rthz <= 0.0) ||
+         (holds[1] && model_noise_[1].white_dps_rthz <= 0.0);
+}
+
 // Beyond the model's noise, where that says anything.
 bool Search::has_grown(std::size_t place, const Fit& null) const {
   const Regression& regression = regressions_[place];
-  for (std::size_t gyro = 0; gyro < 2; ++gyro) {
-    if (regression.data().holds[gyro] && model_noise_[gyro].white_dps_rthz <= 0.0) return false;
-  }
+  if (knows_no_noise(place)) return false;
   const double as_modelled = regression.log_likelihood(null.terms, model_noise_);
   return 2.0 * (null.log_likelihood - as_modelled) > kStatisticMin;
 }
@@ -165,7 +171,7 @@ Found Search::refitted(std::size_t place, const Fit& null, const PairNoise& star
   terms.push_back(row(score.effect.kind).finder == Finder::kStep
                       ? placed(regression, null, score.effect)
                       : score.effect);
-  const Fit with = regression.fit(std::move(terms), start);
+  const Fit with = regression.fit_beside(std::move(terms), start, null);
   Found found;
   found.effect = with.terms.back();
   found.statistic = 2.0 * (with.log_likelihood - null.log_likelihood);
@@ -185,6 +191,7 @@ std::vector<Found> Search::refitted(std::size_t place, const Fit& null, const Pa
       return same_form(other.effect, score.effect);
     });
     if (again || score.statistic < kWorthAFit) continue;
+    if (score.adjusted() < kHopeShare * scores.front().adjusted() - kRivalMargin) break;
     list.push_back(refitted(place, null, start, score));
   }
   sort_by_weight(list);
@@ -219,12 +226,15 @@ void Search::look(std::size_t place, Round& round) {
     if (is_timing(one.effect)) round.timing.push_back(one);
   }
   if (scores.size() > kWordsEach * kRefitsMax) scores.resize(kWordsEach * kRefitsMax);
-  const PairNoise modelled = this->modelled(null.noise);
-  const std::vector<Score> more = scan(place).scores(null, modelled);
   std::vector<Found> found = refitted(place, null, null.noise, scores, kRefitsMax);
-  for (Found& one : refitted(place, null, modelled, more, kRefitsMax))
-    found.push_back(std::move(one));
   const bool grown = has_grown(place, null);
+  // Where the noise has not grown the model's would show the same.
+  if (grown || knows_no_noise(place)) {
+    const PairNoise modelled = this->modelled(null.noise);
+    const std::vector<Score> more = scan(place).scores(null, modelled);
+    for (Found& one : refitted(place, null, modelled, more, kRefitsMax))
+      found.push_back(std::move(one));
+  }
   for (Found& one : found) {
     if (grown) one.needed = kStatisticMinAgainstNoise;
     round.candidates.push_back(std::move(one));

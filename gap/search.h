@@ -56,6 +56,7 @@ class Search {
   [[nodiscard]] std::size_t place_of(const model::Effect& effect) const;
   void keep_noise(std::size_t place, const PairNoise& noise);
   [[nodiscard]] PairNoise modelled(const PairNoise& fitted) const;
+  [[nodiscard]] bool knows_no_noise(std::size_t place) const;
   [[nodiscard]] bool has_grown(std::size_t place, const Fit& null) const;
   [[nodiscard]] std::vector<Found> refitted(std::size_t place, const Fit& null,
                                             const PairNoise& start,
