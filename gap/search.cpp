@@ -266,7 +266,7 @@ Fit Search::fit_with_motion(Effects terms) const {
   for (int turn = 0; turn < kMotionTurns; ++turn) {
     const auto trial = study_->with_motion_on_trial(regressions_.front().with_known(fitted.terms));
     const Regression regression(trial->observations().front(), known_, Part::kFit);
-    fitted = regression.fit(fitted.terms, noise_);
+    fitted = regression.fit_beside(fitted.terms, noise_, Fit{{}, noise_, 0.0, {}});
   }
   return fitted;
 }
@@ -280,6 +280,7 @@ std::vector<Found> Search::timing_rivals(const Found& best,
       return same_reading(reading_of(one.effect), reading_of(score.effect));
     });
     if (again || score.adjusted() < kTimingRivalShare * scores.front().adjusted()) continue;
+    if (rivals.size() >= kRivalsMax) break;
     Effects with = terms(0);
     with.push_back(score.effect);
     const Fit fitted = fit_with_motion(std::move(with));

@@ -274,6 +274,9 @@ class Beside {
  public:
   Beside(const Effects& effects, const Signals& signals, std::span<const double> t_s)
       : effects_(effects), equation_(effects), t_s_(t_s) {
+    needs_angle_ = std::any_of(effects.begin(), effects.end(), [](const Effect& effect) {
+      return effect.kind == model::Kind::kAngleHarmonic;
+    });
     if (!equation_.adds()) return;
     surroundings_.reserve(t_s.size());
     for (const double at_s : t_s)
@@ -295,7 +298,8 @@ class Beside {
       const double late_dps = equation_.is_late() ? prediction.late_dps(t_s_[i]) : rate_dps;
       double added_dps = late_dps - rate_dps;
       if (equation_.adds()) {
-        surroundings_[i].angle_rad = motion.angle_rad(equation_.true_time_s(t_s_[i]));
+        if (needs_angle_)
+          surroundings_[i].angle_rad = motion.angle_rad(equation_.true_time_s(t_s_[i]));
         added_dps += equation_.added_dps(late_dps, surroundings_[i]);
       }
       values[i] -= weight * added_dps;
@@ -307,6 +311,7 @@ class Beside {
   model::Equation equation_;
   std::span<const double> t_s_;
   std::vector<model::Surroundings> surroundings_;
+  bool needs_angle_ = false;
 };
 
 }  // namespace

@@ -18,6 +18,8 @@ namespace {
 constexpr std::size_t kReach = 16;
 constexpr double kAbove = 1.5;
 constexpr double kLine = 20.0;
+// Of a step: an instant of the even grid is a sample's.
+constexpr double kSameInstant = 2e-4;
 // The transform closes a circle. At either end the curve goes on as its own image in the end point,
 // so that level and slope go on, and a ramp joins the two images.
 constexpr double kImage_s = 20.0;
@@ -53,7 +55,9 @@ SampledCurve without_noise(const SampledCurve& curve, double noise_variance) {
   std::vector<double> value(length);
   for (std::size_t i = 0; i < n; ++i) {
     t_s[i] = curve.from_s() + step_s * static_cast<double>(i);
-    value[i] = curve.at(t_s[i]).value;
+    const bool sampled =
+        i < curve.times_s().size() && std::abs(curve.times_s()[i] - t_s[i]) < kSameInstant * step_s;
+    value[i] = sampled ? curve.values()[i] : curve.at(t_s[i]).value;
   }
   close_circle(value, n, step_s);
   Eigen::FFT<double> transform;
