@@ -25,6 +25,7 @@ struct Found {
   double penalty = 0.0;
   double needed = 0.0;  ///< of statistic less penalty
   std::vector<Reading> ambiguous_with;
+  bool starting = false;  ///< of the starting model: what every gyro has, and no name
   [[nodiscard]] double adjusted() const { return statistic - penalty; }
   [[nodiscard]] double margin() const { return adjusted() - needed; }
 };

@@ -98,6 +98,9 @@ struct GyroFigures {
 struct Result {
   Verdict verdict = Verdict::kNoGap;
   Gap gap;
+  /// Bias and noise of the gyros of which the given model says neither, fitted beside the effects:
+  /// what the gap before is counted with. Part of the model.
+  std::vector<NamedEffect> starting;
   std::vector<NamedEffect> effects;  ///< in the order in which they were added
   std::vector<Unexplained> unexplained;
   std::vector<NotIdentifiable> not_identifiable;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 #include "gap/noise_search.h"
 #include "gap/steadiness.h"
@@ -45,6 +46,8 @@ constexpr double kBetter = 0.5;
 constexpr double kFallen = -4.0;
 // Of a drift's statistic: a smaller line in it is a part of it.
 constexpr double kLineShare = 0.05;
+// A starting model's noise is known at best to a hundredth, and is written with as many digits.
+constexpr double kStartingNoiseDoubt = 0.01;
 // Shares of a timing effect's statistic that interpolation leaves behind.
 constexpr double kTimingLeaves = 2e-3;
 constexpr double kJitterLeaves = 2e-2;
@@ -83,6 +86,8 @@ bool is_close(double adjusted, double best, double gain) {
 
 Search::Search(std::shared_ptr<const Study> study, Effects known)
     : known_(std::move(known)), noise_(noise_of(known_)), model_noise_(noise_) {
+  for (std::size_t gyro = 0; gyro < 2; ++gyro)
+    unknown_noise_[gyro] = model_noise_[gyro].white_dps_rthz <= 0.0;
   take(std::move(study));
 }
 
@@ -106,9 +111,63 @@ const Scan& Search::scan(std::size_t place) {
 
 Effects Search::effects() const {
   Effects all = known_;
+  all.insert(all.end(), starting_noise_.begin(), starting_noise_.end());
   for (const Found& found : found_)
     all.push_back(found.effect);
   return all;
+}
+
+std::vector<Found> Search::found() const {
+  std::vector<Found> names;
+  std::copy_if(found_.begin(), found_.end(), std::back_inserter(names),
+               [](const Found& one) { return !one.starting; });
+  return names;
+}
+
+std::vector<Found> Search::starting() const {
+  std::vector<Found> list;
+  std::copy_if(found_.begin(), found_.end(), std::back_inserter(list),
+               [](const Found& one) { return one.starting; });
+  for (const Effect& effect : starting_noise_) {
+    list.push_back({});
+    list.back().effect = effect;
+    list.back().sigma[0] = effect.parameters[0] * kStartingNoiseDoubt;
+  }
+  return list;
+}
+
+// White noise and walk of the gyros of which the model says nothing.
+Effects Search::noise_effects(const PairNoise& noise) const {
+  Effects effects;
+  for (std::size_t gyro = 0; gyro < 2; ++gyro) {
+    if (!unknown_noise_[gyro]) continue;
+    effects.push_back({gyro, Kind::kWhiteNoise, {noise[gyro].white_dps_rthz}, 0});
+    if (noise[gyro].walk_dps_rts > 0.0)
+      effects.push_back({gyro, Kind::kRateRandomWalk, {noise[gyro].walk_dps_rts}, 0});
+  }
+  return effects;
+}
+
+// Every gyro has a bias and noise: where the model says nothing of them they are no names, and the
+// gap counts from there.
+void Search::start() {
+  for (std::size_t gyro = 0; gyro < 2; ++gyro) {
+    const bool knows_bias = std::any_of(known_.begin(), known_.end(), [&](const Effect& effect) {
+      return effect.gyro == gyro && effect.kind == Kind::kBias;
+    });
+    if (!unknown_noise_[gyro] || knows_bias) continue;
+    found_.push_back({});
+    found_.back().effect = {gyro, Kind::kBias, {0.0}, 0};
+    found_.back().starting = true;
+  }
+  if (!unknown_noise_[0] && !unknown_noise_[1]) return;
+  // Twice: of the first motion a bias was no part.
+  settle();
+  settle();
+  for (const Found& one : found_)
+    first_starting_.push_back(one.effect);
+  for (const Effect& effect : noise_effects(noise_))
+    first_starting_.push_back(effect);
 }
 
 std::size_t Search::place_of(const Effect& effect) const {
@@ -367,6 +426,7 @@ void Search::replace_round() {
 }
 
 void Search::replace(std::size_t index) {
+  if (found_[index].starting) return;
   Found& mine = found_[index];
   const std::size_t place = place_of(mine.effect);
   const Regression& regression = regressions_[place];
@@ -405,7 +465,7 @@ void Search::replace(std::size_t index) {
 
 void Search::delete_backward() {
   for (std::size_t i = 0; i < found_.size();) {
-    if (found_[i].margin() >= kFallen) {
+    if (found_[i].starting || found_[i].margin() >= kFallen) {
       ++i;
       continue;
     }
@@ -421,7 +481,7 @@ void Search::reject_unsteady() {
   std::vector<bool> wrong = pieces_of_something_else(found_);
   for (std::size_t i = 0; i < found_.size(); ++i) {
     const Found& one = found_[i];
-    if (wrong[i] || !row(one.effect.kind).keeps_size) continue;
+    if (wrong[i] || one.starting || !row(one.effect.kind).keeps_size) continue;
     const std::size_t place = place_of(one.effect);
     const Effects all = terms(place);
     const auto index =
@@ -472,7 +532,7 @@ bool Search::reject_beside_noise() {
   for (std::size_t i = 0; i < found_.size(); ++i) {
     const Found& one = found_[i];
     const double drift = drift_statistic(one.effect.gyro);
-    if (drift == 0.0 || is_noise(one) || one.needed >= kStatisticMin) {
+    if (drift == 0.0 || is_noise(one) || one.starting || one.needed >= kStatisticMin) {
       kept.push_back(one);
       continue;
     }
@@ -503,11 +563,12 @@ void Search::run() {
   const auto tell = [&](std::string_view what, double share) {
     if (progress) progress(what, share);
   };
+  start();
   for (std::size_t round = 0; round < kFoundMax; ++round) {
     const auto done = static_cast<double>(round);
     tell("scoring candidates", kShareBegun + kShareAdding * done / (done + 2.0));
     if (!add_round()) break;
-    if (found_.size() > 1) replace_round();
+    if (found().size() > 1) replace_round();
   }
   tell("weighing rivals", kShareRivals);
   place_again();
@@ -515,6 +576,13 @@ void Search::run() {
   delete_backward();
   reject_unsteady();
   tell("fitting the noise", kShareNoise);
+  for (std::size_t gyro = 0; gyro < 2; ++gyro) {
+    if (!unknown_noise_[gyro]) continue;
+    model_noise_[gyro] = noise_[gyro];
+    model_noise_[gyro].ratio_rthz = 0.0;
+    model_noise_[gyro].markov.clear();
+  }
+  starting_noise_ = noise_effects(model_noise_);
   const PairNoise model_noise = model_noise_;
   noise_rounds();
   while (reject_beside_noise()) {

@@ -33,7 +33,11 @@ class Search {
   /// Finds deterministic effects, in the order of their weight; then noise.
   void run();
 
-  [[nodiscard]] const std::vector<Found>& found() const { return found_; }
+  [[nodiscard]] std::vector<Found> found() const;
+  /// Bias and noise of the gyros of which the model says neither: every gyro has them.
+  [[nodiscard]] std::vector<Found> starting() const;
+  /// The same before anything was found.
+  [[nodiscard]] const Effects& first_starting() const { return first_starting_; }
   /// What looked like an effect and is none of the catalogue's: it does not hold throughout.
   [[nodiscard]] const std::vector<Found>& rejected() const { return rejected_; }
   /// The model's effects and what was found.
@@ -48,6 +52,8 @@ class Search {
     std::vector<Score> timing;  ///< all that is late, by the linear look
   };
 
+  void start();
+  [[nodiscard]] Effects noise_effects(const PairNoise& noise) const;
   /// Another study, and all that hangs on it.
   void take(std::shared_ptr<const Study> study);
   void renew_motion();
@@ -90,6 +96,9 @@ class Search {
   Effects known_;
   std::vector<Found> found_;
   std::vector<Found> rejected_;
+  std::array<bool, 2> unknown_noise_{};  ///< the model says nothing of it
+  Effects starting_noise_;               ///< of such gyros, once it is fitted
+  Effects first_starting_;
   PairNoise noise_;        ///< fitted
   PairNoise model_noise_;  ///< what the model says, with what was found
 };

@@ -76,15 +76,22 @@ Verdict verdict_of(const Result& result) {
   return rest ? Verdict::kPartlyExplained : Verdict::kExplained;
 }
 
+Effects joined(const Effects& first, const std::vector<NamedEffect>& second) {
+  Effects all = first;
+  for (const NamedEffect& one : second)
+    all.push_back(one.effect);
+  return all;
+}
+
 // The gap before and after each effect, in the order in which they were added, against the floor of
-// the model with all of them.
-void score(const Study& study, const Effects& given, std::uint64_t seed, Result& result) {
-  Effects now = given;
-  for (const NamedEffect& one : result.effects)
-    now.push_back(one.effect);
-  const Floor floor = simulate_floor(study, now, Part::kHeldOut, seed);
-  now.resize(given.size());
-  double gap = gap_of(study, now, floor, Part::kHeldOut);
+// the model with all of them. `first`: the starting model before anything was found.
+void score(const Study& study, const Effects& given, const Effects& first, std::uint64_t seed,
+           Result& result) {
+  Effects now = joined(given, result.starting);
+  const Floor floor = simulate_floor(study, joined(now, result.effects), Part::kHeldOut, seed);
+  Effects before = given;
+  before.insert(before.end(), first.begin(), first.end());
+  double gap = gap_of(study, before, floor, Part::kHeldOut);
   result.gap.before = gap;
   result.gap.band95 = floor.band95;
   for (NamedEffect& one : result.effects) {
@@ -147,14 +154,16 @@ Expected<Result> find_gap(const Recording& recording, const model::Model& model,
     result.effects.push_back(named(finding));
   for (const Found& one : found)
     result.effects.push_back(named(one, recording.has_reference));
-  for (const NamedEffect& effect : result.effects)
-    result.model.effects.push_back(effect.effect);
-  score(study, model.effects, settings.seed, result);
+  for (const Found& one : search.starting())
+    result.starting.push_back(named(one, recording.has_reference));
+  const Effects given = joined(model.effects, result.starting);
+  result.model.effects = joined(given, result.effects);
+  score(study, model.effects, search.first_starting(), settings.seed, result);
   result.verdict = verdict_of(result);
 
   tell("drawing", kShareDrawing);
-  describe_effects(study, model.effects, result);
-  result.figures = gyro_figures(study, model.effects, result.model.effects, settings.seed);
+  describe_effects(study, given, result);
+  result.figures = gyro_figures(study, given, result.model.effects, settings.seed);
   tell("done", 1.0);
   return result;
 }

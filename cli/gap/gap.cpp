@@ -38,6 +38,11 @@ std::string comment_of(const GapSubject& subject, const gap::NamedEffect& named)
 Expected<std::string> extended_model(const GapInputs& inputs, const std::string& given_text,
                                      const gap::Result& result) {
   Expected<std::string> text = given_text;
+  for (const gap::NamedEffect& one : result.starting) {
+    if (!text) return text;
+    text = model::append_effect(*text, one.effect,
+                                "starting model: fitted, for the given model says nothing of it");
+  }
   for (const gap::NamedEffect& named : result.effects) {
     if (!text) return text;
     text = model::append_effect(*text, named.effect, comment_of(inputs.subject, named));

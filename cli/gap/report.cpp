@@ -183,6 +183,14 @@ std::string table(const Rows& rows) {
   return text;
 }
 
+std::string starting_text(const GapSubject& subject, const gap::Result& result) {
+  Rows rows;
+  for (const gap::NamedEffect& one : result.starting)
+    rows.push_back({subject.gyros[one.effect.gyro], std::string(model::info(one.effect.kind).name),
+                    value_text(one)});
+  return "starting model, for the given one says neither bias nor noise:\n" + table(rows);
+}
+
 std::string drop_table(const GapSubject& subject, const gap::Result& result) {
   Rows rows{{"round", "gap before", "after", "gyro", "effect", "value ± σ", "may also be"}};
   for (std::size_t i = 0; i < result.effects.size(); ++i) {
@@ -227,11 +235,13 @@ void add_once(std::vector<std::string>& list, const std::string& text) {
 }  // namespace
 
 void round_to_sigma(gap::Result& result) {
-  for (gap::NamedEffect& named : result.effects) {
-    const model::Effect exact = named.effect;
-    round_effect(named.effect, named.sigma);
-    for (model::Effect& effect : result.model.effects) {
-      if (same(effect, exact)) effect.parameters = named.effect.parameters;
+  for (auto* list : {&result.starting, &result.effects}) {
+    for (gap::NamedEffect& named : *list) {
+      const model::Effect exact = named.effect;
+      round_effect(named.effect, named.sigma);
+      for (model::Effect& effect : result.model.effects) {
+        if (same(effect, exact)) effect.parameters = named.effect.parameters;
+      }
     }
   }
 }
@@ -243,6 +253,16 @@ Json gap_json(const gap::Result& result) {
                  {"after", result.gap.after},
                  {"floor", kFloor},
                  {"band95", {result.gap.band95[0], result.gap.band95[1]}}};
+  if (!result.starting.empty()) {
+    json["starting_model"] = Json::array();
+    for (const gap::NamedEffect& one : result.starting) {
+      const Json whole = effect_json(one);
+      json["starting_model"].push_back({{"kind", whole["kind"]},
+                                        {"gyro", whole["gyro"]},
+                                        {"parameters", whole["parameters"]},
+                                        {"sigma", whole["sigma"]}});
+    }
+  }
   json["effects"] = Json::array();
   for (const gap::NamedEffect& named : result.effects)
     json["effects"].push_back(effect_json(named));
@@ -355,6 +375,7 @@ std::string gap_text(const GapSubject& subject, const gap::Result& result) {
   text += fmt::format("gap {} -> {} nats per sample on {} samples that took no part; {}\n",
                       gap_number(result.gap.before), gap_number(result.gap.after), result.held_out,
                       floor_text(result.gap));
+  if (!result.starting.empty()) text += starting_text(subject, result);
   if (!result.effects.empty()) text += drop_table(subject, result) + experiments(result);
   for (const gap::Unexplained& rest : result.unexplained)
     text += fmt::format("unexplained: {}: {}\n", subject.gyros[rest.gyro], rest.text);
