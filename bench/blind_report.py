@@ -79,6 +79,118 @@ def _summary(judged):
     ]
 
 
+NOISE = {"white_noise", "rate_random_walk", "gauss_markov", "rate_noise", "bias_instability"}
+
+
+def outcome(line):
+    """One word for what became of a recording."""
+    j, group = line["judged"], line["answer"]["group"]
+    if j["confident"]:
+        return "CONFIDENTLY WRONG" if any(k not in NOISE for k, _ in j["confident"]) else "surplus noise"
+    if j["wrong"]:
+        return "wrong set"
+    if group in ("single", "pair", "triple"):
+        if all(j["found"]):
+            return "right" if not j["surplus"] else "right, named twice"
+        return "in the set" if all(j["covered"]) else "missed"
+    return "right"
+
+
+def inside(line):
+    """Whether the gap on the samples that took no part is inside its band."""
+    return line["gap"]["after"] <= line["gap"]["band95"][1]
+
+
+def one_line(line):
+    """A recording in a line: seed, world, hidden, verdict, names, outcome, gap and band, cost."""
+    answer = line["answer"]
+    hidden = " + ".join(f"{e['kind']} {e['gyro']}" for e in answer["effects"]) or "–"
+    if answer["outside"]:
+        hidden = f"{answer['outside']['name']} {answer['outside']['gyro']}"
+    if answer["group"] in ("decoy", "outside"):
+        hidden = f"{answer['group']}: {hidden}"
+    t = "/".join(f"{e['t']:g}" for e in answer["effects"] if e.get("t"))
+    world = answer.get("world", "bench") + (" ref" if answer["reference"] else "")
+    world += " nothing" if answer.get("nothing_given") else ""
+    if answer.get("traits"):
+        traits = answer["traits"]
+        world += f" {traits['pair']} {'x'.join(f'{r:g}' for r in answer['rates_hz'])} {traits['road_dps']:.2g}"
+    front = f"{answer['seed']} | {world} | {hidden}{f' (t {t})' if t else ''} | "
+    if "failed" in line:
+        return front + "FAILED " + line["failed"]
+    g, j = line["gap"], line["judged"]
+    sets = {tuple(u) for u in j["unapplied"]}
+    names = ", ".join(_named(n) + ("*" if tuple(n[:2]) in sets else "") for n in j["named"]) or "–"
+    gap = f"gap {g['before']:.3g} → {g['after']:.3g} [{g['band95'][0]:.3g}, {g['band95'][1]:.3g}]"
+    gap += " in" if inside(line) else " OUT"
+    return front + f"{j['verdict']} | {names} | {outcome(line)} | {gap} | {line['seconds']:.1f} s, {line['memory_mb']:.0f} MB"
+
+
+def must_reach(judged):
+    """The rows that decide, of drives or of all worlds."""
+    def of(*groups):
+        return [line for line in judged if line["answer"]["group"] in groups]
+
+    def soft(line):
+        return line["answer"].get("traits", {}).get("soft_noise", False)
+
+    def share(lines, good):
+        return rate(sum(bool(good(line)) for line in lines), len(lines))
+
+    clean = [line for line in of("clean") if not soft(line)]
+    known = [line for line in of("single") if _plain_enough(line)]
+    effects = of("single", "pair", "triple")
+    covered = [c for line in effects if _plain_enough(line) for c in line["judged"]["covered"]]
+    closed = lambda line: line["judged"]["verdict"] == "no_gap" and inside(line)
+    strange = of("outside")
+    wrong = lambda line: any(k not in NOISE for k, _ in line["judged"]["confident"])
+    times = sorted(line["seconds"] for line in judged) or [0.0]
+    memory = max([line["memory_mb"] for line in judged] or [0.0])
+    longer = sum(t > 10.0 for t in times)
+    rows = [
+        ("clean: \"no gap\", inside the band", share(clean, closed), "≥ 95 %"),
+        ("the same, noise behind the sensor's filter", share([c for c in of("clean") if soft(c)], closed), ""),
+        ("single, \\|t\\| ≥ 8: right name first", share(known, lambda l: l["judged"]["right_first"]), "≥ 95 %"),
+        ("single, \\|t\\| ≥ 8: held-out gap inside the band", share(known, inside), "≥ 95 %"),
+        ("clean: something deterministic named", share(of("clean"), lambda l: l["judged"]["deterministic"]), "≤ 1 %"),
+        ("clean: noise named", share(of("clean"), lambda l: l["judged"]["wrong"] and not l["judged"]["deterministic"]), ""),
+        ("confidently wrong, of all", share(judged, wrong), "≤ 0.5 %"),
+        ("the same, of those with effects of the catalogue", share(effects, wrong), ""),
+        ("named without the truth, not applied", share(judged, lambda l: len(l["judged"]["wrong"]) > len(l["judged"]["confident"])), ""),
+        ("outside the catalogue: something named", share(strange, lambda l: l["judged"]["wrong"]), "≤ 5 %"),
+        ("decoys: something named", share(of("decoy"), lambda l: l["judged"]["wrong"]), ""),
+        ("truth among names and rivals, \\|t\\| ≥ 8", rate(sum(covered), len(covered)), "≥ 99 %"),
+        ("longer than 10 s", rate(longer, len(judged)), "0"),
+    ]
+    cost = f"median {times[len(times) // 2]:.1f} s, longest {times[-1]:.1f} s, peak {memory:.0f} MB"
+    return ["| | measured (95 % interval) | wanted |", "|---|---|---|", *(f"| {a} | {b} | {c} |" for a, b, c in rows),
+            "", f"Time and memory of `vgyro gap`: {cost}."]  # fmt: skip
+
+
+FAMILIES = {
+    "offsets": ["bias", "bias_step", "bias_ramp", "warm_up", "run_in"],
+    "temperature": ["temperature_bias", "temperature_bias_quadratic", "temperature_rate_bias", "temperature_hysteresis"],
+    "surroundings": ["g_sensitivity", "vibration_rectification", "supply_voltage_bias"],
+    "response to the rate": ["scale_factor", "scale_factor_asymmetry", "scale_factor_quadratic", "scale_factor_cubic",
+                             "scale_factor_temperature", "cross_axis"],
+    "tones": ["line", "angle_harmonic"],
+    "lateness and clocks": ["delay", "bandwidth", "clock_skew", "timestamp_jitter"],
+    "noise": sorted(NOISE),
+    "clips and frames": ["saturation", "dead_band", "quantization", "spikes", "stuck", "dropped_frames"],
+}  # fmt: skip
+
+
+def coverage(judged):
+    """Parameters inside their 95 % interval, by family: median of |error|/σ is 0.67 where σ is right."""
+    lines = ["| family | inside 95 % | median of \\|error\\|/σ |", "|---|---|---|"]
+    for family, names in FAMILIES.items():
+        own = [e for line in judged for e in line["judged"]["errors"] if e[0] in names]
+        ratio = sorted(abs(e[2]) / e[3] for e in own)
+        hit = sum(r <= Z95 for r in ratio)
+        lines.append(f"| {family} | {rate(hit, len(own))} | {f'{ratio[len(ratio) // 2]:.2f}' if own else ''} |")
+    return lines
+
+
 def _power(judged):
     cells, columns = collections.defaultdict(list), []
     for line in judged:
@@ -134,6 +246,8 @@ def table(lines, heading):
         )
         times = f"median {seconds[len(seconds) // 2]:.1f} s, longest {seconds[-1]:.1f} s"
         text += [f"Time of `vgyro gap`: {times}; peak memory {memory:.0f} MB.", ""]
+        text += ["### What must be reached", "", *must_reach(judged), ""]
+        text += ["### Parameters inside their interval", "", *coverage(judged), ""]
     text += ["### Right name first, by kind and |t|", "", *head, *body, ""]
     text += ["### Wrong or surplus names", "", *_confusion(judged), ""]
     if failed:

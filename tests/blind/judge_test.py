@@ -149,7 +149,7 @@ if sys.argv[1] == "gap":
     word("--out").mkdir(parents=True)
     (word("--out") / "model.toml").write_text("format = 1")
     effect = {"kind": "scale_factor", "gyro": 1, "parameters": {"error": 1e-3}, "sigma": {}, "ambiguous_with": []}
-    whole = {"verdict": "explained", "gap": {}, "effects": [effect], "unexplained": []}
+    whole = {"verdict": "explained", "gap": {"before": 1.0, "after": 0.0, "band95": [-0.01, 0.01]}, "effects": [effect], "unexplained": []}
     (word("--out") / "gap.json").write_text(json.dumps(whole))
 else:
     word("--json").write_text(json.dumps({"gap": {"value": 0.1, "floor": 0.0, "band95": [-0.01, 0.01]}}))
@@ -183,7 +183,7 @@ class Bench(unittest.TestCase):
                     "--table",
                     str(scratch / "table.md"),
                 ]
-                subprocess.run(command, check=True, stderr=subprocess.DEVNULL)
+                subprocess.run(command, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
                 return (scratch / "table.md").read_text()
 
             bench("1")
