@@ -47,8 +47,9 @@ def make(case, folder, answer_path, recordings=("measured", "fresh")):
         recording.write_log(
             folder / f"{name}.log.xz", recording.streams(world, hidden, odd, temperatures, rng)
         )
+    kind = hidden[0]["kind"] if case.group == "single" else case.kind
     answer = {
-        "case": case.name, "group": case.group, "kind": case.kind, "seed": case.seed, "strength": case.strength,
+        "case": case.name, "group": case.group, "kind": kind, "seed": case.seed, "strength": case.strength,
         "reference": case.reference, "duration_s": worlds[0].motion.duration_s, "rates_hz": list(worlds[0].rates_hz),
         "effects": hidden, "outside": label, "world": case.world, "nothing_given": case.nothing_given,
         "benign": drive.benign(worlds[0], case) if case.world == "drive" else [], "traits": worlds[0].traits,
