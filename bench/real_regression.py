@@ -119,11 +119,11 @@ def lag_of(late, early):
 
 
 def cell_means(t, y, edges):
-    index = np.searchsorted(edges, t, side="right") - 1
-    inside = (index >= 0) & (index < len(edges) - 1)
-    count = np.bincount(index[inside], minlength=len(edges) - 1)
-    total = np.bincount(index[inside], y[inside], minlength=len(edges) - 1)
-    return np.where(count > 0, total / np.maximum(count, 1), np.nan), count
+    """Means of each cell by the trapezoids' area, and how many samples it holds: a plain mean of samples belongs to
+    the middle of the samples, not of the cell, and half a sample is a delay of milliseconds."""
+    area = np.concatenate([[0.0], np.cumsum(0.5 * (y[1:] + y[:-1]) * np.diff(t))])
+    count = np.diff(np.searchsorted(t, edges))
+    return np.diff(np.interp(edges, t, area)) / np.diff(edges), count
 
 
 class Cells:
@@ -149,7 +149,7 @@ class Cells:
         self.heat = None if temperature is None else np.interp(self.t, own[0], temperature)[good]
         self.y, self.x, self.t = y[good], x[good], self.t[good]
         self.d, self.slope = self.y - self.x, (ends[1] - ends[0])[good] / CELL_S
-        self.angle = np.cumsum(x * CELL_S * np.isfinite(x) if not np.isnan(x).any() else np.nan_to_num(x) * CELL_S)[good]
+        self.angle = np.cumsum(np.where(n2 > 0, x, 0.0) * CELL_S)[good]
         pauses = np.cumsum(np.concatenate([[0], np.diff(self.t) > PAUSE_S]))
         self.stretch = _stretches(self.t, pauses)
 
