@@ -167,6 +167,20 @@ def must_reach(judged):
             "", f"Time and memory of `vgyro gap`: {cost}."]  # fmt: skip
 
 
+def uniformity(judged):
+    """Of clean recordings: is the p of the best of all candidates (`null.p_value` of gap.json, where it is written) as
+    often below any bound as the bound says? Kolmogorov and Smirnov's distance, with its 5 % bound."""
+    p = sorted(
+        line["null_p"] for line in judged if line["answer"]["group"] == "clean" and line.get("null_p") is not None
+    )
+    if not p:
+        return []
+    n = len(p)
+    distance = max(max((i + 1) / n - v, v - i / n) for i, v in enumerate(p))
+    below = ", ".join(f"{rate(sum(v <= b for v in p), n)} below {b:g}" for b in (0.01, 0.05, 0.2, 0.5))
+    return [f"p of the best candidate on clean recordings: {below}; distance from uniform {distance:.2f} (5 % bound {1.36 / math.sqrt(n):.2f}).", ""]
+
+
 FAMILIES = {
     "offsets": ["bias", "bias_step", "bias_ramp", "warm_up", "run_in"],
     "temperature": ["temperature_bias", "temperature_bias_quadratic", "temperature_rate_bias", "temperature_hysteresis"],
@@ -247,6 +261,7 @@ def table(lines, heading):
         times = f"median {seconds[len(seconds) // 2]:.1f} s, longest {seconds[-1]:.1f} s"
         text += [f"Time of `vgyro gap`: {times}; peak memory {memory:.0f} MB.", ""]
         text += ["### What must be reached", "", *must_reach(judged), ""]
+        text += uniformity(judged)
         text += ["### Parameters inside their interval", "", *coverage(judged), ""]
     text += ["### Right name first, by kind and |t|", "", *head, *body, ""]
     text += ["### Wrong or surplus names", "", *_confusion(judged), ""]

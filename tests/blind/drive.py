@@ -34,6 +34,9 @@ MOST = {
     "scale_factor_cubic": 3e-5, "scale_factor_temperature": 3e-3, "delay": 0.06, "white_noise": 0.05,
     "rate_random_walk": 5e-3, "gauss_markov": 0.1, "rate_noise": 0.01, "clock_skew": 1000.0,
 }  # fmt: skip
+# Of these, what the better sorts may have: drift and offsets, and scale factors.
+STEADY = {"fog": 0.02, "vibratory": 0.2, "mems": 1.0, "cheap mems": 1.0}
+TRUE_TO_SCALE = {"fog": 0.2, "vibratory": 0.3, "mems": 1.0, "cheap mems": 1.0}
 # Nor would anybody look for less than this share of what a bench meets.
 LEAST_SHARE = 0.1
 LEAST = {"bandwidth": 2.0, "delay": 2e-4, "clock_skew": 2.0}
@@ -219,6 +222,15 @@ def fits(kind, gyro, world, case):
     return True
 
 
+def most(kind, sort):
+    """The most that a sensor of this sort may have."""
+    if kind in kinds.RESPONSES:
+        return MOST[kind] * TRUE_TO_SCALE[sort]
+    if kind in kinds.OFFSETS + kinds.NOISES:
+        return MOST[kind] * STEADY[sort]
+    return MOST.get(kind, np.inf)
+
+
 def draw(kind, gyro, wanted_t, world, rng):
     """effects.draw for a drive; None where the size would be nobody's gyro."""
     name, low, high = kinds.SIZE[kind]
@@ -244,8 +256,10 @@ def draw(kind, gyro, wanted_t, world, rng):
         t_of = lambda s: unit * (1 / (2 * np.pi * s) if kind == "bandwidth" else s)
     if kind == "bandwidth":
         size = min(size, kinds.HIGHEST_CUTOFF_HZ)
-    size = max(size, LEAST.get(kind, LEAST_SHARE * low))
-    if size > MOST.get(kind, np.inf) or kind == "bandwidth" and size <= LEAST["bandwidth"]:
+    sort = world.traits["pair"].split("/")[gyro - 1]
+    least = LEAST_SHARE * low * (STEADY[sort] if kind in kinds.OFFSETS + kinds.NOISES else 1.0)
+    size = max(size, LEAST.get(kind, least))
+    if size > most(kind, sort) or kind == "bandwidth" and size <= LEAST["bandwidth"]:
         return None
     t = round(float(t_of(size)), 2)
     p[name] = float(f"{size * (rng.choice([-1.0, 1.0]) if kind in kinds.SIGNED else 1.0):.6g}")

@@ -13,6 +13,7 @@ SEGMENT_S = 10.0
 BLOCK_S = 0.1
 TURNS_DENSITY, TURNS_HZ = 100.0, 0.5  # of turns, far above any noise: nobody knows them but from the gyros
 FLICKER_AS_WALK = 0.163  # K of a walk whose Allan deviation at 50 s is the flicker's
+UNKNOWN_DPS = 10.0  # of a bias that nobody gave
 SWEEPING_PPM = 50.0  # a sampling clock so far off sweeps through all offsets
 
 
@@ -78,26 +79,33 @@ class Visible:
         return SEGMENT_S * 2.0 * per_hz.sum(axis=1) * (self.f[1] - self.f[0])
 
 
-def _walk(world, gyro):
-    seen = [world.gyros[gyro - 1]] if world.reference else world.gyros
-    total = 0.0
-    for g in seen:
-        markov = 2.0 * g.markov_sigma**2 / g.markov_tau
-        total += g.walk**2 + (FLICKER_AS_WALK * g.flicker) ** 2 + markov
-    return np.sqrt(total)
+def _walks(world, gyro):
+    """K² of the gyro and of the other one, whose drift is in the way where there is no reference."""
+    own, other = (
+        g.walk**2 + (FLICKER_AS_WALK * g.flicker) ** 2 + 2.0 * g.markov_sigma**2 / g.markov_tau
+        for g in (world.gyros[gyro - 1], world.gyros[2 - gyro])
+    )
+    return own, (0.0 if world.reference else other)
 
 
-def _fisher_t(shape, white, walk, level_known):
-    """strength.fisher_t with white noise that changes; both in variance a block."""
-    level, variance, start = (0.0, 0.0, 0) if level_known else (float(shape[0]), float(white[0]), 1)
+def _fisher_t(shape, white, alone, rests, walks, level_known):
+    """|t| of a shape on the first of two gyros: a Kalman filter of both drifts, which sees their difference in motion
+    (`white`: its variance a block) and at rest each by itself (`alone`: both variances). It is run on the shape, and
+    what it did not foresee, over its variance, is information."""
+    unknown = 0.0 if level_known else UNKNOWN_DPS**2
+    m, n, p, q, r = 0.0, 0.0, unknown, unknown, 0.0  # means, variances, covariance
     information = 0.0
-    for x, w in zip(shape[start:].tolist(), white[start:].tolist()):
-        variance += walk
-        total = variance + w
-        information += (x - level) ** 2 / total
-        gain = variance / total
-        level += gain * (x - level)
-        variance *= 1.0 - gain
+    for x, w, still in zip(shape.tolist(), white.tolist(), rests.tolist()):
+        p, q = p + walks[0], q + walks[1]
+        for seen, (h, k), noise in (
+            (((x, (1, 0), alone[0]), (0.0, (0, 1), alone[1])) if still else ((x, (1, -1), w),))
+        ):
+            a, b = p * h + r * k, r * h + q * k
+            total = h * a + k * b + noise
+            off = seen - h * m - k * n
+            information += off * off / total
+            m, n = m + a / total * off, n + b / total * off
+            p, q, r = p - a * a / total, q - b * b / total, r - a * b / total
     return float(np.sqrt(information))
 
 
@@ -117,7 +125,10 @@ def per_unit(kind, p, world, gyro, see):
     shape = kinds.shape(kind, p, gyro, t, world, late).reshape(count, inside).mean(axis=1)
     t = (np.arange(count) + 0.5) * BLOCK_S
     white = see.at(see.slow(), t) / BLOCK_S
-    return _fisher_t(shape, white, _walk(world, gyro) ** 2 * BLOCK_S, kind == "bias")
+    rests = world.motion.course.speed(t) == 0.0
+    alone = [s[2] / BLOCK_S for s in see.streams[:2]]
+    walks = [k2 * BLOCK_S for k2 in _walks(world, gyro)]
+    return _fisher_t(shape, white, alone, rests, walks, kind == "bias")
 
 
 def noise_t(kind, p, world, gyro, see, size):
@@ -133,7 +144,7 @@ def noise_t(kind, p, world, gyro, see, size):
         return float(np.sqrt(2.0 * bins * np.sum(r - 1.0 - np.log(r))))
     rate_hz = see.rate_hz
     density = float(np.sqrt(1.0 / np.mean(1.0 / see.slow())))
-    even = _Even(see.duration_s, rate_hz, density, _walk(world, gyro))
+    even = _Even(see.duration_s, rate_hz, density, np.sqrt(sum(_walks(world, gyro))))
     return kinds._noise_strength(kind, p, 1, even, size)
 
 
