@@ -28,11 +28,12 @@ PAUSE_S = 0.5  # longer silences cut the recording
 STRETCH_S = 20.0  # whose sizes are compared
 STRETCHES_MIN = 4  # fewer show no scatter
 FASTEST_DPS = 400.0  # beyond it a craft tumbles, and no gyro of these is within its range
-OUTLIER_MADS = 8.0
+OUTLIER_TIMES, OUTLIER_SHARE = 8.0, 0.9  # beyond so many times what this share of cells stays below: a crash
 LAG_MAX_S, LAG_STEP_S = 0.15, 0.001
 PARTS = 5  # of a recording, for lags and levels
 ALIKE_MIN = 0.7  # correlation below which a lag is nobody's
 SIGMAS = 3.0  # what a size must be of its scatter to be there, and may be off
+UNSEEN_TIMES = 20.0  # a share that is claimed is not there when less than a twentieth of it shows
 FORETELLS = 0.002  # of the variance of stretches left out: less is nothing
 BEGIN, END = "<!-- real_regression: begin -->", "<!-- real_regression: end -->"
 
@@ -143,8 +144,7 @@ class Cells:
         ends = [np.interp(edges, *truth)[i:][: len(self.t)] for i in (0, 1)]
         good = (n1 >= usual[0]) & (n2 >= usual[1]) & (np.abs(x) < FASTEST_DPS) & (np.abs(y) < FASTEST_DPS)
         d = np.where(good, y - x, 0.0)
-        middle = np.median(d[good])
-        good &= np.abs(d - middle) < OUTLIER_MADS * 1.4826 * np.median(np.abs(d[good] - middle))
+        good &= _usual(d, [np.ones(len(d)), x, ends[1] - ends[0]], good)
         temperature = recording.temperatures[gyro - 1]
         self.heat = None if temperature is None else np.interp(self.t, own[0], temperature)[good]
         self.y, self.x, self.t = y[good], x[good], self.t[good]
@@ -152,6 +152,15 @@ class Cells:
         self.angle = np.cumsum(np.where(n2 > 0, x, 0.0) * CELL_S)[good]
         pauses = np.cumsum(np.concatenate([[0], np.diff(self.t) > PAUSE_S]))
         self.stretch = _stretches(self.t, pauses)
+
+
+def _usual(d, columns, good):
+    """Where the difference, less what level, rate and change explain, is not beyond all measure."""
+    a = np.column_stack(columns)
+    for _ in range(3):
+        off = np.abs(d - a @ np.linalg.lstsq(a[good], d[good], rcond=None)[0])
+        good = good & (off < OUTLIER_TIMES * np.quantile(off[good], OUTLIER_SHARE))
+    return good
 
 
 def _stretches(t, pauses):
@@ -186,6 +195,8 @@ class Fit:
         full = sum(np.sum((q - p @ b) ** 2) for (p, q), b in zip(parts, left_out))
         bare = sum(np.sum((q - p[:, :-1] @ b) ** 2) for (p, q), b in zip(parts, less))
         self.foretells = 1.0 - full / bare
+        beside = a[:, -1] - a[:, :-1] @ solve(whole[:-1, :-1], whole[:-1, -1])
+        self.of_one_unit = float(beside @ beside) * scale[-1] ** 2 / bare  # share that one unit would make of the rest
 
 
 def shape_of(kind, p, cells):
@@ -223,7 +234,7 @@ def base_columns(cells, without):
 
 
 def looked_at(kind, p, cells):
-    """(size, error, share foretold) of one shape beside the base."""
+    """(size, error, share foretold, share that one unit would make) of one shape beside the base."""
     shape = shape_of(kind, p, cells)
     if shape is None or np.ptp(shape) < 1e-12:
         return None
@@ -231,7 +242,7 @@ def looked_at(kind, p, cells):
     size, sigma = float(fit.value[-1]), float(fit.sigma[-1])
     if kind == "delay":
         size += cells.lag_s  # the cells were shifted by it
-    return size, sigma, float(fit.foretells)
+    return size, sigma, float(fit.foretells), fit.of_one_unit
 
 
 def both_ways(cells):
@@ -264,14 +275,16 @@ def allan(cells_d, t, tau_cells):
 
 
 def steps_between(values):
-    """(least distance of neighbouring values, share of them that are whole multiples of it)."""
+    """(step, how well values keep to it: 1 on a lattice, 0 anywhere)."""
     levels = np.unique(np.round(values, 9))
     gaps = np.diff(levels)
     gaps = gaps[gaps > 1e-9]
     if not len(gaps):
         return math.nan, 0.0
-    step = float(np.quantile(gaps, 0.05))
-    return step, float(np.mean(np.abs(gaps / step - np.round(gaps / step)) < 0.02))
+    near = values[np.argsort(np.abs(values - np.median(values)))[: len(values) // 2]]
+    steps = np.median(gaps[gaps < 1.5 * np.quantile(gaps, 0.05)]) * np.linspace(0.95, 1.05, 2001)
+    kept = np.array([np.abs(np.mean(np.exp(2j * np.pi * near / step))) for step in steps])
+    return float(steps[np.argmax(kept)]), float(kept.max())
 
 
 # ---------------------------------------------------------------- judgement
@@ -280,7 +293,8 @@ def judge_size(effect, told):
     kind, name = effect["kind"], SIZES[effect["kind"]]
     claimed = effect["parameters"][name]
     doubt = effect.get("sigma", {}).get(name, 0.0) or 0.0
-    size, sigma, share = told
+    size, sigma, share, of_one = told
+    unseen = claimed if kind != "delay" else 0.0  # a delay was shifted away before
     off = abs(size - claimed) / math.hypot(sigma, doubt, 0.1 * abs(claimed))
     there = abs(size) > SIGMAS * sigma and share > FORETELLS
     text = f"{size:.3g} ± {sigma:.2g}, foretells {100 * share:.1f} % of what was left out"
@@ -288,6 +302,8 @@ def judge_size(effect, told):
         return "agrees", text
     if off >= SIGMAS and abs(claimed) > SIGMAS * sigma:
         return "contradicts", text
+    if unseen**2 * of_one > UNSEEN_TIMES * max(share, FORETELLS):
+        return "contradicts", f"{text}, where {claimed:.3g} would foretell {100 * claimed**2 * of_one:.0f} %"
     return "cannot tell", text
 
 
@@ -298,12 +314,12 @@ def judge_other(effect, recording, cells):
     if kind == "quantization":
         step, share = steps_between(y)
         good = share > 0.9 and abs(step / p["step_dps"] - 1) < 0.02
-        return "agrees" if good else "contradicts", f"values lie {step:.4g} apart, {100 * share:.0f} % of them"
+        return "agrees" if good else "contradicts", f"values lie {step:.4g} apart, and keep to it by {100 * share:.0f} %"
     if kind == "dropped_frames":
-        usual = np.median(np.diff(t))
-        missing = float(np.sum(np.round(np.diff(t)[np.diff(t) < PAUSE_S] / usual) - 1) / len(t))
-        good = 0.3 < p["fraction"] / max(missing, 1e-9) < 3.0
-        return "agrees" if good else "cannot tell", f"{100 * missing:.2f} % of frames missing by the stamps"
+        intervals = np.diff(t)[np.diff(t) < PAUSE_S]
+        missing = max(0.0, 1.0 - float(np.median(intervals) / np.mean(intervals)))
+        good = 0.6 < p["fraction"] / max(missing, 1e-9) < 1.6
+        return "agrees" if good else "contradicts", f"by the median of their intervals {100 * missing:.2f} % of frames are missing"
     if kind in ("white_noise", "rate_random_walk", "gauss_markov", "bias_instability", "rate_noise"):
         short, long = (allan(cells.d, cells.t, n) for n in (1, 50))
         falls = short / math.sqrt(50)

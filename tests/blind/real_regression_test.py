@@ -43,6 +43,13 @@ class Judged(unittest.TestCase):
         # Beside the drift of both gyros four minutes are short for a regression that knows nothing of drift.
         self.assertGreaterEqual([word for word, _ in words.values()].count("agrees"), len(words) - 1, words)
 
+    def test_sizes_are_the_true_ones(self):
+        for kind, name, delta in (("scale_factor", "error", 3e-4), ("delay", "seconds", 3e-4)):
+            for reference in (True, False):
+                hidden, _, cells = self.made[kind, reference]
+                size = real_regression.looked_at(kind, hidden["parameters"], cells[hidden["gyro"]])[0]
+                self.assertAlmostEqual(size, hidden["parameters"][name], delta=delta, msg=f"{kind} {reference}")
+
     def test_contradicts_what_is_not_there(self):
         for of, (hidden, _, _) in self.made.items():
             for kind, parameters in (
