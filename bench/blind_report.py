@@ -126,6 +126,26 @@ def one_line(line):
     return front + f"{j['verdict']} | {names} | {outcome(line)} | {gap} | {line['seconds']:.1f} s, {line['memory_mb']:.0f} MB"
 
 
+def changes(lines, before):
+    """What became of the same recordings under another build: outcome, gap inside its band, seconds."""
+    def told(line):
+        if "failed" in line:
+            return "FAILED", False, math.inf
+        return outcome(line), inside(line), line["seconds"]
+
+    old = {line["case"]: told(line) for line in before}
+    both = [(line["case"], old[line["case"]], told(line)) for line in lines if line["case"] in old]
+    rows = [
+        f"| {case} | {was[0]}, {'in' if was[1] else 'OUT'} | {now[0]}, {'in' if now[1] else 'OUT'} |"
+        for case, was, now in both
+        if was[:2] != now[:2]
+    ]
+    faster = sorted(was[2] / max(now[2], 1e-3) for _, was, now in both if math.isfinite(was[2]) and math.isfinite(now[2]))
+    cost = f", {faster[len(faster) // 2]:.1f} times as fast in the median" if faster else ""
+    head = [f"{len(both)} recordings in both, {len(rows)} changed{cost}.", ""]
+    return [*head, "| case | before | now |", "|---|---|---|", *rows] if rows else head
+
+
 def must_reach(judged):
     """The rows that decide, of drives or of all worlds."""
     def of(*groups):

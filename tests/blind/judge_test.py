@@ -215,6 +215,13 @@ class Lines(unittest.TestCase):
                     "deterministic named | 1 of 2", "confidently wrong, of all | 1 of 4"):  # fmt: skip
             self.assertIn(row, text)
 
+    def test_two_builds_are_held_against_each_other(self):
+        old = {**self.line(answer(SCALE), result(), after=0.5), "case": "a", "seconds": 20.0}
+        new = {**self.line(answer(SCALE), result(named("scale_factor", 2))), "case": "a"}
+        text = "\n".join(blind_report.changes([new], [old, {**old, "case": "b"}]))
+        self.assertIn("1 recordings in both, 1 changed, 10.0 times as fast", text)
+        self.assertIn("| a | missed, OUT | right, in |", text)
+
     def test_p_of_clean_recordings_is_held_against_a_uniform_one(self):
         lines = [{**self.line(answer(group="clean"), result()), "null_p": (i + 0.5) / 50} for i in range(50)]
         self.assertIn("distance from uniform 0.01", blind_report.uniformity(lines)[0])
