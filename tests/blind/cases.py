@@ -137,7 +137,7 @@ def hidden_in(case, world, rng):
             {"kind": "scale_factor", "gyro": k, "parameters": {"error": error}, "t": 0.0} for k in (1, 2)
         ]
     if case.group == "decoy" and case.kind == "flat":
-        draw = drive.draw if case.world == "drive" else kinds.draw
+        draw = drive.draw_somehow if case.world == "drive" else kinds.draw
         hidden = draw("temperature_bias", gyro, None, world, rng)
         p, drift = hidden["parameters"], world.temperatures[gyro - 1]
 

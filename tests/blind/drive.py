@@ -269,6 +269,14 @@ def draw(kind, gyro, wanted_t, world, rng):
     return {"kind": kind, "gyro": gyro, "parameters": p, "t": t}
 
 
+def draw_somehow(kind, gyro, wanted_t, world, rng):
+    """draw, as weak as it must be to be a sensor's."""
+    for wanted in (wanted_t, 12.0, 6.0, 3.0, 1.0, 0.1):
+        if effect := draw(kind, gyro, wanted, world, rng):
+            return effect
+    raise ValueError(f"{kind} of gyro {gyro} fits no sensor in this world")
+
+
 def _chosen(case, rng):
     """Kinds to try, the wanted one first; enough for any case."""
     order = [str(k) for k in rng.permutation([k for k in HIDE if k != "supply_voltage_bias"])]
