@@ -36,9 +36,9 @@ CASES = [
 # Four minutes of a vehicle each. True once the workflow reaches them.
 DRIVES_REACHED = False
 DRIVES = [
-    Case("clean", 320, reference=False, short=True, world="drive"),
-    Case("single", 321, "temperature_bias", 20.0, reference=False, short=True, world="drive"),
-    Case("single", 322, "scale_factor", 20.0, short=True, world="drive"),
+    Case("clean", 334, reference=False, short=True, world="drive"),
+    Case("single", 328, "temperature_bias", 20.0, reference=False, short=True, world="drive"),
+    Case("single", 329, "scale_factor", 20.0, short=True, world="drive"),
 ]
 
 
