@@ -215,6 +215,14 @@ class Lines(unittest.TestCase):
                     "deterministic named | 1 of 2", "confidently wrong, of all | 1 of 4"):  # fmt: skip
             self.assertIn(row, text)
 
+    def test_a_run_that_was_ended_has_found_nothing(self):
+        lines = [self.line(answer(SCALE), result(named("scale_factor", 2)))]
+        lines += [{"case": "x", "answer": answer(SCALE), "failed": "ended after 60 s"}]
+        text = "\n".join(blind_report.must_reach(lines))
+        for row in ("right name first | 1 of 2", "inside the band | 1 of 2", "rivals, \\|t\\| ≥ 8 | 1 of 2",
+                    "ended by the time limit | 1 of 2", "longer than 10 s | 1 of 2", "confidently wrong, of all | 0 of 1"):  # fmt: skip
+            self.assertIn(row, text)
+
     def test_two_builds_are_held_against_each_other(self):
         old = {**self.line(answer(SCALE), result(), after=0.5), "case": "a", "seconds": 20.0}
         new = {**self.line(answer(SCALE), result(named("scale_factor", 2))), "case": "a"}
