@@ -33,6 +33,13 @@ CASES = [
     Case("pair", 315, short=True),
     Case("outside", 312, "loud_minute", short=True),
 ]
+# Four minutes of a vehicle each. True once the workflow reaches them.
+DRIVES_REACHED = False
+DRIVES = [
+    Case("clean", 334, reference=False, short=True, world="drive"),
+    Case("single", 328, "temperature_bias", 20.0, reference=False, short=True, world="drive"),
+    Case("single", 329, "scale_factor", 20.0, short=True, world="drive"),
+]
 
 
 def examine(case):
@@ -47,11 +54,15 @@ def examine(case):
         return case, answer, judge.judge(answer, gap, fresh), None
 
 
-class Blind(unittest.TestCase):
+class Judged:
+    """What is asked of a set of cases, examined once."""
+
+    cases = []
+
     @classmethod
     def setUpClass(cls):
         with multiprocessing.Pool(min(2, os.cpu_count())) as pool:
-            cls.results = pool.map(examine, CASES, chunksize=1)
+            cls.results = pool.map(examine, cls.cases, chunksize=1)
 
     def each(self, check):
         """Calls check(answer, judged) for every case; what fails does not hide the others."""
@@ -81,10 +92,19 @@ class Blind(unittest.TestCase):
 
     def test_the_gap_closes_on_a_recording_never_seen(self):
         def check(answer, judged):
-            if answer["group"] != "outside":
+            if answer["group"] != "outside" and not judged["unapplied"]:
                 self.assertTrue(judged["closed"], f"{judged['fresh_gap']} outside {judged['fresh_band']}")
 
         self.each(check)
+
+
+class Blind(Judged, unittest.TestCase):
+    cases = CASES
+
+
+@unittest.skipUnless(DRIVES_REACHED, "drives: switched off by DRIVES_REACHED")
+class Drives(Judged, unittest.TestCase):
+    cases = DRIVES
 
 
 if __name__ == "__main__":

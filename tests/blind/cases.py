@@ -1,4 +1,6 @@
-"""What hides in a recording: a group, a seed and what the group needs give one case, always the same.
+"""What hides in a recording: a world, a group, a seed and what the group needs give one case, always the same.
+
+Worlds: bench, a rate table with its reference; drive, a vehicle on a road, as a rule without one (drive.py).
 
 Groups: clean, single, pair, triple, outside, decoy. Development seeds are below 1000, evaluation seeds
 from 1000 on."""
@@ -7,6 +9,7 @@ import dataclasses
 
 import numpy as np
 
+import drive
 import effects as kinds
 import motion
 import strangers
@@ -31,21 +34,27 @@ class Case:
     strength: float | None = None  # wanted |t|; None: as a bench meets it
     reference: bool = True
     short: bool = False  # 240 s and 100 Hz, for tests
+    world: str = "bench"
+    nothing_given: bool = False  # no model file: the workflow begins with nothing
 
     @property
     def name(self):
         size = "plain" if self.strength is None else f"t{self.strength:g}"
         parts = [
+            "" if self.world == "bench" else self.world,
             self.group,
             self.kind,
             "" if self.group == "clean" else size,
             "" if self.reference else "noref",
+            "nothing" if self.nothing_given else "",
         ]
         return "-".join([part for part in parts if part] + [str(self.seed)])
 
 
 def world_for(case, rng, motion_rng):
     """The gyros come from `rng`, alike for both recordings of a case; all else from `motion_rng`."""
+    if case.world == "drive":
+        return drive.world_for(case, rng, motion_rng)
     strong = case.group == "clean" and rng.random() < 0.5
     markov = strong and rng.random() < 0.5
     gyros = []
@@ -106,6 +115,8 @@ def feed(world, rng):
 
 def hidden_in(case, world, rng):
     """(effects of the catalogue, functions outside it, name and gyro of what is outside)."""
+    if case.world == "drive" and case.group != "decoy":
+        return drive.hidden_in(case, world, rng)
     found, odd, label = [], [], None
     chosen = _chosen_kinds(case, rng)
     gyro = int(rng.integers(1, 3))
@@ -126,7 +137,8 @@ def hidden_in(case, world, rng):
             {"kind": "scale_factor", "gyro": k, "parameters": {"error": error}, "t": 0.0} for k in (1, 2)
         ]
     if case.group == "decoy" and case.kind == "flat":
-        hidden = kinds.draw("temperature_bias", gyro, None, world, rng)
+        draw = drive.draw_somehow if case.world == "drive" else kinds.draw
+        hidden = draw("temperature_bias", gyro, None, world, rng)
         p, drift = hidden["parameters"], world.temperatures[gyro - 1]
 
         def add(_, which, t, __):

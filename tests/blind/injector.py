@@ -13,6 +13,7 @@ import numpy as np
 sys.dont_write_bytecode = True
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 import cases  # noqa: E402
+import drive  # noqa: E402
 import effects as kinds  # noqa: E402
 import recording  # noqa: E402
 import strangers  # noqa: E402
@@ -20,31 +21,38 @@ import strangers  # noqa: E402
 VERSION = 1  # of what a seed means
 
 
-def make(case, folder, answer_path):
-    """Writes the case; returns the answer."""
+def make(case, folder, answer_path, recordings=("measured", "fresh")):
+    """Writes the case; returns the answer. Of a drive the fresh recording may be left out."""
     root = [VERSION, case.seed, zlib.crc32(case.name.encode())]
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     alike = lambda: np.random.default_rng([*root, 0])
-    worlds = [cases.world_for(case, alike(), np.random.default_rng([*root, 1, i])) for i in range(2)]
+    worlds = [
+        cases.world_for(case, alike(), np.random.default_rng([*root, 1, i])) for i in range(len(recordings))
+    ]
     hidden, odd, label = cases.hidden_in(case, worlds[0], np.random.default_rng([*root, 2]))
-    if any(e["kind"] == "vibration_rectification" for e in hidden):
-        cases.shake(worlds[1], np.random.default_rng([*root, 3]))
+    if case.world == "bench" and any(e["kind"] == "vibration_rectification" for e in hidden):
+        for world in worlds[1:]:
+            cases.shake(world, np.random.default_rng([*root, 3]))
     if any(e["kind"] == "supply_voltage_bias" for e in hidden):
-        cases.feed(worlds[1], np.random.default_rng([*root, 3]))
+        for world in worlds[1:]:
+            cases.feed(world, np.random.default_rng([*root, 3]))
     (folder / "vgyro.toml").write_text(recording.config_text(worlds[0]))
-    (folder / "bench.dbc").write_text(recording.DBC)
-    (folder / "model.toml").write_text(recording.model_text(worlds[0]))
-    for i, (world, name) in enumerate(zip(worlds, ("measured", "fresh"))):
+    (folder / "bench.dbc").write_text(recording.dbc_text(worlds[0]))
+    if not case.nothing_given:
+        (folder / "model.toml").write_text(recording.model_text(worlds[0]))
+    for i, (world, name) in enumerate(zip(worlds, recordings)):
         rng = np.random.default_rng([*root, 4, i])
         temperatures = cases.recorded_temperatures(case, world, rng)
         recording.write_log(
             folder / f"{name}.log.xz", recording.streams(world, hidden, odd, temperatures, rng)
         )
+    kind = hidden[0]["kind"] if case.group == "single" else case.kind
     answer = {
-        "case": case.name, "group": case.group, "kind": case.kind, "seed": case.seed, "strength": case.strength,
+        "case": case.name, "group": case.group, "kind": kind, "seed": case.seed, "strength": case.strength,
         "reference": case.reference, "duration_s": worlds[0].motion.duration_s, "rates_hz": list(worlds[0].rates_hz),
-        "effects": hidden, "outside": label,
+        "effects": hidden, "outside": label, "world": case.world, "nothing_given": case.nothing_given,
+        "benign": drive.benign(worlds[0], case) if case.world == "drive" else [], "traits": worlds[0].traits,
     }  # fmt: skip
     if answer_path is not None:
         Path(answer_path).parent.mkdir(parents=True, exist_ok=True)
@@ -66,10 +74,12 @@ def main():
     parser.add_argument("--strength", type=float, help="wanted |t|; without: a size as benches meet it")
     parser.add_argument("--no-reference", action="store_true")
     parser.add_argument("--short", action="store_true", help="240 s at 100 Hz")
+    parser.add_argument("--world", choices=["bench", "drive"], default="bench")
+    parser.add_argument("--nothing-given", action="store_true", help="no model file")
     a = parser.parse_args()
     if a.folder.resolve() in a.answer.resolve().parents:
         parser.error("the answer must lie outside the folder that the workflow sees")
-    case = cases.Case(a.group, a.seed, a.kind, a.strength, not a.no_reference, a.short)
+    case = cases.Case(a.group, a.seed, a.kind, a.strength, not a.no_reference, a.short, a.world, a.nothing_given)
     print(json.dumps(make(case, a.folder, a.answer)))
 
 

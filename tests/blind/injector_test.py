@@ -202,7 +202,7 @@ class Truth(unittest.TestCase):
 
     def test_every_kind_and_stranger_touches_its_own_gyro_alone(self):
         world = small_world(SEED, 100.0)
-        for i, kind in enumerate([*kinds.KINDS, *strangers.MAKERS]):
+        for i, kind in enumerate([*kinds.KINDS, *strangers.OF_THE_BENCH]):
             rng = np.random.default_rng([SEED, i])
             if kind in kinds.KINDS:
                 with_it = [kinds.draw(kind, 2, None, world, rng)], []

@@ -2,14 +2,20 @@
 
 Right is an effect whose kind and gyro are true; where two readings of the data are the same (without a
 reference, gyro 1 + e and gyro 2 − e), also the other one, if it says so in `ambiguous_with`. Confidently
-wrong is an effect that is not true and does not hold the truth in `ambiguous_with` either. On clean
-recordings, decoys and effects outside the catalogue every name is wrong."""
+wrong is an effect that is not true and does not hold the truth in `ambiguous_with` either; one that was
+not applied (`applied` false) is a set without the truth, which is told apart. On clean recordings, decoys
+and effects outside the catalogue every name is wrong, but for what is true of the gyros beside what hides
+(`benign`) and what another catalogue rightly calls the stranger."""
 
 import math
+
+import strangers
 
 # Drawn at random, a convention, or (of a frozen value) a matter of words by one sample: no truth to meet.
 WITHOUT_TRUTH = {"reference_c", "size_dps/spikes", "from_s", "to_s"}
 EXACT = {"axis", "harmonic"}
+# Statistical names beside the truth fit noise that is there; they are counted, but say nothing about the world.
+NOISE = {"white_noise", "rate_random_walk", "gauss_markov", "rate_noise", "bias_instability"}
 
 
 def _label(effect):
@@ -58,11 +64,17 @@ def judge(answer, gap, compared=None):
         if answer["outside"] or answer["group"] in ("clean", "decoy")
         else [_label(e) for e in answer["effects"]]
     )
-    wrong = [e for e in named if not _set(e) & set(truths)]
+    benign = {tuple(b) for b in answer.get("benign", [])} - set(truths)
+    right = set(truths) | benign
+    if answer["outside"]:
+        also = strangers.ALSO_RIGHT.get(answer["outside"]["name"], [])
+        right |= {(kind, answer["outside"]["gyro"]) for kind in also}
+    wrong = [e for e in named if not _set(e) & right]
     right_first = False
-    if named and len(truths) == 1:
-        first = _label(named[0])
-        told = truths[0] in _set(named[0])
+    counted = [e for e in named if _label(e) not in benign]
+    if counted and len(truths) == 1:
+        first = _label(counted[0])
+        told = truths[0] in _set(counted[0])
         right_first = first == truths[0] or (_mirrored(first, truths[0], answer["reference"]) and told)
     found = [
         any(_label(e) == t or (_mirrored(_label(e), t, answer["reference"]) and t in _set(e)) for e in named)
@@ -81,6 +93,9 @@ def judge(answer, gap, compared=None):
         "named": [[*_label(e), sorted(map(list, _set(e) - {_label(e)}))] for e in named],
         "truth": [list(t) for t in truths],
         "wrong": [list(_label(e)) for e in wrong],
+        "confident": [list(_label(e)) for e in wrong if e.get("applied", True)],
+        "unapplied": [list(_label(e)) for e in named if not e.get("applied", True)],
+        "deterministic": [list(_label(e)) for e in wrong if e["kind"] not in NOISE],
         "surplus": sum(max(0, n - truths.count(label)) for label, n in counts.items()),
         "right_first": right_first,
         "found": found,

@@ -149,11 +149,91 @@ if sys.argv[1] == "gap":
     word("--out").mkdir(parents=True)
     (word("--out") / "model.toml").write_text("format = 1")
     effect = {"kind": "scale_factor", "gyro": 1, "parameters": {"error": 1e-3}, "sigma": {}, "ambiguous_with": []}
-    whole = {"verdict": "explained", "gap": {}, "effects": [effect], "unexplained": []}
+    whole = {"verdict": "explained", "gap": {"before": 1.0, "after": 0.0, "band95": [-0.01, 0.01]}, "effects": [effect], "unexplained": []}
     (word("--out") / "gap.json").write_text(json.dumps(whole))
 else:
     word("--json").write_text(json.dumps({"gap": {"value": 0.1, "floor": 0.0, "band95": [-0.01, 0.01]}}))
 """
+
+
+class Sets(unittest.TestCase):
+    """What was not applied is no certain name."""
+
+    @staticmethod
+    def unapplied(*words, **more):
+        return {**named(*words, **more), "applied": False}
+
+    def test_the_truth_among_the_rivals_of_what_was_not_applied_is_covered(self):
+        found = self.unapplied("scale_factor", 1, [("scale_factor", 2)])
+        j = judge.judge(answer(SCALE, reference=False), result(found))
+        self.assertEqual((j["wrong"], j["confident"], j["covered"], j["found"]), ([], [], [True], [True]))
+        self.assertEqual(j["unapplied"], [["scale_factor", 1]])
+
+    def test_a_set_without_the_truth_is_wrong_but_not_confidently(self):
+        j = judge.judge(answer(SCALE), result(self.unapplied("bias", 1, [("warm_up", 1)])))
+        self.assertEqual((j["wrong"], j["confident"], j["covered"]), ([["bias", 1]], [], [False]))
+
+    def test_what_is_true_of_the_gyros_anyway_may_be_named_and_does_not_come_first(self):
+        told = {**answer(SCALE), "benign": [["bias", 1], ["white_noise", 2]]}
+        j = judge.judge(told, result(named("bias", 1), named("white_noise", 2), named("scale_factor", 2)))
+        self.assertEqual((j["wrong"], j["right_first"], j["deterministic"]), ([], True, []))
+        clean = {**answer(group="clean"), "benign": [["quantization", 1]]}
+        self.assertEqual(judge.judge(clean, result(named("quantization", 1)))["wrong"], [])
+        self.assertEqual(judge.judge(clean, result(named("quantization", 2)))["wrong"], [["quantization", 2]])
+
+    def test_a_stranger_may_bear_the_name_that_a_later_catalogue_has_for_it(self):
+        settling = answer(group="outside", outside={"name": "settling", "gyro": 2})
+        self.assertEqual(judge.judge(settling, result(named("run_in", 2)))["wrong"], [])
+        self.assertEqual(judge.judge(settling, result(named("warm_up", 2)))["wrong"], [["warm_up", 2]])
+
+    def test_noise_beside_the_truth_is_told_from_a_false_cause(self):
+        j = judge.judge(answer(SCALE), result(named("scale_factor", 2), named("rate_random_walk", 1)))
+        self.assertEqual((j["confident"], j["deterministic"]), ([["rate_random_walk", 1]], []))
+
+
+class Lines(unittest.TestCase):
+    def line(self, told, found, after=0.0, verdict="explained"):
+        judged = judge.judge(told, {**found, "verdict": verdict})
+        gap = {"before": 1.0, "after": after, "band95": [-0.01, 0.01]}
+        return {"answer": told, "judged": judged, "gap": gap, "seconds": 2.0, "memory_mb": 50.0}
+
+    def test_outcomes(self):
+        right = self.line(answer(SCALE), result(named("scale_factor", 2)))
+        wrong = self.line(answer(SCALE), result(named("bias", 1)))
+        noise = self.line(answer(SCALE), result(named("scale_factor", 2), named("rate_noise", 1)))
+        missed = self.line(answer(SCALE), result(), after=0.5)
+        told = [blind_report.outcome(line) for line in (right, wrong, noise, missed)]
+        self.assertEqual(told, ["right", "CONFIDENTLY WRONG", "surplus noise", "missed"])
+        self.assertIn(" OUT | 2.0 s, 50 MB", blind_report.one_line(missed))
+
+    def test_what_must_be_reached_is_counted(self):
+        lines = [self.line(answer(SCALE), result(named("scale_factor", 2)), after=a) for a in (0.0, 0.5)]
+        lines += [self.line(answer(group="clean"), result(), verdict="no_gap")]
+        lines += [self.line(answer(group="clean"), result(named("bias_step", 1)))]
+        text = "\n".join(blind_report.must_reach(lines))
+        for row in ("\"no gap\", inside the band | 1 of 2", "right name first | 2 of 2", "held-out gap inside the band | 1 of 2",
+                    "deterministic named | 1 of 2", "confidently wrong, of all | 1 of 4"):  # fmt: skip
+            self.assertIn(row, text)
+
+    def test_a_run_that_was_ended_has_found_nothing(self):
+        lines = [self.line(answer(SCALE), result(named("scale_factor", 2)))]
+        lines += [{"case": "x", "answer": answer(SCALE), "failed": "ended after 60 s"}]
+        text = "\n".join(blind_report.must_reach(lines))
+        for row in ("right name first | 1 of 2", "inside the band | 1 of 2", "rivals, \\|t\\| ≥ 8 | 1 of 2",
+                    "ended by the time limit | 1 of 2", "longer than 10 s | 1 of 2", "confidently wrong, of all | 0 of 1"):  # fmt: skip
+            self.assertIn(row, text)
+
+    def test_two_builds_are_held_against_each_other(self):
+        old = {**self.line(answer(SCALE), result(), after=0.5), "case": "a", "seconds": 20.0}
+        new = {**self.line(answer(SCALE), result(named("scale_factor", 2))), "case": "a"}
+        text = "\n".join(blind_report.changes([new], [old, {**old, "case": "b"}]))
+        self.assertIn("1 recordings in both, 1 changed, 10.0 times as fast", text)
+        self.assertIn("| a | missed, OUT | right, in |", text)
+
+    def test_p_of_clean_recordings_is_held_against_a_uniform_one(self):
+        lines = [{**self.line(answer(group="clean"), result()), "null_p": (i + 0.5) / 50} for i in range(50)]
+        self.assertIn("distance from uniform 0.01", blind_report.uniformity(lines)[0])
+        self.assertEqual(blind_report.uniformity([self.line(answer(group="clean"), result())]), [])
 
 
 class Bench(unittest.TestCase):
@@ -183,7 +263,7 @@ class Bench(unittest.TestCase):
                     "--table",
                     str(scratch / "table.md"),
                 ]
-                subprocess.run(command, check=True, stderr=subprocess.DEVNULL)
+                subprocess.run(command, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
                 return (scratch / "table.md").read_text()
 
             bench("1")

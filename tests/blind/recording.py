@@ -14,9 +14,11 @@ import world as truth  # noqa: E402
 
 START_US = 1_700_000_000_000_000
 LEFT_ID, RIGHT_ID, TABLE_ID, CUBE_ID = 0x121, 0x122, 0x1A0, 0x1B0
-RATE_STEP_DPS, TEMPERATURE_STEP_C, ACCELERATION_STEP_G = 1e-6, 0.01, 5e-4
+WHEEL_ID = 0x1C0
+RATE_STEP_DPS, ACCELERATION_STEP_G, SPEED_STEP_KMH = 1e-6, 5e-4, 0.01
+SPEED_HZ = 20.0
 
-DBC = """\
+_DBC = """\
 VERSION "blind"
 
 NS_ :
@@ -26,14 +28,14 @@ BS_:
 BU_: STAND
 
 BO_ 289 LEFT_GYRO: 8 STAND
- SG_ YawRate : 0|32@1- (1E-06,0) [-2000|2000] "deg/s" STAND
- SG_ Celsius : 32|16@1- (0.01,0) [-60|150] "degC" STAND
+ SG_ YawRate : 0|32@1- (@RATE1,0) [-2000|2000] "deg/s" STAND
+ SG_ Celsius : 32|16@1- (@CELSIUS1,0) [-60|150] "degC" STAND
  SG_ Alive : 48|8@1+ (1,0) [0|255] "" STAND
  SG_ Vcc : 56|8@1+ (0.02,0) [0|5.1] "V" STAND
 
 BO_ 290 RIGHT_GYRO: 8 STAND
- SG_ YawRate : 7|32@0- (1E-06,0) [-2000|2000] "deg/s" STAND
- SG_ Celsius : 39|16@0- (0.01,0) [-60|150] "degC" STAND
+ SG_ YawRate : 7|32@0- (@RATE2,0) [-2000|2000] "deg/s" STAND
+ SG_ Celsius : 39|16@0- (@CELSIUS2,0) [-60|150] "degC" STAND
  SG_ Alive : 48|8@1+ (1,0) [0|255] "" STAND
  SG_ Vcc : 56|8@1+ (0.02,0) [0|5.1] "V" STAND
 
@@ -47,16 +49,34 @@ BO_ 432 CUBE: 8 STAND
 """
 
 
+WHEEL = """
+BO_ 448 WHEEL: 8 STAND
+ SG_ Speed : 0|16@1+ (0.01,0) [0|400] "km/h" STAND
+"""
+
+
+def dbc_text(world):
+    """The signals, each gyro's with the steps in which it sends."""
+    text = _DBC
+    for number, g in enumerate(world.gyros, 1):
+        text = text.replace(f"@RATE{number}", f"{g.rate_step:G}")
+        text = text.replace(f"@CELSIUS{number}", f"{g.temperature_step:g}")
+    return text + (WHEEL if world.speed else "")
+
+
 def config_text(world):
     gyro = '[[gyro]]\nname = "{0}"\nbus = "{1}"\ndbc = "bench.dbc"\nmessage = "{2}_GYRO"\nrate = "YawRate"\n'
     gyro += 'temperature = "Celsius"\ncounter = "Alive"\n'
     gyro += 'supply_voltage = "Vcc"\n\n' if world.supplies else "\n"
     reference = '[reference]\nbus = "can0"\ndbc = "bench.dbc"\nmessage = "RATE_TABLE"\nrate = "Speed"\n\n'
+    cube = '[accelerometer]\nbus = "can0"\ndbc = "bench.dbc"\nmessage = "CUBE"\nx = "Ax"\ny = "Ay"\nz = "Az"\n\n'
+    wheel = '[speed]\nbus = "can0"\ndbc = "bench.dbc"\nmessage = "WHEEL"\nsignal = "Speed"\n\n'
     return (
         gyro.format("left", "can0", "LEFT")
         + gyro.format("right", "can1", "RIGHT")
         + (reference if world.reference else "")
-        + '[accelerometer]\nbus = "can0"\ndbc = "bench.dbc"\nmessage = "CUBE"\nx = "Ax"\ny = "Ay"\nz = "Az"\n\n'
+        + (cube if world.accelerometer else "")
+        + (wheel if world.speed else "")
         + f"[calibration]\nrest_s = {world.motion.rest_s - 2.0:.1f}\nrate_dps = {motion.EARTH_DPS}\n\n"
         + '[corrector]\nmethod = "optimal"\nwindow_s = 10.0\norder = 1\n\n[output]\nbus = "can0"\n'
     )
@@ -77,6 +97,12 @@ def model_text(world):
         text += effect_text(number, "rate_random_walk", {"density_dps_rts": g.walk})
         if g.markov_sigma > 0:
             text += effect_text(number, "gauss_markov", {"sigma_dps": g.markov_sigma, "tau_s": g.markov_tau})
+        for sigma, tau_s in g.flicker_terms:
+            text += effect_text(number, "gauss_markov", {"sigma_dps": sigma, "tau_s": tau_s})
+        for cutoff_hz in g.filters_hz:
+            text += effect_text(number, "bandwidth", {"cutoff_hz": cutoff_hz})
+        if g.rate_step > RATE_STEP_DPS:
+            text += effect_text(number, "quantization", {"step_dps": g.rate_step})
     return text
 
 
@@ -106,8 +132,8 @@ def streams(world, effects, strangers, recorded_temperatures, rng):
     for gyro, can_id, order in ((1, LEFT_ID, "<"), (2, RIGHT_ID, ">")):
         t, stamps, counter, rate = truth.reading(world, gyro, effects, strangers, rng)
         columns = [
-            _integers(rate, RATE_STEP_DPS, order + "i4"),
-            _integers(recorded_temperatures[gyro - 1](t), TEMPERATURE_STEP_C, order + "i2"),
+            _integers(rate, world.gyros[gyro - 1].rate_step, order + "i4"),
+            _integers(recorded_temperatures[gyro - 1](t), world.gyros[gyro - 1].temperature_step, order + "i2"),
             (counter % 256).astype(np.uint8),
         ]
         if world.supplies:
@@ -115,19 +141,28 @@ def streams(world, effects, strangers, recorded_temperatures, rng):
         payloads = _payloads(*columns)
         out.append(_stream(f"can{gyro - 1}", can_id, stamps, payloads))
     if world.reference:
-        t = np.arange(int(world.motion.duration_s * truth.REFERENCE_HZ)) / truth.REFERENCE_HZ
-        rate = world.motion.rate(t) + rng.standard_normal(len(t)) * truth.REFERENCE_SIGMA_DPS
+        t = np.arange(int(world.motion.duration_s * world.reference_hz)) / world.reference_hz
+        rate = world.motion.rate(t) + rng.standard_normal(len(t)) * world.reference_sigma
         out.append(_stream("can0", TABLE_ID, t, _payloads(_integers(rate, RATE_STEP_DPS, "<i4"))))
+    if world.accelerometer:
+        out.append(_acceleration(world, rng))
+    if world.speed:
+        t = 1e-4 + np.arange(int((world.motion.duration_s - 0.01) * SPEED_HZ)) / SPEED_HZ
+        kmh = _integers(3.6 * world.motion.course.speed(t), SPEED_STEP_KMH, "<u2")
+        out.append(_stream("can0", WHEEL_ID, t, _payloads(kmh)))
+    return out
+
+
+def _acceleration(world, rng):
     t = (
         2e-4
         + np.arange(int((world.motion.duration_s - 0.01) * truth.ACCELEROMETER_HZ)) / truth.ACCELEROMETER_HZ
     )
     a = world.acceleration.value(t) + rng.standard_normal((len(t), 3)) * truth.ACCELEROMETER_SIGMA_G
     axes = [np.ascontiguousarray(_integers(a[:, i], ACCELERATION_STEP_G, "<i2")) for i in range(3)]
-    out.append(_stream("can0", CUBE_ID, t, _payloads(*axes)))
-    return out
+    return _stream("can0", CUBE_ID, t, _payloads(*axes))
 
 
 def write_log(path, recorded):
-    with lzma.open(path, "wb", preset=1) as file:
+    with lzma.open(path, "wb", preset=0) as file:
         canlog.write(file, recorded)

@@ -2,7 +2,9 @@
 
 import json
 import os
+import signal
 import subprocess
+import threading
 import time
 from pathlib import Path
 
@@ -14,26 +16,35 @@ class Failed(Exception):
     pass
 
 
-def _run(command):
-    """Seconds and peak memory in MB; Failed with its last words when it ends badly."""
+def _run(command, limit_s=None):
+    """Seconds and peak memory in MB; Failed with its last words when it ends badly, or ends after `limit_s`."""
     begun = time.monotonic()
     process = subprocess.Popen([str(c) for c in command], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
+    watch = threading.Timer(limit_s, process.kill) if limit_s else None
+    if watch:
+        watch.start()
     with process.stderr as pipe:
         words = pipe.read()
     _, status, usage = os.wait4(process.pid, 0)
     process.returncode = os.waitstatus_to_exitcode(status)
+    if watch:
+        watch.cancel()
+    if process.returncode == -signal.SIGKILL and limit_s and time.monotonic() - begun >= limit_s:
+        raise Failed(f"ended after {limit_s} s")
     if process.returncode != 0:
         last = words.decode(errors="replace").strip().splitlines()[-3:]
         raise Failed(f"exit {process.returncode}: {' / '.join(last)}")
     return time.monotonic() - begun, usage.ru_maxrss / 1024.0
 
 
-def gap(folder, out, vgyro=VGYRO):
+def gap(folder, out, vgyro=VGYRO, limit_s=None):
     """(gap.json, seconds, MB) of the workflow on FOLDER's measured recording."""
     folder = Path(folder)
+    model = folder / "model.toml"
     cost = _run(
-        [vgyro, "gap", "--config", folder / "vgyro.toml", "--model", folder / "model.toml"]
-        + ["--measured", folder / "measured.log.xz", "--out", out]
+        [vgyro, "gap", "--config", folder / "vgyro.toml", *(["--model", model] if model.exists() else [])]
+        + ["--measured", folder / "measured.log.xz", "--out", out],
+        limit_s,
     )  # fmt: skip
     return json.loads((Path(out) / "gap.json").read_text()), *cost
 

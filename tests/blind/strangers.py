@@ -120,6 +120,41 @@ def turning_up(gyro, size, rng):
     return _on(gyro, lambda world, t, _: size * np.minimum((world.motion.acceleration(t) / 60.0) ** 2, 25.0))
 
 
+def late_warm_up(gyro, size, rng):
+    """A transient of second order: heat that reaches the gyro through a housing."""
+    outer_s, inner_s = rng.uniform(60.0, 150.0), rng.uniform(20.0, 50.0)
+
+    def add(world, t, _):
+        return 3.0 * size * (np.exp(-t / outer_s) - np.exp(-t / inner_s))
+
+    return _on(gyro, add)
+
+
+def settling(gyro, size, rng):
+    """Drift that goes with the logarithm of time."""
+    tau_s = rng.uniform(5.0, 40.0)
+    return _on(gyro, lambda world, t, _: 0.5 * size * np.log1p(t / tau_s))
+
+
+def wheel_hum(gyro, size, rng):
+    """A tone that turns with the wheels, and its second."""
+    around_m, second = rng.uniform(1.8, 2.2), rng.uniform(0.2, 0.6)
+
+    def add(world, t, _):
+        grid = np.arange(0.0, world.motion.duration_s + 0.02, 0.01)
+        speed = world.motion.course.speed(grid)
+        turns = np.interp(t, grid, np.cumsum(speed) * 0.01 / around_m)
+        loud = np.interp(t, grid, speed > 1.0)
+        return size * loud * (np.sin(2 * np.pi * turns) + second * np.sin(4 * np.pi * turns + 1.0))
+
+    return _on(gyro, add)
+
+
 ALL = [bursts, chirp, relaxation, loud_minute, hysteresis, hidden_axis, square_wave, coloured]
 ALL += [tilt_times_rate, turning_up]
-MAKERS = {maker.__name__: maker for maker in ALL}
+# What only a vehicle brings, or a catalogue that grew since may name.
+ON_THE_ROAD = [late_warm_up, settling, wheel_hum]
+MAKERS = {maker.__name__: maker for maker in [*ALL, *ON_THE_ROAD]}
+OF_THE_BENCH = [maker.__name__ for maker in ALL]
+# Names that are right all the same, where the catalogue has them.
+ALSO_RIGHT = {"settling": ["run_in"], "hysteresis": ["temperature_hysteresis"]}

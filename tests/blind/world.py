@@ -21,6 +21,14 @@ class Gyro:
     walk: float  # deg/s/√s
     markov_sigma: float = 0.0
     markov_tau: float = 1.0
+    # What only vehicles' gyros have: see drive.py.
+    flicker: float = 0.0  # coefficient B of bias instability, deg/s; the Allan floor is 0.664·B
+    flicker_terms: tuple = ()  # (sigma, tau) of the Markov terms that stand for it in the model file
+    filters_hz: tuple = ()  # the sensor's own first-order low-passes
+    filtered_noise: bool = False  # its white noise passes the first of them, too
+    period_ppm: float = 0.0  # its sampling interval is longer by this; stamps are the receiver's, and right
+    rate_step: float = 1e-6
+    temperature_step: float = 0.01
 
 
 @dataclasses.dataclass
@@ -33,12 +41,20 @@ class World:
     offset_s: float  # of the second gyro's stamps
     reference: bool
     supplies: list | None = None  # None: the gyros do not tell it
+    reference_hz: float = REFERENCE_HZ
+    reference_sigma: float = REFERENCE_SIGMA_DPS
+    accelerometer: bool = True
+    speed: bool = False
+    traits: dict = dataclasses.field(default_factory=dict)  # for tables: what sort of a world it is
 
     def times(self, gyro):
         """True instants of a gyro's samples."""
         rate_hz = self.rates_hz[gyro - 1]
         first = self.offset_s if gyro == 2 else 0.0
-        return first + np.arange(int((self.motion.duration_s - 0.01) * rate_hz)) / rate_hz
+        count = np.arange(int((self.motion.duration_s - 0.01) * rate_hz))
+        ppm = self.gyros[gyro - 1].period_ppm
+        t = first + count / rate_hz * (1.0 + ppm * 1e-6)
+        return t[t < self.motion.duration_s - 0.005] if ppm else t
 
     def noise_seen(self, gyro):
         """White noise a sample and random walk a step in which an effect of this gyro must be seen:
@@ -66,21 +82,37 @@ def correlated(count, interval_s, sigma, tau_s, rng):
     return np.array(out)
 
 
-def late_rate(world, t, effects):
-    """What a gyro feels at the instants t, in deg/s: the rate behind its delays and its low-pass."""
+def flicker(count, interval_s, coefficient, rng):
+    """Noise of two-sided density B²/(2πf), down to a quarter of the recording's own lowest frequency."""
+    whole = 4 * count
+    f = np.fft.rfftfreq(whole, interval_s)
+    f[0] = np.inf
+    wave = np.fft.rfft(rng.standard_normal(whole)) * coefficient / np.sqrt(2 * np.pi * f * interval_s)
+    return np.fft.irfft(wave, whole)[:count]
+
+
+def late_rate(world, t, effects, gyro):
+    """What a gyro feels at the instants t, in deg/s: the rate behind its delays and its low-passes."""
     delay_s = sum(p["seconds"] for p in _of(effects, "delay"))
-    cutoffs = _of(effects, "bandwidth")
-    assert len(cutoffs) <= 1
+    cutoffs = [*world.gyros[gyro - 1].filters_hz, *(p["cutoff_hz"] for p in _of(effects, "bandwidth"))]
     if cutoffs:
-        return world.motion.low_passed(t - delay_s, cutoffs[0]["cutoff_hz"])
+        return world.motion.low_passed(t - delay_s, *cutoffs)
     return world.motion.rate(t - delay_s)
+
+
+def _white(g, count, rate_hz, density, rng):
+    """White noise; behind a low-pass of the sensor what is left of it at the samples."""
+    if g.filtered_noise:
+        sigma = density * np.sqrt(np.pi * g.filters_hz[0])
+        return correlated(count, 1.0 / rate_hz, sigma, 1.0 / (2 * np.pi * g.filters_hz[0]), rng)
+    return rng.standard_normal(count) * density * np.sqrt(rate_hz)
 
 
 def _noise(world, gyro, t, rate, effects, rng):
     g, rate_hz = world.gyros[gyro - 1], world.rates_hz[gyro - 1]
     total = np.zeros(len(t))
     for density in [g.density, *(e["density_dps_rthz"] for e in _of(effects, "white_noise"))]:
-        total += rng.standard_normal(len(t)) * density * np.sqrt(rate_hz)
+        total += _white(g, len(t), rate_hz, density, rng)
     for walk in [g.walk, *(e["density_dps_rts"] for e in _of(effects, "rate_random_walk"))]:
         total += np.cumsum(rng.standard_normal(len(t))) * walk / np.sqrt(rate_hz)
     markov = [(e["sigma_dps"], e["tau_s"]) for e in _of(effects, "gauss_markov")]
@@ -88,6 +120,8 @@ def _noise(world, gyro, t, rate, effects, rng):
         markov.append((g.markov_sigma, g.markov_tau))
     for sigma, tau_s in markov:
         total += correlated(len(t), 1.0 / rate_hz, sigma, tau_s, rng)
+    if g.flicker > 0:
+        total += flicker(len(t), 1.0 / rate_hz, g.flicker, rng)
     for e in _of(effects, "rate_noise"):
         total += rng.standard_normal(len(t)) * e["ratio_rthz"] * np.abs(rate) * np.sqrt(rate_hz)
     return total
@@ -103,7 +137,7 @@ def reading(world, gyro, effects, strangers, rng):
     effects = [e for e in effects if e["gyro"] == gyro]
     t = world.times(gyro)
     # It comes late first; what the sensor makes of a rate, it makes of that.
-    rate = late_rate(world, t, effects)
+    rate = late_rate(world, t, effects, gyro)
     y = rate.copy()
     y += world.gyros[gyro - 1].bias
     for e in effects:
