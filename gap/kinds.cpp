@@ -437,4 +437,31 @@ bool same_form(const model::Effect& a, const model::Effect& b) {
          (!row(a.kind).forms_differ || a.parameters[0] == b.parameters[0]);
 }
 
+namespace {
+
+// Ten times what the worst data sheets say, or what would be seen without any tool.
+struct Most {
+  Kind kind;
+  std::size_t parameter;
+  double value;
+};
+constexpr Most kMost[] = {
+    {Kind::kTemperatureBias, 0, 0.5},
+    {Kind::kTemperatureBiasQuadratic, 0, 0.05},
+    {Kind::kScaleFactor, 0, 0.2},
+    {Kind::kScaleFactorAsymmetry, 0, 0.1},
+    {Kind::kScaleFactorTemperature, 0, 5e-3},
+    {Kind::kGSensitivity, 1, 0.5},
+    {Kind::kDelay, 0, 0.3},
+    {Kind::kClockSkew, 0, 2e4},
+};
+
+}  // namespace
+
+bool is_plausible(const model::Effect& effect) {
+  return std::none_of(std::begin(kMost), std::end(kMost), [&](const Most& most) {
+    return most.kind == effect.kind && std::abs(effect.parameters[most.parameter]) > most.value;
+  });
+}
+
 }  // namespace vgyro::gap

@@ -169,4 +169,7 @@ std::uint8_t needs_of(const model::Effect& effect);
 /// Both are the same shape, but for where a search starts.
 bool same_form(const model::Effect& a, const model::Effect& b);
 
+/// No larger than a gyro's can be: what is, is something else that looks like it.
+bool is_plausible(const model::Effect& effect);
+
 }  // namespace vgyro::gap

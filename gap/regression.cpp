@@ -184,8 +184,7 @@ void Regression::improve(Fit& fit) const {
 }
 
 // White noise, that of the rate, and walk; correlated drift as the model has it.
-void Regression::fit_noise(Fit& fit) const {
-  const Eigen::VectorXd residual = this->residual(fit.terms);
+void Regression::fit_noise(Fit& fit, const Eigen::VectorXd& residual) const {
   PairNoise start = fit.noise;
   for (std::size_t gyro = 0; gyro < 2; ++gyro)
     start[gyro].markov = known_noise_[gyro].markov;
@@ -210,13 +209,48 @@ void Regression::allow_drift(Fit& fit, std::size_t gyro) const {
   if (richer.log_likelihood > fit.log_likelihood) fit = std::move(richer);
 }
 
+Fit Regression::fit_linearised(Effects terms, const PairNoise& start, const Fit& null) const {
+  const Matrix all = columns(terms);
+  const Eigen::Index width = all.cols() - 1;
+  Fit fit{std::move(terms), start, 0.0, {}};
+  Eigen::VectorXd x = Eigen::VectorXd::Zero(width);
+  const auto residual = [&] { return Eigen::VectorXd(all.col(0) - all.rightCols(width) * x); };
+  const auto solve = [&] {
+    const Matrix white = whitened(all, fit.noise);
+    const Solution solution = explain_first(white.transpose() * white);
+    x = solution.x;
+    fit.covariance = solution.covariance;
+  };
+  for (int turn = 0; turn < kTurns; ++turn) {
+    solve();
+    const double before = fit.log_likelihood;
+    fit_noise(fit, residual());
+    if (turn > 0 && std::abs(fit.log_likelihood - before) < kSettledLikelihood) break;
+  }
+  for (std::size_t gyro = 0; gyro < 2; ++gyro) {
+    if (!needs_drift(null, gyro)) continue;
+    std::array<Freedom, 2> free;
+    free[gyro].markov = true;
+    const NoiseFitResult with =
+        fit_pair_noise(residual(), data_->layout, fit.noise, free, data_->holds, part_);
+    if (with.log_likelihood < fit.log_likelihood + kDriftGain) continue;
+    fit.noise = with.noise;
+    solve();
+    fit.log_likelihood = gap::log_likelihood(residual(), data_->layout, fit.noise, part_);
+  }
+  fit.terms = moved(fit.terms, x, 1.0);
+  for (Effect& term : fit.terms)
+    keep_in_bounds(term);
+  return fit;
+}
+
 Fit Regression::fit_in_turns(Effects terms, const PairNoise& start) const {
   Fit fit{std::move(terms), start, 0.0, {}};
   const int turns = fit.terms.empty() ? 1 : kTurns;
   for (int turn = 0; turn < turns; ++turn) {
     improve(fit);
     const double before = fit.log_likelihood;
-    fit_noise(fit);
+    fit_noise(fit, residual(fit.terms));
     if (turn > 0 && std::abs(fit.log_likelihood - before) < kSettledLikelihood) break;
   }
   return fit;
@@ -235,6 +269,9 @@ bool Regression::needs_drift(const Fit& fit, std::size_t gyro) const {
 }
 
 Fit Regression::fit_beside(Effects terms, const PairNoise& start, const Fit& null) const {
+  // What the others are moved by it is little: their slopes serve.
+  if (!terms.empty() && is_linear({terms.back()}))
+    return fit_linearised(std::move(terms), start, null);
   Fit fit = fit_in_turns(std::move(terms), start);
   for (std::size_t gyro = 0; gyro < 2; ++gyro) {
     if (needs_drift(null, gyro)) allow_drift(fit, gyro);

@@ -70,7 +70,8 @@ class Regression {
   void solve_linear(Fit& fit) const;
   [[nodiscard]] Fit fit_in_turns(Effects terms, const PairNoise& start) const;
   [[nodiscard]] bool needs_drift(const Fit& fit, std::size_t gyro) const;
-  void fit_noise(Fit& fit) const;
+  void fit_noise(Fit& fit, const Eigen::VectorXd& residual) const;
+  [[nodiscard]] Fit fit_linearised(Effects terms, const PairNoise& start, const Fit& null) const;
   void allow_drift(Fit& fit, std::size_t gyro) const;
 
   std::shared_ptr<const Observations> data_;

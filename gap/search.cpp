@@ -42,10 +42,18 @@ constexpr double kTimingRivalShare = 0.2;
 constexpr double kHopeShare = 0.3;
 // Replacing one name by another that is as good would go on for ever.
 constexpr double kBetter = 0.5;
+// Where no model says how much a gyro drifts, a tenth of what was fitted is tried, too: slow
+// effects raise it.
+constexpr double kUnknownWalk = 0.1;
 // A name that fell this far below what it needs is deleted; less is the noise's doubt.
 constexpr double kFallen = -4.0;
 // Of a drift's statistic: a smaller line in it is a part of it.
 constexpr double kLineShare = 0.05;
+// Held-out samples are a third of those that are fitted. A gain of 2·log-likelihood g scatters by
+// 2·√g; and a step or a ramp tells less where it was not fitted: half of it must be there.
+constexpr double kHeldOutShare = 1.0 / 3.0;
+constexpr double kProofSigmas = 2.5;
+constexpr double kProofShare = 0.5;
 // A starting model's noise is known at best to a hundredth, and is written with as many digits.
 constexpr double kStartingNoiseDoubt = 0.01;
 // Shares of a timing effect's statistic that interpolation leaves behind.
@@ -201,7 +209,9 @@ PairNoise Search::modelled(const PairNoise& fitted) const {
   PairNoise noise = fitted;
   for (std::size_t gyro = 0; gyro < 2; ++gyro) {
     const NoiseTerms& model = model_noise_[gyro];
-    noise[gyro].walk_dps_rts = std::min(noise[gyro].walk_dps_rts, model.walk_dps_rts);
+    const double walk =
+        unknown_noise_[gyro] ? kUnknownWalk * noise[gyro].walk_dps_rts : model.walk_dps_rts;
+    noise[gyro].walk_dps_rts = std::min(noise[gyro].walk_dps_rts, walk);
     noise[gyro].ratio_rthz = model.ratio_rthz;
     noise[gyro].markov = model.markov;
     if (model.white_dps_rthz > 0.0) noise[gyro].white_dps_rthz = model.white_dps_rthz;
@@ -295,6 +305,7 @@ void Search::look(std::size_t place, Round& round) {
       found.push_back(std::move(one));
   }
   for (Found& one : found) {
+    if (!is_plausible(one.effect)) continue;
     if (grown) one.needed = kStatisticMinAgainstNoise;
     round.candidates.push_back(std::move(one));
   }
@@ -448,7 +459,7 @@ void Search::replace(std::size_t index) {
   bool replaced = false;
   for (const Found& other : refitted(place, null, noise_, rivals, kRivalsMax)) {
     const Reading reading = reading_of(other.effect);
-    if (same_reading(reading, reading_of(own.effect))) continue;
+    if (same_reading(reading, reading_of(own.effect)) || !is_plausible(other.effect)) continue;
     if (same_reading(reading, reading_of(mine.effect))) continue;
     if (!replaced && other.adjusted() > own.adjusted() + kBetter) {
       mine = other;
@@ -495,6 +506,38 @@ void Search::reject_unsteady() {
     (wrong[i] ? rejected_ : kept).push_back(found_[i]);
   found_ = std::move(kept);
   settle();
+}
+
+// What 2·log-likelihood gains on held-out samples.
+double Search::held_out_gain(std::size_t index) const {
+  const std::size_t place = place_of(found_[index].effect);
+  const Regression& regression = regressions_[place];
+  Fit without{terms(place, index), noise_, 0.0, {}};
+  regression.improve(without);
+  const Regression held_out(study_->observations()[place], known_, Part::kHeldOut);
+  return 2.0 * (held_out.log_likelihood(terms(place), noise_) -
+                held_out.log_likelihood(without.terms, noise_));
+}
+
+// A name foretells samples that had no part in it: of what the fit gains a third, for they are a
+// quarter of all. One that does not, within what chance does to such a gain, is none.
+void Search::reject_unproven() {
+  bool any = false;
+  for (std::size_t i = 0; i < found_.size();) {
+    const double expected = found_[i].statistic * kHeldOutShare;
+    const double chance = 2.0 * kProofSigmas * std::sqrt(std::max(0.0, expected));
+    const double needed = std::max(0.0, expected - std::max(chance, kProofShare * expected));
+    if (found_[i].starting || is_noise(found_[i]) || held_out_gain(i) >= needed) {
+      ++i;
+      continue;
+    }
+    rejected_.push_back(found_[i]);
+    found_.erase(found_.begin() + static_cast<std::ptrdiff_t>(i));
+    settle();
+    any = true;
+    i = 0;
+  }
+  if (any) replace_round();
 }
 
 void Search::noise_rounds() {
@@ -575,6 +618,7 @@ void Search::run() {
   replace_round();
   delete_backward();
   reject_unsteady();
+  reject_unproven();
   tell("fitting the noise", kShareNoise);
   for (std::size_t gyro = 0; gyro < 2; ++gyro) {
     if (!unknown_noise_[gyro]) continue;

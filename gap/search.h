@@ -82,6 +82,8 @@ class Search {
   void replace(std::size_t index);
   void delete_backward();
   void reject_unsteady();
+  [[nodiscard]] double held_out_gain(std::size_t index) const;
+  void reject_unproven();
   void noise_rounds();
   bool reject_beside_noise();
   [[nodiscard]] double statistic_beside(std::size_t index) const;

@@ -233,7 +233,7 @@ namespace {
 
 // Unseen motion that is more than this share of the motion itself: what folds into the frequency
 // passes for a delay or a low-pass of some per cent.
-constexpr double kComparable = 5e-3;
+constexpr double kComparable = 1e-3;
 // Of blocks with more samples the first cosines are enough: they hold what can be compared.
 constexpr std::uint32_t kCosinesMost = 63;
 // Blocks that follow each other, in their length.

@@ -105,7 +105,7 @@ TEST(Search, NamesAHiddenScaleFactorAloneAndLeavesTheStudyAsItWas) {
   Search search(made.study(), noise_effects(making));
   search.run();
   ASSERT_EQ(search.found().size(), 1U) << "seed 41: " << names_of(search.found());
-  const Found& found = search.found().front();
+  const Found found = search.found().front();
   EXPECT_EQ(found.effect.kind, Kind::kScaleFactor);
   EXPECT_EQ(found.effect.gyro, 1U);
   EXPECT_NEAR(found.effect.parameters[0], kError, kSigmas * found.sigma[0]);
@@ -163,7 +163,7 @@ TEST(Search, WithoutReferenceNamesTheScaleFactorOfOneGyroOrTheOther) {
   Search search(made.study(), noise_effects(making));
   search.run();
   ASSERT_EQ(search.found().size(), 1U) << "seed 45: " << names_of(search.found());
-  const Found& found = search.found().front();
+  const Found found = search.found().front();
   EXPECT_EQ(found.effect.kind, Kind::kScaleFactor);
   const double truth = found.effect.gyro == 0 ? kError : -kError;
   EXPECT_NEAR(found.effect.parameters[0], truth, kSigmas * found.sigma[0]);
