@@ -5,6 +5,7 @@
 #include <iterator>
 
 #include "gap/noise_search.h"
+#include "gap/robust.h"
 #include "gap/steadiness.h"
 #include "model/equation.h"
 
@@ -519,6 +520,19 @@ double Search::held_out_gain(std::size_t index) const {
                 held_out.log_likelihood(without.terms, noise_));
 }
 
+// Beyond what it needs, too, where the residual and not the noise's model says how sure it is.
+bool Search::is_sure_by_residual(std::size_t index) {
+  Found& one = found_[index];
+  const std::size_t place = place_of(one.effect);
+  const Effects all = terms(place);
+  const auto at =
+      static_cast<std::size_t>(std::find(all.begin(), all.end(), one.effect) - all.begin());
+  const double more = inflation(regressions_[place], Fit{all, noise_, 0.0, {}}, at);
+  for (double& sigma : one.sigma)
+    sigma *= std::sqrt(more);
+  return one.statistic / more - one.penalty >= std::min(one.needed, kStatisticMin) + kFallen;
+}
+
 // A name foretells samples that had no part in it: of what the fit gains a third, for they are a
 // quarter of all. One that does not, within what chance does to such a gain, is none.
 void Search::reject_unproven() {
@@ -527,7 +541,8 @@ void Search::reject_unproven() {
     const double expected = found_[i].statistic * kHeldOutShare;
     const double chance = 2.0 * kProofSigmas * std::sqrt(std::max(0.0, expected));
     const double needed = std::max(0.0, expected - std::max(chance, kProofShare * expected));
-    if (found_[i].starting || is_noise(found_[i]) || held_out_gain(i) >= needed) {
+    if (found_[i].starting || is_noise(found_[i]) ||
+        (is_sure_by_residual(i) && held_out_gain(i) >= needed)) {
       ++i;
       continue;
     }

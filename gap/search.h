@@ -83,6 +83,7 @@ class Search {
   void delete_backward();
   void reject_unsteady();
   [[nodiscard]] double held_out_gain(std::size_t index) const;
+  bool is_sure_by_residual(std::size_t index);
   void reject_unproven();
   void noise_rounds();
   bool reject_beside_noise();

@@ -16,25 +16,28 @@ namespace vgyro::gap {
 
 namespace {
 
-// Sixth differences: sin¹² of half the angle, which passes a fortieth of the power at a quarter of
-// the sampling rate and a half at two fifths.
-constexpr std::array kDifference{1.0, -6.0, 15.0, -20.0, 15.0, -6.0, 1.0};
-constexpr double kDifferencePeak = 64.0;  // their gain at half the sampling rate
+// Fourth differences: sin⁸ of half the angle, which passes a sixteenth of the power at a quarter of
+// the sampling rate and 7e-5 at a tenth. A gyro's own filter leaves something of that.
+constexpr std::array kDifference{1.0, -4.0, 6.0, -4.0, 1.0};
+constexpr double kDifferencePeak = 16.0;  // their gain at half the sampling rate
 constexpr double kUneven = 0.1;
 // Short enough for a stretch of bad road.
 constexpr double kCell_s = 1.0;
 // Of all cells this share is quiet for sure, wherever there is any rest.
 constexpr double kQuietShare = 0.15;
 constexpr double kQuietSigmas = -1.04;  // what that share of a Gaussian lies below
-// A cell is above the noise by so many standard errors, in both streams.
-constexpr double kAboveSigmas = 2.5;
-// Independent values in a cell and its neighbours, over the samples in it: sixth differences depend
-// on each other.
+constexpr double kQuietLeast = 0.1;     // where that would be next to nothing
+// A cell is above the noise by so many standard errors in the stream that shows motion best, and
+// not by chance in the other one.
+constexpr double kAboveSigmas = 4.0;
+constexpr double kOtherSigmas = 1.5;
+// Independent values in a cell and its neighbours, over the samples in it: differences depend on
+// each other.
 constexpr double kFreedomShare = 0.8;
 // Streams are alike in pace up to this ratio.
 constexpr double kAlike = 1.5;
 
-// Mean square of the sixth differences in each cell, in units of white noise of one sample.
+// Mean square of the fourth differences in each cell.
 std::vector<double> fast_squares(const SampledCurve& curve) {
   const auto cells = static_cast<std::size_t>(std::max(0.0, curve.to_s()) / kCell_s) + 1;
   std::vector<double> squares(cells, 0.0);
@@ -68,9 +71,22 @@ double quiet_of(std::vector<double> squares) {
   return squares[static_cast<std::size_t>(kQuietShare * static_cast<double>(squares.size() - 1))];
 }
 
-// What is above the quiet cells, as the power that the differences pass whole.
-std::vector<double> above_noise(const std::vector<double>& squares, double interval_s) {
-  const double freedom = std::max(2.0, kFreedomShare * kCell_s / interval_s);
+// What a stream shows of fast motion, by cells.
+struct Shown {
+  std::vector<double> power;   ///< above the noise, as the differences pass it whole
+  std::vector<double> sigmas;  ///< how far above chance
+
+  [[nodiscard]] double clearness() const {
+    double sum = 0.0;
+    for (const double one : sigmas)
+      sum += std::max(0.0, one);
+    return sum;
+  }
+};
+
+Shown shown_by(const SampledCurve& curve) {
+  const std::vector<double> squares = fast_squares(curve);
+  const double freedom = std::max(2.0, kFreedomShare * kCell_s / curve.interval_s());
   const double sigma = std::sqrt(2.0 / freedom);
   std::vector<double> smooth(squares.size());
   for (std::size_t i = 0; i < squares.size(); ++i) {
@@ -78,13 +94,13 @@ std::vector<double> above_noise(const std::vector<double>& squares, double inter
     const double behind = squares[std::min(i + 1, squares.size() - 1)];
     smooth[i] = (before + 2.0 * squares[i] + behind) / 4.0;
   }
-  const double noise = quiet_of(smooth) / std::max(0.1, 1.0 + kQuietSigmas * sigma);
-  for (double& one : smooth) {
-    one = one > (1.0 + kAboveSigmas * sigma) * noise
-              ? (one - noise) / (kDifferencePeak * kDifferencePeak)
-              : 0.0;
+  const double noise = quiet_of(smooth) / std::max(kQuietLeast, 1.0 + kQuietSigmas * sigma);
+  Shown shown;
+  for (const double one : smooth) {
+    shown.power.push_back(std::max(0.0, one - noise) / (kDifferencePeak * kDifferencePeak));
+    shown.sigmas.push_back(noise > 0.0 ? (one / noise - 1.0) / sigma : 0.0);
   }
-  return smooth;
+  return shown;
 }
 
 }  // namespace
@@ -217,11 +233,13 @@ FastMotion::FastMotion(const SampledCurve& a, const SampledCurve& b) {
 
 void FastMotion::set(const SampledCurve& a, const SampledCurve& b) {
   if (a.empty() || b.empty()) return;
-  power_ = above_noise(fast_squares(a), a.interval_s());
-  const std::vector<double> other = above_noise(fast_squares(b), b.interval_s());
-  power_.resize(std::min(power_.size(), other.size()));
-  for (std::size_t i = 0; i < power_.size(); ++i)
-    power_[i] = std::min(power_[i], other[i]);
+  Shown best = shown_by(a);
+  Shown other = shown_by(b);
+  if (other.clearness() > best.clearness()) std::swap(best, other);
+  power_.assign(std::min(best.power.size(), other.power.size()), 0.0);
+  for (std::size_t i = 0; i < power_.size(); ++i) {
+    if (best.sigmas[i] > kAboveSigmas && other.sigmas[i] > kOtherSigmas) power_[i] = best.power[i];
+  }
 }
 
 double FastMotion::power(double t_s) const {
@@ -246,9 +264,8 @@ struct Seen {
   double power = 0.0;
 };
 
-// Twice the power is kept where two streams sample a motion half a period apart; and what folds is
-// as much again.
-constexpr double kShareMost = 4.0;
+// Of the power that the differences show a filter may have left a tenth; what folds comes on top.
+constexpr double kShareMost = 40.0;
 // Below this many standard errors, or this share of the noise where it is strongest, it is nothing.
 constexpr double kShareSigmas = 3.0;
 constexpr double kNoiseShareMin = 0.02;

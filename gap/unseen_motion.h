@@ -20,8 +20,8 @@ namespace vgyro::gap {
 class FastMotion {
  public:
   FastMotion() = default;
-  /// What only one of them shows is its noise. Of streams of different pace the faster one is
-  /// looked at where the slower one has samples.
+  /// The clearer one tells how much; what the other one does not show at all is noise. Of streams
+  /// of different pace the faster one is looked at where the slower one has samples.
   FastMotion(const SampledCurve& a, const SampledCurve& b);
 
   /// (deg/s)²; 0 where there is none.
