@@ -65,6 +65,8 @@ struct Block {
   std::array<double, 3> within_gain{};
   std::array<double, 3> mean_gain{};
   bool held_out = false;
+  /// First of a further recording: drift begins anew there, and the gyros' biases with it.
+  bool begins = false;
 };
 inline constexpr double kBlock_s = 0.1;
 

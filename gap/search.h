@@ -10,9 +10,11 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <string>
 #include <string_view>
 #include <vector>
 
+#include "gap/acceptance.h"
 #include "gap/found.h"
 #include "gap/regression.h"
 #include "gap/scan.h"
@@ -29,13 +31,20 @@ class Search {
   Search& operator=(const Search&) = delete;
 
   std::function<void(std::string_view what, double share)> progress;
+  /// What is left of the caller's time, 1 to 0; nothing: there is no end to it. What it is too
+  /// short for is left open.
+  std::function<double()> time_left;
 
   /// Finds deterministic effects, in the order of their weight; then noise.
   void run();
+  /// After run(): takes the readings that the caller knows to be right, and fits all again.
+  void accept(const std::vector<Acceptance>& accept);
 
   [[nodiscard]] const std::vector<Found>& found() const { return found_; }
   /// What looked like an effect and is none of the catalogue's: it does not hold throughout.
   [[nodiscard]] const std::vector<Found>& rejected() const { return rejected_; }
+  /// What the time was too short for, for people.
+  [[nodiscard]] const std::vector<std::string>& open() const { return open_; }
   /// The model's effects and what was found.
   [[nodiscard]] Effects effects() const;
   /// The recording, with the motion that `effects()` give.
@@ -48,6 +57,8 @@ class Search {
     std::vector<Score> timing;  ///< all that is late, by the linear look
   };
 
+  [[nodiscard]] bool is_over(double needed) const;
+  void leave_open(const std::string& what);
   /// Another study, and all that hangs on it.
   void take(std::shared_ptr<const Study> study);
   void renew_motion();
@@ -73,6 +84,7 @@ class Search {
   void place_again();
   void replace_round();
   void replace(std::size_t index);
+  void check();
   void delete_backward();
   void reject_unsteady();
   void noise_rounds();
@@ -89,6 +101,7 @@ class Search {
   Effects known_;
   std::vector<Found> found_;
   std::vector<Found> rejected_;
+  std::vector<std::string> open_;
   PairNoise noise_;        ///< fitted
   PairNoise model_noise_;  ///< what the model says, with what was found
 };
