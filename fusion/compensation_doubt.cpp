@@ -19,9 +19,8 @@ bool is_taken_back(model::Kind kind) {
 
 // The effect with this parameter moved by so much, within its limits.
 model::Effect moved(model::Effect effect, std::size_t parameter, double by) {
-  effect.parameters[parameter] =
-      model::within_limits(model::info(effect.kind).parameters[parameter],
-                           effect.parameters[parameter] + by);
+  effect.parameters[parameter] = model::within_limits(
+      model::info(effect.kind).parameters[parameter], effect.parameters[parameter] + by);
   return effect;
 }
 
@@ -37,9 +36,8 @@ CompensationDoubt::CompensationDoubt(std::span<const model::Effect> effects) : e
     for (std::size_t i = 0; i < effect.sigma.size(); ++i) {
       const double sigma = effect.sigma[i];
       if (sigma == 0.0) continue;
-      terms_.push_back({.high = moved(effect, i, sigma),
-                        .low = moved(effect, i, -sigma),
-                        .is_held = is_held});
+      terms_.push_back(
+          {.high = moved(effect, i, sigma), .low = moved(effect, i, -sigma), .is_held = is_held});
     }
   }
 }

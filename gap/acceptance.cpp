@@ -31,10 +31,10 @@ bool accept_readings(const std::vector<Acceptance>& accept, std::vector<Found>& 
     if (one.ambiguous_with.empty()) continue;
     one.accepted = is_accepted(accept, reading_of(one.effect));
     if (one.accepted) continue;
-    const auto other = std::find_if(
-        one.ambiguous_with.begin(), one.ambiguous_with.end(), [&](const Reading& reading) {
-          return reading.is_fitted() && is_accepted(accept, reading);
-        });
+    const auto other = std::find_if(one.ambiguous_with.begin(), one.ambiguous_with.end(),
+                                    [&](const Reading& reading) {
+                                      return reading.is_fitted() && is_accepted(accept, reading);
+                                    });
     if (other == one.ambiguous_with.end()) continue;
     exchange(one, *other);
     one.accepted = changed = true;

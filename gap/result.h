@@ -23,7 +23,7 @@ std::string_view verdict_name(Verdict verdict);
 /// model score there: the floor, which is 0.
 struct Gap {
   double before = 0.0;
-  double after = 0.0;  ///< with all that was found, applied or not
+  double after = 0.0;              ///< with all that was found, applied or not
   std::array<double, 2> band95{};  ///< of simulations of the final model
   double of_model = 0.0;           ///< with what is applied: of Result::model
 };
@@ -79,7 +79,7 @@ struct NamedEffect {
   /// It stands in the model. One that is ambiguous does so only where the caller accepts a reading,
   /// one that was not checked never.
   bool applied = true;
-  bool checked = true;  ///< false: the time was over before all that speaks against it was tried
+  bool checked = true;     ///< false: the time was over before all that speaks against it was tried
   std::string evidence;    ///< one sentence for people: what gave it away
   std::string experiment;  ///< what would tell the ambiguous readings apart; empty: nothing to tell
   Figure figure;           ///< that shows it: before and after
@@ -117,8 +117,8 @@ struct Result {
   std::vector<NotIdentifiable> not_identifiable;
   model::Model model;  ///< the given one and what is applied
   std::array<GyroFigures, 2> figures;
-  double seconds = 0.0;       ///< of the recording, or of all
-  std::vector<Span> drives;   ///< when each of several begins and ends; empty for one
+  double seconds = 0.0;      ///< of the recording, or of all
+  std::vector<Span> drives;  ///< when each of several begins and ends; empty for one
   std::array<std::size_t, 2> samples{};
   std::size_t held_out = 0;  ///< samples that took no part in naming or fitting
   bool with_reference = false;

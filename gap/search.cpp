@@ -49,8 +49,8 @@ constexpr double kJitterLeaves = 2e-2;
 // Each turn learns the motion from the last fit. The rivals are only compared, and all after as
 // many.
 constexpr int kMotionTurns = 3;
-// What must be left of a bounded time: names are worth nothing before they were checked, which takes
-// about as long as finding them; and what was found must be scored and drawn.
+// What must be left of a bounded time: names are worth nothing before they were checked, which
+// takes about as long as finding them; and what was found must be scored and drawn.
 constexpr double kLeftToCheck = 0.5;
 constexpr double kLeftToScore = 0.15;
 // How far the whole is, for people who wait.
@@ -524,8 +524,8 @@ void Search::check() {
   replace_round();
   delete_backward();
   reject_unsteady();
-  const bool all = std::none_of(found_.begin(), found_.end(),
-                                [](const Found& one) { return one.unchecked; });
+  const bool all =
+      std::none_of(found_.begin(), found_.end(), [](const Found& one) { return one.unchecked; });
   if (!all) leave_open("whether what was found may also be something else");
 }
 

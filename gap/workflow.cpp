@@ -178,7 +178,8 @@ Expected<Result> find_gap(const std::vector<Recording>& recordings, const model:
 
   tell("drawing", kShareDrawing);
   describe_effects(study, model.effects, result);
-  result.figures = gyro_figures(study, model.effects, with_all_named(model.effects, result), settings.seed);
+  result.figures =
+      gyro_figures(study, model.effects, with_all_named(model.effects, result), settings.seed);
   tell("done", 1.0);
   return result;
 }

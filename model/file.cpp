@@ -60,9 +60,9 @@ std::optional<double> checked_sigma(TomlReader& reader, const Parameter& paramet
   const auto sigma = reader.number(key);
   const double most = parameter.maximum - parameter.minimum;
   if (!sigma || (*sigma >= 0.0 && *sigma <= most)) return sigma;
-  reader.complain(reader.where(key), fmt::format("{} is {:g}", key, *sigma),
-                  fmt::format("0 to {:g}{}{}", most, parameter.unit.empty() ? "" : " ",
-                              parameter.unit));
+  reader.complain(
+      reader.where(key), fmt::format("{} is {:g}", key, *sigma),
+      fmt::format("0 to {:g}{}{}", most, parameter.unit.empty() ? "" : " ", parameter.unit));
   return std::nullopt;
 }
 

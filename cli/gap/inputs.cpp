@@ -25,7 +25,10 @@ tl::expected<GapInputs, std::vector<Error>> load_gap_inputs(
   const gateway::Plan& plan = loaded->plan;
   GapInputs inputs;
   if (plan.model) inputs.model = *plan.model;
-  inputs.subject = {config, inputs.model.file, fmt::format("{}", fmt::join(logs, ", ")), {plan.gyros[0].name, plan.gyros[1].name}};
+  inputs.subject = {config,
+                    inputs.model.file,
+                    fmt::format("{}", fmt::join(logs, ", ")),
+                    {plan.gyros[0].name, plan.gyros[1].name}};
   for (const std::string& log : logs) {
     auto recording = read_recording(log, plan, doing);
     if (!recording) return tl::unexpected(std::vector<Error>{recording.error()});

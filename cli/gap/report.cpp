@@ -51,8 +51,7 @@ double rounded(const Parameter& parameter, double value, double sigma) {
   return parameter.allows(result) ? result : value;
 }
 
-void round_parameters(model::Kind kind, const model::Parameters& sigma,
-                      model::Parameters& values) {
+void round_parameters(model::Kind kind, const model::Parameters& sigma, model::Parameters& values) {
   const auto parameters = model::info(kind).parameters;
   for (std::size_t i = 0; i < parameters.size(); ++i)
     values[i] = rounded(parameters[i], values[i], sigma[i]);
@@ -181,10 +180,10 @@ std::string reading_text(const GapSubject& subject, const gap::Reading& reading)
 
 template <class Judged>
 std::string subject_text(const GapSubject& subject, const Judged& judged) {
-  std::string text = fmt::format("{}: {:.1f} s, {} samples of {}, {} of {}, {} reference\n",
-                                 subject.log, judged.seconds, judged.samples[0], subject.gyros[0],
-                                 judged.samples[1], subject.gyros[1],
-                                 judged.with_reference ? "with a" : "no");
+  std::string text =
+      fmt::format("{}: {:.1f} s, {} samples of {}, {} of {}, {} reference\n", subject.log,
+                  judged.seconds, judged.samples[0], subject.gyros[0], judged.samples[1],
+                  subject.gyros[1], judged.with_reference ? "with a" : "no");
   for (std::size_t i = 0; i < judged.drives.size(); ++i) {
     text += fmt::format("  recording {} from {:.0f} to {:.0f} s\n", i + 1, judged.drives[i].from_s,
                         judged.drives[i].to_s);
@@ -226,7 +225,8 @@ std::string table(const Rows& rows) {
 }
 
 std::string drop_table(const GapSubject& subject, const gap::Result& result) {
-  Rows rows{{"round", "gap before", "after", "gyro", "effect", "value ± σ", "in model.toml", "may also be"}};
+  Rows rows{{"round", "gap before", "after", "gyro", "effect", "value ± σ", "in model.toml",
+             "may also be"}};
   for (std::size_t i = 0; i < result.effects.size(); ++i) {
     const gap::NamedEffect& named = result.effects[i];
     std::string also;
@@ -403,15 +403,13 @@ std::string verdict_text(const gap::Result& result) {
 
 std::string open_text(const gap::Result& result) {
   if (result.open.empty()) return {};
-  return fmt::format("the time limit was reached; open is {}",
-                     fmt::join(result.open, ", and "));
+  return fmt::format("the time limit was reached; open is {}", fmt::join(result.open, ", and "));
 }
 
 std::string not_applied_text(const gap::Result& result) {
   const auto count_of = [&](bool checked) {
-    return std::count_if(result.effects.begin(), result.effects.end(), [&](const auto& one) {
-      return !one.applied && one.checked == checked;
-    });
+    return std::count_if(result.effects.begin(), result.effects.end(),
+                         [&](const auto& one) { return !one.applied && one.checked == checked; });
   };
   const auto ambiguous = count_of(true);
   const auto unchecked = count_of(false);

@@ -90,8 +90,8 @@ TEST(GapReportTest, RoundingStaysInsideTheLimitsOfTheKind) {
 TEST(GapReportTest, TellsPeopleTheStoryInSomeTwentyLines) {
   const std::string text = gap_text(plain_subject(), made_up_result());
   for (const char* part :
-       {"drive.log: 400.0 s, 40000 samples of left", "2 effects named; something remains", "0.81 -> 0.014",
-        "-0.006 to 0.007", "error -0.0004212 ± 3.1e-06",
+       {"drive.log: 400.0 s, 40000 samples of left", "2 effects named; something remains",
+        "0.81 -> 0.014", "-0.006 to 0.007", "error -0.0004212 ± 3.1e-06",
         "axis z, coefficient_dps_g 0.00123 ± 2e-05", "left scale_factor",
         "to tell what round 1 is: record a rate table",
         "unexplained: left: line at 37.02 ± 0.01 Hz",

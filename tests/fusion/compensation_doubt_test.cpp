@@ -24,7 +24,8 @@ CompensationDoubt doubt_of(const Effect& one) {
 TEST(CompensationDoubt, IsNothingWhereNothingIsSaid) {
   EXPECT_FALSE(CompensationDoubt().any());
   EXPECT_FALSE(doubt_of(effect(Kind::kScaleFactor, {0.01}, {})).any());
-  EXPECT_FALSE(doubt_of(effect(Kind::kWhiteNoise, {0.01}, {1e-3})).any()) << "nothing is taken back";
+  EXPECT_FALSE(doubt_of(effect(Kind::kWhiteNoise, {0.01}, {1e-3})).any())
+      << "nothing is taken back";
   EXPECT_FALSE(doubt_of(effect(Kind::kDelay, {0.01}, {1e-3})).any()) << "the corrector's to know";
 }
 
@@ -71,8 +72,9 @@ TEST(CompensationDoubt, OfALineIsNotLearnedAway) {
 }
 
 TEST(CompensationDoubt, OfSeveralParametersAddsInSquares) {
-  const CompensationDoubt doubt(std::vector<Effect>{
-      effect(Kind::kScaleFactor, {0.0}, {3e-3}), effect(Kind::kScaleFactorAsymmetry, {0.0}, {4e-3})});
+  const CompensationDoubt doubt(
+      std::vector<Effect>{effect(Kind::kScaleFactor, {0.0}, {3e-3}),
+                          effect(Kind::kScaleFactorAsymmetry, {0.0}, {4e-3})});
   EXPECT_NEAR(doubt.at(10.0, {}).own_dps, 0.05, 1e-12);
 }
 

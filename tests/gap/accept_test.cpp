@@ -1,9 +1,8 @@
 // An ambiguous effect is told and not applied, unless the caller knows the right reading.
 
-#include "gap/acceptance.h"
-
 #include <gtest/gtest.h>
 
+#include "gap/acceptance.h"
 #include "gap/workflow.h"
 #include "tests/gap/made_study.h"
 

@@ -116,10 +116,10 @@ TEST(ModelDoubt, LeavesAMethodWithoutAStatementAlone) {
 }
 
 TEST(ModelDoubt, OfADelayGoesToTheCorrector) {
-  const Plan plan = plan_with(
-      {{.gyro = 0, .kind = Kind::kDelay, .parameters = {5e-3}, .sigma = {1e-3}},
-       {.gyro = 0, .kind = Kind::kDelay, .parameters = {2e-3}, .ambiguous = true},
-       {.gyro = 1, .kind = Kind::kBandwidth, .parameters = {10.0}, .sigma = {1.0}}});
+  const Plan plan =
+      plan_with({{.gyro = 0, .kind = Kind::kDelay, .parameters = {5e-3}, .sigma = {1e-3}},
+                 {.gyro = 0, .kind = Kind::kDelay, .parameters = {2e-3}, .ambiguous = true},
+                 {.gyro = 1, .kind = Kind::kBandwidth, .parameters = {10.0}, .sigma = {1.0}}});
   EXPECT_DOUBLE_EQ(plan.corrector.gyros[0].lag_sigma_s, 1e-3);
   EXPECT_DOUBLE_EQ(plan.corrector.gyros[0].lag_common_sigma_s, 2e-3);
   EXPECT_NEAR(plan.corrector.gyros[1].lag_sigma_s, 0.1 / (2.0 * 3.14159265358979 * 10.0), 1e-12);

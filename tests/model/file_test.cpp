@@ -179,7 +179,8 @@ TEST(ModelFile, NamesLineCauseAndRemedyOfAWrongSigma) {
   const Bad cases[] = {
       {effect(scale + "sigma = -1\n"), "m.toml:7: ", "sigma is -1; 0 to 9.9"},
       {effect(scale + "sigma = nan\n"), "m.toml:7: ", "sigma is nan"},
-      {effect(scale + "sigma = \"1\"\n"), "m.toml:7: ", "sigma = 1e-3, or sigma = { error = 1e-3 }"},
+      {effect(scale + "sigma = \"1\"\n"),
+       "m.toml:7: ", "sigma = 1e-3, or sigma = { error = 1e-3 }"},
       {effect(scale + "sigma = { eror = 1e-3 }\n"), "m.toml:7: ", "did you mean \"error\"?"},
       {effect(scale + "sigma = { error = 1e6 }\n"), "m.toml:7: ", "0 to 9.9"},
       {effect(tilt + "sigma = { axis = 1 }\n"), "m.toml:8: ", "axis is chosen, and has no sigma"},
