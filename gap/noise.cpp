@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <numbers>
 #include <tuple>
 
 #include <nlopt.hpp>
@@ -61,6 +62,8 @@ constexpr double kTauStart_s = 10.0;
 // be seen to forget. Of a recording however short the bounds stay apart.
 constexpr double kMarkovSpans = 8.0;
 constexpr double kTauMaxLeast_s = 2.0;
+// A cosine that lies on a limit, but for rounding, lies beyond it.
+constexpr double kFrequencySame = 1e-6;
 
 // From one switch-on to the next a gyro's bias is another one: some tenths of a deg/s for a cheap
 // sensor. Wider would cost digits and gain nothing.
@@ -176,17 +179,76 @@ double seconds_of(const Block& block, const Layout& layout) {
 }  // namespace
 
 double sample_variance(const Block& block, const PairNoise& noise, const Layout& layout) {
-  return white_variance(block.within_gain, block.rate_square, noise, layout);
+  return white_variance(block.within_gain, block.rate_square, noise, layout) +
+         layout.unseen.all * block.motion_power;
 }
 
 double mean_variance(const Block& block, const PairNoise& noise, const Layout& layout) {
-  return white_variance(block.mean_gain, block.rate_square, noise, layout);
+  return white_variance(block.mean_gain, block.rate_square, noise, layout) +
+         layout.unseen.mean * block.motion_power;
 }
 
 double within_variance(const Block& block, const PairNoise& noise, const Layout& layout) {
   return sample_variance(block, noise, layout) +
          drift_within(block.channel, noise, seconds_of(block, layout));
 }
+
+std::uint32_t cosines_below(const Block& block, double frequency_hz, const Layout& layout) {
+  const double of_first_hz = 0.5 / seconds_of(block, layout);
+  const double below = std::floor(frequency_hz / of_first_hz - kFrequencySame);
+  return static_cast<std::uint32_t>(std::clamp(below, 0.0, static_cast<double>(block.count - 1)));
+}
+
+namespace {
+
+double motion_of_cosine(const Block& block, std::uint32_t k, const Layout& layout) {
+  const std::vector<double>& share = layout.unseen.cosine;
+  if (block.motion_power == 0.0 || share.empty()) return 0.0;
+  // Blocks that are longer or shorter than usual have cosines of other frequencies.
+  const double usual = k * layout.block_s / seconds_of(block, layout);
+  const auto place = static_cast<std::size_t>(std::max(1L, std::lround(usual)));
+  return share[std::min(place, share.size()) - 1] * block.motion_power;
+}
+
+}  // namespace
+
+double cosine_variance(const Block& block, std::uint32_t k, const PairNoise& noise,
+                       const Layout& layout) {
+  return white_variance(block.within_gain, block.rate_square, noise, layout) +
+         drift_within(block.channel, noise, seconds_of(block, layout)) +
+         motion_of_cosine(block, k, layout);
+}
+
+Matrix slowest_cosines(std::uint32_t samples, std::uint32_t cosines) {
+  Matrix matrix(cosines, samples);
+  const double norm = std::sqrt(2.0 / samples);
+  for (std::uint32_t k = 0; k < cosines; ++k) {
+    for (std::uint32_t i = 0; i < samples; ++i)
+      matrix(k, i) = norm * std::cos(std::numbers::pi * (k + 1) * (i + 0.5) / samples);
+  }
+  return matrix;
+}
+
+namespace {
+
+// The cosines of blocks one after the other: most are as long as the last.
+class Cosines {
+ public:
+  const Matrix& of(const Block& block) {
+    if (matrix_.cols() != block.count || matrix_.rows() != block.kept)
+      matrix_ = slowest_cosines(block.count, block.kept);
+    return matrix_;
+  }
+
+ private:
+  Matrix matrix_;
+};
+
+bool is_all_kept(const Block& block) {
+  return block.motion_power == 0.0;
+}
+
+}  // namespace
 
 Matrix block_means(const Matrix& columns, const Layout& layout) {
   Matrix means(static_cast<Eigen::Index>(layout.blocks.size()), columns.cols());
@@ -341,6 +403,7 @@ double whiten_means(Matrix& means, const Layout& layout, const PairNoise& noise,
 }
 
 double whiten_within(Matrix& columns, const Layout& layout, const PairNoise& noise, Part part) {
+  Cosines cosines;
   double log_likelihood = 0.0;
   for (const Block& block : layout.blocks) {
     auto rows = columns.middleRows(block.first, block.count);
@@ -348,53 +411,105 @@ double whiten_within(Matrix& columns, const Layout& layout, const PairNoise& noi
       rows.setZero();
       continue;
     }
-    const double variance = within_variance(block, noise, layout);
-    const Eigen::RowVectorXd mean = rows.colwise().mean();
-    rows = (rows.rowwise() - mean) / std::sqrt(variance);
-    log_likelihood -= 0.5 * static_cast<double>(block.count - 1) * std::log(variance);
+    if (is_all_kept(block)) {
+      const double variance = within_variance(block, noise, layout);
+      const Eigen::RowVectorXd mean = rows.colwise().mean();
+      rows = (rows.rowwise() - mean) / std::sqrt(variance);
+      log_likelihood -= 0.5 * static_cast<double>(block.count - 1) * std::log(variance);
+      continue;
+    }
+    const Matrix slow = cosines.of(block) * rows;
+    rows.setZero();
+    for (std::uint32_t k = 0; k < block.kept; ++k) {
+      const double variance = cosine_variance(block, k + 1, noise, layout);
+      rows.row(k) = slow.row(k) / std::sqrt(variance);
+      log_likelihood -= 0.5 * std::log(variance);
+    }
   }
   return log_likelihood;
 }
 
-std::vector<WithinBin> within_bins(const Eigen::VectorXd& residual, const Layout& layout,
-                                   Part part) {
-  std::map<std::tuple<int, int, int>, WithinBin> bins;
-  for (const Block& block : layout.blocks) {
-    if (!counts(block, part) || block.count < 2) continue;
-    const auto values = residual.segment(block.first, block.count);
-    const double squares = (values.array() - values.mean()).square().sum();
+namespace {
+
+// Classes of what spans many octaves; 0 is one of its own.
+int octave_class(double value) {
+  constexpr int kLeast = -100;
+  return value > 0.0 ? std::max(kLeast, static_cast<int>(std::floor(2.0 * std::log2(value))))
+                     : kLeast - 1;
+}
+
+}  // namespace
+
+namespace {
+
+// Sums by classes of about the same variance.
+class Bins {
+ public:
+  void add(const Block& block, double freedom, double squares, double motion, double seconds) {
     const int rate_class =
         block.rate_square < kRateSquareMin
             ? 0
             : 1 + static_cast<int>(kClassesPerOctave * std::log2(block.rate_square));
     const int gain_class =
         static_cast<int>(kClassesPerGain * (block.within_gain[0] + block.within_gain[1]));
-    WithinBin& bin = bins[{static_cast<int>(block.channel), rate_class, gain_class}];
-    const double freedom = static_cast<double>(block.count - 1);
+    WithinBin& bin =
+        bins_[{static_cast<int>(block.channel), rate_class, gain_class, octave_class(motion)}];
     bin.channel = block.channel;
     bin.rate_square += freedom * block.rate_square;
     for (std::size_t i = 0; i < bin.gain.size(); ++i)
       bin.gain[i] += freedom * block.within_gain[i];
-    bin.seconds += freedom * seconds_of(block, layout);
+    bin.motion += freedom * motion;
+    bin.seconds += freedom * seconds;
     bin.freedom += freedom;
     bin.squares += squares;
   }
-  std::vector<WithinBin> list;
-  for (auto& [key, bin] : bins) {
-    bin.rate_square /= bin.freedom;
-    for (double& gain : bin.gain)
-      gain /= bin.freedom;
-    bin.seconds /= bin.freedom;
-    list.push_back(bin);
+
+  [[nodiscard]] std::vector<WithinBin> means() {
+    std::vector<WithinBin> list;
+    for (auto& [key, bin] : bins_) {
+      bin.rate_square /= bin.freedom;
+      for (double& gain : bin.gain)
+        gain /= bin.freedom;
+      bin.motion /= bin.freedom;
+      bin.seconds /= bin.freedom;
+      list.push_back(bin);
+    }
+    return list;
   }
-  return list;
+
+ private:
+  std::map<std::tuple<int, int, int, int>, WithinBin> bins_;
+};
+
+}  // namespace
+
+std::vector<WithinBin> within_bins(const Eigen::VectorXd& residual, const Layout& layout,
+                                   Part part) {
+  Bins bins;
+  Cosines cosines;
+  for (const Block& block : layout.blocks) {
+    if (!counts(block, part) || block.count < 2) continue;
+    const auto values = residual.segment(block.first, block.count);
+    const double seconds = seconds_of(block, layout);
+    if (is_all_kept(block)) {
+      bins.add(block, block.count - 1.0, (values.array() - values.mean()).square().sum(), 0.0,
+               seconds);
+      continue;
+    }
+    const Eigen::VectorXd slow = cosines.of(block) * values;
+    for (std::uint32_t k = 0; k < block.kept; ++k) {
+      const double motion = motion_of_cosine(block, k + 1, layout);
+      bins.add(block, 1.0, slow[k] * slow[k], motion, seconds);
+    }
+  }
+  return bins.means();
 }
 
 double within_log_likelihood(const std::vector<WithinBin>& bins, const PairNoise& noise,
                              const Layout& layout) {
   double sum = 0.0;
   for (const WithinBin& bin : bins) {
-    const double variance = white_variance(bin.gain, bin.rate_square, noise, layout) +
+    const double variance = white_variance(bin.gain, bin.rate_square, noise, layout) + bin.motion +
                             drift_within(bin.channel, noise, bin.seconds);
     sum -= 0.5 * (bin.freedom * std::log(variance) + bin.squares / variance);
   }
@@ -508,7 +623,8 @@ Scatter scatter_of(const std::vector<WithinBin>& bins, std::size_t gyro, double 
   for (const WithinBin& bin : bins) {
     if (bin.gain[gyro] == 0.0) continue;
     freedom += bin.freedom;
-    squares += bin.squares / (bin.gain[0] + bin.gain[1]);
+    const double expected = bin.freedom * bin.motion;
+    squares += std::max(0.0, bin.squares - expected) / (bin.gain[0] + bin.gain[1]);
     scatter.rate_square = std::max(scatter.rate_square, bin.rate_square);
   }
   scatter.density_dps_rthz =

@@ -53,6 +53,15 @@ constexpr double share_of(Channel channel, std::size_t gyro) {
   return static_cast<std::size_t>(channel) == gyro ? 1.0 : 0.0;
 }
 
+/// What motion between the samples does to a block, over the power of the fast motion in it. A
+/// block of n samples is its mean and the cosines k = 1 to n − 1, of k half periods each.
+struct UnseenMotion {
+  double mean = 0.0;           ///< variance of the block's mean
+  std::vector<double> cosine;  ///< of the k-th cosine's, k from 1 on, of those that can be compared
+  double lost_hz = 0.0;        ///< from here on the motion cannot be compared; 0: all can
+  double all = 0.0;            ///< variance of a sample, with what cannot be compared
+};
+
 /// Samples of one channel that follow each other within kBlock_s.
 struct Block {
   double t_s = 0.0;  ///< mean of its instants
@@ -64,6 +73,11 @@ struct Block {
   /// scatter about the block's mean, and variance of that mean, over the variance of one sample.
   std::array<double, 3> within_gain{};
   std::array<double, 3> mean_gain{};
+  /// Power of the fast motion in it, (deg/s)²: gap/unseen_motion.
+  double motion_power = 0.0;
+  bool compared = false;  ///< with another stream, which samples the motion at other instants
+  std::uint32_t kept =
+      0;  ///< dimensions that count beside the mean: all, or cosines from the slowest
   bool held_out = false;
   /// First of a further recording: drift begins anew there, and the gyros' biases with it.
   bool begins = false;
@@ -75,13 +89,15 @@ struct Layout {
   std::array<double, 2> interval_s{};
   double reference_variance = 0.0;  ///< of the rate that the readings are compared with, (deg/s)²
   std::size_t samples = 0;
+  double block_s = kBlock_s;  ///< usual length of a block
+  UnseenMotion unseen;
 };
 
 /// Of a sample about its block's mean: white noise, and what drift moves within a block.
 double within_variance(const Block& block, const PairNoise& noise, const Layout& layout);
-/// White noise alone.
+/// Without the drift.
 double sample_variance(const Block& block, const PairNoise& noise, const Layout& layout);
-/// White noise of the block's mean.
+/// Of the block's mean without the drift.
 double mean_variance(const Block& block, const PairNoise& noise, const Layout& layout);
 
 /// Which blocks count.
@@ -93,11 +109,24 @@ inline bool counts(const Block& block, Part part) {
 /// Columns over all samples → means of blocks.
 Matrix block_means(const Matrix& columns, const Layout& layout);
 
+/// The slowest cosines of a block, orthonormal: cosines × samples.
+Matrix slowest_cosines(std::uint32_t samples, std::uint32_t cosines);
+/// Variance of its k-th cosine, k from 1 on.
+double cosine_variance(const Block& block, std::uint32_t k, const PairNoise& noise,
+                       const Layout& layout);
+/// How many of its cosines lie below a frequency.
+std::uint32_t cosines_below(const Block& block, double frequency_hz, const Layout& layout);
+/// Dimensions that count, of all its samples.
+inline std::uint32_t dimensions(const Block& block) {
+  return block.kept + 1;
+}
+
 /// Block means → normalised innovations, in place; rows of blocks that do not count are zeroed.
 /// Returns −½ Σ log of the innovations' variances over the blocks that count.
 double whiten_means(Matrix& means, const Layout& layout, const PairNoise& noise, Part part);
 
-/// Samples → deviations from their block's mean in units of the noise, in place; likewise.
+/// Samples → deviations from their block's mean in units of the noise, in place; likewise. Of a
+/// block in fast motion the first rows are the cosines that are kept, the others zero.
 double whiten_within(Matrix& columns, const Layout& layout, const PairNoise& noise, Part part);
 
 /// What is needed of a residual to fit white noise: sums of squares within blocks, by channel and
@@ -106,6 +135,7 @@ struct WithinBin {
   Channel channel = Channel::kGyro1;
   double rate_square = 0.0;
   std::array<double, 3> gain{};
+  double motion = 0.0;   ///< what motion between the samples adds, (deg/s)²
   double seconds = 0.0;  ///< length of its blocks
   double freedom = 0.0;
   double squares = 0.0;

@@ -44,9 +44,13 @@ Weighing weigh(const SampledCurve& curve, std::span<const double> t_s) {
     const SampledCurve::Weights weights = curve.weights_at(at_s);
     std::vector<double>& sums = weighing.sums;
     if (sums.empty()) first = weights.first;
-    if (weights.first < first) continue;  // times within a block increase
-    sums.resize(std::max(sums.size(), weights.first - first + weights.value.size()), 0.0);
-    for (std::size_t i = 0; i < weights.value.size(); ++i) {
+    // Times within a block increase, but a polynomial reaches less far back than a sinc.
+    if (weights.first < first) {
+      sums.insert(sums.begin(), first - weights.first, 0.0);
+      first = weights.first;
+    }
+    sums.resize(std::max(sums.size(), weights.first - first + weights.count), 0.0);
+    for (std::size_t i = 0; i < weights.count; ++i) {
       sums[weights.first - first + i] += weights.value[i];
       weighing.squares += weights.value[i] * weights.value[i];
     }
@@ -106,7 +110,7 @@ std::vector<Block> cut(const std::vector<Observation>& samples, double block_s) 
       blocks.push_back(block);
     }
     Block& block = blocks.back();
-    ++block.count;
+    block.kept = block.count++;
     block.t_s += sample.t_s;
     block.rate_square += sample.rate_dps * sample.rate_dps;
   }
@@ -219,6 +223,7 @@ Observations make_observations(std::vector<Observation> samples, const Circumsta
   data.layout.interval_s = about.interval_s;
   data.layout.reference_variance = reference_variance;
   data.layout.samples = samples.size();
+  data.layout.block_s = block_s;
   data.layout.blocks = cut(samples, block_s);
   data.observed_dps.resize(static_cast<Eigen::Index>(samples.size()));
   for (std::size_t i = 0; i < samples.size(); ++i) {
@@ -278,12 +283,13 @@ void append_part(const Observations& part, double from_s, Observations& all) {
 
 }  // namespace
 
-Observations join(const std::vector<const Observations*>& parts,
-                  const std::vector<double>& from_s) {
+Observations join(const std::vector<const Observations*>& parts, const std::vector<double>& from_s,
+                  const Effects& effects) {
   Observations all;
   all.holds = parts.front()->holds;
   all.about = parts.front()->about;
   all.layout.interval_s = parts.front()->layout.interval_s;
+  all.layout.block_s = parts.front()->layout.block_s;
   for (const Observations* part : parts) {
     all.layout.reference_variance =
         std::max(all.layout.reference_variance, part->layout.reference_variance);
@@ -293,7 +299,29 @@ Observations join(const std::vector<const Observations*>& parts,
   for (std::size_t gyro = 0; gyro < 2; ++gyro) {
     if (all.holds[gyro]) all.excitation[gyro] = excitation_of(all, gyro);
   }
+  // What each has learned of it is in the blocks' powers; how much of that is unseen, all tell.
+  all.learn_unseen_motion(effects);
   return all;
+}
+
+void Observations::learn_unseen_motion(const FastMotion& motion, const Effects& effects) {
+  for (Block& block : layout.blocks) {
+    block.compared = about.with_reference || block.channel == Channel::kDifference;
+    block.motion_power = block.compared ? motion.power(block.t_s) : 0.0;
+  }
+  learn_unseen_motion(effects);
+}
+
+void Observations::learn_unseen_motion(const Effects& effects) {
+  const std::size_t gyro = holds[0] ? 0 : 1;
+  Matrix columns(size(), 3);
+  columns.col(0) = residual(effects);
+  for (Eigen::Index i = 0; i < size(); ++i) {
+    const SampledCurve::Point point = rate[gyro][static_cast<std::size_t>(i)];
+    columns(i, 1) = point.value;
+    columns(i, 2) = point.slope;
+  }
+  gap::learn_unseen_motion(columns, layout);
 }
 
 Observations Observations::with_for_fit(const std::vector<Span>& spans) const {

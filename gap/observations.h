@@ -16,6 +16,7 @@
 #include "gap/noise.h"
 #include "gap/result.h"
 #include "gap/signals.h"
+#include "gap/unseen_motion.h"
 #include "model/effect.h"
 
 namespace vgyro::gap {
@@ -94,6 +95,10 @@ class Observations {
   /// d contribution / d parameter beside `others`.
   [[nodiscard]] Eigen::VectorXd derivative(const Effects& others, const model::Effect& effect,
                                            const Free& free) const;
+  /// Learns what motion between the samples adds to the noise, from what `effects` leave.
+  void learn_unseen_motion(const FastMotion& motion, const Effects& effects);
+  /// Of blocks that know the motion's power.
+  void learn_unseen_motion(const Effects& effects);
   /// With these seconds for the fit. `spans`: all such.
   [[nodiscard]] Observations with_for_fit(const std::vector<Span>& spans) const;
 
@@ -116,7 +121,9 @@ class Observations {
 
 /// Several recordings' observations as one, each `from_s` later than its own time says. What a gyro
 /// is stays the same; its drift begins anew in each. Precondition: all hold the same gyros.
-Observations join(const std::vector<const Observations*>& parts, const std::vector<double>& from_s);
+/// `effects`: what is known of the gyros.
+Observations join(const std::vector<const Observations*>& parts, const std::vector<double>& from_s,
+                  const Effects& effects);
 
 /// Samples in any order. `reference_variance`: of one sample of the rate, (deg/s)².
 Observations make_observations(std::vector<Observation> samples, const Circumstances& about,

@@ -28,7 +28,7 @@ Likelihood observed(const Study& study, const std::vector<Effect>& effects, Part
     const Eigen::VectorXd residual = data->residual(effects);
     sum.nats -= log_likelihood(residual, data->layout, noise, part);
     for (const Block& block : data->layout.blocks) {
-      if (counts(block, part)) sum.samples += block.count;
+      if (counts(block, part)) sum.samples += dimensions(block);
     }
   }
   return sum;
@@ -54,7 +54,7 @@ Floor simulate_floor(const Study& study, const std::vector<Effect>& effects, Par
     const Eigen::VectorXd nothing = Eigen::VectorXd::Zero(data->size());
     nats -= log_likelihood(nothing, data->layout, noise, part);
     for (const Block& block : data->layout.blocks) {
-      if (counts(block, part)) samples += block.count;
+      if (counts(block, part)) samples += dimensions(block);
     }
   }
   std::mt19937_64 random(seed);

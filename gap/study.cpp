@@ -19,9 +19,22 @@ struct Study::Facts {
   const Recording& recording;
   std::array<Transport, 2> transports;
   std::array<SampledCurve, 2> readings;  ///< samples that are not masked
+  SampledCurve reference;                ///< as it was sampled
+  std::array<double, 3> quiet{};         ///< variance of a sample of each gyro and of the reference
+  std::array<FastMotion, 2> fast;        ///< as each gyro is compared; without a reference alike
   RestingSeconds rest;
   std::vector<Finding> findings;
   std::vector<std::string> notes;
+
+  void learn_fast_motion() {
+    quiet = {quiet_variance(readings[0]), quiet_variance(readings[1]), quiet_variance(reference)};
+    if (!recording.has_reference) {
+      fast[0] = FastMotion(readings[0], readings[1]);
+      return;
+    }
+    for (std::size_t gyro = 0; gyro < 2; ++gyro)
+      fast[gyro] = FastMotion(readings[gyro], reference);
+  }
 };
 
 // What several recordings have in common.
@@ -227,9 +240,6 @@ Expected<std::shared_ptr<const Study>> Study::begin(const Recording& recording,
     facts->transports[gyro] = check_transport(series, gyro, of_gyro(effects, gyro));
     auto signals = std::make_shared<Signals>();
     set_circumstances(series, recording.acceleration, *signals);
-    if (recording.has_reference)
-      signals->motion =
-          Motion(SampledCurve(recording.reference_dps.t_s, recording.reference_dps.value));
     study->signals_[gyro] = std::move(signals);
   }
   // What a finding costs is known when the spikes are masked too.
@@ -250,15 +260,17 @@ Expected<std::shared_ptr<const Study>> Study::begin(const Recording& recording,
                             left, recording.gyros[gyro].name),
                 "record with a sensor that moves");
   }
+  facts->reference = SampledCurve(recording.reference_dps.t_s, recording.reference_dps.value);
   if (!recording.has_reference) facts->rest = find_rest(recording, facts->transports);
   if (!recording.has_reference && facts->rest.count() < kRestMin_s) {
     return fail("", "the recording holds no rest, and there is no reference",
                 "without either nothing tells which gyro is wrong: record a minute at rest, or "
                 "name a [reference]");
   }
+  facts->learn_fast_motion();
   study->facts_ = std::move(facts);
-  if (!recording.has_reference) study->learn_motion(effects);
-  study->observe();
+  study->learn_motion(effects);
+  study->observe(effects);
   return std::shared_ptr<const Study>(study);
 }
 
@@ -331,18 +343,20 @@ Expected<std::shared_ptr<const Study>> Study::begin(const std::vector<Recording>
   joint->notes.emplace_back(
       "steps and lines are not looked for in several recordings together: no instant comes twice, "
       "and no phase is kept; judge the recording that shows one by itself");
-  return joined(std::move(parts), std::move(joint));
+  return joined(std::move(parts), std::move(joint), effects);
 }
 
 std::shared_ptr<const Study> Study::joined(std::vector<std::shared_ptr<const Study>> parts,
-                                           std::shared_ptr<const Joint> joint) {
+                                           std::shared_ptr<const Joint> joint,
+                                           const Effects& effects) {
   const std::shared_ptr<Study> study(new Study);
   for (std::size_t place = 0; place < parts.front()->observations().size(); ++place) {
     std::vector<const Observations*> each;
     each.reserve(parts.size());
     for (const auto& part : parts)
       each.push_back(part->observations()[place].get());
-    study->observations_.push_back(std::make_shared<Observations>(join(each, joint->from_s)));
+    study->observations_.push_back(
+        std::make_shared<Observations>(join(each, joint->from_s, effects)));
   }
   study->parts_ = std::move(parts);
   study->joint_ = std::move(joint);
@@ -360,29 +374,20 @@ std::vector<Span> Study::drives() const {
 
 std::shared_ptr<const Study> Study::with_motion(const Effects& effects) const {
   if (joint_) {
-    if (recording().has_reference) return std::shared_ptr<const Study>(new Study(*this));
     std::vector<std::shared_ptr<const Study>> parts;
     parts.reserve(parts_.size());
     for (const auto& part : parts_)
       parts.push_back(part->with_motion(effects));
-    return joined(std::move(parts), joint_);
+    // No step is looked for, and so none has taken seconds for the fit.
+    return joined(std::move(parts), joint_, effects);
   }
   const std::shared_ptr<Study> study(new Study(*this));
-  if (recording().has_reference) return study;
-  study->learn_motion(effects);
-  study->observe();
+  if (!recording().has_reference) study->learn_motion(effects);
+  study->observe(effects);
   return study;
 }
 
 std::shared_ptr<const Study> Study::with_used_for_fit(Span span) const {
-  if (joint_) {
-    std::vector<std::shared_ptr<const Study>> parts;
-    for (std::size_t i = 0; i < parts_.size(); ++i) {
-      const double from_s = joint_->from_s[i];
-      parts.push_back(parts_[i]->with_used_for_fit({span.from_s - from_s, span.to_s - from_s}));
-    }
-    return joined(std::move(parts), joint_);
-  }
   const std::shared_ptr<Study> study(new Study(*this));
   study->for_fit_.push_back(span);
   for (auto& data : study->observations_)
@@ -416,6 +421,16 @@ std::vector<double> Study::mean_rate(const std::array<double, 2>& weight,
 // The first guess knows no errors; each further one takes off what the effects say at the last,
 // until nothing changes.
 void Study::learn_motion(const Effects& effects) {
+  if (recording().has_reference) {
+    // Noise of the reference must not pass for motion, or a low-pass would seem to take it off.
+    const Motion motion{without_noise(facts_->reference, facts_->quiet[2])};
+    for (auto& its : signals_) {
+      const auto signals = std::make_shared<Signals>(*its);
+      signals->motion = motion;
+      its = signals;
+    }
+    return;
+  }
   const std::array<double, 2> weight = weights(noise_of(effects));
   const std::array<Effects, 2> mine{of_gyro(effects, 0), of_gyro(effects, 1)};
   std::array<std::shared_ptr<Signals>, 2> signals;
@@ -424,13 +439,17 @@ void Study::learn_motion(const Effects& effects) {
     signals[gyro]->motion = Motion();
     signals_[gyro] = signals[gyro];
   }
+  double quiet = 0.0;
+  for (std::size_t gyro = 0; gyro < 2; ++gyro)
+    quiet += weight[gyro] * weight[gyro] * facts_->quiet[gyro];
   std::vector<double> rate_dps;
   for (int round = 0; round < kMotionRounds; ++round) {
     std::vector<double> next_dps = mean_rate(weight, mine);
     const bool settled = round > 0 && greatest_change(next_dps, rate_dps) < kMotionSame_dps;
     rate_dps = std::move(next_dps);
     // Noise must not pass for motion, or what the effects make of it would come on top.
-    const Motion motion{without_noise(SampledCurve(facts_->readings[0].times_s(), rate_dps))};
+    const Motion motion{
+        without_noise(SampledCurve(facts_->readings[0].times_s(), rate_dps), quiet)};
     for (const auto& its : signals)
       its->motion = motion;
     if (settled) break;
@@ -448,19 +467,19 @@ Circumstances Study::circumstances() const {
 Observations Study::against_reference(std::size_t gyro) const {
   const GyroSeries& series = recording().gyros[gyro];
   const Motion& motion = signals_[gyro]->motion;
-  const double reach_s = kReferenceHole * motion.curve().interval_s();
+  const SampledCurve& reference = facts_->reference;
+  const double reach_s = kReferenceHole * reference.interval_s();
   std::vector<Observation> samples;
   samples.reserve(series.t_s.size());
   for (std::size_t i = 0; i < series.t_s.size(); ++i) {
     const double t_s = transport(gyro).t_s[i];
-    if (transport(gyro).masked[i] != 0 || motion.curve().hole_at(t_s, reach_s)) continue;
-    if (t_s < motion.curve().from_s() || t_s > motion.curve().to_s()) continue;
-    const double rate_dps = motion.rate(t_s).value;
-    samples.push_back({t_s, channel_of(gyro), series.rate_dps[i] - rate_dps, rate_dps});
+    if (transport(gyro).masked[i] != 0 || reference.hole_at(t_s, reach_s)) continue;
+    if (t_s < reference.from_s() || t_s > reference.to_s()) continue;
+    samples.push_back({t_s, channel_of(gyro), series.rate_dps[i] - reference.at(t_s).value,
+                       motion.rate(t_s).value});
   }
   return make_observations(std::move(samples), circumstances(), {gyro == 0, gyro == 1},
-                           {&motion.curve(), 2}, noise_variance(recording().reference_dps),
-                           for_fit_);
+                           {&reference, 2}, noise_variance(recording().reference_dps), for_fit_);
 }
 
 // Each gyro at rest, the difference elsewhere.
@@ -488,14 +507,19 @@ Observations Study::of_pair() const {
                            0.0, for_fit_);
 }
 
-void Study::observe() {
-  observations_.clear();
-  if (!recording().has_reference) {
-    observations_.push_back(std::make_shared<Observations>(of_pair()));
-    return;
+void Study::observe(const Effects& effects) {
+  std::vector<Observations> list;
+  if (recording().has_reference) {
+    for (std::size_t gyro = 0; gyro < 2; ++gyro)
+      list.push_back(against_reference(gyro));
+  } else {
+    list.push_back(of_pair());
   }
-  for (std::size_t gyro = 0; gyro < 2; ++gyro)
-    observations_.push_back(std::make_shared<Observations>(against_reference(gyro)));
+  observations_.clear();
+  for (std::size_t place = 0; place < list.size(); ++place) {
+    list[place].learn_unseen_motion(facts_->fast[place], effects);
+    observations_.push_back(std::make_shared<Observations>(std::move(list[place])));
+  }
 }
 
 }  // namespace vgyro::gap

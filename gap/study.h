@@ -53,8 +53,9 @@ class Study {
   /// Its values are so far apart that rounding is no noise: only great effects can be judged.
   [[nodiscard]] bool is_coarse(std::size_t gyro) const;
 
-  /// Without a reference: with the rate anew, from both gyros less what `effects` say of them. It
-  /// depends on the effects alone, not on the motion of this one.
+  /// With what `effects` tell of the motion: without a reference the rate anew, from both gyros
+  /// less what they say; and what is left of the motion between the samples. It depends on the
+  /// effects alone, not on the motion of this one.
   [[nodiscard]] std::shared_ptr<const Study> with_motion(const Effects& effects) const;
 
   /// What was set aside of these seconds is no longer.
@@ -66,8 +67,9 @@ class Study {
 
   Study() = default;
   static std::shared_ptr<const Study> joined(std::vector<std::shared_ptr<const Study>> parts,
-                                             std::shared_ptr<const Joint> joint);
-  void observe();
+                                             std::shared_ptr<const Joint> joint,
+                                             const Effects& effects);
+  void observe(const Effects& effects);
   void learn_motion(const Effects& effects);
   [[nodiscard]] std::vector<double> mean_rate(const std::array<double, 2>& weight,
                                               const std::array<Effects, 2>& taken_off) const;

@@ -126,13 +126,14 @@ Sums sums_of(const Observations& data, std::size_t gyro, const Effects& effects)
     Sums::Stretch& stretch = sums.stretches[chunk];
     const auto rows = within.col(0).segment(block.first, block.count);
     stretch.fast += rows.squaredNorm();
-    stretch.fast_freedom += block.count - 1.0;
+    stretch.fast_freedom += block.kept;
     const double innovation = means(static_cast<Eigen::Index>(b), 0);
     stretch.slow += innovation * innovation;
     stretch.slow_freedom += 1.0;
     sums.innovations.push_back(innovation);
     // Interpolation colours a difference.
     if (block.channel == Channel::kDifference || block.count < kNeighboursMin) continue;
+    if (block.motion_power > 0.0) continue;  // its rows are no samples
     add_neighbours(
         block, rows,
         sample_variance(block, noise, data.layout) / within_variance(block, noise, data.layout),

@@ -18,16 +18,36 @@ namespace {
 constexpr std::size_t kReach = 16;
 constexpr double kAbove = 1.5;
 constexpr double kLine = 20.0;
-// What a ramp from the end back to the beginning takes.
+// The transform closes a circle. At either end the curve goes on as its own image in the end point,
+// so that level and slope go on, and a ramp joins the two images.
+constexpr double kImage_s = 20.0;
 constexpr double kBridge_s = 20.0;
+
+// `value` holds the curve in its first `n` places; the rest of the circle is filled.
+void close_circle(std::vector<double>& value, std::size_t n, double step_s) {
+  const std::size_t length = value.size();
+  const auto image = std::min(n - 1, static_cast<std::size_t>(kImage_s / step_s));
+  for (std::size_t k = 1; k <= image; ++k) {
+    value[n - 1 + k] = 2.0 * value[n - 1] - value[n - 1 - k];
+    value[length - k] = 2.0 * value[0] - value[k];
+  }
+  const std::size_t from = n - 1 + image;
+  const std::size_t to = length - image;
+  const double last = value[to % length];
+  for (std::size_t i = from + 1; i < to; ++i) {
+    const double share = static_cast<double>(i - from) / static_cast<double>(to - from);
+    value[i] = value[from] + share * (last - value[from]);
+  }
+}
 }  // namespace
 
-SampledCurve without_noise(const SampledCurve& curve) {
+SampledCurve without_noise(const SampledCurve& curve, double noise_variance) {
   if (curve.empty()) return curve;
   const double step_s = curve.interval_s();
   const auto n = static_cast<std::size_t>((curve.to_s() - curve.from_s()) / step_s) + 1;
   std::size_t length = 256;
-  while (static_cast<double>(length) < static_cast<double>(n) + kBridge_s / step_s)
+  while (static_cast<double>(length) <
+         static_cast<double>(n) + (2.0 * kImage_s + kBridge_s) / step_s)
     length *= 2;
   std::vector<double> t_s(n);
   std::vector<double> value(length);
@@ -35,10 +55,7 @@ SampledCurve without_noise(const SampledCurve& curve) {
     t_s[i] = curve.from_s() + step_s * static_cast<double>(i);
     value[i] = curve.at(t_s[i]).value;
   }
-  for (std::size_t i = n; i < length; ++i) {
-    const double share = static_cast<double>(i - n + 1) / static_cast<double>(length - n + 1);
-    value[i] = value[n - 1] + share * (value[0] - value[n - 1]);
-  }
+  close_circle(value, n, step_s);
   Eigen::FFT<double> transform;
   std::vector<std::complex<double>> spectrum;
   transform.fwd(spectrum, value);
@@ -47,7 +64,8 @@ SampledCurve without_noise(const SampledCurve& curve) {
   for (std::size_t i = 0; i <= half; ++i)
     power[i] = std::norm(spectrum[i]);
   std::vector<double> upper(power.begin() + static_cast<std::ptrdiff_t>(half / 2), power.end());
-  const double noise = kAbove * median_of(upper) / std::numbers::ln2;
+  const double noise = kAbove * std::min(median_of(upper) / std::numbers::ln2,
+                                         noise_variance * static_cast<double>(n));
   double sum = 0.0;
   for (std::size_t i = 0; i < std::min(kReach, half + 1); ++i)
     sum += power[i];

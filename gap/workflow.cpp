@@ -35,7 +35,7 @@ void fill_facts(const Study& study, std::size_t& held_out, std::array<std::size_
   samples = {};
   for (const auto& data : study.observations()) {
     for (const Block& block : data->layout.blocks) {
-      if (block.held_out) held_out += block.count;
+      if (block.held_out) held_out += dimensions(block);
       for (std::size_t gyro = 0; gyro < 2; ++gyro) {
         if (share_of(block.channel, gyro) != 0.0) samples[gyro] += block.count;
       }

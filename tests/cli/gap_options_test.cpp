@@ -23,7 +23,8 @@ TEST(AcceptOption, NamesAGyroAKindOrBoth) {
 }
 
 TEST(AcceptOption, SaysWhatIsWrongAndWhatWouldBeRight) {
-  for (const char* word : {"", "2", "gyro", "gyro=", "gyro=0", "gyro=3", "gyro=1,", ",gyro=1", "GYRO=1"}) {
+  for (const char* word :
+       {"", "2", "gyro", "gyro=", "gyro=0", "gyro=3", "gyro=1,", ",gyro=1", "GYRO=1"}) {
     const auto wrong = acceptance_from(word);
     ASSERT_FALSE(wrong) << word;
     EXPECT_NE(wrong.error().message().find("gyro=1 or gyro=2"), std::string::npos) << word;
