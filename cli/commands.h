@@ -74,8 +74,8 @@ int run_allan(const AllanOptions& options);
 struct CompareOptions {
   std::string config;
   std::string model;
-  std::string measured;  ///< log
-  std::string json;      ///< "-": standard output; empty: nowhere
+  std::vector<std::string> measured;  ///< logs, each a recording of its own
+  std::string json;                   ///< "-": standard output; empty: nowhere
   std::uint64_t seed = 1;
   bool quiet = false;
 };
@@ -83,9 +83,11 @@ int run_compare(const CompareOptions& options);
 
 struct GapOptions {
   std::string config;
-  std::optional<std::string> model;  ///< path, instead of the configured one
-  std::string measured;              ///< log
-  std::string out;                   ///< folder
+  std::optional<std::string> model;   ///< path, instead of the configured one
+  std::vector<std::string> measured;  ///< logs, each a recording of its own
+  std::string out;                    ///< folder
+  std::vector<std::string> accept;    ///< "gyro=2", "kind=delay,gyro=1", "likeliest"
+  double time_limit_s = 0.0;          ///< 0: none
   std::uint64_t seed = 1;
   bool quiet = false;
 };

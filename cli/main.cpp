@@ -10,6 +10,7 @@
 #include "can/frame.h"
 #include "cli/commands.h"
 #include "cli/exit_code.h"
+#include "cli/gap/accept.h"
 #include "cli/number_option.h"
 #include "cli/output/errors.h"
 #include "cli/output/terminal.h"
@@ -222,9 +223,13 @@ CLI::App* add_allan(CLI::App& app, AllanOptions& options) {
   return command;
 }
 
-void add_recording(CLI::App& command, std::string& config, std::string& measured) {
+void add_recording(CLI::App& command, std::string& config, std::vector<std::string>& measured) {
   command.add_option("--config", config, "configuration, e.g. vgyro.toml")->required();
-  command.add_option("--measured", measured, kLogHelp)->required();
+  command
+      .add_option("--measured", measured,
+                  std::string(kLogHelp) + ";\nagain for a further recording of the same pair")
+      ->required()
+      ->allow_extra_args(false);
 }
 
 CLI::App* add_compare(CLI::App& app, CompareOptions& options) {
@@ -241,6 +246,16 @@ CLI::App* add_compare(CLI::App& app, CompareOptions& options) {
   return command;
 }
 
+// Longer nobody waits.
+constexpr double kTimeLimitMax_s = 1e6;
+
+// Empty for a good one, as CLI11 wants it.
+std::string wrong_acceptance(const std::string& word) {
+  const auto acceptance = acceptance_from(word);
+  if (acceptance) return {};
+  return acceptance.error().what + "; " + acceptance.error().remedy;
+}
+
 CLI::App* add_gap(CLI::App& app, GapOptions& options) {
   CLI::App* command =
       app.add_subcommand("gap", "Find what the model lacks, name it, add it, show the gap shrink");
@@ -249,6 +264,14 @@ CLI::App* add_gap(CLI::App& app, GapOptions& options) {
                       "model file to begin with; default: the configured one, or none");
   command->add_option("--out", options.out, "folder for report.html, gap.json and model.toml")
       ->required();
+  command
+      ->add_option("--accept", options.accept,
+                   "of ambiguous readings apply that of gyro=N, of kind=KIND, of both with\n"
+                   "a comma between, or the likeliest; may be given again")
+      ->allow_extra_args(false)
+      ->check(wrong_acceptance);
+  add_number(*command, "--time-limit", options.time_limit_s, {0.0, kTimeLimitMax_s},
+             "seconds until what is certain is written, the rest told as open; 0: none");
   add_number(*command, "--seed", options.seed, {}, "of the simulations");
   command->add_flag("-q,--quiet", options.quiet, "no summary");
   command->footer(

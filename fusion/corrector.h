@@ -104,6 +104,8 @@ class Corrector {
   /// Variance of the specific force's magnitude from now on, g²; NaN where it is not known.
   virtual void set_vibration(double /*variance_g2*/) {}
 
+  /// What of the rate is either gyro's: they add up to 1.
+  [[nodiscard]] virtual std::array<double, 2> shares() const { return {0.5, 0.5}; }
   [[nodiscard]] virtual Drift drift(double t_s) const = 0;
   [[nodiscard]] virtual WindowCounts windows() const = 0;
   [[nodiscard]] virtual Condition condition() const { return {}; }

@@ -205,6 +205,7 @@ class OptimalCorrector final : public Corrector {
   }
   void set_vibration(double variance_g2) override { vibration_g2_ = variance_g2; }
 
+  [[nodiscard]] std::array<double, 2> shares() const override { return weight_; }
   [[nodiscard]] Drift drift(double t_s) const override {
     if (readings_.empty()) return {{kNone, kNone}, kNone, kNone, kNone};
     return {{bias(0, t_s), bias(1, t_s)},
@@ -1132,6 +1133,10 @@ void OptimalCorrector::set_weights(Present present) {
                       ? 0.0
                       : skew_square * (estimate_.blame[0] * squared(weight_[0]) +
                                        estimate_.blame[1] * squared(weight_[1]));
+  for (std::size_t gyro = 0; gyro < 2; ++gyro) {
+    const GyroParameters& known = settings_.gyros[gyro];
+    timing_doubt_ += squared(known.lag_sigma_s * weight_[gyro]) + squared(known.lag_common_sigma_s);
+  }
 }
 
 Condition OptimalCorrector::condition() const {

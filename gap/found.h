@@ -25,13 +25,15 @@ struct Found {
   double penalty = 0.0;
   double needed = 0.0;  ///< of statistic less penalty
   std::vector<Reading> ambiguous_with;
-  bool starting = false;  ///< of the starting model: what every gyro has, and no name
+  bool starting = false;   ///< of the starting model: what every gyro has, and no name
+  bool accepted = false;   ///< ambiguous, and the caller chose this reading
+  bool unchecked = false;  ///< the time was over before all that speaks against it was tried
   [[nodiscard]] double adjusted() const { return statistic - penalty; }
   [[nodiscard]] double margin() const { return adjusted() - needed; }
 };
 
 inline Reading reading_of(const model::Effect& effect) {
-  return {effect.kind, effect.gyro};
+  return {effect.kind, effect.gyro, effect.parameters};
 }
 
 }  // namespace vgyro::gap

@@ -65,6 +65,10 @@ constexpr double kTauMaxLeast_s = 2.0;
 // A cosine that lies on a limit, but for rounding, lies beyond it.
 constexpr double kFrequencySame = 1e-6;
 
+// From one switch-on to the next a gyro's bias is another one: some tenths of a deg/s for a cheap
+// sensor. Wider would cost digits and gain nothing.
+constexpr double kOtherStart_dps = 1.0;
+
 constexpr std::size_t kTermsMax = 1 + kMarkovMax;
 constexpr std::size_t kStatesMax = 2 * kTermsMax;
 
@@ -271,6 +275,17 @@ class DriftFilter {
       p_[i][i] = states_.start_variance[i];
   }
 
+  /// A further recording: nothing is left of the drift but what the gyros are.
+  void begin_anew() {
+    const std::size_t n = states_.count;
+    for (std::size_t i = 0; i < n; ++i) {
+      p_[i].fill(0.0);
+      const bool is_walk = states_.tau_s[i] == 0.0;
+      p_[i][i] = is_walk ? kOtherStart_dps * kOtherStart_dps : states_.start_variance[i];
+    }
+    x_.setZero();
+  }
+
   void predict(double step_s) {
     const std::size_t n = states_.count;
     for (std::size_t i = 0; i < n; ++i) {
@@ -368,6 +383,10 @@ double whiten_means(Matrix& means, const Layout& layout, const PairNoise& noise,
   double last_s = 0.0;
   for (std::size_t b = 0; b < layout.blocks.size(); ++b) {
     const Block& block = layout.blocks[b];
+    if (block.begins) {
+      filter.begin_anew();
+      last_s = block.t_s;
+    }
     filter.predict(std::max(0.0, block.t_s - last_s));
     last_s = std::max(last_s, block.t_s);
     // A mean's increments are less than those of the drift at its middle, by as much as the drift

@@ -82,6 +82,8 @@ struct Block {
   std::uint32_t kept =
       0;  ///< dimensions that count beside the mean: all, or cosines from the slowest
   bool held_out = false;
+  /// First of a further recording: drift begins anew there, and the gyros' biases with it.
+  bool begins = false;
 };
 inline constexpr double kBlock_s = 0.1;
 

@@ -121,6 +121,12 @@ std::optional<NoiseFound> free_one(const Regression& regression, const Eigen::Ve
   return one;
 }
 
+// What a correlated drift is before it forgets.
+Reading walk_like(const model::Effect& markov) {
+  const double density = markov.parameters[0] * std::sqrt(2.0 / markov.parameters[1]);
+  return {Kind::kRateRandomWalk, markov.gyro, {density}};
+}
+
 void name_rivals(const std::vector<std::pair<double, Reading>>& seen, double seconds, Found& best) {
   for (const auto& [adjusted, reading] : seen) {
     if (reading.kind == best.effect.kind && reading.gyro == best.effect.gyro) continue;
@@ -128,7 +134,7 @@ void name_rivals(const std::vector<std::pair<double, Reading>>& seen, double sec
   }
   if (row(best.effect.kind).random == Random::kMarkov &&
       best.effect.parameters[1] > seconds / kForgottenTimes)
-    best.ambiguous_with.push_back({Kind::kRateRandomWalk, best.effect.gyro});
+    best.ambiguous_with.push_back(walk_like(best.effect));
 }
 
 // In the order in which equals are preferred: the plainest first.

@@ -240,11 +240,79 @@ Observations make_observations(std::vector<Observation> samples, const Circumsta
   return data;
 }
 
+namespace {
+
+template <class T>
+void append(std::vector<T>& to, const std::vector<T>& more) {
+  to.insert(to.end(), more.begin(), more.end());
+}
+
+void append_blocks(const Layout& part, double from_s, Layout& layout) {
+  const std::size_t first = layout.blocks.size();
+  for (Block block : part.blocks) {
+    block.first += static_cast<std::uint32_t>(layout.samples);
+    block.t_s += from_s;
+    // One figure stands for all references: what each was worth is in the gains.
+    if (layout.reference_variance > 0.0) {
+      const double share = part.reference_variance / layout.reference_variance;
+      block.within_gain[2] *= share;
+      block.mean_gain[2] *= share;
+    }
+    layout.blocks.push_back(block);
+  }
+  if (first > 0 && first < layout.blocks.size()) layout.blocks[first].begins = true;
+  layout.samples += part.samples;
+}
+
+void append_part(const Observations& part, double from_s, Observations& all) {
+  all.drives.push_back({all.t_s.size(), part.t_s.size(), from_s, part.about.signals});
+  append_blocks(part.layout, from_s, all.layout);
+  for (const double t_s : part.t_s)
+    all.t_s.push_back(t_s + from_s);
+  append(all.channel, part.channel);
+  for (std::size_t gyro = 0; gyro < 2; ++gyro) {
+    append(all.rate[gyro], part.rate[gyro]);
+    append(all.surroundings[gyro], part.surroundings[gyro]);
+    all.about.coarse[gyro] = all.about.coarse[gyro] || part.about.coarse[gyro];
+  }
+  const Eigen::Index before = all.observed_dps.size();
+  all.observed_dps.conservativeResize(before + part.observed_dps.size());
+  all.observed_dps.tail(part.observed_dps.size()) = part.observed_dps;
+  all.about.seconds = from_s + part.about.seconds;
+}
+
+}  // namespace
+
+Observations join(const std::vector<const Observations*>& parts, const std::vector<double>& from_s,
+                  const Effects& effects) {
+  Observations all;
+  all.holds = parts.front()->holds;
+  all.about = parts.front()->about;
+  all.layout.interval_s = parts.front()->layout.interval_s;
+  all.layout.block_s = parts.front()->layout.block_s;
+  for (const Observations* part : parts) {
+    all.layout.reference_variance =
+        std::max(all.layout.reference_variance, part->layout.reference_variance);
+  }
+  for (std::size_t i = 0; i < parts.size(); ++i)
+    append_part(*parts[i], from_s[i], all);
+  for (std::size_t gyro = 0; gyro < 2; ++gyro) {
+    if (all.holds[gyro]) all.excitation[gyro] = excitation_of(all, gyro);
+  }
+  // What each has learned of it is in the blocks' powers; how much of that is unseen, all tell.
+  all.learn_unseen_motion(effects);
+  return all;
+}
+
 void Observations::learn_unseen_motion(const FastMotion& motion, const Effects& effects) {
   for (Block& block : layout.blocks) {
     block.compared = about.with_reference || block.channel == Channel::kDifference;
     block.motion_power = block.compared ? motion.power(block.t_s) : 0.0;
   }
+  learn_unseen_motion(effects);
+}
+
+void Observations::learn_unseen_motion(const Effects& effects) {
   const std::size_t gyro = holds[0] ? 0 : 1;
   Matrix columns(size(), 3);
   columns.col(0) = residual(effects);
@@ -262,6 +330,10 @@ Observations Observations::with_for_fit(const std::vector<Span>& spans) const {
   return other;
 }
 
+Drive Observations::whole() const {
+  return {0, t_s.size(), 0.0, about.signals};
+}
+
 // What a gyro feels less the true rate, at each sample that holds it: what delay, low-passes and
 // clock skew make of the motion.
 Eigen::VectorXd Observations::lateness_dps(std::size_t gyro, const Effects& moving) const {
@@ -271,11 +343,13 @@ Eigen::VectorXd Observations::lateness_dps(std::size_t gyro, const Effects& movi
                    [&](const Remembered& one) { return one.gyro == gyro && one.moving == moving; });
   if (found != remembered_.end()) return found->values;
   Eigen::VectorXd lateness = Eigen::VectorXd::Zero(size());
-  const Prediction prediction(moving, *about.signals[gyro]);
-  for (Eigen::Index i = 0; i < size(); ++i) {
-    const auto place = static_cast<std::size_t>(i);
-    if (share_of(channel[place], gyro) == 0.0) continue;
-    lateness[i] = prediction.late_dps(t_s[place]) - rate[gyro][place].value;
+  for (const Drive& drive : is_one() ? std::vector<Drive>{whole()} : drives) {
+    const Prediction prediction(moving, *drive.signals[gyro]);
+    for (std::size_t place = drive.first; place < drive.first + drive.count; ++place) {
+      if (share_of(channel[place], gyro) == 0.0) continue;
+      lateness[static_cast<Eigen::Index>(place)] =
+          prediction.late_dps(t_s[place] - drive.from_s) - rate[gyro][place].value;
+    }
   }
   Remembered one{gyro, moving, lateness};
   if (remembered_.size() < kRemembered) {

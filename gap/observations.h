@@ -14,6 +14,7 @@
 
 #include "gap/kinds.h"
 #include "gap/noise.h"
+#include "gap/result.h"
 #include "gap/signals.h"
 #include "gap/unseen_motion.h"
 #include "model/effect.h"
@@ -48,12 +49,6 @@ struct Interpolated {
   std::size_t slot = 0;
 };
 
-/// Seconds that are not set aside, whatever the lot says.
-struct Span {
-  double from_s = 0.0;
-  double to_s = 0.0;
-};
-
 /// What all observations of a recording have in common.
 struct Circumstances {
   double seconds = 0.0;  ///< of the recording
@@ -62,6 +57,14 @@ struct Circumstances {
   /// A gyro's values are so far apart that rounding is no noise: only great effects can be judged.
   std::array<bool, 2> coarse{};
   std::array<std::shared_ptr<const Signals>, 2> signals;  ///< as each gyro is judged against
+};
+
+/// One of several recordings whose observations stand behind each other.
+struct Drive {
+  std::size_t first = 0;  ///< of its samples
+  std::size_t count = 0;
+  double from_s = 0.0;  ///< its first frame: zero of its own signals' time, and of the model's
+  std::array<std::shared_ptr<const Signals>, 2> signals;
 };
 
 class Observations {
@@ -76,7 +79,10 @@ class Observations {
   std::array<std::vector<SampledCurve::Point>, 2> rate;
   std::array<std::vector<model::Surroundings>, 2> surroundings;
   std::array<Excitation, 2> excitation;
+  std::vector<Drive> drives;  ///< empty: one recording, with the signals of `about`
 
+  /// Of one recording: an instant that comes once can be told, and a phase that is kept.
+  [[nodiscard]] bool is_one() const { return drives.empty(); }
   [[nodiscard]] Eigen::Index size() const { return observed_dps.size(); }
 
   /// What is observed less what the effects say, of every sample.
@@ -91,10 +97,13 @@ class Observations {
                                            const Free& free) const;
   /// Learns what motion between the samples adds to the noise, from what `effects` leave.
   void learn_unseen_motion(const FastMotion& motion, const Effects& effects);
+  /// Of blocks that know the motion's power.
+  void learn_unseen_motion(const Effects& effects);
   /// With these seconds for the fit. `spans`: all such.
   [[nodiscard]] Observations with_for_fit(const std::vector<Span>& spans) const;
 
  private:
+  [[nodiscard]] Drive whole() const;
   [[nodiscard]] Eigen::VectorXd lateness_dps(std::size_t gyro, const Effects& moving) const;
   [[nodiscard]] Eigen::VectorXd late_with(const Effects& others, const model::Effect& effect) const;
   void add(std::size_t gyro, const Effects& added, const Eigen::VectorXd& lateness,
@@ -109,6 +118,12 @@ class Observations {
   mutable std::vector<Remembered> remembered_;
   mutable std::size_t forget_next_ = 0;
 };
+
+/// Several recordings' observations as one, each `from_s` later than its own time says. What a gyro
+/// is stays the same; its drift begins anew in each. Precondition: all hold the same gyros.
+/// `effects`: what is known of the gyros.
+Observations join(const std::vector<const Observations*>& parts, const std::vector<double>& from_s,
+                  const Effects& effects);
 
 /// Samples in any order. `reference_variance`: of one sample of the rate, (deg/s)².
 Observations make_observations(std::vector<Observation> samples, const Circumstances& about,

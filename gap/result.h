@@ -23,8 +23,15 @@ std::string_view verdict_name(Verdict verdict);
 /// model score there: the floor, which is 0.
 struct Gap {
   double before = 0.0;
-  double after = 0.0;
+  double after = 0.0;              ///< with all that was found, applied or not
   std::array<double, 2> band95{};  ///< of simulations of the final model
+  double of_model = 0.0;           ///< with what is applied: of Result::model
+};
+
+/// A stretch of time.
+struct Span {
+  double from_s = 0.0;
+  double to_s = 0.0;
 };
 
 struct Where {
@@ -37,6 +44,9 @@ struct Where {
 struct Reading {
   model::Kind kind = model::Kind::kBias;
   std::size_t gyro = 0;
+  model::Parameters parameters{};  ///< as fitted; all 0 where nobody fitted it
+
+  [[nodiscard]] bool is_fitted() const { return parameters != model::Parameters{}; }
 };
 
 struct Curve {
@@ -66,6 +76,10 @@ struct NamedEffect {
   double gap_after = 0.0;
   Where where;
   std::vector<Reading> ambiguous_with;
+  /// It stands in the model. One that is ambiguous does so only where the caller accepts a reading,
+  /// one that was not checked never.
+  bool applied = true;
+  bool checked = true;     ///< false: the time was over before all that speaks against it was tried
   std::string evidence;    ///< one sentence for people: what gave it away
   std::string experiment;  ///< what would tell the ambiguous readings apart; empty: nothing to tell
   Figure figure;           ///< that shows it: before and after
@@ -104,13 +118,15 @@ struct Result {
   std::vector<NamedEffect> effects;  ///< in the order in which they were added
   std::vector<Unexplained> unexplained;
   std::vector<NotIdentifiable> not_identifiable;
-  model::Model model;  ///< the given one and what was added
+  model::Model model;  ///< the given one and what is applied
   std::array<GyroFigures, 2> figures;
-  double seconds = 0.0;  ///< of the recording
+  double seconds = 0.0;      ///< of the recording, or of all
+  std::vector<Span> drives;  ///< when each of several begins and ends; empty for one
   std::array<std::size_t, 2> samples{};
   std::size_t held_out = 0;  ///< samples that took no part in naming or fitting
   bool with_reference = false;
   std::vector<std::string> notes;  ///< what a reader must know: masked samples, parts left out
+  std::vector<std::string> open;   ///< what the time was too short for
 };
 
 /// `vgyro compare`: one model against one recording.
@@ -126,7 +142,8 @@ struct Comparison {
   Gap gap;                              ///< before and after are both the value
   std::vector<Difference> differences;  ///< largest first
   std::array<GyroFigures, 2> figures;
-  double seconds = 0.0;
+  double seconds = 0.0;      ///< of the recording, or of all
+  std::vector<Span> drives;  ///< when each of several begins and ends; empty for one
   std::array<std::size_t, 2> samples{};
   bool with_reference = false;
   std::vector<std::string> notes;

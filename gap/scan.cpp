@@ -180,8 +180,10 @@ std::vector<Score> Scan::scores(const Fit& null, const PairNoise& noise) const {
   const Base base = base_of(null, noise);
   std::vector<Score> scores;
   score_shapes(base, noise, scores);
-  if (!enough(null.terms, Kind::kBiasStep)) score_steps(base, noise, scores);
-  if (!enough(null.terms, Kind::kLine)) score_lines(base, noise, scores);
+  // In several recordings no instant comes twice, and no phase is kept.
+  const bool is_one = regression_.data().is_one();
+  if (is_one && !enough(null.terms, Kind::kBiasStep)) score_steps(base, noise, scores);
+  if (is_one && !enough(null.terms, Kind::kLine)) score_lines(base, noise, scores);
   std::sort(scores.begin(), scores.end(),
             [](const Score& a, const Score& b) { return a.adjusted() > b.adjusted(); });
   return scores;

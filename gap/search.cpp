@@ -63,6 +63,10 @@ constexpr double kJitterLeaves = 2e-2;
 // Each turn learns the motion from the last fit. The rivals are only compared, and all after as
 // many.
 constexpr int kMotionTurns = 3;
+// What must be left of a bounded time: names are worth nothing before they were checked, which
+// takes about as long as finding them; and what was found must be scored and drawn.
+constexpr double kLeftToCheck = 0.5;
+constexpr double kLeftToScore = 0.15;
 // How far the whole is, for people who wait.
 constexpr double kShareBegun = 0.1;
 constexpr double kShareAdding = 0.6;
@@ -86,12 +90,26 @@ void sort_by_weight(std::vector<Found>& list) {
             [](const Found& a, const Found& b) { return a.adjusted() > b.adjusted(); });
 }
 
+// One clock that is fast, or the other one as slow.
+Reading other_clock_of(const Effect& skew) {
+  return {Kind::kClockSkew, 1 - skew.gyro, {-skew.parameters[0]}};
+}
+
 // Cannot be told from `best`, of an effect with such a gain.
 bool is_close(double adjusted, double best, double gain) {
   return adjusted > best - kLead - kLeadShare * gain;
 }
 
 }  // namespace
+
+// Without a caller's limit there is always time.
+bool Search::is_over(double needed) const {
+  return time_left && time_left() < needed;
+}
+
+void Search::leave_open(const std::string& what) {
+  if (std::find(open_.begin(), open_.end(), what) == open_.end()) open_.push_back(what);
+}
 
 Search::Search(std::shared_ptr<const Study> study, Effects known)
     : known_(std::move(known)), noise_(noise_of(known_)), model_noise_(noise_) {
@@ -262,6 +280,7 @@ std::vector<Found> Search::refitted(std::size_t place, const Fit& null, const Pa
     });
     if (again || score.statistic < kWorthAFit) continue;
     if (score.adjusted() < kHopeShare * scores.front().adjusted() - kRivalMargin) break;
+    if (is_over(kLeftToScore)) break;
     list.push_back(refitted(place, null, start, score));
   }
   sort_by_weight(list);
@@ -314,8 +333,14 @@ void Search::look(std::size_t place, Round& round) {
 
 bool Search::add_round() {
   Round round;
-  for (std::size_t place = 0; place < regressions_.size(); ++place)
-    look(place, round);
+  for (std::size_t place = 0; place < regressions_.size(); ++place) {
+    if (!is_over(kLeftToCheck)) look(place, round);
+  }
+  // The best of some of the proposals may be none of all of them.
+  if (is_over(kLeftToCheck)) {
+    leave_open("whether there are further effects");
+    return false;
+  }
   const auto best =
       std::max_element(round.candidates.begin(), round.candidates.end(),
                        [](const Found& a, const Found& b) { return a.margin() < b.margin(); });
@@ -374,7 +399,7 @@ Found Search::judge_timing(Found best, const std::vector<Score>& scores) const {
   const Found& first = rivals.front();
   // Which of two clocks is the wrong one, no reading says.
   const bool is_clock = first.effect.kind == Kind::kClockSkew;
-  if (is_clock) best.ambiguous_with.push_back({Kind::kClockSkew, 1 - first.effect.gyro});
+  if (is_clock) best.ambiguous_with.push_back(other_clock_of(first.effect));
   best.effect = first.effect;
   best.penalty = first.penalty;
   // At the motion of the present terms any other lateness looks great: each has its own.
@@ -433,8 +458,10 @@ void Search::place_again() {
 
 // Each found effect against all others in its place.
 void Search::replace_round() {
-  for (std::size_t i = 0; i < found_.size(); ++i)
-    replace(i);
+  for (std::size_t i = 0; i < found_.size(); ++i) {
+    if (!is_over(kLeftToScore)) replace(i);
+    if (is_over(kLeftToScore)) found_[i].unchecked = true;
+  }
 }
 
 void Search::replace(std::size_t index) {
@@ -482,6 +509,7 @@ void Search::delete_backward() {
       continue;
     }
     found_.erase(found_.begin() + static_cast<std::ptrdiff_t>(i));
+    if (is_over(kLeftToScore)) continue;
     settle();
     replace_round();
     i = 0;
@@ -493,7 +521,9 @@ void Search::reject_unsteady() {
   std::vector<bool> wrong = pieces_of_something_else(found_);
   for (std::size_t i = 0; i < found_.size(); ++i) {
     const Found& one = found_[i];
-    if (wrong[i] || one.starting || !row(one.effect.kind).keeps_size) continue;
+    if (is_over(kLeftToScore)) found_[i].unchecked = true;
+    if (wrong[i] || one.starting || found_[i].unchecked || !row(one.effect.kind).keeps_size)
+      continue;
     const std::size_t place = place_of(one.effect);
     const Effects all = terms(place);
     const auto index =
@@ -565,6 +595,7 @@ void Search::noise_rounds() {
     may[gyro] = !unknown && !study_->is_coarse(gyro);
   }
   for (int round = 0; round < kNoiseRoundsMax; ++round) {
+    if (is_over(kLeftToScore)) return leave_open("what noise the model lacks");
     std::vector<NoiseQuestion> questions;
     for (std::size_t place = 0; place < regressions_.size(); ++place)
       questions.push_back({&regressions_[place], terms(place)});
@@ -617,6 +648,18 @@ double Search::statistic_beside(std::size_t index) const {
   return 2.0 * (fitted(terms(place)) - fitted(terms(place, index)));
 }
 
+// All that may speak against the names; a name that the time was too short for stays unchecked.
+void Search::check() {
+  if (!is_over(kLeftToScore)) place_again();
+  replace_round();
+  delete_backward();
+  reject_unsteady();
+  if (!is_over(kLeftToScore)) reject_unproven();
+  const bool all =
+      std::none_of(found_.begin(), found_.end(), [](const Found& one) { return one.unchecked; });
+  if (!all) leave_open("whether what was found may also be something else");
+}
+
 void Search::run() {
   const auto tell = [&](std::string_view what, double share) {
     if (progress) progress(what, share);
@@ -629,11 +672,7 @@ void Search::run() {
     if (found().size() > 1) replace_round();
   }
   tell("weighing rivals", kShareRivals);
-  place_again();
-  replace_round();
-  delete_backward();
-  reject_unsteady();
-  reject_unproven();
+  check();
   tell("fitting the noise", kShareNoise);
   for (std::size_t gyro = 0; gyro < 2; ++gyro) {
     if (!unknown_noise_[gyro]) continue;
@@ -651,6 +690,13 @@ void Search::run() {
     noise_rounds();
   }
   // The last values and the noise belong to the motion too.
+  renew_motion();
+}
+
+void Search::accept(const std::vector<Acceptance>& accept) {
+  if (!accept_readings(accept, found_)) return;
+  model_noise_ = noise_of(effects());
+  settle();
   renew_motion();
 }
 

@@ -10,9 +10,11 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <string>
 #include <string_view>
 #include <vector>
 
+#include "gap/acceptance.h"
 #include "gap/found.h"
 #include "gap/regression.h"
 #include "gap/scan.h"
@@ -29,9 +31,14 @@ class Search {
   Search& operator=(const Search&) = delete;
 
   std::function<void(std::string_view what, double share)> progress;
+  /// What is left of the caller's time, 1 to 0; nothing: there is no end to it. What it is too
+  /// short for is left open.
+  std::function<double()> time_left;
 
   /// Finds deterministic effects, in the order of their weight; then noise.
   void run();
+  /// After run(): takes the readings that the caller knows to be right, and fits all again.
+  void accept(const std::vector<Acceptance>& accept);
 
   [[nodiscard]] std::vector<Found> found() const;
   /// Bias and noise of the gyros of which the model says neither: every gyro has them.
@@ -40,6 +47,8 @@ class Search {
   [[nodiscard]] const Effects& first_starting() const { return first_starting_; }
   /// What looked like an effect and is none of the catalogue's: it does not hold throughout.
   [[nodiscard]] const std::vector<Found>& rejected() const { return rejected_; }
+  /// What the time was too short for, for people.
+  [[nodiscard]] const std::vector<std::string>& open() const { return open_; }
   /// The model's effects and what was found.
   [[nodiscard]] Effects effects() const;
   /// The recording, with the motion that `effects()` give.
@@ -54,6 +63,8 @@ class Search {
 
   void start();
   [[nodiscard]] Effects noise_effects(const PairNoise& noise) const;
+  [[nodiscard]] bool is_over(double needed) const;
+  void leave_open(const std::string& what);
   /// Another study, and all that hangs on it.
   void take(std::shared_ptr<const Study> study);
   void renew_motion();
@@ -80,6 +91,7 @@ class Search {
   void place_again();
   void replace_round();
   void replace(std::size_t index);
+  void check();
   void delete_backward();
   void reject_unsteady();
   [[nodiscard]] double held_out_gain(std::size_t index) const;
@@ -102,6 +114,7 @@ class Search {
   std::array<bool, 2> unknown_noise_{};  ///< the model says nothing of it
   Effects starting_noise_;               ///< of such gyros, once it is fitted
   Effects first_starting_;
+  std::vector<std::string> open_;
   PairNoise noise_;        ///< fitted
   PairNoise model_noise_;  ///< what the model says, with what was found
 };

@@ -40,6 +40,14 @@ struct Study::Facts {
   }
 };
 
+// What several recordings have in common.
+struct Study::Joint {
+  Recording summary;
+  std::vector<double> from_s;
+  std::vector<Finding> findings;
+  std::vector<std::string> notes;
+};
+
 namespace {
 
 using model::Effect;
@@ -62,6 +70,11 @@ constexpr double kMotionSameShare = 0.01;  // of the noise of a sample
 // is not.
 constexpr double kReferenceHole = 3.0;
 constexpr double kGyroHole = 1.5;
+// Between two recordings, and in whole tens of seconds: stretches of time that are judged as one
+// then hold samples of one recording only.
+constexpr double kBetween_s = 10.0;
+// A gyro's intervals in several recordings are one clock's, or it was not set up alike.
+constexpr double kOtherInterval = 0.1;
 
 Effects of_gyro(const Effects& effects, std::size_t gyro) {
   Effects mine;
@@ -175,19 +188,23 @@ Channel channel_of(std::size_t gyro) {
 }  // namespace
 
 const Recording& Study::recording() const {
-  return facts_->recording;
+  return joint_ ? joint_->summary : facts_->recording;
 }
 const Transport& Study::transport(std::size_t gyro) const {
   return facts_->transports[gyro];
 }
 const std::vector<Finding>& Study::findings() const {
-  return facts_->findings;
+  return joint_ ? joint_->findings : facts_->findings;
 }
 const std::vector<std::string>& Study::notes() const {
-  return facts_->notes;
+  return joint_ ? joint_->notes : facts_->notes;
 }
 
 bool Study::is_coarse(std::size_t gyro) const {
+  if (joint_) {
+    return std::any_of(parts_.begin(), parts_.end(),
+                       [&](const auto& part) { return part->is_coarse(gyro); });
+  }
   const Transport& its = transport(gyro);
   return its.lattice_dps > 0.0 && its.repeats > kCoarseRepeats;
 }
@@ -240,7 +257,113 @@ Expected<std::shared_ptr<const Study>> Study::begin(const Recording& recording,
   return std::shared_ptr<const Study>(study);
 }
 
+namespace {
+
+// What two recordings show of one thing is told once, as the one has it that shows it best.
+void add_finding(Finding finding, double from_s, std::vector<Finding>& findings) {
+  finding.where.from_s += from_s;
+  finding.where.to_s += from_s;
+  const auto same = std::find_if(findings.begin(), findings.end(), [&](const Finding& other) {
+    return other.effect.kind == finding.effect.kind && other.effect.gyro == finding.effect.gyro;
+  });
+  if (same == findings.end()) {
+    findings.push_back(std::move(finding));
+    return;
+  }
+  const double cost_nats = same->cost_nats + finding.cost_nats;
+  if (finding.statistic > same->statistic) *same = std::move(finding);
+  same->cost_nats = cost_nats;
+}
+
+Expected<void> check_alike(const Study& first, const Study& other, std::size_t number) {
+  for (std::size_t gyro = 0; gyro < 2; ++gyro) {
+    const double interval_s = first.transport(gyro).interval_s;
+    const double other_s = other.transport(gyro).interval_s;
+    if (std::abs(other_s - interval_s) <= kOtherInterval * interval_s) continue;
+    return fail("",
+                fmt::format("{} sends every {:.4g} s in recording 1 and every {:.4g} s in "
+                            "recording {}",
+                            first.recording().gyros[gyro].name, interval_s, other_s, number),
+                "judge recordings of another rate by themselves");
+  }
+  return {};
+}
+
+// A recording by its number; they have no names here.
+Error of_recording(Error error, std::size_t number) {
+  error.what = fmt::format("recording {}: {}", number, error.what);
+  return error;
+}
+
+}  // namespace
+
+Expected<std::shared_ptr<const Study>> Study::begin(const std::vector<Recording>& recordings,
+                                                    const Effects& effects) {
+  if (recordings.size() == 1) return begin(recordings.front(), effects);
+  auto joint = std::make_shared<Joint>();
+  std::vector<std::shared_ptr<const Study>> parts;
+  double end_s = 0.0;
+  for (std::size_t i = 0; i < recordings.size(); ++i) {
+    auto part = begin(recordings[i], effects);
+    if (!part) return tl::unexpected(of_recording(part.error(), i + 1));
+    if (i > 0) end_s = kBetween_s * std::ceil(end_s / kBetween_s + 1.0);
+    joint->from_s.push_back(end_s);
+    for (const Finding& finding : (*part)->findings())
+      add_finding(finding, end_s, joint->findings);
+    for (const std::string& note : (*part)->notes())
+      joint->notes.push_back(fmt::format("recording {}: {}", i + 1, note));
+    end_s += recordings[i].seconds;
+    parts.push_back(*std::move(part));
+    if (auto alike = check_alike(*parts.front(), *parts.back(), i + 1); !alike) {
+      return tl::unexpected(alike.error());
+    }
+  }
+  joint->summary.seconds = end_s;
+  joint->summary.has_reference = recordings.front().has_reference;
+  joint->summary.has_acceleration = recordings.front().has_acceleration;
+  for (std::size_t gyro = 0; gyro < 2; ++gyro)
+    joint->summary.gyros[gyro].name = recordings.front().gyros[gyro].name;
+  joint->notes.emplace_back(
+      "steps and lines are not looked for in several recordings together: no instant comes twice, "
+      "and no phase is kept; judge the recording that shows one by itself");
+  return joined(std::move(parts), std::move(joint), effects);
+}
+
+std::shared_ptr<const Study> Study::joined(std::vector<std::shared_ptr<const Study>> parts,
+                                           std::shared_ptr<const Joint> joint,
+                                           const Effects& effects) {
+  const std::shared_ptr<Study> study(new Study);
+  for (std::size_t place = 0; place < parts.front()->observations().size(); ++place) {
+    std::vector<const Observations*> each;
+    each.reserve(parts.size());
+    for (const auto& part : parts)
+      each.push_back(part->observations()[place].get());
+    study->observations_.push_back(
+        std::make_shared<Observations>(join(each, joint->from_s, effects)));
+  }
+  study->parts_ = std::move(parts);
+  study->joint_ = std::move(joint);
+  return study;
+}
+
+std::vector<Span> Study::drives() const {
+  std::vector<Span> spans;
+  for (std::size_t i = 0; i < parts_.size(); ++i) {
+    const double from_s = joint_->from_s[i];
+    spans.push_back({from_s, from_s + parts_[i]->recording().seconds});
+  }
+  return spans;
+}
+
 std::shared_ptr<const Study> Study::with_motion(const Effects& effects) const {
+  if (joint_) {
+    std::vector<std::shared_ptr<const Study>> parts;
+    parts.reserve(parts_.size());
+    for (const auto& part : parts_)
+      parts.push_back(part->with_motion(effects));
+    // No step is looked for, and so none has taken seconds for the fit.
+    return joined(std::move(parts), joint_, effects);
+  }
   const std::shared_ptr<Study> study(new Study(*this));
   if (!recording().has_reference) study->learn_motion(effects);
   study->observe(effects);

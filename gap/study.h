@@ -24,6 +24,15 @@ class Study {
   /// Error when the recording cannot be judged. The recording outlives all studies of it.
   static Expected<std::shared_ptr<const Study>> begin(const Recording& recording,
                                                       const Effects& effects);
+  /// Of several recordings of one pair, each with a study of its own: transport, rest and motion
+  /// know nothing of the others, and only the observations stand behind each other. One recording
+  /// is a study as above.
+  static Expected<std::shared_ptr<const Study>> begin(const std::vector<Recording>& recordings,
+                                                      const Effects& effects);
+
+  /// When each of several recordings begins and ends, on the time that they have in common; empty
+  /// for one.
+  [[nodiscard]] std::vector<Span> drives() const;
 
   /// One with a reference for each gyro, otherwise one for both.
   [[nodiscard]] const std::vector<std::shared_ptr<const Observations>>& observations() const {
@@ -34,10 +43,12 @@ class Study {
   [[nodiscard]] const Observations& observations_of(std::size_t gyro) const {
     return *observations_[place_of(gyro)];
   }
+  /// Precondition of both: one recording.
   [[nodiscard]] const Transport& transport(std::size_t gyro) const;
   [[nodiscard]] const Signals& signals(std::size_t gyro) const { return *signals_[gyro]; }
   [[nodiscard]] const std::vector<Finding>& findings() const;
   [[nodiscard]] const std::vector<std::string>& notes() const;
+  /// Of several: names, what is configured, and how long they last behind each other.
   [[nodiscard]] const Recording& recording() const;
   /// Its values are so far apart that rounding is no noise: only great effects can be judged.
   [[nodiscard]] bool is_coarse(std::size_t gyro) const;
@@ -56,8 +67,12 @@ class Study {
 
  private:
   struct Facts;
+  struct Joint;
 
   Study() = default;
+  static std::shared_ptr<const Study> joined(std::vector<std::shared_ptr<const Study>> parts,
+                                             std::shared_ptr<const Joint> joint,
+                                             const Effects& effects);
   void observe(const Effects& effects);
   [[nodiscard]] std::vector<Observations> observed() const;
   void learn_motion(const Effects& effects);
@@ -71,6 +86,8 @@ class Study {
   std::array<std::shared_ptr<const Signals>, 2> signals_;
   std::vector<Span> for_fit_;
   std::vector<std::shared_ptr<const Observations>> observations_;
+  std::shared_ptr<const Joint> joint_;  ///< of several recordings; none of one
+  std::vector<std::shared_ptr<const Study>> parts_;
 };
 
 }  // namespace vgyro::gap

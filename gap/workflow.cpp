@@ -43,6 +43,13 @@ void fill_facts(const Study& study, std::size_t& held_out, std::array<std::size_
   }
 }
 
+double seconds_of(const std::vector<Recording>& recordings) {
+  double sum = 0.0;
+  for (const Recording& recording : recordings)
+    sum += recording.seconds;
+  return sum;
+}
+
 NamedEffect named(const Finding& finding) {
   NamedEffect named;
   named.effect = finding.effect;
@@ -62,6 +69,8 @@ NamedEffect named(const Found& one, bool with_reference) {
   named.statistic = one.statistic;
   named.p_value = std::min(1.0, kTrials * chi_square_tail(one.adjusted()));
   named.ambiguous_with = one.ambiguous_with;
+  named.checked = !one.unchecked;
+  named.applied = named.checked && (one.ambiguous_with.empty() || one.accepted);
   if (!one.ambiguous_with.empty()) {
     named.experiment =
         experiment_for(reading_of(one.effect), one.ambiguous_with.front(), with_reference);
@@ -101,6 +110,9 @@ void score(const Study& study, const Effects& given, const Effects& first, std::
     one.gap_after = gap;
   }
   result.gap.after = gap;
+  // What is not applied is part of the account and not of the model.
+  const bool all = now.size() == result.model.effects.size();
+  result.gap.of_model = all ? gap : gap_of(study, result.model.effects, floor, Part::kHeldOut);
 }
 
 // What the raw frames show by themselves is in from the start.
@@ -127,24 +139,28 @@ std::string_view verdict_name(Verdict verdict) {
   return "unexplained";
 }
 
-Expected<Result> find_gap(const Recording& recording, const model::Model& model,
+Expected<Result> find_gap(const std::vector<Recording>& recordings, const model::Model& model,
                           const Settings& settings) {
   const auto tell = [&](std::string_view what, double share) {
     if (settings.progress) settings.progress(what, share);
   };
   tell("checking frames and stamps", kShareFrames);
-  auto begun = Study::begin(recording, model.effects);
+  auto begun = Study::begin(recordings, model.effects);
   if (!begun) return tl::unexpected(begun.error());
   Search search(*begun, known_effects(model.effects, (*begun)->findings()));
   search.progress = settings.progress;
+  search.time_left = settings.time_left;
   search.run();
+  search.accept(settings.accept);
   const Study& study = search.study();
 
   tell("scoring held-out samples", kShareScoring);
   Result result;
-  result.seconds = recording.seconds;
-  result.with_reference = recording.has_reference;
+  result.seconds = seconds_of(recordings);
+  result.drives = study.drives();
+  result.with_reference = study.recording().has_reference;
   result.notes = study.notes();
+  result.open = search.open();
   result.model = model;
   result.not_identifiable = not_identifiable(study);
   fill_facts(study, result.held_out, result.samples);
@@ -153,32 +169,36 @@ Expected<Result> find_gap(const Recording& recording, const model::Model& model,
   for (const Finding& finding : study.findings())
     result.effects.push_back(named(finding));
   for (const Found& one : found)
-    result.effects.push_back(named(one, recording.has_reference));
+    result.effects.push_back(named(one, result.with_reference));
   for (const Found& one : search.starting())
-    result.starting.push_back(named(one, recording.has_reference));
+    result.starting.push_back(named(one, result.with_reference));
   const Effects given = joined(model.effects, result.starting);
-  result.model.effects = joined(given, result.effects);
+  result.model.effects = given;
+  for (const NamedEffect& effect : result.effects) {
+    if (effect.applied) result.model.effects.push_back(effect.effect);
+  }
   score(study, model.effects, search.first_starting(), settings.seed, result);
   result.verdict = verdict_of(result);
 
   tell("drawing", kShareDrawing);
   describe_effects(study, given, result);
-  result.figures = gyro_figures(study, given, result.model.effects, settings.seed);
+  result.figures = gyro_figures(study, given, joined(given, result.effects), settings.seed);
   tell("done", 1.0);
   return result;
 }
 
-Expected<Comparison> compare(const Recording& recording, const model::Model& model,
+Expected<Comparison> compare(const std::vector<Recording>& recordings, const model::Model& model,
                              const Settings& settings) {
-  auto begun = Study::begin(recording, model.effects);
+  auto begun = Study::begin(recordings, model.effects);
   if (!begun) return tl::unexpected(begun.error());
   const Study& study = **begun;
   Comparison comparison;
   const Floor floor = simulate_floor(study, model.effects, Part::kHeldOut, settings.seed);
   const double gap = gap_of(study, model.effects, floor, Part::kHeldOut);
   comparison.gap = {gap, gap, floor.band95};
-  comparison.seconds = recording.seconds;
-  comparison.with_reference = recording.has_reference;
+  comparison.seconds = seconds_of(recordings);
+  comparison.drives = study.drives();
+  comparison.with_reference = study.recording().has_reference;
   comparison.notes = study.notes();
   std::size_t held_out = 0;
   fill_facts(study, held_out, comparison.samples);

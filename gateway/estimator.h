@@ -72,6 +72,8 @@ class Estimator {
   /// The next sample of one gyro alone. Precondition: knows_gyros().
   fusion::VirtualRate update_alone(std::size_t gyro, TimePoint t, double rate_dps);
 
+  /// What of the newest rate is either gyro's.
+  [[nodiscard]] std::array<double, 2> shares() const { return corrector_->shares(); }
   /// What the corrector thinks of its data, as of the newest rate.
   [[nodiscard]] const fusion::Condition& condition() const { return condition_; }
   /// What is known of the drifts at `t`. Precondition: knows_gyros().

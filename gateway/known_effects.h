@@ -9,6 +9,7 @@
 
 #include "base/time.h"
 #include "fusion/compensation.h"
+#include "fusion/compensation_doubt.h"
 #include "gateway/plan.h"
 #include "gateway/surroundings.h"
 
@@ -28,6 +29,16 @@ class KnownEffects {
     // Most have no model, and ask for no surroundings.
     return take_any(gyro) ? take_off_any(gyro, reading_dps, surroundings, t) : reading_dps;
   }
+  /// Whether the model file says how far it may be wrong.
+  [[nodiscard]] bool is_doubted() const { return doubts_[0].any() || doubts_[1].any(); }
+  /// The biases were learned, at rest, with what is taken off at `t`.
+  [[gnu::cold, gnu::noinline]] void settle(const Surroundings& surroundings, TimePoint t);
+  /// 1σ of what that does to a rate of which each gyro has such a share, deg/s.
+  [[nodiscard]] [[gnu::cold, gnu::noinline]] double doubt_dps(double rate_dps,
+                                                              const std::array<double, 2>& shares,
+                                                              const Surroundings& surroundings,
+                                                              TimePoint t) const;
+
   /// What of it is the gyro's zero offset at `t`, deg/s.
   [[nodiscard]] double zero_offset_dps(std::size_t gyro, const Surroundings& surroundings,
                                        TimePoint t) const;
@@ -43,6 +54,7 @@ class KnownEffects {
                                                       TimePoint t) const;
 
   std::array<fusion::Compensation, 2> compensations_;
+  std::array<fusion::CompensationDoubt, 2> doubts_;
   std::array<std::uint8_t, 2> needs_{};
   Duration lag_most_{0};
 };

@@ -42,6 +42,13 @@ void add_noise(const model::Effect& effect, fusion::GyroParameters& parameters) 
   }
 }
 
+void add_lag_doubt(const model::Effect& effect, fusion::GyroParameters& parameters) {
+  if (model::info(effect.kind).nature != model::Nature::kLag) return;
+  parameters.lag_sigma_s = std::hypot(parameters.lag_sigma_s, model::lag_sigma_s(effect));
+  if (!effect.ambiguous) return;
+  parameters.lag_common_sigma_s = std::hypot(parameters.lag_common_sigma_s, model::lag_s(effect));
+}
+
 void add_limit(const model::Effect& effect, GyroPlan& gyro) {
   const double value_dps = effect.parameters[0];
   if (effect.kind == model::Kind::kSaturation) {
@@ -115,6 +122,7 @@ void apply_model(const model::Model& model, Plan& plan, std::vector<Error>& erro
     const std::string place = at_line(model.file, effect.line);
     check_inputs(effect, plan, place, errors);
     add_noise(effect, plan.corrector.gyros[effect.gyro]);
+    add_lag_doubt(effect, plan.corrector.gyros[effect.gyro]);
     add_limit(effect, plan.gyros[effect.gyro]);
     // What the model tells of the temperature is not learned besides.
     if (effect.kind == model::Kind::kTemperatureBias ||

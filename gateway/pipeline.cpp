@@ -64,6 +64,7 @@ struct Pipeline::Impl {
   void tell_estimator(TimePoint t);
   void tell_surroundings(TimePoint t, double rate_dps, bool valid);
   void note_condition(TimePoint t);
+  [[gnu::cold, gnu::noinline]] void add_doubt(fusion::VirtualRate& rate, TimePoint t);
 
   [[nodiscard]] TimePoint on_axis(TimePoint stamp) const {
     return whole_microseconds(stamp) + guard.offset();
@@ -281,14 +282,16 @@ void Pipeline::Impl::take_pair(const fusion::AlignedPair& pair) {
   tell_estimator(pair.t);
   if (!estimator.calibrated()) {
     estimator.calibrate(pair);
+    if (known_effects.is_doubted()) known_effects.settle(surroundings, pair.t);
     if (estimator.calibrated()) enter_state();
   }
   // While one gyro was missing the other spoke alone, perhaps for later instants than this.
   if (pair.t <= newest) return;
   newest = pair.t;
   const bool valid = estimator.calibrated() && !contradicted;
-  const fusion::VirtualRate rate = valid ? estimator.update(pair) : fusion::VirtualRate{};
+  fusion::VirtualRate rate = valid ? estimator.update(pair) : fusion::VirtualRate{};
   if (valid) note_condition(pair.t);
+  if (valid && known_effects.is_doubted()) add_doubt(rate, pair.t);
   tell_surroundings(pair.t, rate.rate_dps, valid);
   if (observer != nullptr) {
     observer->on_rate(pair.t - guard.offset(), pair.rate_dps, valid ? rate.rate_dps : kNone);
@@ -312,6 +315,7 @@ void Pipeline::Impl::take_single(std::size_t gyro, TimePoint t, double rate_dps,
     tell_estimator(t);
     rate = estimator.update_alone(gyro, t, rate_dps);
     note_condition(t);
+    if (known_effects.is_doubted()) add_doubt(rate, t);
     valid = rate.usable;
   }
   tell_surroundings(t, rate.rate_dps, valid);
@@ -337,6 +341,13 @@ void Pipeline::Impl::tell_surroundings(TimePoint t, double rate_dps, bool valid)
   } else if (!plan.calibration.from_reference) {
     surroundings.add_rate(t, plan.calibration.rate_dps);
   }
+}
+
+// What was taken off the readings may be wrong, and the corrector cannot see it: the gyros agree.
+void Pipeline::Impl::add_doubt(fusion::VirtualRate& rate, TimePoint t) {
+  if (estimator.condition().stopped) known_effects.settle(surroundings, t);
+  rate.sigma_dps = std::hypot(
+      rate.sigma_dps, known_effects.doubt_dps(rate.rate_dps, estimator.shares(), surroundings, t));
 }
 
 // The corrector's opinion of both; of one gyro alone it has none that is new.

@@ -270,6 +270,19 @@ std::vector<std::string> kind_names() {
   return names;
 }
 
+const Parameter* size_parameter(Kind kind) {
+  for (const Parameter& parameter : info(kind).parameters) {
+    // A line's frequency stands before its amplitude, and says when, not how much.
+    const bool says_when = kind == Kind::kLine && parameter.unit == "Hz";
+    if (parameter.form == Form::kNumber && !parameter.preset && !says_when) return &parameter;
+  }
+  return nullptr;
+}
+
+double within_limits(const Parameter& parameter, double value) {
+  return std::clamp(value, parameter.minimum, parameter.maximum);
+}
+
 double added_dps(const Effect& effect, double rate_dps, const Surroundings& surroundings) {
   const KindInfo& row = info(effect.kind);
   assert(row.added != nullptr);
@@ -305,6 +318,11 @@ double lag_s(const Effect& effect) {
   return 1.0 / (2.0 * std::numbers::pi * effect.parameters[0]);
 }
 
+double lag_sigma_s(const Effect& effect) {
+  if (effect.kind == Kind::kDelay) return effect.sigma[0];
+  return lag_s(effect) * effect.sigma[0] / effect.parameters[0];
+}
+
 std::string parameters_text(const Effect& effect) {
   std::string text;
   const std::span<const Parameter> parameters = info(effect.kind).parameters;
@@ -316,7 +334,9 @@ std::string parameters_text(const Effect& effect) {
     } else {
       text += fmt::format("{:g}", effect.parameters[i]);
     }
+    if (effect.sigma[i] > 0.0) text += fmt::format(" ± {:g}", effect.sigma[i]);
   }
+  if (effect.ambiguous) text += ", ambiguous";
   return text;
 }
 

@@ -86,6 +86,13 @@ const KindInfo& info(Kind kind);
 const KindInfo* find_kind(std::string_view name);
 std::vector<std::string> kind_names();
 
+/// The parameter that says how large the effect is: what a plain `sigma` in the model file is of.
+/// Null where it has none.
+const Parameter* size_parameter(Kind kind);
+
+/// Within `parameter.minimum` and `parameter.maximum`, for a sum of value and doubt.
+double within_limits(const Parameter& parameter, double value);
+
 /// What an offset or a response adds to the reading, deg/s; `rate_dps` is the late rate. 0 where it
 /// depends on something that is not known.
 double added_dps(const Effect& effect, double rate_dps, const Surroundings& surroundings);
@@ -96,10 +103,13 @@ double slope(const Effect& effect, double rate_dps, const Surroundings& surround
 /// What the kinds of Nature::kClip make of a reading.
 double clipped_dps(const Effect& effect, double reading_dps);
 
+/// Of Nature::kLag: 1σ of lag_s(), from the effect's σ.
+double lag_sigma_s(const Effect& effect);
+
 /// Of Nature::kLag: how much later than the rate the reading comes, for rates that change slowly.
 double lag_s(const Effect& effect);
 
-/// "error 0.00042", as check and the summaries print it.
+/// "error 0.00042 ± 3e-06", as check and the summaries print it.
 std::string parameters_text(const Effect& effect);
 
 }  // namespace vgyro::model

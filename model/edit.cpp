@@ -43,6 +43,23 @@ std::string value_text(const Parameter& parameter, double value) {
                                  : "\"\"";
 }
 
+// Empty where it says nothing. One number where only the effect's size has one.
+std::string sigma_text(const Effect& effect) {
+  const std::span<const Parameter> parameters = info(effect.kind).parameters;
+  const Parameter* size = size_parameter(effect.kind);
+  std::string table;
+  std::string alone;
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < parameters.size(); ++i) {
+    if (effect.sigma[i] == 0.0) continue;
+    const std::string number = fmt::format("{}", effect.sigma[i]);
+    if (&parameters[i] == size) alone = number;
+    table += fmt::format("{} {} = {}", count++ == 0 ? "" : ",", parameters[i].name, number);
+  }
+  if (count == 1 && !alone.empty()) return alone;
+  return count == 0 ? std::string() : fmt::format("{{{} }}", table);
+}
+
 std::string table_text(const Effect& effect, std::string_view newline) {
   const KindInfo& kind = info(effect.kind);
   std::string text = fmt::format("[[effect]]{0}gyro = {1}{0}kind = \"{2}\"{0}", newline,
@@ -51,6 +68,10 @@ std::string table_text(const Effect& effect, std::string_view newline) {
     text += fmt::format("{} = {}{}", kind.parameters[i].name,
                         value_text(kind.parameters[i], effect.parameters[i]), newline);
   }
+  if (const std::string sigma = sigma_text(effect); !sigma.empty()) {
+    text += fmt::format("sigma = {}{}", sigma, newline);
+  }
+  if (effect.ambiguous) text += fmt::format("ambiguous = true{}", newline);
   return text;
 }
 
@@ -61,7 +82,8 @@ Expected<Model> read(std::string_view text) {
 }
 
 bool same(const Effect& a, const Effect& b) {
-  return a.gyro == b.gyro && a.kind == b.kind && a.parameters == b.parameters;
+  return a.gyro == b.gyro && a.kind == b.kind && a.parameters == b.parameters &&
+         a.sigma == b.sigma && a.ambiguous == b.ambiguous;
 }
 
 // `text` must hold these effects, whatever else it holds.
@@ -89,16 +111,40 @@ Expected<void> check_form(std::string_view text) {
 
 }  // namespace
 
-Expected<std::string> append_effect(std::string_view text, const Effect& effect,
-                                    std::string_view comment) {
+namespace {
+
+// A whole file, ready for more lines.
+std::string begun_file(std::string_view text) {
   const bool blank = text.find_first_not_of(" \t\r\n") == std::string_view::npos;
   std::string result(text);
   if (blank) result += kHead;
+  if (!result.ends_with('\n')) result += newline_of(text);
+  return result;
+}
+
+}  // namespace
+
+Expected<std::string> append_comment(std::string_view text, std::string_view comment) {
+  std::string result = begun_file(text);
+  const auto before = read(result);
+  if (!before) return tl::unexpected(before.error());
+  const std::string_view newline = newline_of(text);
+  result += newline;
+  result += comment_lines(comment, newline);
+  return read_back(std::move(result), before->effects);
+}
+
+std::string effect_table(const Effect& effect) {
+  return table_text(effect, "\n");
+}
+
+Expected<std::string> append_effect(std::string_view text, const Effect& effect,
+                                    std::string_view comment) {
+  std::string result = begun_file(text);
   const auto before = read(result);
   if (!before) return tl::unexpected(before.error());
   if (const auto good = check_form(result); !good) return tl::unexpected(good.error());
   const std::string_view newline = newline_of(text);
-  if (!result.ends_with('\n')) result += newline;
   result += newline;
   result += comment_lines(comment, newline);
   result += table_text(effect, newline);

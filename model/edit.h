@@ -19,6 +19,13 @@ namespace vgyro::model {
 Expected<std::string> append_effect(std::string_view text, const Effect& effect,
                                     std::string_view comment);
 
+/// `text` with `comment` at its end, every line of it behind a "#": effects that are known and not
+/// applied. An empty text becomes a whole file. An error where `text` is no model file.
+Expected<std::string> append_comment(std::string_view text, std::string_view comment);
+
+/// The effect's [[effect]] table, with `sigma` and `ambiguous` where they say something.
+std::string effect_table(const Effect& effect);
+
 /// A whole file with these effects.
 std::string to_toml(const Model& model);
 

@@ -57,10 +57,17 @@ struct Effect {
   std::size_t gyro = 0;  ///< 0 or 1
   Kind kind = Kind::kBias;
   Parameters parameters{};
-  unsigned line = 0;  ///< of its table in the model file; 0 when it comes from elsewhere
+  unsigned line = 0;       ///< of its table in the model file; 0 when it comes from elsewhere
+  Parameters sigma{};      ///< 1σ of each parameter; 0: nothing is said of its doubt
+  bool ambiguous = false;  ///< another reading is as good: the whole effect may not be this gyro's
 
   friend bool operator==(const Effect&, const Effect&) = default;
 };
+
+/// It says how far it may be wrong.
+inline bool is_doubted(const Effect& effect) {
+  return effect.ambiguous || effect.sigma != Parameters{};
+}
 
 /// What a gyro's error depends on besides the true rate, at one instant. NaN: not known.
 struct Surroundings {

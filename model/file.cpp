@@ -54,6 +54,69 @@ std::optional<double> read_parameter(TomlReader& reader, const KindInfo& kind,
                                                   : read_number(reader, parameter);
 }
 
+// Two values within the limits are no further apart.
+std::optional<double> checked_sigma(TomlReader& reader, const Parameter& parameter,
+                                    std::string_view key) {
+  const auto sigma = reader.number(key);
+  const double most = parameter.maximum - parameter.minimum;
+  if (!sigma || (*sigma >= 0.0 && *sigma <= most)) return sigma;
+  reader.complain(
+      reader.where(key), fmt::format("{} is {:g}", key, *sigma),
+      fmt::format("0 to {:g}{}{}", most, parameter.unit.empty() ? "" : " ", parameter.unit));
+  return std::nullopt;
+}
+
+std::string sigma_example(const KindInfo& kind) {
+  const Parameter* size = size_parameter(kind.kind);
+  return size == nullptr ? std::string("leave it out: nothing of this kind is measured")
+                         : fmt::format("sigma = 1e-3, or sigma = {{ {} = 1e-3 }}", size->name);
+}
+
+// One number is of the effect's size; a table names parameters.
+void read_sigma_table(const toml::table& table, TomlReader& effect_reader, const std::string& file,
+                      std::vector<Error>& errors, Effect& effect) {
+  TomlReader reader(table, file, "sigma", errors);
+  const KindInfo& kind = info(effect.kind);
+  for (std::size_t i = 0; i < kind.parameters.size(); ++i) {
+    const Parameter& parameter = kind.parameters[i];
+    if (!reader.has(parameter.name)) {
+      reader.forgive({parameter.name});
+    } else if (parameter.form != Parameter::Form::kNumber) {
+      effect_reader.complain(reader.where(parameter.name),
+                             fmt::format("{} is chosen, and has no sigma", parameter.name),
+                             sigma_example(kind));
+      reader.forgive({parameter.name});
+    } else {
+      effect.sigma[i] = checked_sigma(reader, parameter, parameter.name).value_or(0.0);
+    }
+  }
+  reader.finish();
+}
+
+void read_sigma(const toml::table& table, TomlReader& reader, const std::string& file,
+                std::vector<Error>& errors, Effect& effect) {
+  if (!reader.has("sigma")) {
+    reader.forgive({"sigma"});
+    return;
+  }
+  const KindInfo& kind = info(effect.kind);
+  const Parameter* size = size_parameter(effect.kind);
+  if (size == nullptr) {
+    reader.forgive({"sigma"});
+    reader.complain(reader.where("sigma"), fmt::format("{} has no sigma", kind.name),
+                    sigma_example(kind));
+  } else if (table["sigma"].is_table()) {
+    read_sigma_table(*reader.table("sigma"), reader, file, errors, effect);
+  } else if (table["sigma"].is_number()) {
+    const auto place = static_cast<std::size_t>(size - kind.parameters.data());
+    effect.sigma[place] = checked_sigma(reader, *size, "sigma").value_or(0.0);
+  } else {
+    reader.forgive({"sigma"});
+    reader.complain(reader.where("sigma"), "sigma must be a number or a table",
+                    sigma_example(kind));
+  }
+}
+
 std::optional<std::size_t> read_gyro(TomlReader& reader) {
   const auto number = reader.integer("gyro");
   if (number && (*number == 1 || *number == 2)) return static_cast<std::size_t>(*number - 1);
@@ -97,6 +160,8 @@ std::optional<Effect> read_effect(const toml::table& table, const std::string& f
   for (std::size_t i = 0; i < kind->parameters.size(); ++i) {
     effect.parameters[i] = read_parameter(reader, *kind, kind->parameters[i]).value_or(0.0);
   }
+  read_sigma(table, reader, file, errors, effect);
+  effect.ambiguous = reader.boolean("ambiguous").value_or(false);
   reader.finish();
   if (errors.size() > errors_before) return std::nullopt;
   check_together(reader, effect);

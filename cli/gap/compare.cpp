@@ -21,7 +21,7 @@ namespace {
 Expected<gap::Comparison> judge(const GapInputs& inputs, const CompareOptions& options) {
   Progress progress("compare");
   auto comparison =
-      gap::compare(inputs.recording, inputs.model, settings_of(options.seed, progress));
+      gap::compare(inputs.recordings, inputs.model, settings_of(options.seed, progress));
   if (!comparison) return tl::unexpected(at_log(comparison.error(), inputs.subject.log));
   return comparison;
 }

@@ -1,5 +1,7 @@
 #include "cli/gap/inputs.h"
 
+#include <fmt/format.h>
+
 #include "cli/output/errors.h"
 #include "cli/output/overwrite.h"
 #include "cli/recording.h"
@@ -8,24 +10,30 @@
 namespace vgyro::cli {
 
 tl::expected<GapInputs, std::vector<Error>> load_gap_inputs(
-    const std::string& config, const std::optional<std::string>& model, const std::string& log,
-    const std::string& doing, const std::vector<std::string>& outputs) {
+    const std::string& config, const std::optional<std::string>& model,
+    const std::vector<std::string>& logs, const std::string& doing,
+    const std::vector<std::string>& outputs) {
   auto loaded = gateway::load_config(config, {.model = model});
   if (!loaded) return tl::unexpected(loaded.error());
   for (const Error& warning : loaded->warnings)
     warn(warning);
   std::vector<std::string> read = loaded->files;
-  read.push_back(log);
+  read.insert(read.end(), logs.begin(), logs.end());
   if (const auto free = check_outputs(read, outputs); !free) {
     return tl::unexpected(std::vector<Error>{free.error()});
   }
   const gateway::Plan& plan = loaded->plan;
   GapInputs inputs;
   if (plan.model) inputs.model = *plan.model;
-  inputs.subject = {config, inputs.model.file, log, {plan.gyros[0].name, plan.gyros[1].name}};
-  auto recording = read_recording(log, plan, doing);
-  if (!recording) return tl::unexpected(std::vector<Error>{recording.error()});
-  inputs.recording = std::move(*recording);
+  inputs.subject = {config,
+                    inputs.model.file,
+                    fmt::format("{}", fmt::join(logs, ", ")),
+                    {plan.gyros[0].name, plan.gyros[1].name}};
+  for (const std::string& log : logs) {
+    auto recording = read_recording(log, plan, doing);
+    if (!recording) return tl::unexpected(std::vector<Error>{recording.error()});
+    inputs.recordings.push_back(*std::move(recording));
+  }
   return inputs;
 }
 

@@ -20,14 +20,15 @@ namespace vgyro::cli {
 struct GapInputs {
   GapSubject subject;
   model::Model model;  ///< empty when there is none
-  gap::Recording recording;
+  std::vector<gap::Recording> recordings;
 };
 
 /// `model` comes before the configuration's own; `doing` is for the line of progress;
 /// `outputs` must be none of the files that are read.
 tl::expected<GapInputs, std::vector<Error>> load_gap_inputs(
-    const std::string& config, const std::optional<std::string>& model, const std::string& log,
-    const std::string& doing, const std::vector<std::string>& outputs);
+    const std::string& config, const std::optional<std::string>& model,
+    const std::vector<std::string>& logs, const std::string& doing,
+    const std::vector<std::string>& outputs);
 
 /// Of the workflow; it tells `progress`, which must live as long, how far it is.
 gap::Settings settings_of(std::uint64_t seed, Progress& progress);

@@ -25,6 +25,7 @@ constexpr std::string_view kUnit = "nats_per_sample";
 // Rounding then moves a value by less than a two-hundredth of its σ.
 constexpr int kDigitsOfSigma = 3;
 constexpr int kDigitsMost = 12;
+constexpr int kDigitsOfReading = 4;
 
 int decade(double value) {
   return static_cast<int>(std::floor(std::log10(std::abs(value))));
@@ -50,10 +51,24 @@ double rounded(const Parameter& parameter, double value, double sigma) {
   return parameter.allows(result) ? result : value;
 }
 
-void round_effect(model::Effect& effect, const model::Parameters& sigma) {
-  const auto parameters = model::info(effect.kind).parameters;
+void round_parameters(model::Kind kind, const model::Parameters& sigma, model::Parameters& values) {
+  const auto parameters = model::info(kind).parameters;
   for (std::size_t i = 0; i < parameters.size(); ++i)
-    effect.parameters[i] = rounded(parameters[i], effect.parameters[i], sigma[i]);
+    values[i] = rounded(parameters[i], values[i], sigma[i]);
+}
+
+// Of another kind nobody has asked how sure it would be.
+void round_reading(const gap::NamedEffect& named, gap::Reading& reading) {
+  if (reading.kind == named.effect.kind) {
+    round_parameters(reading.kind, named.sigma, reading.parameters);
+    return;
+  }
+  const auto parameters = model::info(reading.kind).parameters;
+  for (std::size_t i = 0; i < parameters.size(); ++i) {
+    if (parameters[i].form != Parameter::Form::kNumber) continue;
+    const double value = with_digits(reading.parameters[i], kDigitsOfReading);
+    if (parameters[i].allows(value)) reading.parameters[i] = value;
+  }
 }
 
 bool same(const model::Effect& a, const model::Effect& b) {
@@ -84,20 +99,32 @@ void add_where(Json& json, const gap::Where& where) {
   json["band_hz"] = {where.low_hz, where.high_hz};
 }
 
+Json parameters_json(model::Kind kind, const model::Parameters& parameters) {
+  Json json = Json::object();
+  const auto rows = model::info(kind).parameters;
+  for (std::size_t i = 0; i < rows.size(); ++i)
+    json[std::string(rows[i].name)] = parameter_json(rows[i], parameters[i]);
+  return json;
+}
+
+Json reading_json(const gap::Reading& reading) {
+  Json json{{"kind", kind_name(reading.kind)}, {"gyro", gyro_number(reading.gyro)}};
+  if (reading.is_fitted()) json["parameters"] = parameters_json(reading.kind, reading.parameters);
+  return json;
+}
+
 Json effect_json(const gap::NamedEffect& named) {
-  Json values = Json::object();
+  const Json values = parameters_json(named.effect.kind, named.effect.parameters);
   Json sigma = Json::object();
   const auto parameters = model::info(named.effect.kind).parameters;
   for (std::size_t i = 0; i < parameters.size(); ++i) {
-    const std::string name(parameters[i].name);
-    values[name] = parameter_json(parameters[i], named.effect.parameters[i]);
-    if (estimated(named.sigma[i])) sigma[name] = named.sigma[i];
+    if (estimated(named.sigma[i])) sigma[std::string(parameters[i].name)] = named.sigma[i];
   }
   Json where = Json::object();
   add_where(where, named.where);
   Json ambiguous = Json::array();
   for (const gap::Reading& reading : named.ambiguous_with)
-    ambiguous.push_back({{"kind", kind_name(reading.kind)}, {"gyro", gyro_number(reading.gyro)}});
+    ambiguous.push_back(reading_json(reading));
   return {{"kind", kind_name(named.effect.kind)},
           {"gyro", gyro_number(named.effect.gyro)},
           {"parameters", values},
@@ -108,6 +135,8 @@ Json effect_json(const gap::NamedEffect& named) {
           {"gap_after", named.gap_after},
           {"where", where},
           {"ambiguous_with", ambiguous},
+          {"applied", named.applied},
+          {"checked", named.checked},
           {"evidence", named.evidence},
           {"experiment", named.experiment}};
 }
@@ -122,11 +151,17 @@ Json unexplained_json(const gap::Unexplained& rest) {
   return json;
 }
 
-Json recording_json(double seconds, const std::array<std::size_t, 2>& samples,
-                    bool with_reference) {
-  return {{"seconds", seconds},
-          {"samples", {samples[0], samples[1]}},
-          {"with_reference", with_reference}};
+template <class Judged>
+Json recording_json(const Judged& judged) {
+  Json json{{"seconds", judged.seconds},
+            {"samples", {judged.samples[0], judged.samples[1]}},
+            {"with_reference", judged.with_reference}};
+  // Times of a result are of all recordings behind each other.
+  if (judged.drives.empty()) return json;
+  json["parts"] = Json::array();
+  for (const gap::Span& drive : judged.drives)
+    json["parts"].push_back({{"from_s", drive.from_s}, {"to_s", drive.to_s}});
+  return json;
 }
 
 // --- text ----------------------------------------------------------------------------------------
@@ -143,11 +178,17 @@ std::string reading_text(const GapSubject& subject, const gap::Reading& reading)
   return fmt::format("{} {}", subject.gyros[reading.gyro], model::info(reading.kind).name);
 }
 
-std::string subject_text(const GapSubject& subject, double seconds,
-                         const std::array<std::size_t, 2>& samples, bool with_reference) {
-  return fmt::format("{}: {:.1f} s, {} samples of {}, {} of {}, {} reference\n", subject.log,
-                     seconds, samples[0], subject.gyros[0], samples[1], subject.gyros[1],
-                     with_reference ? "with a" : "no");
+template <class Judged>
+std::string subject_text(const GapSubject& subject, const Judged& judged) {
+  std::string text =
+      fmt::format("{}: {:.1f} s, {} samples of {}, {} of {}, {} reference\n", subject.log,
+                  judged.seconds, judged.samples[0], subject.gyros[0], judged.samples[1],
+                  subject.gyros[1], judged.with_reference ? "with a" : "no");
+  for (std::size_t i = 0; i < judged.drives.size(); ++i) {
+    text += fmt::format("  recording {} from {:.0f} to {:.0f} s\n", i + 1, judged.drives[i].from_s,
+                        judged.drives[i].to_s);
+  }
+  return text;
 }
 
 std::string floor_text(const gap::Gap& gap) {
@@ -192,7 +233,8 @@ std::string starting_text(const GapSubject& subject, const gap::Result& result) 
 }
 
 std::string drop_table(const GapSubject& subject, const gap::Result& result) {
-  Rows rows{{"round", "gap before", "after", "gyro", "effect", "value ± σ", "may also be"}};
+  Rows rows{{"round", "gap before", "after", "gyro", "effect", "value ± σ", "in model.toml",
+             "may also be"}};
   for (std::size_t i = 0; i < result.effects.size(); ++i) {
     const gap::NamedEffect& named = result.effects[i];
     std::string also;
@@ -201,7 +243,7 @@ std::string drop_table(const GapSubject& subject, const gap::Result& result) {
     rows.push_back({std::to_string(i + 1), gap_number(named.gap_before),
                     gap_number(named.gap_after), subject.gyros[named.effect.gyro],
                     std::string(model::info(named.effect.kind).name), value_text(named),
-                    also.empty() ? "-" : also});
+                    named.applied ? "yes" : "no", also.empty() ? "-" : also});
   }
   return table(rows);
 }
@@ -238,7 +280,12 @@ void round_to_sigma(gap::Result& result) {
   for (auto* list : {&result.starting, &result.effects}) {
     for (gap::NamedEffect& named : *list) {
       const model::Effect exact = named.effect;
-      round_effect(named.effect, named.sigma);
+      for (gap::Reading& reading : named.ambiguous_with)
+        round_reading(named, reading);
+      round_parameters(named.effect.kind, named.sigma, named.effect.parameters);
+      for (double& sigma : named.sigma) {
+        if (estimated(sigma)) sigma = with_digits(sigma, kDigitsOfSigma);
+      }
       for (model::Effect& effect : result.model.effects) {
         if (same(effect, exact)) effect.parameters = named.effect.parameters;
       }
@@ -252,7 +299,8 @@ Json gap_json(const gap::Result& result) {
                  {"before", result.gap.before},
                  {"after", result.gap.after},
                  {"floor", kFloor},
-                 {"band95", {result.gap.band95[0], result.gap.band95[1]}}};
+                 {"band95", {result.gap.band95[0], result.gap.band95[1]}},
+                 {"of_model", result.gap.of_model}};
   if (!result.starting.empty()) {
     json["starting_model"] = Json::array();
     for (const gap::NamedEffect& one : result.starting) {
@@ -276,9 +324,14 @@ Json gap_json(const gap::Result& result) {
                                         {"why", kind.why},
                                         {"experiment", kind.experiment}});
   }
-  json["recording"] = recording_json(result.seconds, result.samples, result.with_reference);
+  json["recording"] = recording_json(result);
   json["recording"]["held_out"] = result.held_out;
   json["notes"] = result.notes;
+  for (const std::string& text : {not_applied_text(result), open_text(result)}) {
+    if (!text.empty()) json["notes"].push_back(text);
+  }
+  json["complete"] = result.open.empty();
+  json["open"] = result.open;
   json["model"] = "model.toml";
   json["report"] = "report.html";
   return json;
@@ -299,8 +352,7 @@ Json comparison_json(const gap::Comparison& comparison) {
     where["text"] = difference.text;
     json["where"].push_back(where);
   }
-  json["recording"] =
-      recording_json(comparison.seconds, comparison.samples, comparison.with_reference);
+  json["recording"] = recording_json(comparison);
   json["notes"] = comparison.notes;
   return json;
 }
@@ -362,15 +414,41 @@ std::string verdict_text(const gap::Result& result) {
           "its own simulations",
           effects);
     case gap::Verdict::kPartlyExplained:
-      return fmt::format("Partly explained: {} named and added; something remains", effects);
+      return fmt::format("Partly explained: {} named; something remains", effects);
     case gap::Verdict::kUnexplained:
       break;
   }
   return "Unexplained: simulation and measurement differ, and no known effect accounts for it";
 }
 
+std::string open_text(const gap::Result& result) {
+  if (result.open.empty()) return {};
+  return fmt::format("the time limit was reached; open is {}", fmt::join(result.open, ", and "));
+}
+
+std::string not_applied_text(const gap::Result& result) {
+  const auto count_of = [&](bool checked) {
+    return std::count_if(result.effects.begin(), result.effects.end(),
+                         [&](const auto& one) { return !one.applied && one.checked == checked; });
+  };
+  const auto ambiguous = count_of(true);
+  const auto unchecked = count_of(false);
+  if (ambiguous + unchecked == 0) return {};
+  std::vector<std::string> why;
+  if (ambiguous > 0) why.push_back(fmt::format("{} ambiguous", ambiguous));
+  if (unchecked > 0) why.push_back(fmt::format("{} not checked for lack of time", unchecked));
+  std::string text = fmt::format(
+      "effects that are not applied: {}; the gap after counts them, model.toml holds them as "
+      "comments only and leaves a gap of {}",
+      fmt::join(why, ", "), gap_number(result.gap.of_model));
+  if (ambiguous > 0) {
+    text += "; --accept gyro=1 or gyro=2 writes the reading that you know to be right";
+  }
+  return text;
+}
+
 std::string gap_text(const GapSubject& subject, const gap::Result& result) {
-  std::string text = subject_text(subject, result.seconds, result.samples, result.with_reference);
+  std::string text = subject_text(subject, result);
   text += verdict_text(result) + ".\n";
   text += fmt::format("gap {} -> {} nats per sample on {} samples that took no part; {}\n",
                       gap_number(result.gap.before), gap_number(result.gap.after), result.held_out,
@@ -383,13 +461,16 @@ std::string gap_text(const GapSubject& subject, const gap::Result& result) {
     text += fmt::format("not identifiable: {}: {}{}{}\n", line.who, line.why,
                         line.experiment.empty() ? "" : "; ", line.experiment);
   }
-  return text + notes_text(result.notes);
+  std::vector<std::string> notes = result.notes;
+  for (const std::string& note : {not_applied_text(result), open_text(result)}) {
+    if (!note.empty()) notes.push_back(note);
+  }
+  return text + notes_text(notes);
 }
 
 std::string comparison_text(const GapSubject& subject, const gap::Comparison& comparison) {
   const gap::Gap& gap = comparison.gap;
-  std::string text =
-      subject_text(subject, comparison.seconds, comparison.samples, comparison.with_reference);
+  std::string text = subject_text(subject, comparison);
   const bool inside = gap.before <= gap.band95[1];
   text += fmt::format("gap {} nats per sample, {} what the model's own simulations score; {}\n",
                       gap_number(gap.before), inside ? "within" : "above", floor_text(gap));

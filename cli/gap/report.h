@@ -43,6 +43,12 @@ struct NotTold {
 };
 std::vector<NotTold> not_told(const GapSubject& subject, const gap::Result& result);
 
+/// What the time limit left open; empty where there was time for all.
+std::string open_text(const gap::Result& result);
+
+/// What is in the gap's account and not in the model file; empty where nothing is.
+std::string not_applied_text(const gap::Result& result);
+
 /// One sentence.
 std::string verdict_text(const gap::Result& result);
 

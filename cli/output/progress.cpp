@@ -1,5 +1,6 @@
 #include "cli/output/progress.h"
 
+#include <cmath>
 #include <cstdio>
 #include <unistd.h>
 
@@ -14,6 +15,16 @@ std::string human_count(double count) {
   if (count >= 1e6) return fmt::format("{:.1f} M", count * 1e-6);
   if (count >= 1e4) return fmt::format("{:.0f} k", count * 1e-3);
   return fmt::format("{:.0f}", count);
+}
+
+std::string remaining_text(double elapsed_s, double share) {
+  constexpr double kElapsedMin_s = 3.0;
+  constexpr double kShareMin = 0.05;
+  constexpr double kMinute_s = 60.0;
+  if (elapsed_s < kElapsedMin_s || share < kShareMin || share >= 1.0) return {};
+  const double left_s = elapsed_s * (1.0 - share) / share;
+  if (left_s < 2.0 * kMinute_s) return fmt::format(", some {:.0f} s left", std::ceil(left_s));
+  return fmt::format(", some {:.0f} min left", std::ceil(left_s / kMinute_s));
 }
 
 Progress::Progress(const std::string& what)
@@ -32,7 +43,9 @@ bool Progress::due() {
 
 void Progress::update(std::string_view doing, double share) {
   if (!due()) return;
-  draw(stderr, fmt::format("\r\x1b[K{} {:3.0f} %  {}", what_, 100.0 * share, printable(doing)));
+  const double elapsed_s = std::chrono::duration<double>(last_ - begin_).count();
+  draw(stderr, fmt::format("\r\x1b[K{} {:3.0f} %  {}{}", what_, 100.0 * share, printable(doing),
+                           remaining_text(elapsed_s, share)));
   std::fflush(stderr);
   drawn_ = true;
 }

@@ -18,7 +18,8 @@ class Progress {
 
   /// Draws at most ten times a second. `total` 0: unknown.
   void update(std::uint64_t done, std::uint64_t total, std::uint64_t frames);
-  /// Of work that knows its share, 0 to 1; `doing` says what is done now.
+  /// Of work that knows its share, 0 to 1; `doing` says what is done now. What is left is as long
+  /// as what is done was, in proportion.
   void update(std::string_view doing, double share);
   void clear();
 
@@ -32,6 +33,10 @@ class Progress {
   std::chrono::steady_clock::time_point begin_;
   std::chrono::steady_clock::time_point last_;
 };
+
+/// ", some 40 s left", of work that has taken `elapsed_s` for this share; empty as long as that
+/// would be a guess.
+std::string remaining_text(double elapsed_s, double share);
 
 /// "1.2 M"
 std::string human_count(double count);

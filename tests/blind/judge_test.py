@@ -138,6 +138,8 @@ class Judge(unittest.TestCase):
 # Finds a scale factor in everything and counts its calls.
 FAKE = """#!/usr/bin/python3
 import json, pathlib, sys
+if "--help" in sys.argv:
+    sys.exit()
 word = lambda name: pathlib.Path(sys.argv[sys.argv.index(name) + 1])
 with open(pathlib.Path(__file__).parent / "calls", "a") as calls:
     calls.write(sys.argv[1] + "\\n")

@@ -20,13 +20,18 @@ TEST(GapReportTest, HoldsTheFieldsOfTheInterface) {
   EXPECT_EQ(json["format"], 1);
   EXPECT_EQ(json["verdict"], "partly_explained");
   EXPECT_EQ(json["gap"], Json::parse(R"({"unit": "nats_per_sample", "before": 0.81, "after": 0.014,
-                                         "floor": 0.0, "band95": [-0.006, 0.007]})"));
+                                         "floor": 0.0, "band95": [-0.006, 0.007], "of_model": 0.7})"));
   const Json& scale = json["effects"][0];
   EXPECT_EQ(scale["kind"], "scale_factor");
   EXPECT_EQ(scale["gyro"], 2);
   EXPECT_EQ(scale["where"],
             Json::parse(R"({"from_s": 60.0, "to_s": 340.0, "band_hz": [0.0, 8.0]})"));
-  EXPECT_EQ(scale["ambiguous_with"], Json::parse(R"([{"kind": "scale_factor", "gyro": 1}])"));
+  EXPECT_EQ(scale["ambiguous_with"], Json::parse(R"([{"kind": "scale_factor", "gyro": 1,
+                                                      "parameters": {"error": 4.2e-4}}])"));
+  EXPECT_EQ(scale["applied"], false);
+  EXPECT_EQ(json["effects"][1]["applied"], true);
+  EXPECT_EQ(json["complete"], true);
+  EXPECT_EQ(json["open"], Json::array());
   EXPECT_EQ(json["model"], "model.toml");
   EXPECT_EQ(json["report"], "report.html");
 }
@@ -85,16 +90,44 @@ TEST(GapReportTest, RoundingStaysInsideTheLimitsOfTheKind) {
 TEST(GapReportTest, TellsPeopleTheStoryInSomeTwentyLines) {
   const std::string text = gap_text(plain_subject(), made_up_result());
   for (const char* part :
-       {"drive.log: 400.0 s, 40000 samples of left", "2 effects named and added", "0.81 -> 0.014",
-        "-0.006 to 0.007", "error -0.0004212 ± 3.1e-06",
+       {"drive.log: 400.0 s, 40000 samples of left", "2 effects named; something remains",
+        "0.81 -> 0.014", "-0.006 to 0.007", "error -0.0004212 ± 3.1e-06",
         "axis z, coefficient_dps_g 0.00123 ± 2e-05", "left scale_factor",
         "to tell what round 1 is: record a rate table",
         "unexplained: left: line at 37.02 ± 0.01 Hz",
         "left, right: temperature_bias, scale_factor_temperature: temperature is constant; let it",
-        "right: saturation: the rate stays low\n", "note: 3 samples"}) {
+        "right: saturation: the rate stays low\n", "note: 3 samples",
+        "effects that are not applied: 1 ambiguous; the gap after counts them, model.toml holds "
+        "them as comments only and leaves a gap of 0.7; --accept gyro=1 or gyro=2"}) {
     EXPECT_NE(text.find(part), std::string::npos) << part << "\nis not in\n" << text;
   }
   EXPECT_LE(std::count(text.begin(), text.end(), '\n'), 20);
+}
+
+TEST(GapReportTest, SaysWhatTheTimeWasTooShortFor) {
+  gap::Result result = made_up_result();
+  result.open = {"whether there are further effects", "what noise the model lacks"};
+  result.effects[1].checked = result.effects[1].applied = false;
+  const Json json = gap_json(result);
+  EXPECT_EQ(json["complete"], false);
+  EXPECT_EQ(json["open"].size(), 2U);
+  EXPECT_EQ(json["effects"][1]["checked"], false);
+  const std::string text = gap_text(plain_subject(), result);
+  EXPECT_NE(text.find("the time limit was reached; open is whether there are further effects, and "
+                      "what noise the model lacks"),
+            std::string::npos)
+      << text;
+  EXPECT_NE(text.find("1 ambiguous, 1 not checked for lack of time"), std::string::npos) << text;
+}
+
+TEST(GapReportTest, TellsWhenEachOfSeveralRecordingsWas) {
+  gap::Result result = made_up_result();
+  result.drives = {{0.0, 190.5}, {210.0, 400.0}};
+  EXPECT_EQ(gap_json(result)["recording"]["parts"],
+            Json::parse(R"([{"from_s": 0.0, "to_s": 190.5}, {"from_s": 210.0, "to_s": 400.0}])"));
+  EXPECT_NE(gap_text(plain_subject(), result).find("recording 2 from 210 to 400 s"),
+            std::string::npos);
+  EXPECT_FALSE(gap_json(made_up_result())["recording"].contains("parts"));
 }
 
 TEST(GapReportTest, SaysThatAComparisonFoundNothing) {

@@ -3,8 +3,11 @@
 gets. Whether the right effects are found is the blind test's business."""
 
 import json
+import os
 import resource
+import signal
 import struct
+import subprocess
 import tomllib
 import unittest
 
@@ -183,6 +186,8 @@ class Fields:
         self.where(effect["where"])
         for reading in effect["ambiguous_with"]:
             self.reading(reading)
+        self.test.assertIsInstance(effect["applied"], bool)
+        self.test.assertIsInstance(effect["checked"], bool)
 
     def result(self, result):
         self.test.assertEqual(result["format"], 1)
@@ -197,6 +202,8 @@ class Fields:
         for kind in result["not_identifiable"]:
             self.reading(kind)
             self.test.assertTrue(kind["why"])
+        self.number(result["gap"]["of_model"])
+        self.test.assertEqual(result["complete"], not result["open"])
         self.test.assertEqual((result["model"], result["report"]), ("model.toml", "report.html"))
 
     def comparison(self, comparison):
@@ -261,6 +268,167 @@ class Gap(GapBench):
         said = self.bad("gap", "--config", "vgyro.toml", "--measured", "drive.log", "--out", "out")
         self.assertIn("notes.txt", said)
         self.assertEqual([path.name for path in (self.folder / "out").iterdir()], ["notes.txt"])
+
+
+class Ambiguous(GapBench):
+    """Without a reference a scale factor of one gyro is as well one of the other."""
+
+    kept = {}  # one run for each choice: they take seconds
+
+    def setUp(self):
+        super().setUp()
+        self.write("vgyro.toml", GYROS)
+
+    def run_with(self, *accept):
+        if accept not in Ambiguous.kept:
+            options = [word for choice in accept for word in ("--accept", choice)]
+            Ambiguous.kept[accept] = self.gap("--model", "model.toml", *options)
+        done, files = Ambiguous.kept[accept]
+        return done.stdout.decode(), json.loads(files["gap.json"]), files["model.toml"].decode()
+
+    def test_is_kept_in_the_account_and_stands_in_the_model_as_comments(self):
+        text, result, model = self.run_with()
+        Fields(self).result(result)
+        (effect,) = result["effects"]
+        self.assertEqual(effect["kind"], "scale_factor")
+        self.assertEqual(len(effect["ambiguous_with"]), 1)
+        self.assertIs(effect["applied"], False)
+        self.assertLessEqual(result["gap"]["after"], result["gap"]["band95"][1], "the gap counts it, or it could not close")
+        self.assertGreater(result["gap"]["of_model"], result["gap"]["band95"][1], "model.toml leaves it")
+        self.assertTrue(model.startswith(MODEL))
+        self.assertEqual(tomllib.loads(model), tomllib.loads(MODEL), "nothing is applied")
+        for part in ("not applied", "to tell: ", "# gyro = 1", "# gyro = 2", "# ambiguous = true"):
+            self.assertIn(part, model)
+        self.assertRegex(text, r"scale_factor .* no +(left|right) scale_factor")
+        self.assertIn("not applied", text)
+        self.assertTrue(any("--accept" in note for note in result["notes"]))
+
+    def test_either_reading_may_be_taken_out_of_its_comment(self):
+        added = self.run_with()[2][len(MODEL):]
+        lines = [line[2:] for line in added.splitlines() if line.startswith("# ")]
+        begins = [i for i, line in enumerate(lines) if line == "[[effect]]"]
+        self.assertEqual(len(begins), 2)
+        gyros = set()
+        for begin in begins:
+            table = "\n".join(line for line in lines[begin:begin + 6] if line == "[[effect]]" or " = " in line)
+            effect = tomllib.loads(table)["effect"][0]
+            gyros.add(effect["gyro"])
+            truth = SCALE_ERROR if effect["gyro"] == 2 else -SCALE_ERROR
+            self.assertAlmostEqual(effect["error"], truth, delta=0.2 * SCALE_ERROR)
+            self.write("taken.toml", MODEL + "\n\n" + table + "\n")
+            self.assertIn("ambiguous", self.good("check", "--model", "taken.toml", "vgyro.toml").stdout.decode())
+        self.assertEqual(gyros, {1, 2})
+
+    def test_accept_applies_the_reading_of_that_gyro_with_its_doubt(self):
+        for choice, gyro in (("gyro=1", 1), ("gyro=2", 2), ("kind=scale_factor,gyro=1", 1)):
+            text, result, model = self.run_with(choice)
+            (effect,) = result["effects"]
+            self.assertEqual((effect["gyro"], effect["applied"]), (gyro, True), choice)
+            self.assertEqual([reading["gyro"] for reading in effect["ambiguous_with"]], [3 - gyro])
+            self.assertEqual(result["gap"]["of_model"], result["gap"]["after"])
+            written = tomllib.loads(model)["effect"][-1]
+            self.assertEqual((written["gyro"], written["error"]), (gyro, effect["parameters"]["error"]))
+            self.assertEqual(written["sigma"], effect["sigma"]["error"])
+            self.assertIs(written["ambiguous"], True)
+            self.assertLess(abs(effect["parameters"]["error"] - (SCALE_ERROR if gyro == 2 else -SCALE_ERROR)), 4 * written["sigma"])
+            self.assertRegex(text, r"scale_factor .* yes +(left|right) scale_factor")
+
+    def test_accept_of_a_kind_that_is_no_reading_applies_nothing(self):
+        self.assertIs(self.run_with("kind=delay")[1]["effects"][0]["applied"], False)
+
+
+class Several(GapBench):
+    """Two recordings of one pair, one model."""
+
+    def setUp(self):
+        super().setUp()
+        self.write("other.log", recording(seconds=70.0, hz=50.0))
+
+    def test_one_model_is_fitted_over_all(self):
+        files = self.gap("--model", "model.toml", "--measured", "other.log")[1]
+        result = json.loads(files["gap.json"])
+        Fields(self).result(result)
+        self.assertEqual([(effect["kind"], effect["gyro"]) for effect in result["effects"]], [("scale_factor", 2)])
+        first, second = result["recording"]["parts"]
+        self.assertEqual(first["from_s"], 0.0)
+        self.assertGreater(second["from_s"], first["to_s"])
+        self.assertAlmostEqual(second["to_s"] - second["from_s"], 70.0, delta=0.1)
+        self.assertLess(result["effects"][0]["sigma"]["error"], json.loads(self.once()[1]["gap.json"])["effects"][0]["sigma"]["error"])
+        self.assertLessEqual(result["gap"]["after"], result["gap"]["band95"][1])
+
+    def test_compare_takes_several_too(self):
+        done = self.good("compare", "--config", "vgyro.toml", "--model", "model.toml", "--measured", "drive.log", "--measured", "other.log",
+                         "--json", "-")
+        comparison = json.loads(done.stdout)
+        Fields(self).comparison(comparison)
+        self.assertEqual(len(comparison["recording"]["parts"]), 2)
+        self.assertGreater(comparison["gap"]["value"], comparison["gap"]["band95"][1])
+
+    def test_one_that_cannot_be_judged_is_named_by_its_number(self):
+        self.write("short.log", recording(seconds=4.0))
+        said = self.bad("gap", "--config", "vgyro.toml", "--measured", "drive.log", "--measured", "short.log", "--out", "out")
+        self.assertRegex(said, r"short\.log: recording 2: the recording is too short")
+        self.assertNotIn("out", self.names())
+
+    def test_none_of_them_is_written_over(self):
+        (self.folder / "out").mkdir()
+        (self.folder / "out" / "model.toml").symlink_to("../other.log")
+        self.bad("gap", "--config", "vgyro.toml", "--measured", "drive.log", "--measured", "other.log", "--out", "out")
+        self.assertEqual(self.read("other.log"), recording(seconds=70.0, hz=50.0))
+
+
+class Bounded(GapBench):
+    def test_what_is_certain_in_time_is_written_and_the_rest_is_open(self):
+        done, files = self.gap("--model", "model.toml", "--time-limit", "0.001")
+        self.assertEqual(sorted(files), ["gap.json", "model.toml", "report.html"])
+        result = json.loads(files["gap.json"])
+        Fields(self).result(result)
+        self.assertIs(result["complete"], False)
+        self.assertTrue(result["open"])
+        self.assertEqual(result["effects"], [])
+        self.assertEqual(files["model.toml"].decode(), MODEL)
+        self.assertIn("the time limit was reached", done.stdout.decode())
+
+    def test_time_enough_changes_nothing(self):
+        files = self.gap("--model", "model.toml", "--time-limit", "100000")[1]
+        for name in ("gap.json", "model.toml"):
+            self.assertEqual(files[name], self.once()[1][name], name)
+
+    def interrupted(self, write):
+        """A run that reads from a pipe until `write` has done its part, and is then interrupted."""
+        os.mkfifo(self.folder / "pipe.log")
+        with subprocess.Popen([bench.VGYRO, "gap", "--config", "vgyro.toml", "--model", "model.toml", "--measured", "pipe.log", "--out", "out"],
+                              cwd=self.folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+            with open(self.folder / "pipe.log", "w", encoding="ascii") as pipe:
+                write(pipe, lambda: process.send_signal(signal.SIGINT))
+            process.communicate()
+        (self.folder / "pipe.log").unlink()
+        return process.returncode
+
+    def test_interrupt_leaves_no_half_written_folder(self):
+        before = self.names()
+
+        def while_reading(pipe, interrupt):
+            pipe.write(LOG[:len(LOG) // 2])
+            pipe.flush()
+            interrupt()
+
+        def at_work(pipe, interrupt):
+            pipe.write(LOG)
+            pipe.close()
+            interrupt()
+
+        self.assertEqual(self.interrupted(while_reading), -signal.SIGINT)
+        self.assertEqual(self.names(), before)
+        if self.interrupted(at_work) == -signal.SIGINT:
+            self.assertEqual(self.names(), before)
+
+    def test_interrupt_keeps_the_earlier_result(self):
+        (self.folder / "out").mkdir()
+        self.write("out/gap.json", "{}")
+        self.assertEqual(self.interrupted(lambda pipe, interrupt: (pipe.write(LOG[:1000]), pipe.flush(), interrupt())), -signal.SIGINT)
+        self.assertEqual(self.read("out/gap.json"), "{}")
+        self.assertEqual([path.name for path in (self.folder / "out").iterdir()], ["gap.json"])
 
 
 class Compare(GapBench):

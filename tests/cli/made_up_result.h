@@ -42,7 +42,7 @@ inline gap::Figure made_up_figure(const char* title, bool logarithmic, bool poin
 inline gap::Result made_up_result() {
   gap::Result result;
   result.verdict = gap::Verdict::kPartlyExplained;
-  result.gap = {.before = 0.81, .after = 0.014, .band95 = {-0.006, 0.007}};
+  result.gap = {.before = 0.81, .after = 0.014, .band95 = {-0.006, 0.007}, .of_model = 0.7};
   gap::NamedEffect scale;
   scale.effect = {1, model::Kind::kScaleFactor, {-4.2123456e-4}};
   scale.sigma = {3.123e-6};
@@ -50,7 +50,8 @@ inline gap::Result made_up_result() {
   scale.gap_before = 0.81;
   scale.gap_after = 0.09;
   scale.where = {60.0, 340.0, 0.0, 8.0};
-  scale.ambiguous_with = {{model::Kind::kScaleFactor, 0}};
+  scale.ambiguous_with = {{model::Kind::kScaleFactor, 0, {4.2e-4}}};
+  scale.applied = false;
   scale.evidence = "What it reads too little grows with the rate.";
   scale.experiment = "record a rate table";
   scale.figure = made_up_figure("Against the rate", false, true);

@@ -12,6 +12,8 @@ COMMANDS = {
     "allan": {"--config", "--json", "--plot", "LOG"},
     "replay": {"--config", "--method", "--model", "--state", "-o", "--output", "--json", "--csv", "--plot", "--map", "--digits", "-q", "--quiet",
                "LOG"},
+    "compare": {"--config", "--model", "--measured", "--json", "--seed", "-q", "--quiet"},
+    "gap": {"--config", "--model", "--measured", "--out", "--accept", "--time-limit", "--seed", "-q", "--quiet"},
     "convert": {"-o", "--output", "--digits", "-q", "--quiet", "LOG"},
 }
 
@@ -58,6 +60,9 @@ class Usage(bench.Bench):
             (("allan", "--config", "vgyro.toml"), "LOG"),
             (("replay", "--config", "vgyro.toml", "--method", "median", "in.log"), "median"),
             (("replay", "--config", "vgyro.toml", "--colour", "in.log"), "--colour"),
+            (("gap", "--config", "vgyro.toml", "--measured", "in.log", "--out", "o", "--accept", "gyro=3"), "gyro=1 or gyro=2"),
+            (("gap", "--config", "vgyro.toml", "--measured", "in.log", "--out", "o", "--accept", "kind=dely"), 'mean "delay"'),
+            (("gap", "--config", "vgyro.toml", "--measured", "in.log", "--out", "o", "--time-limit", "-1"), "--time-limit"),
         ):
             with self.subTest(arguments):
                 self.assertIn(part, self.bad(*arguments, code=2))

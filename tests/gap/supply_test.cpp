@@ -47,7 +47,7 @@ TEST(SupplyVoltageBias, IsNamedWhereTheSupplyMoves) {
   Supplied supplied(kCoefficient_dps_v);
   for (const double t_s : supplied.recording.gyros[1].t_s)
     supplied.recording.gyros[1].supply_v.push_back(supply_v(t_s));
-  const auto result = find_gap(supplied.recording, supplied.model, {});
+  const auto result = find_gap({supplied.recording}, supplied.model, {});
   ASSERT_TRUE(result) << result.error().message();
   ASSERT_EQ(result->effects.size(), 1U);
   const NamedEffect& named = result->effects[0];
@@ -64,11 +64,11 @@ TEST(SupplyVoltageBias, IsNamedWhereTheSupplyMoves) {
 // Who names no such signal is not told of it; who does is told when it says nothing.
 TEST(SupplyVoltageBias, IsAskedForOnlyWhereTheSupplyIsToldAndStandsStill) {
   Supplied supplied(0.0);
-  const auto without = find_gap(supplied.recording, supplied.model, {});
+  const auto without = find_gap({supplied.recording}, supplied.model, {});
   ASSERT_TRUE(without) << without.error().message();
   EXPECT_TRUE(said_of_supply(*without).empty());
   supplied.recording.gyros[0].supply_v.assign(supplied.recording.gyros[0].t_s.size(), 5.0);
-  const auto with = find_gap(supplied.recording, supplied.model, {});
+  const auto with = find_gap({supplied.recording}, supplied.model, {});
   ASSERT_TRUE(with) << with.error().message();
   ASSERT_EQ(said_of_supply(*with).size(), 1U);
   EXPECT_EQ(said_of_supply(*with)[0],

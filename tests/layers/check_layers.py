@@ -48,6 +48,7 @@ GAP_ARROWS = {
     "views": GAP_DATA,
     "scan": GAP_REGRESSION | {"periodogram"},
     "noise_search": GAP_REGRESSION,
+    "acceptance": {"result", "found"},
     "steadiness": GAP_REGRESSION,
     "study": GAP_DATA | {"rest", "spikes", "transport", "wiener"},
     "identifiable": GAP_STUDY,
@@ -55,9 +56,9 @@ GAP_ARROWS = {
     "figures": GAP_STUDY | {"views"},
     "describe": GAP_STUDY | {"views", "evidence"},
     "differences": GAP_STUDY | GAP_REGRESSION | {"scan", "views", "evidence"},
-    "search": GAP_STUDY | GAP_REGRESSION | {"scan", "noise_search", "steadiness"},
+    "search": GAP_STUDY | GAP_REGRESSION | {"acceptance", "scan", "noise_search", "steadiness"},
     "leftover": GAP_STUDY | {"search", "whiteness"},
-    "workflow": GAP_STUDY | {"describe", "differences", "figures", "identifiable", "leftover", "score", "search"},
+    "workflow": GAP_STUDY | {"acceptance", "describe", "differences", "figures", "identifiable", "leftover", "score", "search"},
 }
 
 # What, as a pattern of an included header → the files that may include it.

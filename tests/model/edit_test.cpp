@@ -31,6 +31,11 @@ Effect any_effect(Kind kind, std::mt19937_64& random) {
     effect.parameters[i] = any_value(parameters[i], random);
   if (kind == Kind::kStuck && effect.parameters[0] >= effect.parameters[1])
     effect.parameters = {-1.0, 1.0};
+  for (std::size_t i = 0; i < parameters.size(); ++i) {
+    const bool has_one = parameters[i].form == Parameter::Form::kNumber && random() % 2 == 0;
+    if (has_one) effect.sigma[i] = 1e-3 * (parameters[i].maximum - parameters[i].minimum);
+  }
+  effect.ambiguous = random() % 2 == 0;
   return effect;
 }
 
@@ -38,6 +43,8 @@ void expect_same(const Effect& read, const Effect& written) {
   EXPECT_EQ(read.gyro, written.gyro);
   EXPECT_EQ(read.kind, written.kind);
   EXPECT_EQ(read.parameters, written.parameters) << info(written.kind).name;
+  EXPECT_EQ(read.sigma, written.sigma) << info(written.kind).name;
+  EXPECT_EQ(read.ambiguous, written.ambiguous) << info(written.kind).name;
 }
 
 constexpr const char* kUsersFiles[] = {
@@ -104,6 +111,32 @@ TEST(ModelEdit, WritesTheFewestDigitsThatReadBack) {
   EXPECT_EQ(
       *text,
       "format = 1\n\n# why\n[[effect]]\ngyro = 2\nkind = \"scale_factor\"\nerror = -0.00042\n");
+}
+
+TEST(ModelEdit, WritesOneNumberWhereOnlyTheSizeHasASigma) {
+  Effect line{.kind = Kind::kLine, .parameters = {37.0, 0.01, 0.5}};
+  line.sigma = {0.0, 1e-4, 0.0};
+  EXPECT_NE(effect_table(line).find("\nsigma = 0.0001\n"), std::string::npos);
+  line.sigma = {1e-3, 1e-4, 0.0};
+  line.ambiguous = true;
+  EXPECT_NE(effect_table(line).find(
+                "\nsigma = { frequency_hz = 0.001, amplitude_dps = 0.0001 }\nambiguous = true\n"),
+            std::string::npos)
+      << effect_table(line);
+}
+
+TEST(ModelEdit, AppendsACommentThatChangesNoEffect) {
+  const Effect bias{.gyro = 1, .kind = Kind::kBias, .parameters = {0.5}};
+  for (const char* users : kUsersFiles) {
+    const auto before = parse_model(users, "m");
+    const auto text = append_comment(users, "not applied\n\n" + effect_table(bias));
+    ASSERT_TRUE(text) << text.error().message();
+    EXPECT_TRUE(text->starts_with(users));
+    EXPECT_NE(text->find("# [[effect]]"), std::string::npos);
+    const auto after = parse_model(*text, "m");
+    ASSERT_TRUE(after) << *text;
+    EXPECT_EQ(after->effects.size(), before ? before->effects.size() : 0);
+  }
 }
 
 TEST(ModelEdit, KeepsTheLineEndsOfTheUser) {

@@ -128,6 +128,74 @@ TEST(ModelFile, NamesLineCauseAndRemedyOfEveryMistake) {
   }
 }
 
+TEST(ModelFile, ReadsHowFarAnEffectMayBeWrong) {
+  const ModelResult result = parse_model(R"(format = 1
+[[effect]]
+gyro = 1
+kind = "scale_factor"
+error = 4e-4
+sigma = 3e-5
+ambiguous = true
+[[effect]]
+gyro = 2
+kind = "g_sensitivity"
+axis = "z"
+coefficient_dps_g = -2e-3
+sigma = 1e-4
+[[effect]]
+gyro = 1
+kind = "line"
+frequency_hz = 37
+amplitude_dps = 0.01
+phase_rad = 0
+sigma = 1e-3
+[[effect]]
+gyro = 1
+kind = "warm_up"
+amplitude_dps = 0.1
+tau_s = 300
+sigma = { amplitude_dps = 0.01, tau_s = 20 }
+[[effect]]
+gyro = 1
+kind = "bias"
+value_dps = 1
+)",
+                                         "m.toml");
+  ASSERT_TRUE(result) << result.error().front().message();
+  const auto& effects = result->effects;
+  EXPECT_EQ(effects[0].sigma, (Parameters{3e-5}));
+  EXPECT_TRUE(effects[0].ambiguous);
+  EXPECT_EQ(effects[1].sigma, (Parameters{0.0, 1e-4})) << "one number is of the effect's size";
+  EXPECT_EQ(effects[2].sigma, (Parameters{0.0, 1e-3})) << "of the amplitude, not of the frequency";
+  EXPECT_EQ(effects[3].sigma, (Parameters{0.01, 20.0}));
+  EXPECT_FALSE(is_doubted(effects[4]));
+  EXPECT_TRUE(is_doubted(effects[0]));
+}
+
+TEST(ModelFile, NamesLineCauseAndRemedyOfAWrongSigma) {
+  const std::string scale = "gyro = 1\nkind = \"scale_factor\"\nerror = 1e-4\n";
+  const std::string tilt =
+      "gyro = 1\nkind = \"g_sensitivity\"\naxis = \"x\"\ncoefficient_dps_g = 1\n";
+  const Bad cases[] = {
+      {effect(scale + "sigma = -1\n"), "m.toml:7: ", "sigma is -1; 0 to 9.9"},
+      {effect(scale + "sigma = nan\n"), "m.toml:7: ", "sigma is nan"},
+      {effect(scale + "sigma = \"1\"\n"),
+       "m.toml:7: ", "sigma = 1e-3, or sigma = { error = 1e-3 }"},
+      {effect(scale + "sigma = { eror = 1e-3 }\n"), "m.toml:7: ", "did you mean \"error\"?"},
+      {effect(scale + "sigma = { error = 1e6 }\n"), "m.toml:7: ", "0 to 9.9"},
+      {effect(tilt + "sigma = { axis = 1 }\n"), "m.toml:8: ", "axis is chosen, and has no sigma"},
+      {effect(scale + "ambiguous = 1\n"), "m.toml:7: ", "true or false"},
+      {effect(scale + "sgima = 1\n"), "m.toml:7: ", "did you mean \"sigma\"?"},
+  };
+  for (const Bad& bad : cases) {
+    SCOPED_TRACE(bad.text);
+    const std::vector<std::string> messages = complaints_of(bad.text);
+    ASSERT_FALSE(messages.empty());
+    EXPECT_TRUE(messages.front().starts_with(bad.begins)) << messages.front();
+    EXPECT_NE(messages.front().find(bad.holds), std::string::npos) << messages.front();
+  }
+}
+
 TEST(ModelFile, SuggestsTheParameterThatWasMeant) {
   const auto messages = complaints_of(effect("gyro = 1\nkind = \"bias\"\nvalue_dsp = 1\n"));
   ASSERT_EQ(messages.size(), 2U);

@@ -57,7 +57,8 @@ const stretch = (from, to) => `${number(from, 4)} to ${number(to, 4)} s`;
 
 function gapRows() {
   const rows = [{ label: data.model ? "model as given" : "no model", value: data.gap.before }];
-  for (const effect of data.effects) rows.push({ label: "+ " + effectName(effect), value: effect.gap_after });
+  for (const effect of data.effects)
+    rows.push({ label: "+ " + effectName(effect) + (effect.applied ? "" : " (not applied)"), value: effect.gap_after });
   const last = rows[rows.length - 1].value;
   if (data.effects.length > 0 && Math.abs(last - data.gap.after) > 1e-9) {
     rows.push({ label: "final model", value: data.gap.after });
@@ -286,6 +287,7 @@ function opening() {
       `Model: ${data.model || "none"}. Configuration: ${data.config}.`),
     make("p", { class: "verdict " + data.verdict }, data.verdict_text + "."),
     gapFigure(),
+    (recording.parts || []).map((part, i) => make("p", { class: "soft" }, `Recording ${i + 1}: ${stretch(part.from_s, part.to_s)}.`)),
     data.notes.map((note) => make("p", { class: "soft" }, "Note: " + note + ".")),
   ];
 }
@@ -294,9 +296,9 @@ function rounds() {
   if (data.effects.length === 0) return [];
   const rows = data.effects.map((effect, i) => [
     { number: String(i + 1) }, { number: number(effect.gap_before, 4) }, { number: number(effect.gap_after, 4) },
-    gyroName(effect.gyro), effect.kind, { number: effect.value }, { number: effect.p_value > 0 ? number(effect.p_value, 2) : "≈ 0" }, readings(effect) || "–"]);
-  return [make("h2", {}, "What was added"),
-    table(["round", "gap before", "after", "gyro", "effect", "value ± σ", "p", "may also be"], rows)];
+    gyroName(effect.gyro), effect.kind, { number: effect.value }, { number: effect.p_value > 0 ? number(effect.p_value, 2) : "≈ 0" }, effect.applied ? "yes" : "no", readings(effect) || "–"]);
+  return [make("h2", {}, "What was found"),
+    table(["round", "gap before", "after", "gyro", "effect", "value ± σ", "p", "in model.toml", "may also be"], rows)];
 }
 
 function effectSection(effect, i) {
@@ -309,7 +311,9 @@ function effectSection(effect, i) {
     `${number(band[0], 3)} to ${number(band[1], 3)} Hz.`));
   if (effect.ambiguous_with.length > 0) {
     const tell = effect.experiment ? ` To tell them apart: ${effect.experiment.replace(/\.$/, "")}.` : "";
-    lines.push(make("p", {}, `This recording cannot tell it from: ${readings(effect)}.${tell}`));
+    const standing = effect.applied ? "It was accepted and is applied; its doubt is in σ."
+      : "It is not applied: model.toml holds all readings as comments, and --accept gyro=1 or gyro=2 writes one.";
+    lines.push(make("p", {}, `This recording cannot tell it from: ${readings(effect)}.${tell} ${standing}`));
   }
   if (effect.figure.curves.length > 0) lines.push(plot(effect.figure));
   return lines;
@@ -349,7 +353,7 @@ const GLOSSARY = [
   ["Floor and band", "Simulations of the final model, scored in the same way, spread around the floor; 95 % of them lie inside the band. A gap inside the band is closed: the recording looks like one of the simulations."],
   ["σ", "Standard error of an estimated number; 95 of 100 true values lie within 2 σ of the estimate. Bars and bands in the plots are 2 σ."],
   ["p", "How often a score as high as this would turn up anywhere in the whole search if nothing were there."],
-  ["May also be", "Other effects that would have produced the same recording. The likelier reading was added; nothing is certain between them."],
+  ["May also be", "Other effects that would have produced the same recording; nothing is certain between them. The gap counts the likelier one. Neither is in model.toml unless it was accepted."],
   ["Measured less predicted", "The gyro's reading less what the model says it should have read at the rate as far as that is known: from the reference, or else from both gyros together, where only differences between the gyros show."],
   ["Allan deviation", "How far means over a time differ from the next such mean. White noise falls with the square root of the time, drift rises with it."],
 ];

@@ -1,0 +1,57 @@
+#pragma once
+
+// How far wrong the rate may be because of what the model file takes off one gyro: the effects' σ,
+// and whole effects whose reading is open. A corrector follows what a gyro's bias is off by, so a
+// doubt counts from what it was when the biases were last learned: a wrong constant is harmless, a
+// wrong temperature coefficient is as far as the temperature has changed since, a wrong scale
+// factor counts in turns. Lags are none of this: their doubt is of the rate's slope, and the
+// corrector's to know (GyroParameters).
+
+#include <span>
+#include <vector>
+
+#include "model/effect.h"
+#include "model/equation.h"
+
+namespace vgyro::fusion {
+
+class CompensationDoubt {
+ public:
+  /// 1σ, deg/s.
+  struct Sigma {
+    double own_dps = 0.0;  ///< of this gyro alone: counts by its share of the rate
+    /// Where an ambiguous reading is the wrong one the other gyro agrees with the error: whatever
+    /// the shares, the rate is off by all of it.
+    double common_dps = 0.0;
+  };
+
+  /// Of nothing.
+  CompensationDoubt() = default;
+  /// `effects` of one gyro, of any kind.
+  explicit CompensationDoubt(std::span<const model::Effect> effects);
+
+  [[nodiscard]] bool any() const { return !terms_.empty(); }
+
+  /// The biases have just been learned, at rest, with all that is taken off now.
+  void settle(const model::Surroundings& surroundings);
+
+  [[nodiscard]] Sigma at(double rate_dps, const model::Surroundings& surroundings) const;
+
+ private:
+  /// One parameter at both ends of its σ; or the effect and nothing, when it is ambiguous.
+  struct Term {
+    model::Effect high;
+    model::Effect low;
+    bool is_common = false;
+    bool is_held = true;       ///< what was learned of it stays; false: over before it is learned
+    double settled_dps = 0.0;  ///< what it was when the biases were learned
+  };
+
+  [[nodiscard]] static double value_dps(const Term& term, double rate_dps,
+                                        const model::Surroundings& surroundings);
+
+  std::vector<Term> terms_;
+  model::Equation equation_;
+};
+
+}  // namespace vgyro::fusion
