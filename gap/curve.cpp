@@ -194,6 +194,12 @@ SampledCurve::Point SampledCurve::at(double t_s) const {
           product(weights.slope[row], weights.slope[row + 1], share, values) / step_s};
 }
 
+SampledCurve::Point SampledCurve::nearby(double t_s) const {
+  if (t_s <= t_s_.front()) return {value_.front(), 0.0};
+  if (t_s >= t_s_.back()) return {value_.back(), 0.0};
+  return polynomial_at(t_s);
+}
+
 // Lagrange's polynomials; times in intervals keep the products small.
 SampledCurve::Point SampledCurve::polynomial_at(double t_s) const {
   const std::size_t count = std::min(kPoints, t_s_.size());

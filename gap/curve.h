@@ -40,6 +40,8 @@ class SampledCurve {
   [[nodiscard]] Weights weights_at(double t_s) const;
   /// Beyond the ends the outermost value, slope 0.
   [[nodiscard]] Point at(double t_s) const;
+  /// The same by the nearest six samples alone: for what may hold spikes, which a sinc spreads.
+  [[nodiscard]] Point nearby(double t_s) const;
   /// Straight between neighbours: for what steps.
   [[nodiscard]] double linear(double t_s) const;
   /// No sample within `reach_s` on both sides.

@@ -57,7 +57,7 @@ std::vector<double> deviations_dps(const GyroSeries& series, const Transport& tr
   const auto covered = [&](double at_s) { return at_s > truth.from_s() && at_s < truth.to_s(); };
   std::vector<double> error(n);
   for (std::size_t i = 0; i < n; ++i)
-    error[i] = series.rate_dps[i] - truth.at(t_s[i]).value;
+    error[i] = series.rate_dps[i] - truth.nearby(t_s[i]).value;
   std::vector<double> out(n, 0.0);
   for (std::size_t i = kNeighbours; i + kNeighbours < n; ++i) {
     const auto from = transport.masked.begin() + static_cast<std::ptrdiff_t>(i - kNeighbours);

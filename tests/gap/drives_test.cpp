@@ -95,8 +95,9 @@ TEST(Drives, ShowTogetherWhatNeitherShowsAlone) {
   // A ramp of this one drive has the same shape, and so may be it.
   const bool named = warmth != nullptr || find(result, Kind::kBiasRamp, 1) != nullptr;
   EXPECT_TRUE(named) << names_of(result);
-  if (warmth != nullptr)
+  if (warmth != nullptr) {
     EXPECT_NEAR(warmth->effect.parameters[0], kPerK, kSigmas * warmth->sigma[0]);
+  }
   EXPECT_LE(result.gap.after, 1.5 * result.gap.band95[1]);
 }
 

@@ -35,10 +35,8 @@ struct Heading final : OutputObserver {
     const double t_s = to_seconds(output.instant - TimePoint{});
     const double step_s = last_s > 0.0 ? t_s - last_s : 0.0;
     last_s = t_s;
-    if (t_s < kStart_s + 1.0) {
-      rest_sigma_dps = output.sigma_dps;
-      return;
-    }
+    if (t_s < kStart_s - 1.0) rest_sigma_dps = output.sigma_dps;
+    if (t_s < kStart_s + 1.0) return;
     error_deg += step_s * (output.rate_dps - truth_dps(t_s));
     allowed_deg += step_s * output.sigma_dps;
   }

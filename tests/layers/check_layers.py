@@ -28,12 +28,13 @@ ARROWS = {
 # The gap workflow is as much as all other layers together, so it has arrows of its own: file → the files of its folder
 # that it may include. The search decides on top of what only answers; what answers knows no search.
 GAP_BASE = {"curve", "median", "recording", "result", "kinds"}
-GAP_DATA = GAP_BASE | {"noise", "signals", "observations"}
+GAP_DATA = GAP_BASE | {"noise", "signals", "observations", "unseen_motion"}
 GAP_REGRESSION = GAP_DATA | {"least_squares", "regression", "found"}
 GAP_STUDY = GAP_DATA | {"transport", "study"}
 GAP_ARROWS = {
     "curve": {"median"}, "median": set(), "recording": set(), "result": set(), "least_squares": set(), "kinds": set(),
     "wiener": {"curve", "median"},
+    "unseen_motion": {"curve", "kinds", "noise"},
     "signals": {"curve", "median", "recording"},
     "noise": {"kinds"},
     "found": {"result"},
@@ -50,13 +51,14 @@ GAP_ARROWS = {
     "noise_search": GAP_REGRESSION,
     "acceptance": {"result", "found"},
     "steadiness": GAP_REGRESSION,
+    "robust": GAP_REGRESSION,
     "study": GAP_DATA | {"rest", "spikes", "transport", "wiener"},
     "identifiable": GAP_STUDY,
     "score": GAP_STUDY,
     "figures": GAP_STUDY | {"views"},
     "describe": GAP_STUDY | {"views", "evidence"},
     "differences": GAP_STUDY | GAP_REGRESSION | {"scan", "views", "evidence"},
-    "search": GAP_STUDY | GAP_REGRESSION | {"acceptance", "scan", "noise_search", "steadiness"},
+    "search": GAP_STUDY | GAP_REGRESSION | {"acceptance", "scan", "noise_search", "robust", "steadiness"},
     "leftover": GAP_STUDY | {"search", "whiteness"},
     "workflow": GAP_STUDY | {"acceptance", "describe", "differences", "figures", "identifiable", "leftover", "score", "search"},
 }
