@@ -271,7 +271,7 @@ CLI::App* add_gap(CLI::App& app, GapOptions& options) {
       ->allow_extra_args(false)
       ->check(wrong_acceptance);
   add_number(*command, "--time-limit", options.time_limit_s, {0.0, kTimeLimitMax_s},
-             "seconds until what is certain is written and the rest is left open; 0: none");
+             "after so many seconds what is certain is written; 0: no limit");
   add_number(*command, "--seed", options.seed, {}, "of the simulations");
   command->add_flag("-q,--quiet", options.quiet, "no summary");
   command->footer(

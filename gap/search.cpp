@@ -51,10 +51,11 @@ constexpr double kFallen = -4.0;
 // Of a drift's statistic: a smaller line in it is a part of it.
 constexpr double kLineShare = 0.05;
 // Held-out samples are a third of those that are fitted. A gain of 2·log-likelihood g scatters by
-// 2·√g; and a step or a ramp tells less where it was not fitted: half of it must be there.
+// 2·√g, and beside others that share its shape it is less: a fifth of it must be there. What is
+// none foretells nothing.
 constexpr double kHeldOutShare = 1.0 / 3.0;
 constexpr double kProofSigmas = 2.5;
-constexpr double kProofShare = 0.5;
+constexpr double kProofShare = 0.8;
 // A starting model's noise is known at best to a hundredth, and is written with as many digits.
 constexpr double kStartingNoiseDoubt = 0.01;
 // Shares of a timing effect's statistic that interpolation leaves behind.
