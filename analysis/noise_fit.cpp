@@ -31,18 +31,33 @@ constexpr double kStepMax = 2.0;
 constexpr int kIterationsMax = 200;
 constexpr double kTolerance = 1e-9;
 
+// Drift that forgets itself instead of a walk: what each parameter more must gain in twice the
+// logarithm of the likelihood (by chance once in 140 walks); memories that are tried, from so many
+// intervals on; the record must hold so many of the longest, or nobody can say that it forgets.
+constexpr double kMarkovGain = 6.0;
+constexpr double kMemoryStep = 1.3;
+constexpr double kMemoryIntervals = 20.0;
+constexpr double kMemories = 8.0;
+
 using Powers = Eigen::Array<double, kTermCount, 1>;
 
 double flicker_variance_gain() {
   return 2.0 * std::numbers::ln2 / std::numbers::pi;
 }
 
+// What is left of a walk's power when it forgets itself with this memory; 0: it does not.
+double remembered(const PowerBin& bin, double memory_s) {
+  if (memory_s <= 0.0) return 1.0;
+  const double keeps = std::exp(-bin.interval_s / memory_s);
+  return bin.step_gain / (bin.step_gain + (1.0 - keeps) * (1.0 - keeps) / keeps);
+}
+
 // Expected power of a coefficient for each term of unit strength.
-Powers shapes(const PowerBin& bin, const FitSettings& settings) {
+Powers shapes(const PowerBin& bin, const FitSettings& settings, double memory_s) {
   const double white = bin.step_gain / bin.interval_s * settings.measured_share;
   Powers result;
   result[kWhite] = white;
-  result[kWalk] = bin.interval_s * (1.0 - bin.step_gain / 6.0);
+  result[kWalk] = bin.interval_s * (1.0 - bin.step_gain / 6.0) * remembered(bin, memory_s);
   result[kFlicker] = bin.step_gain / bin.interval_s / (2.0 * std::numbers::pi * bin.frequency_hz) *
                      (1.0 - kFlickerLoss / bin.half_periods);
   if (settings.interpolation_gain < 1.0) {
@@ -58,11 +73,11 @@ Powers shapes(const PowerBin& bin, const FitSettings& settings) {
 class Likelihood {
  public:
   Likelihood(const std::vector<PowerBin>& bins, double frequency_max_hz,
-             const FitSettings& settings) {
+             const FitSettings& settings, double memory_s = 0.0) {
     for (const PowerBin& bin : bins) {
       if (bin.frequency_hz > frequency_max_hz || bin.power <= 0.0) continue;
       bins_.push_back(bin);
-      shapes_.push_back(shapes(bin, settings));
+      shapes_.push_back(shapes(bin, settings, memory_s));
       count_ += bin.count;
     }
     largest_.setConstant(std::numeric_limits<double>::infinity());
@@ -220,8 +235,12 @@ double upper_bound(const Likelihood& likelihood, const Solution& chosen, std::si
   Powers start = chosen.strength;
   start[index] = 0.5 * likelihood.largest()[index];
   const Mask mask = chosen.mask | bit(term);
-  const double least = std::min(chosen.value.cost, solve(likelihood, mask, start).value.cost);
+  const Solution best = solve(likelihood, mask, start);
+  const double least = std::min(chosen.value.cost, best.value.cost);
+  // The likelihood may fall to both sides of the best value: the bound is above it.
   double low = kLogPowerMin;
+  if (best.value.cost < chosen.value.cost)
+    low = std::max(low, std::log(best.strength[index] / likelihood.largest()[index]));
   double high = 3.0;
   for (int i = 0; i < 40; ++i) {
     const double middle = 0.5 * (low + high);
@@ -292,6 +311,49 @@ NoiseFit result_of(const Likelihood& likelihood, const Solution& chosen, bool in
 
 }  // namespace
 
+namespace {
+
+// A drift that forgets itself, where that makes the record much likelier than what was chosen.
+struct Forgetting {
+  double memory_s = 0.0;
+  Solution solution;
+};
+std::optional<Forgetting> forgetting(const std::vector<PowerBin>& bins, double top_hz,
+                                     const FitSettings& settings, const Solution& chosen) {
+  if ((chosen.mask & (bit(kWalk) | bit(kFlicker))) == 0) return {};
+  double lowest_hz = top_hz;
+  for (const PowerBin& bin : bins)
+    lowest_hz = std::min(lowest_hz, bin.frequency_hz / bin.half_periods);
+  // A coefficient's half periods fill the record.
+  const double longest_s = 0.5 / lowest_hz / kMemories;
+  const auto score = [](const Solution& solution, int more) {
+    return 2.0 * solution.value.cost + kMarkovGain * (std::popcount(solution.mask) + more);
+  };
+  double best_score = score(chosen, 0);
+  std::optional<Forgetting> best;
+  for (double memory_s = kMemoryIntervals * settings.interval_s; memory_s <= longest_s;
+       memory_s *= kMemoryStep) {
+    const Likelihood other(bins, top_hz, settings, memory_s);
+    const Mask alone = (chosen.mask | bit(kWhite) | bit(kWalk)) & ~bit(kFlicker);
+    for (const Mask mask : {alone, alone | bit(kFlicker)}) {
+      const Solution solution = solve(other, mask, 0.5 * other.largest());
+      if (score(solution, 1) >= best_score) continue;
+      best_score = score(solution, 1);
+      best = Forgetting{memory_s, solution};
+    }
+  }
+  return best;
+}
+
+// K is then what the drift is over short times, and no walk of the record is more.
+void set_markov(const Forgetting& forgetting, NoiseFit& fit) {
+  const Estimate walk = fit.walk_dps_rts;
+  fit.markov = Markov{walk.value * std::sqrt(0.5 * forgetting.memory_s), forgetting.memory_s};
+  fit.walk_dps_rts = {.below = walk.value + 2.0 * walk.sigma};
+}
+
+}  // namespace
+
 std::optional<NoiseFit> fit_noise(const std::vector<PowerBin>& bins, const FitSettings& settings) {
   const bool interpolated = settings.interpolation_gain < 1.0;
   std::optional<NoiseFit> fit;
@@ -303,9 +365,14 @@ std::optional<NoiseFit> fit_noise(const std::vector<PowerBin>& bins, const FitSe
     // What grows with the frequency inside a limited band is no quantisation.
     const bool asks_other = interpolated || !limited;
     const Mask all = bit(kTermCount) - 1;
-    const Solution chosen = select(likelihood, asks_other ? all : all & ~bit(kOther));
-    const auto worst = likelihood.worst_octave(chosen.strength, chosen.value.ramp, top_hz);
-    fit = result_of(likelihood, chosen, interpolated, asks_other);
+    const Solution walking = select(likelihood, asks_other ? all : all & ~bit(kOther));
+    const auto forgets = forgetting(bins, top_hz, settings, walking);
+    const Likelihood judge =
+        forgets ? Likelihood(bins, top_hz, settings, forgets->memory_s) : likelihood;
+    const Solution chosen = forgets ? forgets->solution : walking;
+    const auto worst = judge.worst_octave(chosen.strength, chosen.value.ramp, top_hz);
+    fit = result_of(judge, chosen, interpolated, asks_other);
+    if (forgets) set_markov(*forgets, *fit);
     fit->frequency_max_hz = top_hz;
     fit->limited = limited;
     fit->describes = !worst.serious;
@@ -313,6 +380,19 @@ std::optional<NoiseFit> fit_noise(const std::vector<PowerBin>& bins, const FitSe
     fit->worst_hz = worst.frequency_hz;
     if (!worst.serious) return fit;
   }
+}
+
+double Markov::walk_dps_rts() const {
+  return sigma_dps * std::sqrt(2.0 / tau_s);
+}
+
+double Markov::variance(double at_s) const {
+  // Below a thousandth of the memory the difference of the terms has no digits left.
+  const double x = at_s / tau_s;
+  constexpr double kShort = 1e-3;
+  if (x < kShort) return 2.0 / 3.0 * sigma_dps * sigma_dps * x;
+  return sigma_dps * sigma_dps / (x * x) *
+         (2.0 * x - 3.0 + 4.0 * std::exp(-x) - std::exp(-2.0 * x));
 }
 
 double NoiseFit::variance(NoiseKind kind, double tau_s) const {
@@ -324,7 +404,8 @@ double NoiseFit::variance(NoiseKind kind, double tau_s) const {
     case NoiseKind::kFlicker:
       return flicker_variance_gain() * flicker_dps.value * flicker_dps.value;
     case NoiseKind::kWalk:
-      return walk_dps_rts.value * walk_dps_rts.value * tau_s / 3.0;
+      return walk_dps_rts.value * walk_dps_rts.value * tau_s / 3.0 +
+             (markov ? markov->variance(tau_s) : 0.0);
   }
   return 0.0;
 }

@@ -24,11 +24,23 @@ struct Estimate {
   double below = 0.0;  ///< where not resolved: 95 % sure that the true value is below this
 };
 
+/// Drift that forgets itself: exponentially correlated.
+struct Markov {
+  double sigma_dps = 0.0;
+  double tau_s = 0.0;
+  /// Of the random walk that it is over times much shorter than tau_s.
+  [[nodiscard]] double walk_dps_rts() const;
+  /// Allan variance.
+  [[nodiscard]] double variance(double at_s) const;
+};
+
 struct NoiseFit {
   Estimate white_dps_rthz;    ///< N, angle random walk: Allan deviation N/√τ
   Estimate walk_dps_rts;      ///< K, rate random walk: K·√(τ/3)
   Estimate flicker_dps;       ///< B, bias instability: B·√(2 ln 2/π), at any τ
   Estimate quantisation_deg;  ///< Q, of the angle: √3·Q/τ
+  /// Where the drift is surely no random walk: K is then a bound.
+  std::optional<Markov> markov;
   double ramp_dps_s = 0.0;
   double ramp_sigma_dps_s = 0.0;
   double frequency_max_hz = 0.0;  ///< fitted up to here
@@ -37,7 +49,8 @@ struct NoiseFit {
   double worst_ratio = 1.0;       ///< of measured to modelled power in the worst octave
   double worst_hz = 0.0;          ///< middle of that octave
 
-  /// Allan variance of one kind at averaging time tau_s; 0 where not resolved.
+  /// Allan variance of one kind at averaging time tau_s; 0 where not resolved. A drift that forgets
+  /// itself counts as walk.
   [[nodiscard]] double variance(NoiseKind kind, double tau_s) const;
   /// Of all kinds; without the ramp.
   [[nodiscard]] double variance(double tau_s) const;

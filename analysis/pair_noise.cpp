@@ -57,7 +57,8 @@ SeriesNoise judge_gyro(const Series& series, double step_dps, bool rests) {
 // Above this frequency nothing but white noise matters; white noise is there.
 double white_from_hz(const NoiseFit& fit) {
   const double white = fit.white_dps_rthz.value * fit.white_dps_rthz.value / kWhiteOverOther;
-  const double walk_hz = fit.walk_dps_rts.value / (2.0 * std::numbers::pi * std::sqrt(white));
+  const double walk = fit.markov ? fit.markov->walk_dps_rts() : fit.walk_dps_rts.value;
+  const double walk_hz = walk / (2.0 * std::numbers::pi * std::sqrt(white));
   const double flicker_hz =
       fit.flicker_dps.value * fit.flicker_dps.value / (2.0 * std::numbers::pi * white);
   return std::max(walk_hz, flicker_hz);
@@ -123,7 +124,7 @@ std::optional<Correlation> white_correlation(const PairNoise& noise,
 
 PairNoise judge_pair(const PairRecording& recording) {
   PairNoise noise;
-  noise.motion = find_motion(recording.paired);
+  noise.motion = find_motion(recording.paired, recording.step_dps);
   const auto resting = [&](const Series& series) {
     const bool partly = noise.motion.rest && !noise.motion.at_rest;
     return partly ? slice(series, noise.motion.rest->from_s, noise.motion.rest->to_s) : series;

@@ -37,9 +37,11 @@ Recommendation recommend(const NoiseFit& difference, double seconds) {
   Recommendation best;
   best.ramp_significant = difference.ramp_significance() > kRampSigmas;
   const double ramp_dps_s = best.ramp_significant ? difference.ramp_dps_s : 0.0;
-  best.drift_known = difference.walk_dps_rts.resolved || best.ramp_significant;
-  const double walk = difference.walk_dps_rts.resolved ? difference.walk_dps_rts.value
-                                                       : difference.walk_dps_rts.below;
+  best.drift_known = difference.walk_dps_rts.resolved || difference.markov || best.ramp_significant;
+  // What forgets itself later than a window is a walk to it.
+  const double bound =
+      difference.markov ? difference.markov->walk_dps_rts() : difference.walk_dps_rts.below;
+  const double walk = difference.walk_dps_rts.resolved ? difference.walk_dps_rts.value : bound;
   std::array<double, 2> least{};
   std::array<double, 2> window_s{kWindows_s[0], kWindows_s[0]};
   const auto error = [&](double of_s, std::size_t order) {

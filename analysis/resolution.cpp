@@ -76,6 +76,7 @@ NoiseFit bounded_by_step(std::optional<NoiseFit> fit, double step_dps, const Ser
   result.walk_dps_rts = bounded(result.walk_dps_rts, step_dps / std::sqrt(seconds));
   result.flicker_dps = bounded(result.flicker_dps, step_dps);
   result.quantisation_deg = {};
+  result.markov.reset();
   const double slope = step_dps / seconds;
   if (std::abs(result.ramp_dps_s) < slope) result.ramp_dps_s = 0.0;
   result.ramp_sigma_dps_s = std::max(result.ramp_sigma_dps_s, slope);

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <utility>
 
 #include <Eigen/Dense>
 
@@ -9,144 +11,458 @@ namespace vgyro::analysis {
 
 namespace {
 
+// Motion is slower than this, or is seen by the scatter; slow gyros need longer for so many pairs.
 constexpr double kBlock_s = 1.0;
-// A second moves when the sum of the rates steps by more than this many usual steps of the
-// difference, or scatters so much more than the difference does. Correlated noise alone raises the
-// sum over the difference: up to ρ = 0.8, three times.
-constexpr double kSteps = 10.0;
-constexpr double kScatter = 4.0;
-// What the sum may wander in a rest: so many times what the difference does, and what two gyros
-// that warm up alike may drift.
-constexpr double kWander = 6.0;
-constexpr double kWander_dps = 0.2;
-constexpr double kStep_dps = 0.02;
+constexpr double kPairsMin = 5.0;
+// The mean of a block that holds less of the usual count is too unsure to be held against others.
+constexpr double kFullShare = 0.5;
+// The part of the blocks whose noise is surely the gyros' own: motion leaves some of itself in the
+// difference, by other scales and delays.
+constexpr std::size_t kQuietOneIn = 10;
+// The mean may scatter so many times as the difference: noise that both have in common raises it,
+// by three up to a correlation of 0.8.
+constexpr double kScatterMost = 4.0;
+constexpr double kCommonMost = 3.0;
+// And beyond what is usual at rest by this, and by so many standard errors of a scatter.
+constexpr double kSteady = 1.5;
+constexpr double kScatterSigmas = 4.0;
+// A block whose difference is livelier than the quiet ones by more than this is no measure.
+constexpr double kLively = 3.0;
+// The lower decile of a scatter of five values, in its standard deviation.
+constexpr double kFifthsDecile = 0.516;
+constexpr double kFifthsCount = 5.0;
+// Of a normal value, from its mean down.
+constexpr double kDecileSigmas = 1.2816;
+// A value that stands between two steps of a coarse sensor scatters by half a step; this is a
+// quarter of both.
+constexpr double kStepShare = 0.25;
+// From block to block, and over two and four of them, the mean may move by so many times what the
+// difference does, and by what a building sways.
+constexpr std::array<std::size_t, 3> kLags{1, 2, 4};
+constexpr double kLagSigmas = 5.0;
+constexpr double kSway_dps = 0.005;
+// Of normal values: standard deviation over the median of the magnitudes.
+constexpr double kSigmaPerMedian = 1.4826;
+// Against the last rest the mean may have moved by this, as in the gateway's calibration, and by
+// what two gyros drift alike when they warm up. What one alone has drifted the difference tells.
+constexpr double kStill_dps = 0.05;
+constexpr double kAlike_dps_s = 1e-3;
+constexpr double kAlone = 1.2;
+// One gyro alone by no more: else it is blind, and the other one turns.
+constexpr double kAloneMost_dps = 2.0;
+// Shorter rests are turning points of a motion.
+constexpr std::size_t kBlocksMin = 4;
+// Beside a motion this much of a rest may hold the end of it.
+constexpr std::size_t kMarginBlocks = 1;
+// And as much more, up to this, as the last few seconds' mean is off those before, beyond chance.
+constexpr std::array<std::size_t, 4> kEdges{1, 2, 4, 8};
+constexpr std::size_t kEdgeMost = 12;
+constexpr double kEdgeSigmas = 4.0;
+// The recording begins at rest, the configuration says: a rest that begins so soon is the first.
+constexpr double kStart_s = 5.0;
 
-struct RestBlock {
-  double begin_s = 0.0;
-  double sum_dps = 0.0;  ///< mean of y₁ + y₂
-  double difference_dps = 0.0;
-  double sum_scatter_dps = 0.0;  ///< standard deviation
-  double difference_scatter_dps = 0.0;
-  bool first = false;  ///< of its part
-};
+using Blocks = std::vector<RestBlock>;
 
-RestBlock make_block(const double* first, const double* second, std::size_t count) {
-  const auto n = static_cast<Eigen::Index>(count);
-  const Eigen::Map<const Eigen::ArrayXd> y1(first, n);
-  const Eigen::Map<const Eigen::ArrayXd> y2(second, n);
-  const Eigen::ArrayXd sum = y1 + y2;
-  const Eigen::ArrayXd difference = y1 - y2;
-  RestBlock block;
-  block.sum_dps = sum.mean();
-  block.difference_dps = difference.mean();
-  block.sum_scatter_dps = std::sqrt((sum - block.sum_dps).square().mean());
-  block.difference_scatter_dps = std::sqrt((difference - block.difference_dps).square().mean());
-  return block;
-}
-
-std::vector<RestBlock> blocks_of(const std::array<Series, 2>& paired) {
-  const double interval_s = paired[0].interval_s;
-  const auto count = static_cast<std::size_t>(std::max(2.0, std::round(kBlock_s / interval_s)));
-  std::vector<RestBlock> blocks;
-  for (std::size_t p = 0; p < paired[0].parts.size(); ++p) {
-    const Part& part = paired[0].parts[p];
-    for (std::size_t i = 0; i + count <= part.rate_dps.size(); i += count) {
-      RestBlock block = make_block(&part.rate_dps[i], &paired[1].parts[p].rate_dps[i], count);
-      block.begin_s = part.begin_s + static_cast<double>(i) * interval_s;
-      block.first = i == 0;
-      blocks.push_back(block);
-    }
-  }
-  return blocks;
+// Precondition: there are some.
+double quantile(std::vector<double> values, std::size_t one_in) {
+  const auto place = values.begin() + static_cast<std::ptrdiff_t>(values.size() / one_in);
+  std::nth_element(values.begin(), place, values.end());
+  return *place;
 }
 
 double median(std::vector<double> values) {
-  if (values.empty()) return 0.0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
+  return values.empty() ? 0.0 : quantile(std::move(values), 2);
 }
 
-// What is usual for the difference: its step from block to block, and its scatter in a block. A
-// rest anywhere is judged by the quieter quarter of the record, motion spoils the rest of it.
-struct Usual {
-  double step_dps = 0.0;
-  double scatter_dps = 0.0;
+// From block `first` to before `end`.
+struct Run {
+  std::size_t first = 0;
+  std::size_t end = 0;
+  [[nodiscard]] std::size_t length() const { return end - first; }
 };
 
-Usual usual_of(const std::vector<RestBlock>& blocks) {
-  std::vector<double> steps;
-  std::vector<double> scatters;
-  for (std::size_t i = 0; i < blocks.size(); ++i) {
-    scatters.push_back(blocks[i].difference_scatter_dps);
-    if (blocks[i].first) continue;
-    steps.push_back(std::abs(blocks[i].difference_dps - blocks[i - 1].difference_dps));
+struct Level {
+  double common_dps = 0.0;
+  double apart_dps = 0.0;
+};
+
+Level level_of(const Blocks& blocks, std::size_t first, std::size_t end) {
+  Level level;
+  for (std::size_t i = first; i < end; ++i) {
+    level.common_dps += blocks[i].common_dps;
+    level.apart_dps += blocks[i].apart_dps;
   }
-  const auto quarter = [](std::vector<double>& values) {
-    std::sort(values.begin(), values.end());
-    values.resize((values.size() + 1) / 2);
-    return median(values);
-  };
-  // The lower quartile of |normal| is 0.319 σ.
-  return {quarter(steps) / 0.319, quarter(scatters)};
+  const auto count = static_cast<double>(end - first);
+  return {level.common_dps / count, level.apart_dps / count};
 }
 
-bool turns(const RestBlock& block, const Usual& usual) {
-  return std::abs(block.sum_dps) > 2.0 * MotionSummary::kTurning_dps ||
-         block.sum_scatter_dps > kScatter * std::max(usual.scatter_dps, kStep_dps * 1e-3);
-}
+// All that is asked of the blocks of one recording.
+class RestSearch {
+ public:
+  RestSearch(const Blocks& blocks, double block_s, const RestFinder::Settings& settings)
+      : blocks_(blocks),
+        block_s_(block_s),
+        rate_dps_(settings.rate_dps),
+        step_dps_(std::hypot(settings.step_dps[0], settings.step_dps[1])) {}
 
-bool moves(const std::vector<RestBlock>& blocks, std::size_t i, const Usual& usual) {
-  const RestBlock& block = blocks[i];
-  if (turns(block, usual)) return true;
-  if (block.first) return false;
-  return std::abs(block.sum_dps - blocks[i - 1].sum_dps) > kSteps * usual.step_dps + kStep_dps;
-}
-
-// Extends the rest that begins with block `begin`; one beyond its last block.
-std::size_t end_of_rest(const std::vector<RestBlock>& blocks, std::size_t begin,
-                        const Usual& usual) {
-  std::size_t end = begin;
-  double wander_dps = 0.0;
-  for (; end < blocks.size(); ++end) {
-    if (end == begin ? turns(blocks[end], usual) : moves(blocks, end, usual)) break;
-    wander_dps =
-        std::max(wander_dps, std::abs(blocks[end].difference_dps - blocks[begin].difference_dps));
-    const double limit_dps = kWander * wander_dps + kSteps * usual.step_dps + kWander_dps;
-    if (std::abs(blocks[end].sum_dps - blocks[begin].sum_dps) > limit_dps) break;
+  [[nodiscard]] std::vector<Run> run() {
+    set_quiet();
+    mark_steady();
+    set_lags();
+    set_bends();
+    std::vector<Run> runs;
+    for (const Run& run : steady_runs()) {
+      const Run inner = trimmed(run);
+      if (inner.length() > 0) runs.push_back(inner);
+    }
+    return of_one_level(runs);
   }
-  return end;
-}
+
+ private:
+  [[nodiscard]] std::size_t size() const { return blocks_.size(); }
+
+  // What the difference scatters by where nothing moves. Two gyros at their limits would scatter by
+  // nothing at all: what turns has no say, if there is anything else.
+  void set_quiet() {
+    std::vector<double> scatters;
+    std::vector<double> slow;
+    const auto turning = [&](const RestBlock& block) {
+      return turns({block.common_dps, block.apart_dps});
+    };
+    const bool all = std::all_of(blocks_.begin(), blocks_.end(), turning);
+    for (const RestBlock& block : blocks_) {
+      if (!all && turning(block)) continue;
+      scatters.push_back(block.apart_scatter_dps);
+      slow.push_back(block.apart_slow_dps);
+    }
+    quiet_dps_ = std::max(quantile(std::move(scatters), kQuietOneIn) / decile_of_scatter(),
+                          kStepShare * step_dps_);
+    slow_dps_ =
+        std::max(quantile(std::move(slow), kQuietOneIn) / kFifthsDecile, kStepShare * step_dps_);
+    std::vector<double> ratios;
+    for (const RestBlock& block : blocks_) {
+      if (block.common_scatter_dps <= kScatterMost * quiet_dps_)
+        ratios.push_back(block.common_scatter_dps / std::max(block.apart_scatter_dps, quiet_dps_));
+    }
+    common_ = std::clamp(median(std::move(ratios)), 1.0, kCommonMost);
+  }
+
+  // The lower decile of a scatter of as many values as a block has, in its standard deviation.
+  [[nodiscard]] double decile_of_scatter() const {
+    std::vector<double> counts;
+    for (const RestBlock& block : blocks_)
+      counts.push_back(block.count);
+    const double freedom = median(std::move(counts)) - 1.0;
+    return std::max(kFifthsDecile, 1.0 - kDecileSigmas / std::sqrt(2.0 * freedom));
+  }
+
+  void mark_steady() {
+    steady_.assign(size(), 0);
+    for (std::size_t i = 0; i < size(); ++i) {
+      const RestBlock& block = blocks_[i];
+      // Motion is slow: in the means of fifths it stands out of more noise than in the samples.
+      const bool steady =
+          block.common_scatter_dps <= kScatterMost * quiet_dps_ &&
+          is_steady(block.common_scatter_dps, block.apart_scatter_dps, quiet_dps_, block.count) &&
+          is_steady(block.common_slow_dps, block.apart_slow_dps, slow_dps_, kFifthsCount);
+      if (steady) steady_[i] = 1;
+    }
+  }
+
+  // Of so many values, where the difference scatters by `quiet_dps` when nothing moves.
+  [[nodiscard]] bool is_steady(double common_dps, double apart_dps, double quiet_dps,
+                               double count) const {
+    const double own_dps = std::clamp(apart_dps, quiet_dps, kLively * quiet_dps);
+    const double factor = kSteady + kScatterSigmas / std::sqrt(2.0 * (count - 1.0));
+    return common_dps <= factor * common_ * own_dps;
+  }
+
+  // By how much the difference moves over so many blocks.
+  void set_lags() {
+    for (std::size_t k = 0; k < kLags.size(); ++k) {
+      std::vector<double> moves;
+      for (std::size_t i = kLags[k]; i < size(); ++i) {
+        if (steady_[i] + steady_[i - kLags[k]] == 2)
+          moves.push_back(std::abs(blocks_[i].apart_dps - blocks_[i - kLags[k]].apart_dps));
+      }
+      lag_dps_[k] = kSigmaPerMedian * median(std::move(moves));
+    }
+  }
+
+  [[nodiscard]] bool goes_on(const Run& run, std::size_t i) const {
+    for (std::size_t k = 0; k < kLags.size(); ++k) {
+      if (i < run.first + kLags[k]) break;
+      const RestBlock& before = blocks_[i - kLags[k]];
+      const double most_dps = kLagSigmas * common_ * lag_dps_[k] + kSway_dps + 0.5 * step_dps_;
+      // Across a hole no lag is known.
+      if (blocks_[i].from_s - before.from_s > (static_cast<double>(kLags[k]) + 0.5) * block_s_)
+        continue;
+      if (std::abs(blocks_[i].common_dps - before.common_dps) > most_dps) return false;
+    }
+    const RestBlock& first = blocks_[run.first];
+    return is_near({first.common_dps, first.apart_dps},
+                   {blocks_[i].common_dps, blocks_[i].apart_dps}, blocks_[i].from_s - first.from_s);
+  }
+
+  // What two gyros at rest may have drifted from one level to the other.
+  [[nodiscard]] bool is_near(const Level& one, const Level& other, double apart_s) const {
+    const double common_dps = std::abs(one.common_dps - other.common_dps);
+    const double alone_dps = std::abs(one.apart_dps - other.apart_dps);
+    const double noise_dps = kLagSigmas * common_ * lag_dps_[0] + 0.5 * step_dps_;
+    return common_dps <= kStill_dps + noise_dps + kAlike_dps_s * apart_s +
+                             kAlone * std::min(alone_dps, 0.5 * kAloneMost_dps);
+  }
+
+  [[nodiscard]] std::vector<Run> steady_runs() const {
+    std::vector<Run> runs;
+    for (std::size_t first = 0; first < size();) {
+      if (steady_[first] == 0) {
+        ++first;
+        continue;
+      }
+      Run run{first, first + 1};
+      while (run.end < size() && steady_[run.end] != 0 && goes_on(run, run.end))
+        ++run.end;
+      if (run.length() >= kBlocksMin) runs.push_back(run);
+      first = run.end;
+    }
+    return runs;
+  }
+
+  // The second difference of three means in a row, each of so many blocks: it leaves drift out.
+  template <class At>
+  static double bend_of(std::size_t width, const At& value_at) {
+    double sum_dps = 0.0;
+    for (std::size_t k = 0; k < width; ++k)
+      sum_dps += value_at(k) - 2.0 * value_at(width + k) + value_at(2 * width + k);
+    return sum_dps / static_cast<double>(width);
+  }
+
+  // What is usual of it in the difference.
+  void set_bends() {
+    for (std::size_t e = 0; e < kEdges.size(); ++e) {
+      const std::size_t width = kEdges[e];
+      std::vector<double> bends;
+      std::size_t steady = 0;
+      for (std::size_t i = 0; i < size(); ++i) {
+        steady = steady_[i] != 0 ? steady + 1 : 0;
+        if (steady < 3 * width) continue;
+        const auto apart = [&](std::size_t k) { return blocks_[i - k].apart_dps; };
+        bends.push_back(std::abs(bend_of(width, apart)));
+      }
+      bend_dps_[e] = kSigmaPerMedian * median(std::move(bends));
+    }
+  }
+
+  // How many blocks of an edge are off what lies inside of them: `at(k)` is the k-th from the edge.
+  template <class At>
+  [[nodiscard]] std::size_t off_edge(std::size_t length, const At& at) const {
+    std::size_t off = 0;
+    for (std::size_t e = 0; e < kEdges.size(); ++e) {
+      const std::size_t width = kEdges[e];
+      if (off + 3 * width > length || off + width > kEdgeMost) break;
+      const double common_dps =
+          bend_of(width, [&](std::size_t k) { return at(off + k).common_dps; });
+      const double own_dps = bend_of(width, [&](std::size_t k) { return at(off + k).apart_dps; });
+      if (std::abs(common_dps) >
+          kEdgeSigmas * common_ * bend_dps_[e] + std::abs(own_dps) + kSway_dps + 0.5 * step_dps_)
+        off += width;
+    }
+    return off;
+  }
+
+  // Without what may hold a motion's end; before the recording begins and after it ends there is
+  // none.
+  [[nodiscard]] Run trimmed(const Run& run) const {
+    const auto from_front = [&](std::size_t k) { return blocks_[run.first + k]; };
+    const auto from_back = [&](std::size_t k) { return blocks_[run.end - 1 - k]; };
+    std::size_t front = off_edge(run.length(), from_front);
+    std::size_t back = off_edge(run.length(), from_back);
+    if (run.first > 0) front += kMarginBlocks;
+    if (run.end < size()) back += kMarginBlocks;
+    if (front + back >= run.length()) return {};
+    return {run.first + front, run.end - back};
+  }
+
+  [[nodiscard]] bool turns(const Level& level) const {
+    const double first_dps = level.common_dps + level.apart_dps - rate_dps_;
+    const double second_dps = level.common_dps - level.apart_dps - rate_dps_;
+    if (first_dps * second_dps < 0.0) return false;
+    const double smaller_dps = std::min(std::abs(first_dps), std::abs(second_dps));
+    return smaller_dps > MotionSummary::kTurning_dps;
+  }
+
+  // The rest that is surely one: the first, where the recording begins with it, else the longest.
+  [[nodiscard]] std::size_t surest(const std::vector<Run>& runs,
+                                   const std::vector<Level>& levels) const {
+    std::size_t best = runs.size();
+    for (std::size_t k = 0; k < runs.size(); ++k) {
+      if (turns(levels[k])) continue;
+      if (blocks_[runs[k].first].from_s < blocks_.front().from_s + kStart_s) return k;
+      if (best == runs.size() || runs[k].length() > runs[best].length()) best = k;
+    }
+    return best;
+  }
+
+  // From the surest on to both sides: each that reads what the last rest did, as far as drift lets.
+  [[nodiscard]] std::vector<Run> of_one_level(const std::vector<Run>& runs) const {
+    std::vector<Level> levels;
+    for (const Run& run : runs)
+      levels.push_back(level_of(blocks_, run.first, run.end));
+    const std::size_t sure = surest(runs, levels);
+    if (sure == runs.size()) return {};
+    std::vector<std::uint8_t> rests(runs.size(), 0);
+    rests[sure] = 1;
+    const auto judge = [&](std::size_t k, std::size_t& last) {
+      const double apart_s =
+          std::abs(blocks_[runs[k].first].from_s - blocks_[runs[last].first].from_s);
+      if (!is_near(levels[last], levels[k], apart_s)) return;
+      rests[k] = 1;
+      last = k;
+    };
+    std::size_t last = sure;
+    for (std::size_t k = sure + 1; k < runs.size(); ++k)
+      judge(k, last);
+    last = sure;
+    for (std::size_t k = sure; k-- > 0;)
+      judge(k, last);
+    std::vector<Run> resting;
+    for (std::size_t k = 0; k < runs.size(); ++k) {
+      if (rests[k] != 0) resting.push_back(runs[k]);
+    }
+    return resting;
+  }
+
+  const Blocks& blocks_;
+  double block_s_;
+  double rate_dps_;
+  double step_dps_;  ///< of both
+  double quiet_dps_ = 0.0;
+  double slow_dps_ = 0.0;  ///< likewise of the means of fifths
+  double common_ = 1.0;    ///< scatter of the mean over that of the difference, at rest
+  std::array<double, kLags.size()> lag_dps_{};
+  std::array<double, kEdges.size()> bend_dps_{};
+  std::vector<std::uint8_t> steady_;
+};
 
 }  // namespace
 
-MotionSummary find_motion(const std::array<Series, 2>& paired) {
-  MotionSummary motion;
-  const std::vector<RestBlock> blocks = blocks_of(paired);
-  if (blocks.empty()) return motion;
-  std::vector<double> sums;
-  sums.reserve(blocks.size());
-  for (const RestBlock& block : blocks)
-    sums.push_back(block.sum_dps);
-  const double usual_sum_dps = median(sums);
-  for (const RestBlock& block : blocks) {
-    motion.turned_up_to_dps =
-        std::max(motion.turned_up_to_dps, 0.5 * std::abs(block.sum_dps - usual_sum_dps));
+RestFinder::RestFinder(const Settings& settings)
+    : settings_(settings),
+      block_s_(
+          std::max(kBlock_s, std::ceil(kPairsMin * settings.interval_s / kBlock_s) * kBlock_s)) {}
+
+void RestFinder::add(double t_s, const std::array<double, 2>& rate_dps) {
+  const double from_s = block_s_ * std::floor(t_s / block_s_);
+  if (from_s != open_.from_s) {
+    close_block();
+    open_ = {};
+    open_.from_s = from_s;
+    fifths_ = {};
   }
-  if (0.5 * std::abs(usual_sum_dps) > MotionSummary::kTurning_dps) {
-    motion.turned_up_to_dps += 0.5 * std::abs(usual_sum_dps);
+  // About the first, so that squares keep their digits.
+  const double common_dps = 0.5 * (rate_dps[0] + rate_dps[1]);
+  const double apart_dps = 0.5 * (rate_dps[0] - rate_dps[1]);
+  if (open_.count == 0.0) pivot_ = {common_dps, apart_dps};
+  const double x = common_dps - pivot_[0];
+  const double y = apart_dps - pivot_[1];
+  open_.count += 1.0;
+  open_.common_dps += x;
+  open_.apart_dps += y;
+  open_.common_scatter_dps += x * x;
+  open_.apart_scatter_dps += y * y;
+  const double share = (t_s - from_s) / block_s_ * static_cast<double>(kFifths);
+  Sums& fifth = fifths_[std::min(kFifths - 1, static_cast<std::size_t>(share))];
+  fifth.count += 1.0;
+  fifth.common_dps += x;
+  fifth.apart_dps += y;
+}
+
+void RestFinder::close_block() {
+  if (open_.count < kPairsMin) return;
+  RestBlock block = open_;
+  const auto scatter = [&](double mean, double squares) {
+    return std::sqrt(std::max(0.0, squares / block.count - mean * mean));
+  };
+  block.common_dps /= block.count;
+  block.apart_dps /= block.count;
+  block.common_scatter_dps = scatter(block.common_dps, open_.common_scatter_dps);
+  block.apart_scatter_dps = scatter(block.apart_dps, open_.apart_scatter_dps);
+  double cells = 0.0;
+  for (const Sums& fifth : fifths_) {
+    if (fifth.count == 0.0) continue;
+    cells += 1.0;
+    const double common_off = fifth.common_dps / fifth.count - block.common_dps;
+    const double apart_off = fifth.apart_dps / fifth.count - block.apart_dps;
+    block.common_slow_dps += common_off * common_off;
+    block.apart_slow_dps += apart_off * apart_off;
   }
-  const Usual usual = usual_of(blocks);
-  Stretch longest;
-  for (std::size_t begin = 0; begin < blocks.size();) {
-    const std::size_t end = end_of_rest(blocks, begin, usual);
-    if (end > begin) {
-      const Stretch stretch{blocks[begin].begin_s, blocks[end - 1].begin_s + kBlock_s};
-      if (stretch.seconds() > longest.seconds()) longest = stretch;
-      motion.at_rest = begin == 0 && end == blocks.size();
+  block.common_slow_dps = std::sqrt(block.common_slow_dps / cells);
+  block.apart_slow_dps = std::sqrt(block.apart_slow_dps / cells);
+  block.common_dps += pivot_[0];
+  block.apart_dps += pivot_[1];
+  blocks_.push_back(block);
+}
+
+std::vector<RestPart> RestFinder::find() {
+  close_block();
+  open_ = {};
+  if (blocks_.empty()) return {};
+  std::vector<double> counts;
+  for (const RestBlock& block : blocks_)
+    counts.push_back(block.count);
+  const double least = kFullShare * median(std::move(counts));
+  const auto is_poor = [&](const RestBlock& block) { return block.count < least; };
+  blocks_.erase(std::remove_if(blocks_.begin(), blocks_.end(), is_poor), blocks_.end());
+  std::vector<RestPart> parts;
+  std::size_t number = 0;
+  for (const auto& run : RestSearch(blocks_, block_s_, settings_).run()) {
+    for (std::size_t i = run.first; i < run.end; ++i) {
+      const Stretch stretch{blocks_[i].from_s, blocks_[i].from_s + block_s_};
+      const bool goes_on =
+          i > run.first && stretch.from_s < parts.back().stretch.to_s + 0.5 * block_s_;
+      if (goes_on) {
+        parts.back().stretch.to_s = stretch.to_s;
+      } else {
+        parts.push_back({stretch, number});
+      }
     }
-    begin = std::max(end, begin + 1);
+    ++number;
   }
+  return parts;
+}
+
+MotionSummary find_motion(const std::array<Series, 2>& paired,
+                          const std::array<double, 2>& step_dps) {
+  RestFinder finder({.interval_s = paired[0].interval_s, .step_dps = step_dps});
+  for (std::size_t p = 0; p < paired[0].parts.size(); ++p) {
+    const Part& part = paired[0].parts[p];
+    for (std::size_t i = 0; i < part.rate_dps.size(); ++i) {
+      finder.add(part.begin_s + static_cast<double>(i) * paired[0].interval_s,
+                 {part.rate_dps[i], paired[1].parts[p].rate_dps[i]});
+    }
+  }
+  const std::vector<RestPart> parts = finder.find();
+  MotionSummary motion;
+  const std::vector<RestBlock>& blocks = finder.blocks();
+  if (blocks.empty()) return motion;
+  std::vector<double> means;
+  for (const RestBlock& block : blocks)
+    means.push_back(block.common_dps);
+  const double usual_dps = median(means);
+  for (const double mean_dps : means)
+    motion.turned_up_to_dps = std::max(motion.turned_up_to_dps, std::abs(mean_dps - usual_dps));
+  if (std::abs(usual_dps) > MotionSummary::kTurning_dps)
+    motion.turned_up_to_dps += std::abs(usual_dps);
+  Stretch longest;
+  Stretch rest;
+  for (std::size_t k = 0; k < parts.size(); ++k) {
+    const bool same = k > 0 && parts[k].rest == parts[k - 1].rest;
+    rest = {same ? rest.from_s : parts[k].stretch.from_s, parts[k].stretch.to_s};
+    if (rest.seconds() > longest.seconds()) longest = rest;
+  }
+  motion.at_rest = !parts.empty() && longest.from_s <= blocks.front().from_s &&
+                   longest.to_s >= blocks.back().from_s + 0.5 * finder.block_s();
   if (motion.at_rest || longest.seconds() >= MotionSummary::kRestMin_s) motion.rest = longest;
   return motion;
 }

@@ -57,6 +57,12 @@ void print_gyro(const gateway::GyroPlan& gyro) {
            fmt::format("{} in {}, {}", gyro.supply_voltage->name,
                        printable(gyro.supply_voltage->unit), gyro.supply_voltage->layout));
   }
+  for (std::size_t axis = 0; axis < gateway::kOtherAxes.size(); ++axis) {
+    const auto& other = gyro.*gateway::kOtherAxes[axis];
+    if (!other) continue;
+    detail(fmt::format("about {}", "xyz"[axis]),
+           fmt::format("{} in {}, {}", other->name, printable(other->unit), other->layout));
+  }
   print_e2e(gyro.e2e);
   if (gyro.valid) detail("valid when", gyro.valid->text);
   if (gyro.max_bias_dps) detail("bias", fmt::format("at most {:g} deg/s", *gyro.max_bias_dps));

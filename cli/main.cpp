@@ -187,7 +187,8 @@ CLI::App* add_simulate(CLI::App& app, SimulateOptions& options) {
       ->required();
   command
       ->add_option("--profile", options.profile,
-                   "motion, CSV: t_s,rate_dps[,temperature_c][,acc_x_g,acc_y_g,acc_z_g][,supply_v]")
+                   "motion, CSV: t_s,rate_dps[,temperature_c][,acc_x_g,acc_y_g,acc_z_g][,supply_v]"
+                   "[,rate_x_dps,rate_y_dps,rate_z_dps]")
       ->required();
   add_number(*command, "--seed", options.seed, {}, "of the noise; the same gives the same bytes");
   command->add_option("-o,--output", options.output, "candump log; - is standard output")

@@ -72,6 +72,8 @@ class Recorder {
       shift(gyro.t_s);
       fill_beginning(gyro.temperature_c);
       fill_beginning(gyro.supply_v);
+      for (std::vector<double>& axis : gyro.other_rate_dps)
+        fill_beginning(axis);
     }
     shift(recording_.reference_dps.t_s);
     shift(recording_.acceleration.t_s);
@@ -107,6 +109,15 @@ class Recorder {
     if (plan_.gyros[i].temperature)
       series.temperature_c.push_back(inputs_[i].input().temperature_c());
     if (plan_.gyros[i].supply_voltage) series.supply_v.push_back(inputs_[i].input().supply_v());
+    take_other_axes(i);
+  }
+
+  void take_other_axes(std::size_t i) {
+    const std::array<double, 3> rate_dps = inputs_[i].input().other_rate_dps();
+    for (std::size_t axis = 0; axis < rate_dps.size(); ++axis) {
+      if (plan_.gyros[i].*gateway::kOtherAxes[axis])
+        recording_.gyros[i].other_rate_dps[axis].push_back(rate_dps[axis]);
+    }
   }
 
   void take_reference(const canlog::LogRecord& record) {

@@ -42,11 +42,25 @@ enum Part : std::uint8_t { kGyroA = 0, kGyroB = 1, kReference = 2, kAcceleromete
 /// What a gyro's message tells besides its rate, and where the simulator has it from.
 struct Beside {
   std::optional<gateway::Quantity> gateway::GyroPlan::*quantity;
-  double (simulation::Simulator::*value)(double t_s) const;
+  double (*value)(const simulation::Simulator& simulator, const simulation::GyroSample& sample);
 };
+template <std::size_t axis>
+double other_rate_dps(const simulation::Simulator& /*simulator*/,
+                      const simulation::GyroSample& sample) {
+  return sample.other_rate_dps[axis];
+}
 constexpr std::array kBesides{
-    Beside{&gateway::GyroPlan::temperature, &simulation::Simulator::temperature_c},
-    Beside{&gateway::GyroPlan::supply_voltage, &simulation::Simulator::supply_v}};
+    Beside{&gateway::GyroPlan::temperature,
+           [](const simulation::Simulator& simulator, const simulation::GyroSample& sample) {
+             return simulator.temperature_c(sample.t_s);
+           }},
+    Beside{&gateway::GyroPlan::supply_voltage,
+           [](const simulation::Simulator& simulator, const simulation::GyroSample& sample) {
+             return simulator.supply_v(sample.t_s);
+           }},
+    Beside{&gateway::GyroPlan::rate_x, other_rate_dps<0>},
+    Beside{&gateway::GyroPlan::rate_y, other_rate_dps<1>},
+    Beside{&gateway::GyroPlan::rate_z, other_rate_dps<2>}};
 constexpr bool all_besides_are_played() {
   if (kBesides.size() != gateway::kBesides.size()) return false;
   for (std::size_t i = 0; i < kBesides.size(); ++i) {
@@ -236,7 +250,7 @@ void Recording::put_besides(Part part, std::size_t n, can::Frame& frame) const {
     const auto& quantity = gyro.*beside.quantity;
     if (!quantity || !gateway::carries(gyro, *quantity, frame)) continue;
     if (page_is_chosen && !quantity->presence.holds(frame.payload())) continue;
-    gateway::put_quantity(*quantity, (simulator_.*beside.value)(gyros_[part][n].t_s), frame);
+    gateway::put_quantity(*quantity, beside.value(simulator_, gyros_[part][n]), frame);
     page_is_chosen = page_is_chosen || !quantity->presence.always();
   }
 }
@@ -247,7 +261,7 @@ void Recording::put_page(Part part, std::size_t n, const gateway::Quantity& page
   for (const Beside& beside : kBesides) {
     const auto& quantity = plan_.gyros[part].*beside.quantity;
     if (!quantity || !quantity->presence.holds(frame.payload())) continue;
-    gateway::put_quantity(*quantity, (simulator_.*beside.value)(gyros_[part][n].t_s), frame);
+    gateway::put_quantity(*quantity, beside.value(simulator_, gyros_[part][n]), frame);
   }
 }
 
@@ -325,6 +339,12 @@ void Recording::say_constants() const {
   if (tells_supply && !simulator_.profile().supply_v) {
     tell("  supply voltage: {:g} V throughout; the profile has no column supply_v\n",
          simulation::Simulator::kSupply_v);
+  }
+  for (std::size_t axis = 0; axis < gateway::kOtherAxes.size(); ++axis) {
+    const bool tells =
+        plan_.gyros[0].*gateway::kOtherAxes[axis] || plan_.gyros[1].*gateway::kOtherAxes[axis];
+    if (!tells || simulator_.profile().other_rate_dps[axis]) continue;
+    tell("  rate about {0}: 0 throughout; the profile has no column rate_{0}_dps\n", "xyz"[axis]);
   }
 }
 

@@ -17,7 +17,9 @@ constexpr double kSlopeMin = 0.05;
 Compensation::Compensation(std::span<const model::Effect> effects)
     : equation_(effects), lag_(from_seconds(equation_.lag_s())) {
   std::vector<model::Effect> lasting(effects.begin(), effects.end());
-  std::erase_if(lasting, [](const model::Effect& e) { return e.kind == model::Kind::kLine; });
+  std::erase_if(lasting, [](const model::Effect& e) {
+    return e.kind == model::Kind::kLine || e.kind == model::Kind::kCrossAxis;
+  });
   lasting_ = model::Equation(lasting);
 }
 

@@ -31,7 +31,7 @@ class Compensation {
   [[nodiscard]] double correct(double reading_dps, const model::Surroundings& surroundings) const;
 
   /// The part that is the gyro's zero offset, for people and for VG_Bias: all offsets but lines,
-  /// which are over before anybody has read them.
+  /// which are over before anybody has read them, and what comes of other rotations.
   [[nodiscard]] double zero_offset_dps(const model::Surroundings& surroundings) const;
 
   /// A sample stamped t is of the rate at t − lag.
@@ -41,7 +41,7 @@ class Compensation {
   [[nodiscard]] double invert(double reading_dps, const model::Surroundings& surroundings) const;
 
   model::Equation equation_;
-  model::Equation lasting_;  ///< without lines
+  model::Equation lasting_;  ///< the zero offset's
   Duration lag_{0};
 };
 

@@ -12,6 +12,7 @@
 #include "gap/kinds.h"
 #include "gap/views.h"
 #include "model/catalogue.h"
+#include "model/temperature_past.h"
 
 namespace vgyro::gap {
 
@@ -76,6 +77,14 @@ constexpr AxisRow kAxes[] = {
      [](const Seen& s) { return s.around.temperature_c; }},
     {Axis::kTemperatureSlope, "the change of temperature", "change of temperature / (K/s)",
      [](const Seen& s) { return s.around.temperature_slope_c_s; }},
+    {Axis::kTemperatureLag, "how far the temperature with play stays behind",
+     "temperature with play less temperature / K",
+     [](const Seen& s) {
+       const model::TemperaturePast* const past = s.around.temperature_past;
+       return past == nullptr
+                  ? model::Surroundings::kUnknown
+                  : past->followed_c(s.p[1], s.around.temperature_c) - s.around.temperature_c;
+     }},
     {Axis::kRateTimesTemperature, "the rate times the temperature",
      "(temperature - {reference:.4g} °C) · rate / (K deg/s)",
      [](const Seen& s) { return (s.around.temperature_c - s.p[1]) * s.rate.value; }},
@@ -85,6 +94,8 @@ constexpr AxisRow kAxes[] = {
      [](const Seen& s) { return s.around.vibration_g2; }},
     {Axis::kSupply, "the supply voltage", "supply voltage / V",
      [](const Seen& s) { return s.around.supply_v; }},
+    {Axis::kOtherRate, "the rate about {axis}", "rate about {axis} / (deg/s)",
+     [](const Seen& s) { return s.around.other_rate_dps[static_cast<std::size_t>(s.p[0])]; }},
     {Axis::kRateSlope, "the slope of the rate", "slope of the rate / (deg/s²)",
      [](const Seen& s) { return s.rate.slope; }},
     {Axis::kGrowingLag, "time, as a lag that grows", "time / s",
@@ -302,7 +313,8 @@ Where where_of_noise(const Subject& s, const PairNoise& without) {
   const double nyquist_hz = 0.5 / s.data.layout.interval_s[s.gyro()];
   Where where{0.0, seconds, 0.0, nyquist_hz};
   const Random part = row(s.named.effect.kind).random;
-  if (part == Random::kWalk) where.high_hz = std::min(nyquist_hz, 0.5 / kBlock_s);
+  if (part == Random::kWalk || part == Random::kFlicker)
+    where.high_hz = std::min(nyquist_hz, 0.5 / kBlock_s);
   if (part == Random::kMarkov)
     where.high_hz = std::min(nyquist_hz, 1.0 / std::max(s.p()[1], kMemoryMin_s));
   if (part != Random::kRatio) return where;

@@ -66,8 +66,8 @@ std::array<Curve, 2> time_band(const Observations& data, std::size_t gyro, Sight
     for (std::size_t k = 0; k < 2; ++k) {
       if (!data.holds[k] || (sight == Sight::kOwn && k != gyro)) continue;
       variance += noise[k].walk_dps_rts * noise[k].walk_dps_rts * t_s;
-      for (const MarkovTerm& term : noise[k].markov)
-        variance += term.sigma_dps * term.sigma_dps;
+      noise[k].each_correlated(
+          [&](const MarkovTerm& term) { variance += term.sigma_dps * term.sigma_dps; });
     }
     band[0].x.push_back(t_s);
     band[0].y.push_back(2.0 * std::sqrt(variance));

@@ -15,9 +15,10 @@ namespace {
 using model::Kind;
 
 constexpr std::array kAxes{Input::kAccelerationX, Input::kAccelerationY, Input::kAccelerationZ};
+constexpr std::array kOtherAxes{Input::kRateX, Input::kRateY, Input::kRateZ};
 
 // Rows that speak for an input that stands still: those that need no other but these.
-std::vector<Kind> speakers(std::uint8_t needs) {
+std::vector<Kind> speakers(Inputs needs) {
   std::vector<Kind> list;
   for (const KindRow& its : kinds()) {
     if (its.speaks_for_input && its.needs != 0 && (its.needs & ~needs) == 0)
@@ -39,6 +40,7 @@ class Lacks {
     rate();
     acceleration();
     supply();
+    other_axes();
   }
 
  private:
@@ -47,7 +49,7 @@ class Lacks {
   }
 
   void temperature() {
-    const std::uint8_t needs = bit(Input::kTemperature) | bit(Input::kTemperatureSlope);
+    const Inputs needs = bit(Input::kTemperature) | bit(Input::kTemperatureSlope);
     if (!x_.knows(Input::kTemperature)) {
       add(speakers(needs).front(), "the configuration names no temperature signal",
           "name `temperature` in [[gyro]], if the sensor sends one");
@@ -101,13 +103,27 @@ class Lacks {
 
   // Few gyros tell it: who names none is not told to.
   void supply() {
-    const std::uint8_t needs = bit(Input::kSupply);
+    const Inputs needs = bit(Input::kSupply);
     if (!x_.knows(Input::kSupply) || x_.moves(needs)) return;
     for (const Kind kind : speakers(needs)) {
       add(kind,
           fmt::format("the supply voltage is constant in this recording, within {:.2g} V",
                       x_.of(Input::kSupply)),
           "let the supply voltage change by half a volt, up and down");
+    }
+  }
+
+  // Likewise.
+  void other_axes() {
+    for (std::size_t axis = 0; axis < kOtherAxes.size(); ++axis) {
+      const Input input = kOtherAxes[axis];
+      if (!x_.knows(input) || x_.moves(bit(input))) continue;
+      for (const Kind kind : speakers(bit(kOtherAxes[0]))) {
+        add(kind,
+            fmt::format("the rate about {} is constant in this recording, within {:.2g} deg/s",
+                        "xyz"[axis], x_.of(input)),
+            fmt::format("turn about {}, to and fro", "xyz"[axis]));
+      }
     }
   }
 

@@ -35,6 +35,9 @@ constexpr InputRow kInputs[] = {
      kAccelerationMin_g},
     {Input::kVibration, [](double, const S& s) { return s.vibration_g2; }, kVibrationMin_g2},
     {Input::kSupply, [](double, const S& s) { return s.supply_v; }, kSupplyMin_v},
+    {Input::kRateX, [](double, const S& s) { return s.other_rate_dps[0]; }, kRateMin_dps},
+    {Input::kRateY, [](double, const S& s) { return s.other_rate_dps[1]; }, kRateMin_dps},
+    {Input::kRateZ, [](double, const S& s) { return s.other_rate_dps[2]; }, kRateMin_dps},
 };
 static_assert(std::size(kInputs) == kInputCount);
 
@@ -46,9 +49,9 @@ constexpr bool inputs_in_order() {
 }
 static_assert(inputs_in_order());
 
-constexpr std::uint8_t kNothing = 0;
-constexpr std::uint8_t kRate = bit(Input::kRate);
-constexpr std::uint8_t kTemperature = bit(Input::kTemperature);
+constexpr Inputs kNothing = 0;
+constexpr Inputs kRate = bit(Input::kRate);
+constexpr Inputs kTemperature = bit(Input::kTemperature);
 
 // A reference temperature or voltage is no free parameter: another one is another bias or scale
 // factor.
@@ -62,7 +65,10 @@ constexpr std::array kSecond{Free{1}};
 constexpr std::array kDelayFree{Free{0, false, 1e-4}};
 constexpr std::array kSkewFree{Free{0, false, 1.0}};
 constexpr std::array kCutoffFree{Free{0, false, 1e-3, true}};
+constexpr std::array kSecondOrderFree{Free{0, false, 1e-3, true}, Free{1, false, 1e-3, true}};
 constexpr std::array kWarmUpFree{Free{0}, Free{1, false, 1e-3, true}};
+// So small that hardly a sample gets from one side of the play to the other.
+constexpr std::array kPlayFree{Free{0}, Free{1, false, 1e-6, true}};
 // The sine and the cosine of a phase that is hardly moved.
 constexpr std::array kHarmonicFree{Free{1, false, 1.0}, Free{2, false, 1e-4}};
 constexpr std::array kLineFree{Free{0, false, 1e-6}, Free{1, false, 1.0}, Free{2, false, 1e-4}};
@@ -77,8 +83,16 @@ constexpr std::array kAxes{Parameters{0.0, 1.0}, Parameters{1.0, 1.0}, Parameter
 constexpr std::array kWarmUps{Parameters{1.0, 3.0},   Parameters{1.0, 7.0},  Parameters{1.0, 15.0},
                               Parameters{1.0, 30.0},  Parameters{1.0, 60.0}, Parameters{1.0, 120.0},
                               Parameters{1.0, 240.0}, Parameters{1.0, 480.0}};
+// Four times as long each time: a logarithm hardly bends.
+constexpr std::array kRunIns{Parameters{1.0, 2.0}, Parameters{1.0, 8.0}, Parameters{1.0, 32.0},
+                             Parameters{1.0, 128.0}};
+// Twice as far each time.
+constexpr std::array kPlays{Parameters{1.0, 0.3}, Parameters{1.0, 0.6}, Parameters{1.0, 1.2},
+                            Parameters{1.0, 2.4}, Parameters{1.0, 4.8}};
 constexpr std::array kCutoffs{Parameters{1.0}, Parameters{2.5}, Parameters{6.0}, Parameters{15.0},
                               Parameters{40.0}};
+constexpr std::array kSecondOrders{Parameters{2.0, 0.7}, Parameters{5.0, 0.7},
+                                   Parameters{12.0, 0.7}, Parameters{30.0, 0.7}};
 // What a turntable, a gear or a magnet repeats in a turn.
 constexpr std::array kHarmonics{
     Parameters{1.0, 1.0, 0.0},  Parameters{2.0, 1.0, 0.0},  Parameters{3.0, 1.0, 0.0},
@@ -89,24 +103,48 @@ constexpr std::array kHarmonics{
 constexpr std::array<Bound, 0> kNoBound{};
 // A slower low-pass is no gyro's, a faster one is none.
 constexpr std::array kCutoffBound{Bound{0, 0.05, 1e4}};
+// Filters of gyros neither ring nor creep.
+constexpr std::array kSecondOrderBound{Bound{0, 0.05, 1e4}, Bound{1, 0.2, 2.0}};
+// Below what sensors of a gyro's temperature resolve.
+constexpr std::array kPlayBound{Bound{1, 0.05, 100.0}};
 // Faster than two samples, or slower than hours, it is a spike or a bias.
 constexpr std::array kWarmUpBound{Bound{1, 0.5, 1e4}};
+
+constexpr std::array<Limit, 0> kNoLimit{};
+// What dies away later than the recording ends is a bias.
+constexpr std::array kWarmUpLimit{Limit{1, {}, 1.0, false}};
+// With more play than that the temperature drags it along too little to show a loop: what it stays
+// behind by is the temperature itself.
+constexpr std::array kPlayLimit{Limit{1, Input::kTemperature, 0.35}};
+// A logarithm that hardly bends is a ramp.
+constexpr std::array kRunInLimit{Limit{1, {}, 0.1}};
 
 // Of places tried: starts and a second free parameter count as in docs/gap.md.
 constexpr double kNoPenalty = 0.0;
 constexpr double kWarmUpPenalty = 5.0;
+// Four starts and a free time; and where a ramp explains as much, it is a ramp: the difference is
+// more than what a name must lead by.
+constexpr double kRunInPenalty = 8.0;
+// Five starts and a free play.
+constexpr double kPlayPenalty = 5.0;
 constexpr double kAxisPenalty = 1.0;
 constexpr double kCutoffPenalty = 2.0;
+// Four starts and a free damping; and where a first order, or a delay, explains as much, it is
+// that.
+// It has a lag and a low-pass for free, and passes for either: it must be far better than they are.
+constexpr double kSecondOrderPenalty = 40.0;
 constexpr double kHarmonicPenalty = 7.0;
 // Two parameters more than a walk, one of which means nothing where the other is 0.
 constexpr double kMarkovPenalty = 6.0;
+// A walk that is as good is a walk: more than what a name must lead by.
+constexpr double kFlickerPenalty = 8.0;
 constexpr std::size_t kAnyNumber = 0;
 constexpr std::size_t kFew = 3;
 
 // Fields that the rows of one family share.
-constexpr KindRow added(Kind kind, std::uint8_t needs, std::span<const Parameters> starts,
-                        Axis axis, Experiment experiment, std::string_view against,
-                        std::string_view signature, std::string_view evidence) {
+constexpr KindRow added(Kind kind, Inputs needs, std::span<const Parameters> starts, Axis axis,
+                        Experiment experiment, std::string_view against, std::string_view signature,
+                        std::string_view evidence) {
   return {.kind = kind,
           .finder = Finder::kShape,
           .needs = needs,
@@ -116,6 +154,7 @@ constexpr KindRow added(Kind kind, std::uint8_t needs, std::span<const Parameter
           .starts = starts,
           .penalty = kNoPenalty,
           .bounds = std::span<const Bound>(kNoBound),
+          .limits = std::span<const Limit>(kNoLimit),
           .forms_differ = false,
           .is_fast = false,
           .keeps_size = true,
@@ -144,6 +183,7 @@ constexpr KindRow timing(Kind kind, std::span<const Free> free, Form form,
           .starts = starts,
           .penalty = penalty,
           .bounds = bounds,
+          .limits = std::span<const Limit>(kNoLimit),
           .forms_differ = false,
           .is_fast = true,
           .keeps_size = true,
@@ -169,6 +209,7 @@ constexpr KindRow random(Kind kind, Random part, double penalty, bool fast,
           .starts = std::span<const Parameters>(kNoStart),
           .penalty = penalty,
           .bounds = std::span<const Bound>(kNoBound),
+          .limits = std::span<const Limit>(kNoLimit),
           .forms_differ = false,
           .is_fast = fast,
           .keeps_size = false,
@@ -194,6 +235,7 @@ constexpr KindRow frames(Kind kind, std::string_view against, Random part = Rand
           .starts = std::span<const Parameters>(kNoStart),
           .penalty = kNoPenalty,
           .bounds = std::span<const Bound>(kNoBound),
+          .limits = std::span<const Limit>(kNoLimit),
           .forms_differ = false,
           .is_fast = false,
           .keeps_size = false,
@@ -221,7 +263,33 @@ constexpr KindRow warm_up() {
   row.free = std::span<const Free>(kWarmUpFree);
   row.penalty = kWarmUpPenalty;
   row.bounds = std::span<const Bound>(kWarmUpBound);
+  row.limits = std::span<const Limit>(kWarmUpLimit);
   row.keeps_size = false;
+  return row;
+}
+
+constexpr KindRow run_in() {
+  KindRow row =
+      added(Kind::kRunIn, kNothing, kRunIns, Axis::kTime, Experiment::kLonger, "time", "slow",
+            "the residual of {name} moves on ever more slowly, by {p0:+.3g} deg/s times "
+            "ln(1 + t / {p1:.4g} s)");
+  row.free = std::span<const Free>(kWarmUpFree);
+  row.penalty = kRunInPenalty;
+  row.bounds = std::span<const Bound>(kWarmUpBound);
+  row.limits = std::span<const Limit>(kRunInLimit);
+  row.keeps_size = false;
+  return row;
+}
+
+constexpr KindRow temperature_hysteresis() {
+  KindRow row = added(Kind::kTemperatureHysteresis, kTemperature, kPlays, Axis::kTemperatureLag,
+                      Experiment::kTemperatureCycles, "temperature", "temperature",
+                      "the residual of {name} goes another way when its temperature turns round: "
+                      "{p0:+.3g} deg/s per K that a play of {p1:.3g} K to both sides leaves");
+  row.free = std::span<const Free>(kPlayFree);
+  row.penalty = kPlayPenalty;
+  row.bounds = std::span<const Bound>(kPlayBound);
+  row.limits = std::span<const Limit>(kPlayLimit);
   return row;
 }
 
@@ -243,6 +311,19 @@ constexpr KindRow g_sensitivity() {
   row.free = std::span<const Free>(kSecond);
   row.penalty = kAxisPenalty;
   row.forms_differ = true;
+  row.errors_of = std::size_t{1};
+  return speaking(row);
+}
+
+constexpr KindRow cross_axis() {
+  KindRow row = added(Kind::kCrossAxis, bit(Input::kRateX), kAxes, Axis::kOtherRate,
+                      Experiment::kOtherTurns, "other_rate", "rate",
+                      "the residual of {name} follows the rate about {axis}: {p1:+.3g} of it");
+  row.by_axis = true;
+  row.free = std::span<const Free>(kSecond);
+  row.penalty = kAxisPenalty;
+  row.forms_differ = true;
+  row.is_fast = true;
   row.errors_of = std::size_t{1};
   return speaking(row);
 }
@@ -344,6 +425,18 @@ constexpr KindRow kKinds[] = {
     speaking(added(Kind::kSupplyVoltageBias, bit(Input::kSupply), kUnitAtSupply, Axis::kSupply,
                    Experiment::kSupplySteps, "supply", "supply",
                    "the residual of {name} follows its supply voltage: {p0:+.3g} deg/s per V")),
+    run_in(),
+    temperature_hysteresis(),
+    random(
+        Kind::kBiasInstability, Random::kFlicker, kFlickerPenalty, false,
+        "{name} wanders alike over all times, by {p0:.3g} deg/s of flicker beyond what the model "
+        "says"),
+    cross_axis(),
+    timing(Kind::kBandwidthSecondOrder, kSecondOrderFree, Form::kLowPass, kSecondOrders,
+           kSecondOrderPenalty, kSecondOrderBound, Axis::kRateSlope, false, "rate_slope",
+           "the residual of {name} grows with the frequency of the motion as behind a low-pass of "
+           "second order of {p0:.4g} Hz and a damping of {p1:.2g}",
+           kNoErrors),
 };
 static_assert(std::size(kKinds) == model::kKindCount);
 
@@ -397,6 +490,9 @@ std::string_view experiment_text(Experiment experiment) {
       return "tilt about both horizontal axes, and shake in bursts";
     case Experiment::kSupplySteps:
       return "let the supply voltage rise and fall by half a volt, several times";
+    case Experiment::kOtherTurns:
+      return "turn about the two other axes, at times when the platform does not turn about its "
+             "own";
     case Experiment::kLonger:
       break;
   }
@@ -426,10 +522,10 @@ void tidy_phase(model::Effect& effect) {
   effect.parameters[2] -= turn * std::floor(effect.parameters[2] / turn);
 }
 
-std::uint8_t needs_of(const model::Effect& effect) {
+Inputs needs_of(const model::Effect& effect) {
   const KindRow& its = row(effect.kind);
   const auto axis = its.by_axis ? static_cast<unsigned>(effect.parameters[0]) : 0U;
-  return static_cast<std::uint8_t>(its.needs << axis);
+  return static_cast<Inputs>(its.needs << axis);
 }
 
 bool same_form(const model::Effect& a, const model::Effect& b) {
@@ -454,6 +550,8 @@ constexpr Most kMost[] = {
     {Kind::kGSensitivity, 1, 0.5},
     {Kind::kDelay, 0, 0.3},
     {Kind::kClockSkew, 0, 2e4},
+    {Kind::kTemperatureHysteresis, 0, 0.5},
+    {Kind::kCrossAxis, 1, 0.5},
 };
 
 }  // namespace

@@ -9,6 +9,7 @@
 #include <concepts>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string_view>
 
@@ -16,7 +17,7 @@
 
 namespace vgyro::gap {
 
-/// What a recording holds that an error may depend on. The three axes follow each other.
+/// What a recording holds that an error may depend on. Three axes follow each other.
 enum class Input : std::uint8_t {
   kRate,
   kTemperature,
@@ -26,8 +27,13 @@ enum class Input : std::uint8_t {
   kAccelerationZ,
   kVibration,
   kSupply,
+  kRateX,
+  kRateY,
+  kRateZ,
 };
-inline constexpr std::size_t kInputCount = 8;
+inline constexpr std::size_t kInputCount = 11;
+/// A set of inputs, by bits.
+using Inputs = std::uint16_t;
 
 /// One input: where it is read, how far it must move to show anything, and what to say where it
 /// does not.
@@ -73,11 +79,20 @@ struct Bound {
   double most = 0.0;
 };
 
+/// What a recording can show of a parameter: beyond this share of its length, or of an input's
+/// range, the shape is another kind's.
+struct Limit {
+  std::size_t parameter = 0;
+  std::optional<Input> of = {};  ///< none: the length
+  double share = 1.0;
+  bool in_fits = true;  ///< or only of what is tried
+};
+
 /// Which part of the random model a kind is.
-enum class Random : std::uint8_t { kNone, kWhite, kRatio, kWalk, kMarkov, kRounding };
+enum class Random : std::uint8_t { kNone, kWhite, kRatio, kWalk, kMarkov, kFlicker, kRounding };
 /// It wanders, slower than samples.
 constexpr bool is_drift(Random part) {
-  return part == Random::kWalk || part == Random::kMarkov;
+  return part == Random::kWalk || part == Random::kMarkov || part == Random::kFlicker;
 }
 
 /// What a figure of it is drawn against.
@@ -85,10 +100,12 @@ enum class Axis : std::uint8_t {
   kRate,
   kTemperature,
   kTemperatureSlope,
+  kTemperatureLag,
   kRateTimesTemperature,
   kAcceleration,
   kVibration,
   kSupply,
+  kOtherRate,
   kRateSlope,
   kGrowingLag,
   kAngle,
@@ -104,6 +121,7 @@ enum class Experiment : std::uint8_t {
   kTemperatureCycles,
   kTilt,
   kSupplySteps,
+  kOtherTurns,
   kLonger,
 };
 std::string_view experiment_text(Experiment experiment);
@@ -126,13 +144,14 @@ class Given {
 struct KindRow {
   Given<model::Kind> kind;
   Given<Finder> finder;
-  Given<std::uint8_t> needs;  ///< inputs that must move, by bits
-  Given<bool> by_axis;        ///< parameter 0 is the axis of the acceleration that it needs
+  Given<Inputs> needs;  ///< inputs that must move, by bits
+  Given<bool> by_axis;  ///< parameter 0 is the axis of the input that it needs
   Given<std::span<const Free>> free;
   Given<Form> form;
   Given<std::span<const model::Parameters>> starts;  ///< of the scan, of size 1
   Given<double> penalty;  ///< of its statistic: places that were tried for it
   Given<std::span<const Bound>> bounds;
+  Given<std::span<const Limit>> limits;
   Given<bool> forms_differ;  ///< another parameter 0 is another shape, not another start
   Given<bool> is_fast;       ///< what a late rate leaves may look like it
   Given<bool> keeps_size;    ///< may be judged by its size in parts of the recording
@@ -151,9 +170,9 @@ struct KindRow {
 inline constexpr std::size_t kNoErrors = model::kParametersMax;
 
 // One more input than the bits of a mask have places for would be lost without a word.
-static_assert(kInputCount <= 8);
-constexpr std::uint8_t bit(Input input) {
-  return static_cast<std::uint8_t>(1U << static_cast<unsigned>(input));
+static_assert(kInputCount <= 16);
+constexpr Inputs bit(Input input) {
+  return static_cast<Inputs>(1U << static_cast<unsigned>(input));
 }
 
 /// In the order of model::Kind.
@@ -165,7 +184,7 @@ void clamp(model::Effect& effect);
 /// Amplitude above 0 and phase within a turn, where it has them.
 void tidy_phase(model::Effect& effect);
 /// Inputs that the effect needs, by bits.
-std::uint8_t needs_of(const model::Effect& effect);
+Inputs needs_of(const model::Effect& effect);
 /// Both are the same shape, but for where a search starts.
 bool same_form(const model::Effect& a, const model::Effect& b);
 

@@ -35,7 +35,7 @@ constexpr double kLogOf0 = 1e-300;
 // whole recording: there the likelihood need not be known better than a fiftieth of a nat.
 constexpr int kFastEvaluations = 150;
 constexpr double kFastTolerance = 1e-3;
-constexpr int kSlowEvaluations = 60;  ///< for each unknown
+constexpr int kSlowEvaluations = 40;  ///< for each unknown
 constexpr double kSlowTolerance = 2e-2;
 
 // Bounds of a fitted logarithm, about that of the density by which samples scatter within their
@@ -69,7 +69,7 @@ constexpr double kFrequencySame = 1e-6;
 // sensor. Wider would cost digits and gain nothing.
 constexpr double kOtherStart_dps = 1.0;
 
-constexpr std::size_t kTermsMax = 1 + kMarkovMax;
+constexpr std::size_t kTermsMax = 1 + kFlickerTerms + kMarkovMax;
 constexpr std::size_t kStatesMax = 2 * kTermsMax;
 
 // The drift filter's states: for each gyro a walk and its Markov terms.
@@ -96,14 +96,14 @@ States states_of(const PairNoise& noise, const Layout& layout) {
     states.gyro[states.count] = gyro;
     states.growth[states.count] = terms.walk_dps_rts * terms.walk_dps_rts;
     ++states.count;
-    for (const MarkovTerm& term : terms.markov) {
-      if (states.count == kStatesMax || term.sigma_dps <= 0.0) continue;
+    terms.each_correlated([&](const MarkovTerm& term) {
+      if (states.count == kStatesMax || term.sigma_dps <= 0.0) return;
       states.gyro[states.count] = gyro;
       states.tau_s[states.count] = term.tau_s;
       states.stationary[states.count] = term.sigma_dps * term.sigma_dps;
       states.start_variance[states.count] = states.stationary[states.count];
       ++states.count;
-    }
+    });
   }
   return states;
 }
@@ -127,6 +127,9 @@ PairNoise noise_of(const std::vector<model::Effect>& effects) {
         break;
       case Random::kMarkov:
         terms.markov.push_back({value, effect.parameters[1]});
+        break;
+      case Random::kFlicker:
+        terms.flicker_dps = std::hypot(terms.flicker_dps, value);
         break;
       case Random::kRounding:
         terms.step_dps = std::hypot(terms.step_dps, value);
@@ -154,12 +157,12 @@ double white_variance(const std::array<double, 3>& gain, double rate_square, con
 // variance less that of its mean.
 double drift_within(const NoiseTerms& terms, double seconds) {
   double variance = terms.walk_dps_rts * terms.walk_dps_rts * seconds / 6.0;
-  for (const MarkovTerm& term : terms.markov) {
+  terms.each_correlated([&](const MarkovTerm& term) {
     const double x = seconds / term.tau_s;
     const double of_mean = x > kShortMemories ? 2.0 / (x * x) * (x - 1.0 + std::exp(-x))
                                               : 1.0 - x / 3.0 + x * x / 12.0;
     variance += term.sigma_dps * term.sigma_dps * (1.0 - of_mean);
-  }
+  });
   return variance;
 }
 
@@ -565,7 +568,7 @@ double log_likelihood(const Eigen::VectorXd& residual, const Layout& layout, con
 namespace {
 
 struct Unknown {
-  enum class What : std::uint8_t { kWhite, kRatio, kWalk, kSigma, kTau };
+  enum class What : std::uint8_t { kWhite, kRatio, kWalk, kFlicker, kSigma, kTau };
   std::size_t gyro = 0;
   What what = What::kWhite;
   double low = 0.0;  ///< of the logarithm
@@ -581,6 +584,8 @@ double& value_of(PairNoise& noise, const Unknown& unknown) {
       return terms.ratio_rthz;
     case Unknown::What::kWalk:
       return terms.walk_dps_rts;
+    case Unknown::What::kFlicker:
+      return terms.flicker_dps;
     case Unknown::What::kSigma:
       return terms.markov.back().sigma_dps;
     case Unknown::What::kTau:
@@ -687,6 +692,8 @@ void set_drift_free(NoiseTerms& terms, std::size_t gyro, double density, double 
                     const Freedom& free, std::vector<Unknown>& unknowns) {
   if (free.walk)
     set_free(terms.walk_dps_rts, gyro, Unknown::What::kWalk, density, kWalkRange, unknowns);
+  if (free.flicker)
+    set_free(terms.flicker_dps, gyro, Unknown::What::kFlicker, density, kSigmaRange, unknowns);
   if (!free.markov) return;
   terms.markov.push_back({0.0, kTauStart_s});
   set_free(terms.markov.back().sigma_dps, gyro, Unknown::What::kSigma, density, kSigmaRange,
@@ -725,8 +732,9 @@ NoiseFitResult fit_pair_noise(const Eigen::VectorXd& residual, const Layout& lay
     result.log_likelihood = maximise(result.noise, slow, evaluations, kSlowTolerance, both);
   };
   fit_once();
-  // A correlated term of short memory shares its variance with the white noise.
-  if ((free[0].markov || free[1].markov) && !fast.empty()) fit_once();
+  // A correlated term of short memory shares its variance with the white noise; and from where the
+  // search begins size and memory are a long way for one go.
+  if (free[0].markov || free[1].markov) fit_once();
   return result;
 }
 

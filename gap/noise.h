@@ -13,6 +13,7 @@
 #include <Eigen/Core>
 
 #include "model/effect.h"
+#include "model/flicker.h"
 
 namespace vgyro::gap {
 
@@ -26,13 +27,32 @@ struct MarkovTerm {
   double tau_s = 1.0;
 };
 
+/// Flicker noise is looked at as so many terms, a decade apart: quicker ones drown in white noise,
+/// slower ones are a bias.
+inline constexpr std::size_t kFlickerTerms = 4;
+inline constexpr double kFlickerFrom_s = 0.3;
+inline constexpr double kFlickerTo_s = 3000.0;
+
 /// One gyro's.
 struct NoiseTerms {
   double white_dps_rthz = 0.0;
   double ratio_rthz = 0.0;  ///< white noise of this times the rate
   double walk_dps_rts = 0.0;
   std::vector<MarkovTerm> markov;
-  double step_dps = 0.0;  ///< rounding: variance step²/12 in each sample
+  double step_dps = 0.0;     ///< rounding: variance step²/12 in each sample
+  double flicker_dps = 0.0;  ///< bias instability
+
+  /// Every exponentially correlated term: those of the flicker noise, then `markov`.
+  template <class Visit>
+  void each_correlated(const Visit& visit) const {
+    for (std::size_t i = 0; flicker_dps > 0.0 && i < kFlickerTerms; ++i) {
+      const model::FlickerTerm term =
+          model::flicker_term(flicker_dps, i, kFlickerTerms, kFlickerFrom_s, kFlickerTo_s);
+      visit(MarkovTerm{term.sigma_dps, term.tau_s});
+    }
+    for (const MarkovTerm& term : markov)
+      visit(term);
+  }
 
   /// Variance of one sample.
   [[nodiscard]] double variance(double rate_square, double interval_s) const {
@@ -162,6 +182,7 @@ struct Freedom {
   bool ratio = true;
   bool walk = true;
   bool markov = false;  ///< one further exponentially correlated term
+  bool flicker = false;
 };
 
 struct NoiseFitResult {

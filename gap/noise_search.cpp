@@ -20,7 +20,7 @@ constexpr double kForgottenTimes = 16.0;
 
 Freedom only(Random part) {
   return {part == Random::kWhite, part == Random::kRatio, part == Random::kWalk,
-          part == Random::kMarkov};
+          part == Random::kMarkov, part == Random::kFlicker};
 }
 
 // The sizes of a part, the one that was added last where there are several.
@@ -32,6 +32,8 @@ double& size_of(NoiseTerms& terms, Random part) {
       return terms.ratio_rthz;
     case Random::kWalk:
       return terms.walk_dps_rts;
+    case Random::kFlicker:
+      return terms.flicker_dps;
     case Random::kMarkov:
       return terms.markov.back().sigma_dps;
     case Random::kRounding:
@@ -89,11 +91,19 @@ class Curvature {
   Random part_;
 };
 
+// Flicker and correlated drifts share what a model file can hold: one at the least is the
+// flicker's.
+bool has_room(const NoiseTerms& known, Random part) {
+  const std::size_t held = known.markov.size() + (known.flicker_dps > 0.0 ? 1 : 0);
+  if (part == Random::kMarkov) return held < kMarkovNamedMax;
+  return part != Random::kFlicker || known.flicker_dps > 0.0 || held < kMarkovNamedMax;
+}
+
 std::optional<NoiseFound> free_one(const Regression& regression, const Eigen::VectorXd& residual,
                                    const PairNoise& model, std::size_t gyro, const KindRow& its) {
   const Layout& layout = regression.data().layout;
   const Random part = its.random;
-  if (part == Random::kMarkov && model[gyro].markov.size() >= kMarkovNamedMax) return {};
+  if (!has_room(model[gyro], part)) return {};
   std::array<Freedom, 2> free;
   free[0] = free[1] = only(Random::kNone);
   free[gyro] = only(part);
@@ -139,7 +149,7 @@ void name_rivals(const std::vector<std::pair<double, Reading>>& seen, double sec
 
 // In the order in which equals are preferred: the plainest first.
 constexpr std::array kOrder{Kind::kWhiteNoise, Kind::kRateNoise, Kind::kRateRandomWalk,
-                            Kind::kGaussMarkov};
+                            Kind::kBiasInstability, Kind::kGaussMarkov};
 
 }  // namespace
 

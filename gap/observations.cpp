@@ -206,7 +206,7 @@ Effects late_part(const Effects& effects, std::size_t gyro) {
 
 }  // namespace
 
-bool Excitation::moves(std::uint8_t needs) const {
+bool Excitation::moves(Inputs needs) const {
   return std::all_of(inputs().begin(), inputs().end(), [&](const InputRow& input) {
     return (needs & bit(input.input)) == 0 || of(input.input) >= input.least;
   });
@@ -302,6 +302,10 @@ Observations join(const std::vector<const Observations*>& parts, const std::vect
   // What each has learned of it is in the blocks' powers; how much of that is unseen, all tell.
   all.learn_unseen_motion(effects);
   return all;
+}
+
+double Observations::most_of(const Limit& limit, std::size_t gyro) const {
+  return limit.share * (limit.of ? excitation[gyro].of(*limit.of) : about.seconds);
 }
 
 void Observations::learn_unseen_motion(const FastMotion& motion, const Effects& effects) {

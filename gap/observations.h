@@ -39,7 +39,7 @@ struct Excitation {
   [[nodiscard]] double of(Input input) const { return range[static_cast<std::size_t>(input)]; }
   [[nodiscard]] bool knows(Input input) const { return known[static_cast<std::size_t>(input)]; }
   /// All of these inputs, by bits, moved far enough to show something.
-  [[nodiscard]] bool moves(std::uint8_t needs) const;
+  [[nodiscard]] bool moves(Inputs needs) const;
 };
 
 /// Samples of a curve that stand in others' observations: gyro 2's in a difference (slot 1), the
@@ -95,6 +95,8 @@ class Observations {
   /// d contribution / d parameter beside `others`.
   [[nodiscard]] Eigen::VectorXd derivative(const Effects& others, const model::Effect& effect,
                                            const Free& free) const;
+  /// What a parameter of an effect of this gyro can be, for all that was recorded.
+  [[nodiscard]] double most_of(const Limit& limit, std::size_t gyro) const;
   /// Learns what motion between the samples adds to the noise, from what `effects` leave.
   void learn_unseen_motion(const FastMotion& motion, const Effects& effects);
   /// Of blocks that know the motion's power.

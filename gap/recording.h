@@ -12,17 +12,19 @@
 namespace vgyro::gap {
 
 /// One gyro's usable frames; all vectors have one entry for each, but `counter`,
-/// `temperature_c` and `supply_v`, which are empty where the configuration names none.
+/// `temperature_c`, `supply_v` and `other_rate_dps`, which are empty where the configuration names
+/// none.
 struct GyroSeries {
   std::string name;
   std::vector<double> t_s;       ///< stamps, as they are; never decreasing
   std::vector<double> rate_dps;  ///< as decoded, not corrected
   std::vector<double> temperature_c;
   std::vector<double> supply_v;
-  std::vector<std::uint32_t> counter;  ///< alive counter, raw
-  std::uint32_t counter_modulus = 0;   ///< 0: no counter
-  double step_dps = 0.0;               ///< between neighbouring values of the signal; 0: a float
-  double limit_dps = 0.0;              ///< largest magnitude that the signal can carry; 0: unknown
+  std::array<std::vector<double>, 3> other_rate_dps;  ///< about x, y and z of the unit
+  std::vector<std::uint32_t> counter;                 ///< alive counter, raw
+  std::uint32_t counter_modulus = 0;                  ///< 0: no counter
+  double step_dps = 0.0;   ///< between neighbouring values of the signal; 0: a float
+  double limit_dps = 0.0;  ///< largest magnitude that the signal can carry; 0: unknown
 };
 
 struct ScalarSeries {

@@ -89,6 +89,11 @@ Regression::Regression(std::shared_ptr<const Observations> data, Effects known, 
       part_(part) {}
 
 void Regression::keep_in_bounds(Effect& effect) const {
+  for (const Limit& limit : *row(effect.kind).limits) {
+    if (!limit.in_fits) continue;
+    double& value = effect.parameters[limit.parameter];
+    value = std::min(value, data_->most_of(limit, effect.gyro));
+  }
   clamp(effect);
   // Nothing reads ahead of time; a reference may be late, but the other gyro has a name of its own.
   if (effect.kind == model::Kind::kDelay && !data_->about.with_reference)

@@ -1,8 +1,8 @@
 #pragma once
 
 // When the platform rests: then both gyros should read the known rate at rest, which without a
-// reference is all that tells which of them is wrong. A turn slower than the gyros' biases could be
-// is taken for rest; a turn that either gyro feels is not.
+// reference is all that tells which of them is wrong. What rest is says analysis/rest, for
+// `vgyro allan` too; here it is asked at the recording's instants.
 
 #include <array>
 #include <cstdint>
@@ -29,8 +29,7 @@ class RestingSeconds {
   double count_ = 0.0;
 };
 
-/// Seconds in which both gyros are as steady as in their steadiest seconds and read what they read
-/// in the beginning. None when a gyro has too few seconds near that to tell how steady it is.
+/// Seconds in which both gyros rest, by analysis::RestFinder, of which no part of a second is left.
 /// Precondition: the transports are those of the recording.
 RestingSeconds find_rest(const Recording& recording, const std::array<Transport, 2>& transports);
 

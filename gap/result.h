@@ -86,8 +86,9 @@ struct NamedEffect {
 };
 
 struct Unexplained {
-  std::string signature;  ///< "line", "noise", "step", "slow", "outliers", "rate", …
-  std::size_t gyro = 0;
+  /// "line", "noise", "step", "slow", "outliers", "rate", …; "reference_late"
+  std::string signature;
+  std::optional<std::size_t> gyro = 0;  ///< nothing: it is the reference's
   std::optional<double> frequency_hz;
   std::optional<double> amplitude_dps;
   double from_s = 0.0;

@@ -98,8 +98,15 @@ bool enough(const Effects& terms, Kind kind) {
 bool could_show(const Observations& data, const Effect& effect) {
   if (!data.holds[effect.gyro] || !data.excitation[effect.gyro].moves(needs_of(effect)))
     return false;
-  // What dies away later than the recording ends is a bias.
-  return effect.kind != Kind::kWarmUp || effect.parameters[1] < data.about.seconds;
+  const bool by_slope =
+      effect.kind == Kind::kTemperatureHysteresis || effect.kind == Kind::kTemperatureRateBias;
+  const auto& signals = data.about.signals[effect.gyro];
+  if (by_slope && signals && signals->temperature_step_c >= Signals::kCoarseTemperature_c)
+    return false;
+  const auto limits = *row(effect.kind).limits;
+  return std::all_of(limits.begin(), limits.end(), [&](const Limit& limit) {
+    return effect.parameters[limit.parameter] < data.most_of(limit, effect.gyro);
+  });
 }
 
 std::vector<double> distinct_steps(const Layout& layout, const std::vector<double>& at_s) {

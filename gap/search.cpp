@@ -233,6 +233,7 @@ PairNoise Search::modelled(const PairNoise& fitted) const {
         unknown_noise_[gyro] ? kUnknownWalk * noise[gyro].walk_dps_rts : model.walk_dps_rts;
     noise[gyro].walk_dps_rts = std::min(noise[gyro].walk_dps_rts, walk);
     noise[gyro].ratio_rthz = model.ratio_rthz;
+    noise[gyro].flicker_dps = model.flicker_dps;
     noise[gyro].markov = model.markov;
     if (model.white_dps_rthz > 0.0) noise[gyro].white_dps_rthz = model.white_dps_rthz;
   }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <complex>
 #include <numbers>
 
 #include <Eigen/Cholesky>
@@ -16,6 +17,11 @@ namespace {
 
 constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr std::array kTemperatureReach_s{1.0, 2.0, 4.0, 8.0};
+// Where a temperature comes in steps these follow it too, over means of cells. What steps scatter
+// about a curve that follows is a twelfth of their square, and some more where they are few.
+constexpr std::array kSteppedReach_s{16.0, 32.0};
+constexpr double kSteppedCell_s = 0.25;
+constexpr double kSteppedScatter = 1.5 / 12.0;
 // How much more than usual a temperature may scatter about a parabola that follows it.
 constexpr double kFollows = 1.2;
 constexpr double kGridStep_s = 0.25;
@@ -37,30 +43,48 @@ std::vector<double> quarters_of(const SampledCurve& curve) {
   return value;
 }
 
-// First-order low-pass, exact for a rate that is a parabola in each half of an interval.
-SampledCurve low_pass(const SampledCurve& curve, const std::vector<double>& quarters,
-                      double cutoff_hz) {
+// First-order low-pass with a real or a complex pole, exact for a rate that is a parabola in each
+// half of an interval.
+template <class Number>
+std::vector<Number> behind_pole(const SampledCurve& curve, const std::vector<double>& quarters,
+                                Number pole) {
   const std::span<const double> t_s = curve.times_s();
-  const double pole = 2.0 * std::numbers::pi * cutoff_hz;
-  std::vector<double> value(t_s.size());
-  double state = curve.values().front();
+  std::vector<Number> value(t_s.size());
+  Number state = curve.values().front();
   value[0] = state;
   for (std::size_t i = 0; i + 1 < t_s.size(); ++i) {
     const double half_s = 0.5 * (t_s[i + 1] - t_s[i]);
-    const double decay = std::exp(-pole * half_s);
+    const Number decay = std::exp(-pole * half_s);
     for (std::size_t half = 0; half < 2; ++half) {
       const double* u = &quarters[kQuarters * i + 2 * half];
       const double bend = 2.0 * (u[0] - 2.0 * u[1] + u[2]) / (half_s * half_s);
       const double slope = (u[2] - u[0]) / half_s - bend * half_s;
       // y' = pole·(u − y) is met by a parabola and what decays.
       const double c = bend;
-      const double b = slope - 2.0 * c / pole;
-      const double a = u[0] - b / pole;
+      const Number b = slope - 2.0 * c / pole;
+      const Number a = u[0] - b / pole;
       state = a + (b + c * half_s) * half_s + (state - a) * decay;
     }
     value[i + 1] = state;
   }
-  return {t_s, value};
+  return value;
+}
+
+SampledCurve low_pass(const SampledCurve& curve, const std::vector<double>& quarters,
+                      double cutoff_hz) {
+  return {curve.times_s(), behind_pole(curve, quarters, 2.0 * std::numbers::pi * cutoff_hz)};
+}
+
+// Two of first order, one behind the other, as a weighted sum of both side by side.
+SampledCurve low_pass(const SampledCurve& curve, const std::vector<double>& quarters,
+                      const model::SecondOrder& second) {
+  const auto [a, b] = second.poles();
+  const std::vector<std::complex<double>> of_a = behind_pole(curve, quarters, a);
+  const std::vector<std::complex<double>> of_b = behind_pole(curve, quarters, b);
+  std::vector<double> value(of_a.size());
+  for (std::size_t i = 0; i < value.size(); ++i)
+    value[i] = std::real((b * of_a[i] - a * of_b[i]) / (b - a));
+  return {curve.times_s(), value};
 }
 
 struct Parabola {
@@ -115,6 +139,17 @@ double usual_scatter(std::span<const double> t_s, std::span<const double> y) {
   return median_of(scatter);
 }
 
+SampledCurve known_of(const std::vector<double>& t_s, const std::vector<double>& value) {
+  std::vector<double> known_s;
+  std::vector<double> known;
+  for (std::size_t i = 0; i < value.size(); ++i) {
+    if (std::isnan(value[i])) continue;
+    known_s.push_back(t_s[i]);
+    known.push_back(value[i]);
+  }
+  return {known_s, known};
+}
+
 }  // namespace
 
 Motion::Motion(SampledCurve rate_dps) : rate_dps_(std::move(rate_dps)) {
@@ -148,6 +183,22 @@ SampledCurve Motion::low_passed(double cutoff_hz) const {
   return low_pass(rate_dps_, quarters_of(rate_dps_), cutoff_hz);
 }
 
+SampledCurve Motion::low_passed(const model::SecondOrder& second) const {
+  return low_pass(rate_dps_, quarters_of(rate_dps_), second);
+}
+
+namespace {
+
+// Of the last sample before: between two it goes on straight.
+const model::TemperaturePast* past_at(const SampledCurve& temperature_c,
+                                      const std::vector<model::TemperaturePast>& past, double t_s) {
+  const std::span<const double> times_s = temperature_c.times_s();
+  const auto after = std::upper_bound(times_s.begin(), times_s.end(), t_s) - times_s.begin();
+  return &past[static_cast<std::size_t>(std::max<std::ptrdiff_t>(after - 1, 0))];
+}
+
+}  // namespace
+
 model::Surroundings Signals::at(double t_s) const {
   model::Surroundings s = without_motion_at(t_s);
   s.angle_rad = motion.angle_rad(t_s);
@@ -160,6 +211,7 @@ model::Surroundings Signals::without_motion_at(double t_s) const {
   if (!temperature_c.empty()) {
     s.temperature_c = temperature_c.linear(t_s);
     s.temperature_slope_c_s = temperature_slope_c_s.linear(t_s);
+    s.temperature_past = past_at(temperature_c, temperature_past, t_s);
   }
   if (!vibration_g2.empty()) {
     for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -168,21 +220,84 @@ model::Surroundings Signals::without_motion_at(double t_s) const {
     s.vibration_g2 = vibration_g2.linear(t_s);
   }
   if (!supply_v.empty()) s.supply_v = supply_v.linear(t_s);
+  for (std::size_t axis = 0; axis < other_rate_dps.size(); ++axis) {
+    if (!other_rate_dps[axis].empty()) s.other_rate_dps[axis] = other_rate_dps[axis].at(t_s).value;
+  }
   return s;
 }
+
+namespace {
+
+// The least distance of two values that follow each other, 0 where they never differ.
+double step_of(std::span<const double> values) {
+  double step = 0.0;
+  for (std::size_t i = 1; i < values.size(); ++i) {
+    const double apart = std::abs(values[i] - values[i - 1]);
+    if (apart > 0.0 && (step == 0.0 || apart < step)) step = apart;
+  }
+  return step;
+}
+
+// A temperature, smoothed as far as it allows.
+class SmoothTemperature {
+ public:
+  explicit SmoothTemperature(const GyroSeries& gyro) : t_s_(gyro.t_s), value_(gyro.temperature_c) {
+    const double step = step_of(value_);
+    scatter_most_ = std::max(kFollows * usual_scatter(t_s_, value_), kSteppedScatter * step * step);
+    if (step < Signals::kCoarseTemperature_c) return;
+    for (std::size_t i = 0; i < t_s_.size(); ++i) {
+      if (std::isnan(value_[i])) continue;
+      const double cell = std::floor(t_s_[i] / kSteppedCell_s);
+      if (cell_s_.empty() || cell != cell_) {
+        cell_ = cell;
+        count_ = 0.0;
+        cell_s_.push_back(0.0);
+        cell_value_.push_back(0.0);
+      }
+      count_ += 1.0;
+      cell_s_.back() += (t_s_[i] - cell_s_.back()) / count_;
+      cell_value_.back() += (value_[i] - cell_value_.back()) / count_;
+    }
+  }
+
+  [[nodiscard]] Parabola at(double t_s) const {
+    if (!cell_s_.empty()) {
+      for (auto reach_s = kSteppedReach_s.rbegin(); reach_s != kSteppedReach_s.rend(); ++reach_s) {
+        const Parabola parabola = fit_parabola(cell_s_, cell_value_, t_s, *reach_s);
+        if (parabola.scatter <= scatter_most_) return parabola;
+      }
+    }
+    return widest_parabola(t_s_, value_, t_s, scatter_most_);
+  }
+
+ private:
+  std::span<const double> t_s_;
+  std::span<const double> value_;
+  double scatter_most_ = 0.0;
+  std::vector<double> cell_s_;  ///< only of a coarse temperature
+  std::vector<double> cell_value_;
+  double cell_ = 0.0;
+  double count_ = 0.0;
+};
+
+}  // namespace
 
 void smooth_temperature(const GyroSeries& gyro, Signals& signals) {
   if (gyro.temperature_c.empty()) return;
   const double end_s = gyro.t_s.back();
-  const double scatter_most = kFollows * usual_scatter(gyro.t_s, gyro.temperature_c);
+  const SmoothTemperature smooth(gyro);
   std::vector<double> t_s;
   std::vector<double> value;
   std::vector<double> slope;
+  model::TemperaturePast past;
+  signals.temperature_past.clear();
+  signals.temperature_step_c = step_of(gyro.temperature_c);
   // NOLINTNEXTLINE(clang-analyzer-security.FloatLoopCounter): a time
   for (double t = gyro.t_s.front(); t <= end_s + kGridStep_s; t += kGridStep_s) {
-    const Parabola parabola =
-        widest_parabola(gyro.t_s, gyro.temperature_c, std::min(t, end_s), scatter_most);
+    const Parabola parabola = smooth.at(std::min(t, end_s));
     if (std::isnan(parabola.value)) continue;
+    past.add(parabola.value);
+    signals.temperature_past.push_back(past);
     t_s.push_back(t);
     value.push_back(parabola.value);
     slope.push_back(parabola.slope);
@@ -192,14 +307,12 @@ void smooth_temperature(const GyroSeries& gyro, Signals& signals) {
 }
 
 void set_supply(const GyroSeries& gyro, Signals& signals) {
-  std::vector<double> t_s;
-  std::vector<double> value;
-  for (std::size_t i = 0; i < gyro.supply_v.size(); ++i) {
-    if (std::isnan(gyro.supply_v[i])) continue;
-    t_s.push_back(gyro.t_s[i]);
-    value.push_back(gyro.supply_v[i]);
-  }
-  signals.supply_v = SampledCurve(t_s, value);
+  signals.supply_v = known_of(gyro.t_s, gyro.supply_v);
+}
+
+void set_other_rates(const GyroSeries& gyro, Signals& signals) {
+  for (std::size_t axis = 0; axis < signals.other_rate_dps.size(); ++axis)
+    signals.other_rate_dps[axis] = known_of(gyro.t_s, gyro.other_rate_dps[axis]);
 }
 
 void set_acceleration(const AccelerationSeries& acceleration, Signals& signals) {
@@ -237,17 +350,21 @@ void set_circumstances(const GyroSeries& gyro, const AccelerationSeries& acceler
                        Signals& signals) {
   smooth_temperature(gyro, signals);
   set_supply(gyro, signals);
+  set_other_rates(gyro, signals);
   set_acceleration(acceleration, signals);
 }
 
 Prediction::Prediction(std::span<const model::Effect> effects, const Signals& signals)
     : equation_(effects), signals_(signals) {
-  for (const double cutoff_hz : equation_.cutoffs_hz()) {
-    low_passed_.push_back(
-        low_passed_.empty()
-            ? signals.motion.low_passed(cutoff_hz)
-            : low_pass(low_passed_.back(), quarters_of(low_passed_.back()), cutoff_hz));
-  }
+  const auto pass = [&](const auto& filter) {
+    low_passed_.push_back(low_passed_.empty() ? signals.motion.low_passed(filter)
+                                              : low_pass(low_passed_.back(),
+                                                         quarters_of(low_passed_.back()), filter));
+  };
+  for (const double cutoff_hz : equation_.cutoffs_hz())
+    pass(cutoff_hz);
+  for (const model::SecondOrder& second : equation_.second_orders())
+    pass(second);
 }
 
 double Prediction::late_dps(double t_s) const {

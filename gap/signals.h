@@ -12,6 +12,7 @@
 #include "gap/recording.h"
 #include "model/effect.h"
 #include "model/equation.h"
+#include "model/temperature_past.h"
 
 namespace vgyro::gap {
 
@@ -25,6 +26,7 @@ class Motion {
   [[nodiscard]] double angle_rad(double t_s) const;
   /// The rate through a first-order low-pass.
   [[nodiscard]] SampledCurve low_passed(double cutoff_hz) const;
+  [[nodiscard]] SampledCurve low_passed(const model::SecondOrder& second) const;
   [[nodiscard]] const SampledCurve& curve() const { return rate_dps_; }
 
  private:
@@ -36,9 +38,14 @@ struct Signals {
   Motion motion;  ///< as this gyro is judged against
   SampledCurve temperature_c;
   SampledCurve temperature_slope_c_s;
+  double temperature_step_c = 0.0;  ///< of its values; 0: it never changed
+  /// From this step on its slope, and how it turned, are guesses.
+  static constexpr double kCoarseTemperature_c = 0.2;
+  std::vector<model::TemperaturePast> temperature_past;  ///< at each sample of temperature_c
   std::array<SampledCurve, 3> acceleration_g;
   SampledCurve vibration_g2;
   SampledCurve supply_v;
+  std::array<SampledCurve, 3> other_rate_dps;
 
   [[nodiscard]] model::Surroundings at(double t_s) const;
   /// The same with an angle of 0.
@@ -49,6 +56,7 @@ struct Signals {
 void smooth_temperature(const GyroSeries& gyro, Signals& signals);
 /// As it is told: it steps, and a parabola through a step follows nothing.
 void set_supply(const GyroSeries& gyro, Signals& signals);
+void set_other_rates(const GyroSeries& gyro, Signals& signals);
 void set_acceleration(const AccelerationSeries& acceleration, Signals& signals);
 
 /// All of them, as the recording holds them.

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 
 #include <fmt/core.h>
 
@@ -34,36 +35,46 @@ constexpr double kStretchSamplesMax = 1000.0;
 constexpr std::size_t kJudgedMin = 10;
 // Standard deviation of normal noise over the median of its magnitude.
 constexpr double kSigmaPerMedian = 1.4826;
+// Samples about an instant whose own neighbours tell how well the curve is known there, and what of
+// that is noise: three standard deviations.
+constexpr std::size_t kUnsureReach = 3;
+constexpr double kNoiseSigmas = 3.0;
+// Times the rest, as a knock in between may be off; a spike of the curve itself is off by itself.
+constexpr double kUnsure = 1.5;
 // Standard error of a median over that of a mean: √(π/2).
 constexpr double kMedianError = 1.25;
 
 // How each sample of one gyro stands to its neighbours.
 struct Standing {
-  std::vector<double> out_dps;    // deviation from their median; 0: cannot be judged
-  std::vector<double> sigma_dps;  // scatter of the deviations about there; 0: nothing stands out
+  std::vector<double> out_dps;     // deviation from their median; 0: cannot be judged
+  std::vector<double> sigma_dps;   // scatter of the deviations about there; 0: nothing stands out
+  std::vector<double> unsure_dps;  // what it is seen against is no better known there
 };
 
 // What gyro k is seen against.
-SampledCurve truth_for(const Recording& recording, const std::array<Transport, 2>& transports,
-                       std::size_t gyro) {
-  if (recording.has_reference) return {recording.reference_dps.t_s, recording.reference_dps.value};
+SampledCurve truth_for(const Recording& recording, const Timing& timing,
+                       const std::array<Transport, 2>& transports, std::size_t gyro) {
+  if (recording.has_reference) return {timing.reference_dps.t_s, timing.reference_dps.value};
   return {transports[1 - gyro].t_s, recording.gyros[1 - gyro].rate_dps};
 }
 
 std::vector<double> deviations_dps(const GyroSeries& series, const Transport& transport,
-                                   const SampledCurve& truth) {
+                                   const SampledCurve& truth, const Lag& lag) {
   const std::vector<double>& t_s = transport.t_s;
   const std::size_t n = series.t_s.size();
-  const auto covered = [&](double at_s) { return at_s > truth.from_s() && at_s < truth.to_s(); };
+  const auto felt_s = [&](std::size_t i) { return t_s[i] - lag.at(t_s[i]); };
+  const auto covered = [&](std::size_t i) {
+    return felt_s(i) > truth.from_s() && felt_s(i) < truth.to_s();
+  };
   std::vector<double> error(n);
   for (std::size_t i = 0; i < n; ++i)
-    error[i] = series.rate_dps[i] - truth.nearby(t_s[i]).value;
+    error[i] = series.rate_dps[i] - truth.nearby(felt_s(i)).value;
   std::vector<double> out(n, 0.0);
   for (std::size_t i = kNeighbours; i + kNeighbours < n; ++i) {
     const auto from = transport.masked.begin() + static_cast<std::ptrdiff_t>(i - kNeighbours);
     const auto unusable = [](std::uint8_t mask) { return mask != 0; };
     if (std::any_of(from, from + 2 * kNeighbours + 1, unusable)) continue;
-    if (!covered(t_s[i - kNeighbours]) || !covered(t_s[i + kNeighbours])) continue;
+    if (!covered(i - kNeighbours) || !covered(i + kNeighbours)) continue;
     std::array<double, 2 * kNeighbours> near{error[i - 2], error[i - 1], error[i + 1],
                                              error[i + 2]};
     std::sort(near.begin(), near.end());
@@ -104,11 +115,52 @@ std::vector<double> sigmas_dps(const std::vector<double>& out, double interval_s
   return sigmas;
 }
 
-Standing standing_of(const Recording& recording, const std::array<Transport, 2>& transports,
-                     std::size_t gyro) {
+// How far each sample of a curve is from what its six neighbours let expect, beyond its noise: in a
+// knock that is quicker than its samples nothing tells what was between them. The widest about
+// each.
+std::vector<double> unsure_dps(const SampledCurve& truth) {
+  const std::span<const double> y = truth.values();
+  std::vector<double> off(y.size(), 0.0);
+  for (std::size_t i = 3; i + 3 < y.size(); ++i) {
+    const double sixth = y[i - 3] + y[i + 3] - 6.0 * (y[i - 2] + y[i + 2]) +
+                         15.0 * (y[i - 1] + y[i + 1]) - 20.0 * y[i];
+    off[i] = std::abs(sixth) / 20.0;
+  }
+  std::vector<double> sizes = off;
+  const double noise_dps = sizes.empty() ? 0.0 : kNoiseSigmas * kSigmaPerMedian * median_of(sizes);
+  std::vector<double> widest(off.size(), 0.0);
+  for (std::size_t i = 0; i < off.size(); ++i) {
+    const std::size_t from = i - std::min<std::size_t>(i, kUnsureReach);
+    const std::size_t to = std::min(off.size(), i + kUnsureReach + 1);
+    for (std::size_t k = from; k < to; ++k)
+      widest[i] = std::max(widest[i], kUnsure * (off[k] - noise_dps));
+  }
+  return widest;
+}
+
+// At each of a gyro's samples.
+std::vector<double> unsure_at(const Transport& transport, const SampledCurve& truth,
+                              const Lag& lag) {
+  const std::vector<double> widest = unsure_dps(truth);
+  const std::span<const double> truth_s = truth.times_s();
+  std::vector<double> unsure;
+  if (widest.empty()) return std::vector<double>(transport.t_s.size(), 0.0);
+  unsure.reserve(transport.t_s.size());
+  for (const double t_s : transport.t_s) {
+    const auto at = std::lower_bound(truth_s.begin(), truth_s.end(), t_s - lag.at(t_s));
+    const auto place = static_cast<std::size_t>(at - truth_s.begin());
+    unsure.push_back(widest[std::min(place, widest.size() - 1)]);
+  }
+  return unsure;
+}
+
+Standing standing_of(const Recording& recording, const Timing& timing,
+                     const std::array<Transport, 2>& transports, std::size_t gyro) {
   Standing standing;
-  standing.out_dps = deviations_dps(recording.gyros[gyro], transports[gyro],
-                                    truth_for(recording, transports, gyro));
+  const SampledCurve truth = truth_for(recording, timing, transports, gyro);
+  const Lag& lag = timing.lag[gyro];
+  standing.out_dps = deviations_dps(recording.gyros[gyro], transports[gyro], truth, lag);
+  standing.unsure_dps = unsure_at(transports[gyro], truth, lag);
   standing.sigma_dps = sigmas_dps(standing.out_dps, transports[gyro].interval_s);
   return standing;
 }
@@ -116,7 +168,8 @@ Standing standing_of(const Recording& recording, const std::array<Transport, 2>&
 bool stands_out(const Standing& standing, std::size_t i, double lattice_dps) {
   if (standing.sigma_dps[i] <= 0.0) return false;
   const double size = std::abs(standing.out_dps[i]);
-  if (size < std::max(kSpikeSigmas * standing.sigma_dps[i], kSpikeLatticeSteps * lattice_dps))
+  if (size < std::max({kSpikeSigmas * standing.sigma_dps[i], kSpikeLatticeSteps * lattice_dps,
+                       standing.unsure_dps[i]}))
     return false;
   return size >= std::abs(standing.out_dps[i - 1]) && size >= std::abs(standing.out_dps[i + 1]);
 }
@@ -130,13 +183,16 @@ bool is_others(const Standing& others, const Transport& transport, double at_s, 
   for (std::ptrdiff_t j = near - kReach; j < near + kReach; ++j) {
     if (j < kReach || j + kReach >= static_cast<std::ptrdiff_t>(t_s.size())) continue;
     const auto place = static_cast<std::size_t>(j);
-    if (std::abs(others.out_dps[place]) > size_dps || transport.masked[place] != 0) return true;
+    // What it is seen against, this gyro, is the rougher one there: it is not the other's.
+    const double out_dps = std::abs(others.out_dps[place]);
+    const bool larger = out_dps > size_dps && out_dps > others.unsure_dps[place];
+    if (larger || transport.masked[place] != 0) return true;
   }
   return false;
 }
 
 // Indices of a gyro's spikes, which are masked.
-std::vector<std::size_t> mask_spikes(const Recording& recording,
+std::vector<std::size_t> mask_spikes(const Recording& recording, const Timing& timing,
                                      std::array<Transport, 2>& transports,
                                      const std::array<Standing, 2>& standings, std::size_t gyro) {
   Transport& transport = transports[gyro];
@@ -147,9 +203,10 @@ std::vector<std::size_t> mask_spikes(const Recording& recording,
       continue;
     const double size_dps = std::abs(standings[gyro].out_dps[i]);
     if (!recording.has_reference &&
-        is_others(standings[other], transports[other], transport.t_s[i], size_dps))
+        is_others(standings[other], transports[other],
+                  transport.t_s[i] - timing.lag[gyro].at(transport.t_s[i]), size_dps))
       continue;
-    transport.masked[i] = 1;
+    transport.masked[i] = kSpike;
     spikes.push_back(i);
   }
   return spikes;
@@ -189,14 +246,16 @@ Finding finding_of(const Recording& recording, const Transport& transport, const
 
 }  // namespace
 
-std::vector<Finding> find_spikes(const Recording& recording, std::array<Transport, 2>& transports,
+std::vector<Finding> find_spikes(const Recording& recording, const Timing& timing,
+                                 std::array<Transport, 2>& transports,
                                  const std::vector<Effect>& known) {
   // Of both before any is masked: a spike must not hide the other gyro's.
-  const std::array<Standing, 2> standings{standing_of(recording, transports, 0),
-                                          standing_of(recording, transports, 1)};
+  const std::array<Standing, 2> standings{standing_of(recording, timing, transports, 0),
+                                          standing_of(recording, timing, transports, 1)};
   std::vector<Finding> findings;
   for (std::size_t gyro = 0; gyro < 2; ++gyro) {
-    const std::vector<std::size_t> spikes = mask_spikes(recording, transports, standings, gyro);
+    const std::vector<std::size_t> spikes =
+        mask_spikes(recording, timing, transports, standings, gyro);
     count_masked(transports[gyro]);
     const bool told = std::any_of(known.begin(), known.end(), [&](const Effect& effect) {
       return effect.gyro == gyro && effect.kind == Kind::kSpikes;

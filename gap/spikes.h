@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "gap/recording.h"
+#include "gap/timing.h"
 #include "gap/transport.h"
 #include "model/effect.h"
 
@@ -17,7 +18,8 @@ namespace vgyro::gap {
 
 /// Masks every spike of both gyros in `transports`. Returns what is beyond `known`, gyro 1's first.
 /// Precondition: the transports are those of the recording.
-std::vector<Finding> find_spikes(const Recording& recording, std::array<Transport, 2>& transports,
+std::vector<Finding> find_spikes(const Recording& recording, const Timing& timing,
+                                 std::array<Transport, 2>& transports,
                                  const std::vector<model::Effect>& known);
 
 }  // namespace vgyro::gap

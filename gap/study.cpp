@@ -8,6 +8,7 @@
 
 #include "gap/rest.h"
 #include "gap/spikes.h"
+#include "gap/timing.h"
 #include "gap/wiener.h"
 
 namespace vgyro::gap {
@@ -23,9 +24,24 @@ struct Study::Facts {
   SampledCurve reference;                ///< as it was sampled
   std::array<double, 3> quiet{};         ///< variance of a sample of each gyro and of the reference
   std::array<FastMotion, 2> fast;        ///< as each gyro is compared; without a reference alike
+  Timing timing;
   RestingSeconds rest;
   std::vector<Finding> findings;
   std::vector<std::string> notes;
+
+  // What transport, timing and spikes found, in this order.
+  void gather(const std::vector<Finding>& spikes) {
+    const auto append = [](auto& list, const auto& more) {
+      list.insert(list.end(), more.begin(), more.end());
+    };
+    append(notes, timing.notes);
+    for (const Transport& transport : transports) {
+      append(findings, transport.findings);
+      append(notes, transport.notes);
+    }
+    append(findings, timing.findings);
+    append(findings, spikes);
+  }
 
   void learn_fast_motion() {
     quiet = {quiet_variance(readings[0]), quiet_variance(readings[1]), quiet_variance(reference)};
@@ -199,6 +215,12 @@ const std::vector<Finding>& Study::findings() const {
 const std::vector<std::string>& Study::notes() const {
   return joint_ ? joint_->notes : facts_->notes;
 }
+double Study::reference_late_s() const {
+  if (!joint_) return facts_->timing.reference_late_s;
+  for (const auto& part : parts_)
+    if (part->reference_late_s() != 0.0) return part->reference_late_s();
+  return 0.0;
+}
 
 bool Study::is_coarse(std::size_t gyro) const {
   if (joint_) {
@@ -213,26 +235,29 @@ std::size_t Study::place_of(std::size_t gyro) const {
   return observations_.size() == 2 ? gyro : 0;
 }
 
+// Each gyro's, and the reference's motion.
+void Study::set_signals(const Recording& recording) {
+  for (std::size_t gyro = 0; gyro < 2; ++gyro) {
+    auto signals = std::make_shared<Signals>();
+    set_circumstances(recording.gyros[gyro], recording.acceleration, *signals);
+    signals_[gyro] = std::move(signals);
+  }
+}
+
 Expected<std::shared_ptr<const Study>> Study::begin(const Recording& recording,
                                                     const Effects& effects) {
   if (auto good = check(recording); !good) return tl::unexpected(good.error());
   auto facts = std::make_shared<Facts>(recording);
   const std::shared_ptr<Study> study(new Study);
-  for (std::size_t gyro = 0; gyro < 2; ++gyro) {
-    const GyroSeries& series = recording.gyros[gyro];
-    facts->transports[gyro] = check_transport(series, gyro, of_gyro(effects, gyro));
-    auto signals = std::make_shared<Signals>();
-    set_circumstances(series, recording.acceleration, *signals);
-    study->signals_[gyro] = std::move(signals);
-  }
+  for (std::size_t gyro = 0; gyro < 2; ++gyro)
+    facts->transports[gyro] = check_transport(recording.gyros[gyro], gyro, of_gyro(effects, gyro));
+  // Lateness before spikes: what stands out at the wrong instant is none.
+  facts->timing = find_timing(recording, facts->transports, effects);
+  study->set_signals(recording);
   // What a finding costs is known when the spikes are masked too.
-  const std::vector<Finding> spikes = find_spikes(recording, facts->transports, effects);
-  for (const Transport& transport : facts->transports) {
-    facts->findings.insert(facts->findings.end(), transport.findings.begin(),
-                           transport.findings.end());
-    facts->notes.insert(facts->notes.end(), transport.notes.begin(), transport.notes.end());
-  }
-  facts->findings.insert(facts->findings.end(), spikes.begin(), spikes.end());
+  const std::vector<Finding> spikes =
+      find_spikes(recording, facts->timing, facts->transports, effects);
+  facts->gather(spikes);
   for (std::size_t gyro = 0; gyro < 2; ++gyro) {
     facts->readings[gyro] = unmasked(recording.gyros[gyro], facts->transports[gyro]);
     const std::size_t left = facts->readings[gyro].times_s().size();
@@ -243,17 +268,25 @@ Expected<std::shared_ptr<const Study>> Study::begin(const Recording& recording,
                             left, recording.gyros[gyro].name),
                 "record with a sensor that moves");
   }
-  facts->reference = SampledCurve(recording.reference_dps.t_s, recording.reference_dps.value);
+  facts->reference =
+      SampledCurve(facts->timing.reference_dps.t_s, facts->timing.reference_dps.value);
   if (!recording.has_reference) facts->rest = find_rest(recording, facts->transports);
+  // A rest that is too short tells no bias, and might be none.
   if (!recording.has_reference && facts->rest.count() < kRestMin_s) {
-    return fail("", "the recording holds no rest, and there is no reference",
-                "without either nothing tells which gyro is wrong: record a minute at rest, or "
-                "name a [reference]");
+    facts->rest = RestingSeconds();
+    facts->notes.emplace_back(
+        "the recording holds no rest, and there is no reference: only the difference of the gyros "
+        "is judged, which does not tell which of them an effect is of; a minute at rest or a "
+        "[reference] would");
   }
   facts->learn_fast_motion();
+  // A clock that runs away moves all that is learnt of the motion.
+  Effects known = effects;
+  for (const Finding& finding : facts->timing.findings)
+    known.push_back(finding.effect);
   study->facts_ = std::move(facts);
-  study->learn_motion(effects);
-  study->observe(effects);
+  study->learn_motion(known);
+  study->observe(known);
   return std::shared_ptr<const Study>(study);
 }
 
@@ -371,6 +404,7 @@ std::shared_ptr<const Study> Study::with_motion(const Effects& effects) const {
 }
 
 std::shared_ptr<const Study> Study::with_motion_on_trial(const Effects& effects) const {
+  if (joint_) return with_motion(effects);
   const std::shared_ptr<Study> study(new Study(*this));
   study->learn_motion(effects);
   std::vector<Observations> list = study->observed();

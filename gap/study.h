@@ -13,6 +13,7 @@
 #include "gap/observations.h"
 #include "gap/recording.h"
 #include "gap/signals.h"
+#include "gap/timing.h"
 #include "gap/transport.h"
 #include "model/effect.h"
 
@@ -50,6 +51,8 @@ class Study {
   [[nodiscard]] const std::vector<std::string>& notes() const;
   /// Of several: names, what is configured, and how long they last behind each other.
   [[nodiscard]] const Recording& recording() const;
+  /// By so much it came late, which is taken off already; 0: it did not.
+  [[nodiscard]] double reference_late_s() const;
   /// Its values are so far apart that rounding is no noise: only great effects can be judged.
   [[nodiscard]] bool is_coarse(std::size_t gyro) const;
 
@@ -75,6 +78,7 @@ class Study {
                                              const Effects& effects);
   void observe(const Effects& effects);
   [[nodiscard]] std::vector<Observations> observed() const;
+  void set_signals(const Recording& recording);
   void learn_motion(const Effects& effects);
   void learn_motion_of_reference();
   void learn_motion_of_pair(const Effects& effects);

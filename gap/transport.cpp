@@ -5,6 +5,7 @@
 #include <limits>
 #include <numbers>
 #include <optional>
+#include <tuple>
 #include <utility>
 
 #include <fmt/core.h>
@@ -20,6 +21,13 @@ using model::Kind;
 
 // Logs and kernels count microseconds; candump's rounding is no lateness.
 constexpr double kStampResolution_s = 3e-6;
+
+// Frames over which an adapter's bunches are even; the share of their mean interval below which one
+// frame follows another at once. Of bunches of two half of them do, of stamps that are late at
+// random two fifths at most.
+constexpr std::size_t kBunchFrames = 100;
+constexpr double kAtOnce = 0.5;
+constexpr double kBunchShare = 0.45;
 
 // One or two losses are told in a note: they are no property of the bus. Nor is one pause, which
 // holds more than half of what is missing.
@@ -72,9 +80,12 @@ constexpr double kOffShare = 0.2;
 constexpr std::size_t kOffOneIn = 50;
 constexpr std::size_t kLatticePoints = 2000;
 
-// A frozen value repeats itself this often and for this long: by less nothing is lost.
-constexpr std::size_t kStuckMin = 8;
-constexpr double kStuckMin_s = 0.15;
+// A frozen value repeats itself this often and for this long: by less nothing is lost, unless it
+// happens again and again. Still shorter runs are chance.
+constexpr std::size_t kStuckSure = 8;
+constexpr double kStuckSure_s = 0.15;
+constexpr std::size_t kBriefMin = 3;
+constexpr std::size_t kStuckMin = 5;
 // Of such a run anywhere in the recording, were the values independent.
 constexpr double kChance = 1e-9;
 // Runs count up to this length in the chance that a value repeats itself: longer ones are what is
@@ -390,29 +401,71 @@ class Check {
     if (good > 0) result_.repeats = static_cast<double>(same) / static_cast<double>(good);
   }
 
-  // Number of the sample on the even clock: by the alive counter where there is one.
-  void count_frames() {
+  [[nodiscard]] bool is_counted() const {
+    return series_.counter.size() == n_ && series_.counter_modulus > 1;
+  }
+
+  // Frames from the one before, whole turns of the counter left out; without a counter, by time.
+  [[nodiscard]] double frames_to(std::size_t i) const {
+    if (is_counted()) {
+      return static_cast<double>(
+          (series_.counter[i] + series_.counter_modulus - series_.counter[i - 1]) %
+          series_.counter_modulus);
+    }
+    // What comes in bunches says nothing of what is missing.
+    if (bunch_ > 0.0) return 1.0;
+    return std::round((series_.t_s[i] - series_.t_s[i - 1]) / result_.interval_s);
+  }
+
+  // An adapter that waits hands out its frames in bunches: most follow at once, and a pause is no
+  // loss. The even clock's interval is then what many frames took. Nothing changes where they come
+  // one by one.
+  void find_bunches() {
     std::vector<double> steps_s;
     for (std::size_t i = 1; i < n_; ++i)
       steps_s.push_back(series_.t_s[i] - series_.t_s[i - 1]);
     std::vector<double> unordered_s = steps_s;
     result_.interval_s = median_of(unordered_s);
+    std::vector<double> means_s;
+    for (std::size_t i = kBunchFrames; i < n_; i += kBunchFrames) {
+      double frames = is_counted() ? 0.0 : static_cast<double>(kBunchFrames);
+      for (std::size_t k = i - kBunchFrames + 1; is_counted() && k <= i; ++k)
+        frames += frames_to(k);
+      if (frames > 0.0)
+        means_s.push_back((series_.t_s[i] - series_.t_s[i - kBunchFrames]) / frames);
+    }
+    if (means_s.empty()) return;
+    const double mean_s = median_of(means_s);
+    if (mean_s <= 0.0) return;
+    const auto at_once = std::count_if(steps_s.begin(), steps_s.end(),
+                                       [&](double step_s) { return step_s < kAtOnce * mean_s; });
+    if (static_cast<double>(at_once) < kBunchShare * static_cast<double>(steps_s.size())) return;
+    result_.interval_s = mean_s;
+    std::vector<double> pauses_s;
+    for (const double step_s : steps_s) {
+      if (step_s > mean_s) pauses_s.push_back(step_s);
+    }
+    if (pauses_s.empty()) return;
+    bunch_ = std::round(median_of(pauses_s) / mean_s);
+    result_.notes.push_back(
+        fmt::format("{}: the stamps come in bunches of {:.0f}, as an adapter hands them out: each "
+                    "sample is taken for its place on an even clock of {:.4g} ms",
+                    series_.name, bunch_, kMilli * mean_s));
+  }
+
+  // Number of the sample on the even clock: by the alive counter where there is one.
+  void count_frames() {
+    find_bunches();
     number_.assign(n_, 0.0);
-    const bool counted = series_.counter.size() == n_ && series_.counter_modulus > 1;
     for (std::size_t i = 1; i < n_; ++i) {
-      const double by_time = std::max(1.0, std::round(steps_s[i - 1] / result_.interval_s));
-      double step = by_time;
-      if (counted) {
+      double step = frames_to(i);
+      if (is_counted()) {
         const double modulus = series_.counter_modulus;
-        const double by_counter = static_cast<double>(
-            (series_.counter[i] + series_.counter_modulus - series_.counter[i - 1]) %
-            series_.counter_modulus);
+        const double by_time = (series_.t_s[i] - series_.t_s[i - 1]) / result_.interval_s - bunch_;
         // Whole turns of the counter are told by time.
-        const double turns =
-            std::round((steps_s[i - 1] / result_.interval_s - by_counter) / modulus);
-        step = std::max(1.0, by_counter + std::max(0.0, turns) * modulus);
+        step += std::max(0.0, std::round((by_time - step) / modulus)) * modulus;
       }
-      number_[i] = number_[i - 1] + step;
+      number_[i] = number_[i - 1] + std::max(1.0, step);
     }
   }
 
@@ -472,10 +525,12 @@ class Check {
     // A clock that wanders is no random lateness: neighbours then agree.
     if (lateness.deviation_s < kStampResolution_s ||
         lateness.rough_s < kRoughMin * lateness.deviation_s ||
-        lateness.deviation_s > kLateIntervals * clock->interval_s)
+        lateness.deviation_s > std::max(kLateIntervals, bunch_) * clock->interval_s)
       return;
     for (std::size_t i = 0; i < n_; ++i)
       result_.t_s[i] = clock->offset_s + earliest_s + clock->interval_s * number_[i];
+    // What waited in a bunch is told in a note; the last of it did not wait.
+    if (bunch_ > 0.0) return;
     // Of symmetrical lateness the mean is the place of the clock.
     if (lateness.skewness < kNormalSkewness) {
       for (double& t_s : result_.t_s)
@@ -552,23 +607,39 @@ class Check {
     const std::vector<Run> runs = runs_of(series_.rate_dps);
     const double chance = repeat_chance(runs, n_);
     coarse_ = chance > kCoarse;
-    const double least_s =
-        std::max(kStuckMin_s, coarse_ ? kCoarseRuns * second_longest_s(runs) : 0.0);
-    const auto [least, most] =
-        std::minmax_element(series_.rate_dps.begin(), series_.rate_dps.end());
+    const double least_s = coarse_ ? kCoarseRuns * second_longest_s(runs) : 0.0;
+    std::tie(least_, most_) = std::minmax_element(series_.rate_dps.begin(), series_.rate_dps.end());
+    std::vector<Run> frozen;
+    std::size_t brief = 0;
     for (const Run& run : runs) {
-      const double value = series_.rate_dps[run.first];
-      // At its ends a gyro is clipped, and on 0 in a dead band.
-      if (value == *least || value == *most || value == 0.0) continue;
-      if (run.length() < kStuckMin || length_s(run) < least_s) continue;
-      const double log_chance = static_cast<double>(run.length() - 1) * std::log(chance) +
-                                std::log(static_cast<double>(n_));
-      if (log_chance >= std::log(kChance)) continue;
+      if (length_s(run) < least_s || !is_frozen(run, chance)) continue;
+      frozen.push_back(run);
+      if (is_brief(run)) ++brief;
+    }
+    for (const Run& run : frozen) {
+      if (is_brief(run) && brief < kBriefMin) continue;
       // The first value may be a fresh one.
       for (std::size_t i = run.first + 1; i < run.end; ++i)
-        result_.masked[i] = 1;
-      tell_stuck(run, log_chance);
+        result_.masked[i] = kSetAside;
+      tell_stuck(run, log_chance(run, chance));
     }
+  }
+
+  // Of such a run anywhere in the recording.
+  [[nodiscard]] double log_chance(const Run& run, double chance) const {
+    return static_cast<double>(run.length() - 1) * std::log(chance) +
+           std::log(static_cast<double>(n_));
+  }
+
+  [[nodiscard]] bool is_frozen(const Run& run, double chance) const {
+    const double value = series_.rate_dps[run.first];
+    // At its ends a gyro is clipped, and on 0 in a dead band.
+    if (value == *least_ || value == *most_ || value == 0.0) return false;
+    return run.length() >= kStuckMin && log_chance(run, chance) < std::log(kChance);
+  }
+
+  [[nodiscard]] bool is_brief(const Run& run) const {
+    return run.length() < kStuckSure || length_s(run) < kStuckSure_s;
   }
 
   [[nodiscard]] double length_s(const Run& run) const {
@@ -679,7 +750,8 @@ class Check {
 
   void mask_beyond(double limit_dps) {
     for (std::size_t i = 0; i < n_; ++i) {
-      if (std::abs(series_.rate_dps[i]) >= limit_dps * (1.0 - kClippedShare)) result_.masked[i] = 1;
+      if (std::abs(series_.rate_dps[i]) >= limit_dps * (1.0 - kClippedShare))
+        result_.masked[i] = kSetAside;
     }
   }
 
@@ -731,7 +803,7 @@ class Check {
 
   void mask_below(double width_dps) {
     for (std::size_t i = 0; i < n_; ++i) {
-      if (std::abs(series_.rate_dps[i]) < kMaskedWidths * width_dps) result_.masked[i] = 1;
+      if (std::abs(series_.rate_dps[i]) < kMaskedWidths * width_dps) result_.masked[i] = kSetAside;
     }
   }
 
@@ -739,7 +811,10 @@ class Check {
   std::size_t gyro_;
   const std::vector<Effect>& known_;
   std::size_t n_;
-  std::vector<double> number_;  ///< on the even clock
+  std::vector<double> number_;                 ///< on the even clock
+  std::vector<double>::const_iterator least_;  ///< values; of the whole recording
+  std::vector<double>::const_iterator most_;
+  double bunch_ = 0.0;  ///< frames that are handed out at once; 0: each by itself
   bool coarse_ = false;
   Transport result_;
 };
@@ -749,7 +824,7 @@ class Check {
 void count_masked(Transport& transport) {
   double masked = 0.0;
   for (const std::uint8_t mask : transport.masked)
-    masked += mask;
+    masked += mask != 0 ? 1.0 : 0.0;
   for (Finding& finding : transport.findings) {
     if (finding.effect.kind == Kind::kSaturation || finding.effect.kind == Kind::kDeadBand)
       finding.cost_nats = masked * kMaskedShare * kImpossibleNats;

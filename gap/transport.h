@@ -28,13 +28,18 @@ struct Finding {
   /// What it costs, over the whole recording, a model that knows nothing of it.
   double cost_nats = 0.0;
   Where where;
+  std::vector<Reading> ambiguous_with;
   std::string evidence;
   Figure figure;
 };
 
+/// Why a sample is not to be used: the other reasons than a spike are the frame's or the value's.
+inline constexpr std::uint8_t kSetAside = 1;
+inline constexpr std::uint8_t kSpike = 2;
+
 struct Transport {
   std::vector<double> t_s;           ///< instants of the samples, lateness taken out where found
-  std::vector<std::uint8_t> masked;  ///< not to be used
+  std::vector<std::uint8_t> masked;  ///< not to be used: kSetAside, kSpike; 0: to be used
   std::vector<double> late_s;        ///< of each stamp behind the even clock
   double interval_s = 0.0;           ///< of the even clock
   double lattice_dps = 0.0;          ///< least distance of the values

@@ -192,14 +192,14 @@ double allan_deviation(const NoiseTerms& terms, double interval_s, double rate_s
                        double tau_s) {
   double variance = terms.variance(rate_square, interval_s) * interval_s / tau_s +
                     terms.walk_dps_rts * terms.walk_dps_rts * tau_s / 3.0;
-  for (const MarkovTerm& term : terms.markov) {
+  terms.each_correlated([&](const MarkovTerm& term) {
     const double x = tau_s / term.tau_s;
     // 2σ²/x² (… ) loses its digits for small x, where the term is a random walk.
     const double shape = x < 1e-3
                              ? x / 3.0 * 2.0
                              : (2.0 * x - 3.0 + 4.0 * std::exp(-x) - std::exp(-2.0 * x)) / (x * x);
     variance += term.sigma_dps * term.sigma_dps * shape;
-  }
+  });
   return std::sqrt(variance);
 }
 
@@ -208,10 +208,10 @@ double noise_psd(const NoiseTerms& terms, double interval_s, double rate_square,
   const double omega = 2.0 * kPi * frequency_hz;
   double psd = terms.variance(rate_square, interval_s) * interval_s +
                terms.walk_dps_rts * terms.walk_dps_rts / (omega * omega);
-  for (const MarkovTerm& term : terms.markov) {
+  terms.each_correlated([&](const MarkovTerm& term) {
     const double x = omega * term.tau_s;
     psd += 2.0 * term.sigma_dps * term.sigma_dps * term.tau_s / (1.0 + x * x);
-  }
+  });
   return psd;
 }
 
@@ -238,10 +238,11 @@ Eigen::VectorXd simulate_residual(const Observations& data, const PairNoise& noi
   for (const Block& block : data.layout.blocks)
     std::fill_n(gain.begin() + block.first, block.count, block.within_gain);
   std::array<double, 2> walk{};
-  std::array<std::vector<double>, 2> markov;
+  std::array<std::vector<double>, 2> correlated;
   for (std::size_t gyro = 0; gyro < 2; ++gyro) {
-    for (const MarkovTerm& term : noise[gyro].markov)
-      markov[gyro].push_back(term.sigma_dps * normal(random));
+    noise[gyro].each_correlated([&](const MarkovTerm& term) {
+      correlated[gyro].push_back(term.sigma_dps * normal(random));
+    });
   }
   Eigen::VectorXd residual(data.size());
   double last_s = 0.0;
@@ -255,13 +256,13 @@ Eigen::VectorXd simulate_residual(const Observations& data, const PairNoise& noi
       const NoiseTerms& terms = noise[gyro];
       walk[gyro] += terms.walk_dps_rts * std::sqrt(step_s) * normal(random);
       double drift = walk[gyro];
-      for (std::size_t k = 0; k < terms.markov.size(); ++k) {
-        const double decay = std::exp(-step_s / terms.markov[k].tau_s);
-        markov[gyro][k] = decay * markov[gyro][k] + terms.markov[k].sigma_dps *
-                                                        std::sqrt(1.0 - decay * decay) *
-                                                        normal(random);
-        drift += markov[gyro][k];
-      }
+      std::size_t k = 0;
+      terms.each_correlated([&](const MarkovTerm& term) {
+        double& state = correlated[gyro][k++];
+        const double decay = std::exp(-step_s / term.tau_s);
+        state = decay * state + term.sigma_dps * std::sqrt(1.0 - decay * decay) * normal(random);
+        drift += state;
+      });
       const double rate_dps = data.rate[gyro][i].value;
       value += share_of(data.channel[i], gyro) * drift;
       variance += gain[i][gyro] * terms.variance(rate_dps * rate_dps, data.layout.interval_s[gyro]);

@@ -11,6 +11,7 @@
 #include "gap/score.h"
 #include "gap/search.h"
 #include "gap/study.h"
+#include "gap/timing.h"
 
 namespace vgyro::gap {
 
@@ -50,13 +51,18 @@ double seconds_of(const std::vector<Recording>& recordings) {
   return sum;
 }
 
-NamedEffect named(const Finding& finding) {
+NamedEffect named(const Finding& finding, bool with_reference) {
   NamedEffect named;
   named.effect = finding.effect;
   named.sigma = finding.sigma;
   named.p_value = finding.p_value;
   named.statistic = finding.statistic;
   named.where = finding.where;
+  named.ambiguous_with = finding.ambiguous_with;
+  if (!finding.ambiguous_with.empty()) {
+    named.experiment =
+        experiment_for(reading_of(finding.effect), finding.ambiguous_with.front(), with_reference);
+  }
   named.evidence = finding.evidence;
   named.figure = finding.figure;
   return named;
@@ -80,7 +86,10 @@ NamedEffect named(const Found& one, bool with_reference) {
 
 Verdict verdict_of(const Result& result) {
   const bool closed = result.gap.after <= kClosedBands * result.gap.band95[1];
-  const bool rest = !result.unexplained.empty() || !closed;
+  // The reference's lateness is taken off: nothing of the gyros remains by it.
+  const bool rest =
+      !closed || std::any_of(result.unexplained.begin(), result.unexplained.end(),
+                             [](const Unexplained& one) { return one.gyro.has_value(); });
   if (result.effects.empty()) return rest ? Verdict::kUnexplained : Verdict::kNoGap;
   return rest ? Verdict::kPartlyExplained : Verdict::kExplained;
 }
@@ -113,6 +122,17 @@ void score(const Study& study, const Effects& given, const Effects& first, std::
   // What is not applied is part of the account and not of the model.
   const bool all = now.size() == result.model.effects.size();
   result.gap.of_model = all ? gap : gap_of(study, result.model.effects, floor, Part::kHeldOut);
+}
+
+// What is no fault of the gyros.
+void add_reference(const Study& study, std::vector<Unexplained>& list) {
+  if (study.reference_late_s() == 0.0) return;
+  Unexplained late;
+  late.signature = "reference_late";
+  late.gyro.reset();
+  late.to_s = study.recording().seconds;
+  late.text = reference_late_text(study.reference_late_s());
+  list.insert(list.begin(), std::move(late));
 }
 
 // What the raw frames show by themselves is in from the start.
@@ -166,8 +186,9 @@ Expected<Result> find_gap(const std::vector<Recording>& recordings, const model:
   fill_facts(study, result.held_out, result.samples);
   std::vector<Found> found = search.found();
   result.unexplained = leftovers(search, found);
+  add_reference(study, result.unexplained);
   for (const Finding& finding : study.findings())
-    result.effects.push_back(named(finding));
+    result.effects.push_back(named(finding, result.with_reference));
   for (const Found& one : found)
     result.effects.push_back(named(one, result.with_reference));
   for (const Found& one : search.starting())

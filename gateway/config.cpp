@@ -90,6 +90,25 @@ void read_source_address(TomlReader& reader, const dbc::Message& message, FrameM
   match.others.clear();
 }
 
+// Rates about other axes of the unit, in its own message.
+constexpr std::array<const char*, 3> kOtherAxisKeys{"rate_x", "rate_y", "rate_z"};
+using OtherAxisSignals = std::array<const dbc::Signal*, kOtherAxisKeys.size()>;
+
+OtherAxisSignals other_axis_signals(SignalResolver& resolver) {
+  OtherAxisSignals signals{};
+  for (std::size_t axis = 0; axis < signals.size(); ++axis)
+    signals[axis] = resolver.signal(kOtherAxisKeys[axis], false);
+  return signals;
+}
+
+void read_other_axes(SignalResolver& resolver, const OtherAxisSignals& signals, GyroPlan& gyro) {
+  for (std::size_t axis = 0; axis < signals.size(); ++axis) {
+    if (signals[axis] == nullptr) continue;
+    gyro.*kOtherAxes[axis] =
+        resolver.quantity(*signals[axis], kOtherAxisKeys[axis], Dimension::kRate);
+  }
+}
+
 std::optional<GyroPlan> read_gyro(const toml::table& table, std::size_t index, Context& context) {
   TomlReader reader(table, context.file, "[[gyro]]", context.errors);
   const std::size_t errors_before = context.errors.size();
@@ -105,6 +124,7 @@ std::optional<GyroPlan> read_gyro(const toml::table& table, std::size_t index, C
   const dbc::Signal* sign_signal = resolver.signal("sign_signal", false);
   const dbc::Signal* temperature_signal = resolver.signal("temperature", false);
   const dbc::Signal* supply_signal = resolver.signal("supply_voltage", false);
+  const OtherAxisSignals other_axes = other_axis_signals(resolver);
   const auto unit = reader.text("unit");
   std::optional<GyroPlan> gyro;
   std::optional<Quantity> rate;
@@ -138,6 +158,7 @@ std::optional<GyroPlan> read_gyro(const toml::table& table, std::size_t index, C
       gyro->supply_voltage =
           resolver.quantity(*supply_signal, "supply_voltage", Dimension::kVoltage);
     }
+    read_other_axes(resolver, other_axes, *gyro);
   } else {
     // Ask for the rest, so that a good key is not called unknown on top of the real trouble.
     reader.forgive({"sign", "source_address", "valid", "max_bias_dps"});

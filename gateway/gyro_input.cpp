@@ -68,6 +68,8 @@ GyroInput::GyroInput(const GyroPlan& plan)
       bytes_needed_(bytes_of(plan)),
       temperature_(plan.temperature),
       supply_voltage_(plan.supply_voltage),
+      other_axes_{Beside(plan.rate_x), Beside(plan.rate_y), Beside(plan.rate_z)},
+      has_other_axes_(plan.rate_x || plan.rate_y || plan.rate_z),
       e2e_(plan.e2e) {}
 
 void Beside::keep(const can::Frame& frame) {
@@ -78,6 +80,10 @@ void Beside::keep(const can::Frame& frame) {
 void GyroInput::keep_besides(const can::Frame& frame) {
   if (temperature_.wanted()) temperature_.keep(frame);
   if (supply_voltage_.wanted()) supply_voltage_.keep(frame);
+  if (!has_other_axes_) return;
+  for (Beside& axis : other_axes_) {
+    if (axis.wanted()) axis.keep(frame);
+  }
 }
 
 void GyroInput::decode(const can::Frame& frame, Result& result) {

@@ -4,6 +4,7 @@
 // frame itself tells: check value, length, alive counter, `valid` comparison, finite and in range.
 // Stamps are judged elsewhere.
 
+#include <array>
 #include <cstdint>
 #include <limits>
 #include <optional>
@@ -59,6 +60,10 @@ class GyroInput {
   /// Of the newest frame that was used or told nothing else; NaN when there is none.
   [[nodiscard]] double temperature_c() const { return temperature_.value(); }
   [[nodiscard]] double supply_v() const { return supply_voltage_.value(); }
+  /// About x, y and z.
+  [[nodiscard]] std::array<double, 3> other_rate_dps() const {
+    return {other_axes_[0].value(), other_axes_[1].value(), other_axes_[2].value()};
+  }
 
  private:
   void keep_besides(const can::Frame& frame);
@@ -67,6 +72,8 @@ class GyroInput {
   std::size_t bytes_needed_;
   Beside temperature_;
   Beside supply_voltage_;
+  std::array<Beside, 3> other_axes_;
+  bool has_other_axes_;
   E2eCheck e2e_;
 };
 

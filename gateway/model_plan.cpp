@@ -6,6 +6,7 @@
 #include <fmt/core.h>
 
 #include "base/fnv1a.h"
+#include "model/flicker.h"
 
 namespace vgyro::gateway {
 
@@ -42,6 +43,23 @@ void add_noise(const model::Effect& effect, fusion::GyroParameters& parameters) 
   }
 }
 
+// Flicker as drifts of the corrector, as many as there is room for beside those that are given:
+// three are a decade apart. What is quicker drowns in white noise; what is slower is a bias to
+// every stop.
+constexpr double kFlickerFrom_s = 3.0;
+constexpr double kFlickerTo_s = 3000.0;
+void add_flicker(double coefficient_dps, fusion::GyroParameters& parameters) {
+  if (coefficient_dps == 0.0) return;
+  const std::size_t begin = parameters.gauss_markov_count;
+  const std::size_t room = parameters.gauss_markov.size() - begin;
+  for (std::size_t i = 0; i < room; ++i) {
+    const model::FlickerTerm term =
+        model::flicker_term(coefficient_dps, i, room, kFlickerFrom_s, kFlickerTo_s);
+    parameters.gauss_markov[begin + i] = {term.sigma_dps, term.tau_s};
+  }
+  parameters.gauss_markov_count = parameters.gauss_markov.size();
+}
+
 void add_lag_doubt(const model::Effect& effect, fusion::GyroParameters& parameters) {
   if (model::info(effect.kind).nature != model::Nature::kLag) return;
   parameters.lag_sigma_s = std::hypot(parameters.lag_sigma_s, model::lag_sigma_s(effect));
@@ -74,32 +92,49 @@ std::string digest_of(const std::vector<model::Effect>& effects) {
   return any ? fmt::format("{:08x}", hash) : std::string();
 }
 
+std::size_t axis_of(const model::Effect& effect) {
+  return static_cast<std::size_t>(effect.parameters[0]);
+}
+
 struct Input {
   model::Need need;
   std::string_view word;
-  bool (*is_configured)(const Plan& plan, std::size_t gyro);
-  std::string (*lacking)(const GyroPlan& gyro);
+  bool (*is_configured)(const Plan& plan, const model::Effect& effect);
+  std::string (*lacking)(const GyroPlan& gyro, const model::Effect& effect);
   std::string_view remedy;
 };
 constexpr Input kInputs[] = {
     {model::kNeedsTemperature, "temperature",
-     [](const Plan& plan, std::size_t gyro) { return plan.gyros[gyro].temperature.has_value(); },
-     [](const GyroPlan& gyro) {
+     [](const Plan& plan, const model::Effect& effect) {
+       return plan.gyros[effect.gyro].temperature.has_value();
+     },
+     [](const GyroPlan& gyro, const model::Effect&) {
        return fmt::format("the temperature of gyro {}, which the configuration does not name",
                           gyro.name);
      },
      "temperature = \"SIGNAL\" in its [[gyro]] table"},
     {model::kNeedsAcceleration, "acceleration",
-     [](const Plan& plan, std::size_t) { return plan.accelerometer.has_value(); },
-     [](const GyroPlan&) { return std::string("an [accelerometer]"); },
+     [](const Plan& plan, const model::Effect&) { return plan.accelerometer.has_value(); },
+     [](const GyroPlan&, const model::Effect&) { return std::string("an [accelerometer]"); },
      "an [accelerometer] table in the configuration"},
     {model::kNeedsSupply, "supply voltage",
-     [](const Plan& plan, std::size_t gyro) { return plan.gyros[gyro].supply_voltage.has_value(); },
-     [](const GyroPlan& gyro) {
+     [](const Plan& plan, const model::Effect& effect) {
+       return plan.gyros[effect.gyro].supply_voltage.has_value();
+     },
+     [](const GyroPlan& gyro, const model::Effect&) {
        return fmt::format("the supply voltage of gyro {}, which the configuration does not name",
                           gyro.name);
      },
      "supply_voltage = \"SIGNAL\" in its [[gyro]] table"},
+    {model::kNeedsOtherAxes, "other axes",
+     [](const Plan& plan, const model::Effect& effect) {
+       return (plan.gyros[effect.gyro].*kOtherAxes[axis_of(effect)]).has_value();
+     },
+     [](const GyroPlan& gyro, const model::Effect& effect) {
+       return fmt::format("the rate of gyro {} about {}, which the configuration does not name",
+                          gyro.name, "xyz"[axis_of(effect)]);
+     },
+     "rate_x, rate_y or rate_z = \"SIGNAL\" in its [[gyro]] table"},
 };
 static_assert(model::answers_each_need(kInputs));
 
@@ -107,10 +142,11 @@ void check_inputs(const model::Effect& effect, const Plan& plan, const std::stri
                   std::vector<Error>& errors) {
   const model::KindInfo& kind = model::info(effect.kind);
   for (const Input& input : kInputs) {
-    if ((kind.needs & input.need) == 0 || input.is_configured(plan, effect.gyro)) continue;
-    errors.push_back({place,
-                      fmt::format("{} needs {}", kind.name, input.lacking(plan.gyros[effect.gyro])),
-                      std::string(input.remedy)});
+    if ((kind.needs & input.need) == 0 || input.is_configured(plan, effect)) continue;
+    errors.push_back(
+        {place,
+         fmt::format("{} needs {}", kind.name, input.lacking(plan.gyros[effect.gyro], effect)),
+         std::string(input.remedy)});
   }
 }
 
@@ -118,12 +154,17 @@ void check_inputs(const model::Effect& effect, const Plan& plan, const std::stri
 
 void apply_model(const model::Model& model, Plan& plan, std::vector<Error>& errors) {
   std::array<double, 2> lag_s{};
+  std::array<double, 2> flicker_dps{};
   for (const model::Effect& effect : model.effects) {
     const std::string place = at_line(model.file, effect.line);
     check_inputs(effect, plan, place, errors);
     add_noise(effect, plan.corrector.gyros[effect.gyro]);
     add_lag_doubt(effect, plan.corrector.gyros[effect.gyro]);
     add_limit(effect, plan.gyros[effect.gyro]);
+    if (effect.kind == model::Kind::kBiasInstability) {
+      double& sum_dps = flicker_dps[effect.gyro];
+      sum_dps = std::hypot(sum_dps, effect.parameters[0]);
+    }
     // What the model tells of the temperature is not learned besides.
     if (effect.kind == model::Kind::kTemperatureBias ||
         effect.kind == model::Kind::kTemperatureBiasQuadratic)
@@ -137,6 +178,8 @@ void apply_model(const model::Model& model, Plan& plan, std::vector<Error>& erro
                                   plan.gyros[effect.gyro].name, sum_s),
                       fmt::format("up to {:g} s can be taken back", kLagMax_s)});
   }
+  for (std::size_t gyro = 0; gyro < 2; ++gyro)
+    add_flicker(flicker_dps[gyro], plan.corrector.gyros[gyro]);
   plan.model = model;
   for (std::size_t gyro = 0; gyro < 2; ++gyro)
     plan.gyros[gyro].taken_back = digest_of(effects_of(plan, gyro));

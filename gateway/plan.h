@@ -123,6 +123,9 @@ struct GyroPlan {
   std::optional<dbc::SignalCodec> sign;  ///< separate sign bit: 1 means negative
   std::optional<Quantity> temperature;
   std::optional<Quantity> supply_voltage = {};
+  std::optional<Quantity> rate_x = {};  ///< about other axes of the same unit, beside `rate`
+  std::optional<Quantity> rate_y = {};
+  std::optional<Quantity> rate_z = {};
   E2ePlan e2e = {};
   std::optional<ValidCondition> valid;
   std::optional<double> saturation_dps = {};  ///< from the model file: it clips at ± this
@@ -134,7 +137,9 @@ struct GyroPlan {
 };
 
 /// What a gyro's message may tell besides its rate.
-inline constexpr std::array kBesides{&GyroPlan::temperature, &GyroPlan::supply_voltage};
+inline constexpr std::array kOtherAxes{&GyroPlan::rate_x, &GyroPlan::rate_y, &GyroPlan::rate_z};
+inline constexpr std::array kBesides{&GyroPlan::temperature, &GyroPlan::supply_voltage,
+                                     &GyroPlan::rate_x, &GyroPlan::rate_y, &GyroPlan::rate_z};
 
 struct ReferencePlan {
   std::string bus;

@@ -37,6 +37,14 @@ constexpr std::array<Surroundings::Source, model::kNeedCount> Surroundings::kSou
        to.add_supply(gyro, input.supply_v());
      },
      [](const Surroundings& from, std::size_t gyro) { return !std::isnan(from.supply_v_[gyro]); }},
+    {model::kNeedsOtherAxes,
+     [](Surroundings& to, std::size_t gyro, TimePoint, const GyroInput& input) {
+       to.set_other_rates(gyro, input.other_rate_dps());
+     },
+     [](const Surroundings& from, std::size_t gyro) {
+       const auto& rates = from.other_rate_dps_[gyro];
+       return std::any_of(rates.begin(), rates.end(), [](double r) { return !std::isnan(r); });
+     }},
 }};
 
 Surroundings::Surroundings(const Plan& plan)
@@ -44,6 +52,8 @@ Surroundings::Surroundings(const Plan& plan)
       rate_dps_(plan.calibration.rate_dps) {
   static_assert(model::answers_each_need(kSources));
   supply_v_.fill(model::Surroundings::kUnknown);
+  for (std::array<double, 3>& rates : other_rate_dps_)
+    rates.fill(model::Surroundings::kUnknown);
   acceleration_g_.fill(model::Surroundings::kUnknown);
   if (plan.accelerometer) accelerometer_.emplace(accelerometer_intake(*plan.accelerometer));
   if (plan.speed) speed_.emplace(speed_intake(*plan.speed));
@@ -95,7 +105,9 @@ void Surroundings::add_supply(std::size_t gyro, double supply_v) {
 }
 
 void Surroundings::add_temperature(std::size_t gyro, TimePoint t, double temperature_c) {
-  if (!std::isnan(temperature_c)) temperatures_[gyro].add(t, temperature_c);
+  if (std::isnan(temperature_c)) return;
+  temperatures_[gyro].add(t, temperature_c);
+  temperature_pasts_[gyro].add(temperatures_[gyro].temperature_c());
 }
 
 bool Surroundings::receive_acceleration(const can::Frame& frame, TimePoint raw,
@@ -133,13 +145,16 @@ void Surroundings::add_rate(TimePoint t, double rate_dps) {
 
 model::Surroundings Surroundings::at(std::size_t gyro, TimePoint t) const {
   const Duration ahead = std::clamp<Duration>(t - angle_at_, -kAngleAhead, kAngleAhead);
-  return {.t_s = to_seconds(t - zero_),
-          .temperature_c = temperatures_[gyro].temperature_c(),
-          .temperature_slope_c_s = temperatures_[gyro].slope_c_s(),
-          .acceleration_g = acceleration_g_,
-          .vibration_g2 = vibration_.variance(),
-          .supply_v = supply_v_[gyro],
-          .angle_rad = angle_rad_ + rate_dps_ * to_seconds(ahead) * kRadPerDeg};
+  return {
+      .t_s = to_seconds(t - zero_),
+      .temperature_c = temperatures_[gyro].temperature_c(),
+      .temperature_slope_c_s = temperatures_[gyro].slope_c_s(),
+      .temperature_past = temperature_pasts_[gyro].empty() ? nullptr : &temperature_pasts_[gyro],
+      .acceleration_g = acceleration_g_,
+      .vibration_g2 = vibration_.variance(),
+      .supply_v = supply_v_[gyro],
+      .other_rate_dps = other_rate_dps_[gyro],
+      .angle_rad = angle_rad_ + rate_dps_ * to_seconds(ahead) * kRadPerDeg};
 }
 
 fusion::Wheels Surroundings::wheels(TimePoint t) const {

@@ -21,6 +21,7 @@
 #include "gateway/plan.h"
 #include "model/catalogue.h"
 #include "model/effect.h"
+#include "model/temperature_past.h"
 
 namespace vgyro::gateway {
 
@@ -52,6 +53,10 @@ class Surroundings {
   /// NaN is passed over.
   void add_temperature(std::size_t gyro, TimePoint t, double temperature_c);
   void add_supply(std::size_t gyro, double supply_v);
+  /// About x, y and z, of the same frame as the rate; NaN is none, and ends what was before.
+  void set_other_rates(std::size_t gyro, const std::array<double, 3>& rate_dps) {
+    other_rate_dps_[gyro] = rate_dps;
+  }
   /// False when the frame cannot be used.
   bool receive_acceleration(const can::Frame& frame, TimePoint raw, fusion::StampGuard& guard);
   bool receive_speed(const can::Frame& frame, TimePoint raw, fusion::StampGuard& guard);
@@ -84,7 +89,9 @@ class Surroundings {
   TimePoint zero_;
   TimePoint newest_;
   std::array<fusion::TemperatureFilter, 2> temperatures_;
+  std::array<model::TemperaturePast, 2> temperature_pasts_;
   std::array<double, 2> supply_v_;
+  std::array<std::array<double, 3>, 2> other_rate_dps_;
   std::array<double, 3> acceleration_g_;
   fusion::MovingVariance vibration_;
   TimePoint angle_at_;

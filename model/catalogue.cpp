@@ -8,6 +8,8 @@
 
 #include <fmt/core.h>
 
+#include "model/temperature_past.h"
+
 namespace vgyro::model {
 
 namespace {
@@ -81,6 +83,10 @@ constexpr std::array kGSensitivity{
 constexpr std::array kVibrationRectification{number("coefficient_dps_g2", "(deg/s)/g^2", 1e3)};
 constexpr std::array kDelay{number("seconds", "s", kLagMax_s)};
 constexpr std::array kBandwidth{divisor("cutoff_hz", "Hz", kCutoffMin_hz, kFrequencyMax_hz)};
+// Less damping rings for a hundred periods, more is a low-pass of the first order.
+constexpr std::array kBandwidthSecondOrder{
+    divisor("cutoff_hz", "Hz", kCutoffMin_hz, kFrequencyMax_hz),
+    divisor("damping", "", 0.01, 10.0)};
 constexpr std::array kAngleHarmonic{
     Parameter{
         .name = "harmonic", .unit = "", .minimum = 1.0, .maximum = 100.0, .form = Form::kWhole},
@@ -104,6 +110,15 @@ constexpr std::array kClockSkew{number("ppm", "1e-6", 1e5)};
 constexpr std::array kTimestampJitter{not_negative("sigma_s", "s", 10.0)};
 constexpr std::array kSupplyVoltageBias{number("coefficient_dps_v", "(deg/s)/V", 1e3),
                                         kReferenceSupply};
+constexpr std::array kRunIn{number("coefficient_dps", "deg/s", kRateMax_dps),
+                            divisor("tau_s", "s", kTauMin_s, kTimeMax_s)};
+
+constexpr std::array kTemperatureHysteresis{number("coefficient_dps_k", "(deg/s)/K", 1e3),
+                                            not_negative("play_k", "K", 1e3)};
+constexpr std::array kBiasInstability{noise("coefficient_dps", "deg/s", kNoiseMax)};
+constexpr std::array kCrossAxis{
+    Parameter{.name = "from", .unit = "", .minimum = 0.0, .maximum = 2.0, .form = Form::kAxis},
+    number("coefficient", "", 1.0)};
 
 constexpr KindInfo kCatalogue[] = {
     {Kind::kBias, Nature::kOffset, kNeedsNothing, "bias", "value", kBias,
@@ -190,6 +205,26 @@ constexpr KindInfo kCatalogue[] = {
     {Kind::kSupplyVoltageBias, Nature::kOffset, kNeedsSupply, "supply_voltage_bias",
      "c * (V - ref)", kSupplyVoltageBias,
      [](const P& p, double, const S& s) { return p[0] * (s.supply_v - p[1]); }},
+    {Kind::kRunIn, Nature::kOffset, kNeedsNothing, "run_in", "c * ln(1 + t / tau)", kRunIn,
+     [](const P& p, double, const S& s) {
+       // A reading dated back before the first frame is of a gyro that has not begun.
+       return p[0] * std::log1p(std::max(0.0, s.t_s) / p[1]);
+     }},
+    {Kind::kTemperatureHysteresis, Nature::kOffset, kNeedsTemperature, "temperature_hysteresis",
+     "c * (T with play - T)", kTemperatureHysteresis,
+     [](const P& p, double, const S& s) {
+       if (s.temperature_past == nullptr || std::isnan(s.temperature_c)) return 0.0;
+       return p[0] * (s.temperature_past->followed_c(p[1], s.temperature_c) - s.temperature_c);
+     }},
+    {Kind::kBiasInstability, Nature::kNoise, kNeedsNothing, "bias_instability",
+     "flicker noise B, Allan floor 0.664 * B", kBiasInstability},
+    {Kind::kCrossAxis, Nature::kOffset, kNeedsOtherAxes, "cross_axis",
+     "c * rate about another axis of the unit", kCrossAxis,
+     [](const P& p, double, const S& s) {
+       return p[1] * s.other_rate_dps[static_cast<std::size_t>(p[0])];
+     }},
+    {Kind::kBandwidthSecondOrder, Nature::kLag, kNeedsNothing, "bandwidth_second_order",
+     "second-order low-pass of the rate", kBandwidthSecondOrder},
 };
 static_assert(std::size(kCatalogue) == kKindCount);
 
@@ -314,8 +349,10 @@ double clipped_dps(const Effect& effect, double reading_dps) {
 
 double lag_s(const Effect& effect) {
   if (effect.kind == Kind::kDelay) return effect.parameters[0];
-  assert(effect.kind == Kind::kBandwidth);
-  return 1.0 / (2.0 * std::numbers::pi * effect.parameters[0]);
+  const double first_order_s = 1.0 / (2.0 * std::numbers::pi * effect.parameters[0]);
+  if (effect.kind == Kind::kBandwidth) return first_order_s;
+  assert(effect.kind == Kind::kBandwidthSecondOrder);
+  return 2.0 * effect.parameters[1] * first_order_s;
 }
 
 double lag_sigma_s(const Effect& effect) {

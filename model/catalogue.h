@@ -35,9 +35,10 @@ enum Need : std::uint8_t {
   kNeedsNothing = 0,
   kNeedsTemperature = 1U << 0U,
   kNeedsAcceleration = 1U << 1U,
-  kNeedsSupply = 1U << 2U
+  kNeedsSupply = 1U << 2U,
+  kNeedsOtherAxes = 1U << 3U
 };
-inline constexpr std::size_t kNeedCount = 3;
+inline constexpr std::size_t kNeedCount = 4;
 
 /// Of a table that says something of each need: one row for each bit, in their order. To be
 /// asserted where it stands, so that a new need does not compile before all who must know it do.

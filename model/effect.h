@@ -41,9 +41,14 @@ enum class Kind : std::uint8_t {
   kDroppedFrames,
   kClockSkew,
   kTimestampJitter,
-  kSupplyVoltageBias
+  kSupplyVoltageBias,
+  kRunIn,
+  kTemperatureHysteresis,
+  kBiasInstability,
+  kCrossAxis,
+  kBandwidthSecondOrder
 };
-inline constexpr std::size_t kKindCount = 31;
+inline constexpr std::size_t kKindCount = 36;
 
 /// Effects of kind gauss_markov for one gyro. Three, a decade apart, are flicker noise over the
 /// times that a gyro is used for (docs/allan.md); each is a state of every filter of the gateway.
@@ -69,6 +74,8 @@ inline bool is_doubted(const Effect& effect) {
   return effect.ambiguous || effect.sigma != Parameters{};
 }
 
+class TemperaturePast;
+
 /// What a gyro's error depends on besides the true rate, at one instant. NaN: not known.
 struct Surroundings {
   static constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
@@ -76,10 +83,13 @@ struct Surroundings {
   double t_s = 0.0;  ///< since the first frame of the recording
   double temperature_c = kUnknown;
   double temperature_slope_c_s = kUnknown;
+  const TemperaturePast* temperature_past = nullptr;  ///< up to now; null: not known
   std::array<double, 3> acceleration_g{kUnknown, kUnknown, kUnknown};
   double vibration_g2 = kUnknown;  ///< variance of |a| over the last second
   double supply_v = kUnknown;      ///< at the gyro
-  double angle_rad = 0.0;          ///< ∫Ω dt, up to whole turns
+  /// About x, y and z of the same unit, as it tells them: as late as what it reads itself.
+  std::array<double, 3> other_rate_dps{kUnknown, kUnknown, kUnknown};
+  double angle_rad = 0.0;  ///< ∫Ω dt, up to whole turns
 };
 
 }  // namespace vgyro::model

@@ -1,6 +1,8 @@
 #include "model/equation.h"
 
 #include <algorithm>
+#include <cmath>
+#include <numbers>
 
 #include "model/catalogue.h"
 
@@ -20,6 +22,17 @@ double plus_each_dps(double sum_dps, std::span<const Effect> effects, double lat
 }
 
 }  // namespace
+
+std::array<std::complex<double>, 2> SecondOrder::poles() const {
+  // Two that are equal are moved apart, for the sake of whoever divides by their difference.
+  constexpr double kApart = 1e-3;
+  std::complex<double> root = std::sqrt(std::complex<double>(damping * damping - 1.0, 0.0));
+  if (std::abs(root) < kApart) root = kApart;
+  const double w = 2.0 * std::numbers::pi * cutoff_hz;
+  // The smaller one by the product of both: a difference would lose its digits.
+  const std::complex<double> larger = w * (damping + root);
+  return {w * w / larger, larger};
+}
 
 bool moves_in_time(Kind kind) {
   return info(kind).nature == Nature::kLag || kind == Kind::kClockSkew;
@@ -48,6 +61,8 @@ void Equation::take(const Effect& effect) {
       lag_s_ += model::lag_s(effect);
       if (effect.kind == Kind::kDelay) delay_s_ += effect.parameters[0];
       if (effect.kind == Kind::kBandwidth) cutoffs_hz_.push_back(effect.parameters[0]);
+      if (effect.kind == Kind::kBandwidthSecondOrder)
+        second_orders_.push_back({effect.parameters[0], effect.parameters[1]});
       break;
     case Nature::kClip:
       clips_.push_back(effect);

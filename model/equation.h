@@ -9,6 +9,8 @@
 // and lost frames are drawn by the simulator. Rates in deg/s, times in seconds since the first
 // frame of the recording.
 
+#include <array>
+#include <complex>
 #include <concepts>
 #include <span>
 #include <utility>
@@ -20,6 +22,16 @@ namespace vgyro::model {
 
 /// Of lags and clock_skew: with them the gyro feels, or tells, another instant than its stamp says.
 bool moves_in_time(Kind kind);
+
+/// Ω'' / w² + 2·damping·Ω' / w + Ω = input, w = 2π·cutoff.
+struct SecondOrder {
+  double cutoff_hz = 0.0;
+  double damping = 0.0;
+
+  /// Of the two first-order low-passes, real or not, that it is when they are one behind the other:
+  /// y' = pole·(u − y).
+  [[nodiscard]] std::array<std::complex<double>, 2> poles() const;
+};
 
 class Equation {
  public:
@@ -39,15 +51,17 @@ class Equation {
   [[nodiscard]] double delay_s() const { return delay_s_; }
   /// Whose rate the low-passes are given at this true time.
   [[nodiscard]] double felt_at_s(double true_s) const { return true_s - delay_s_; }
-  /// Of the low-passes, one behind the other, in Hz.
+  /// Of the low-passes of first order, one behind the other, in Hz.
   [[nodiscard]] std::span<const double> cutoffs_hz() const { return cutoffs_hz_; }
+  /// Behind those, of second order.
+  [[nodiscard]] std::span<const SecondOrder> second_orders() const { return second_orders_; }
   /// How much later than the rate the reading comes, for rates that change slowly: Σ delay and the
   /// low-passes' group delays.
   [[nodiscard]] double lag_s() const { return lag_s_; }
   /// Whether anything moves it in time.
   [[nodiscard]] bool is_late() const { return is_late_; }
 
-  /// Ω' at this true time. `low_passed(t_s)` is the rate behind the low-passes of cutoffs_hz(), for
+  /// Ω' at this true time. `low_passed(t_s)` is the rate behind all low-passes, for
   /// which whoever knows the rate over time has means of its own.
   template <std::invocable<double> LowPassed>
   [[nodiscard]] double late_rate_dps(LowPassed&& low_passed, double true_s) const {
@@ -87,6 +101,7 @@ class Equation {
   std::vector<Effect> responses_;
   std::vector<Effect> clips_;
   std::vector<double> cutoffs_hz_;
+  std::vector<SecondOrder> second_orders_;
   double delay_s_ = 0.0;
   double lag_s_ = 0.0;
   double clock_rate_ = 1.0;

@@ -46,6 +46,17 @@ constexpr Evidence kEvidence[] = {
     {Kind::kTimestampJitter, "stamps that scatter about an even clock", "dropped_frames"},
     {Kind::kSupplyVoltageBias, "a supply voltage that rises and falls by some tenths of a volt",
      "bias_step, rate_random_walk"},
+    {Kind::kRunIn, "a long recording from the start on, ten times as long as tau",
+     "warm_up, bias_ramp, rate_random_walk"},
+    {Kind::kTemperatureHysteresis,
+     "temperature that turns round several times, by far more than the play",
+     "temperature_rate_bias, rate_random_walk"},
+    {Kind::kBiasInstability,
+     "rest of a thousand times as long as white noise takes to sink below it",
+     "gauss_markov, rate_random_walk"},
+    {Kind::kCrossAxis, "turns about the other axes; their rates on the bus", "g_sensitivity, line"},
+    {Kind::kBandwidthSecondOrder, "turning to and fro below the cut-off and beyond it",
+     "bandwidth, delay"},
 };
 
 static_assert(std::size(kEvidence) == kKindCount);

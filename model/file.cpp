@@ -189,6 +189,24 @@ void check_count(TomlReader& root, Kind kind, std::size_t most, const Model& mod
   }
 }
 
+// Flicker noise becomes correlated drifts, of which there must be room for one.
+void check_flicker(TomlReader& root, const Model& model) {
+  for (std::size_t gyro = 0; gyro < 2; ++gyro) {
+    const auto of_kind = [&](Kind kind) {
+      return [gyro, kind](const Effect& e) { return e.gyro == gyro && e.kind == kind; };
+    };
+    const auto flicker =
+        std::find_if(model.effects.begin(), model.effects.end(), of_kind(Kind::kBiasInstability));
+    const auto drifts = static_cast<std::size_t>(
+        std::count_if(model.effects.begin(), model.effects.end(), of_kind(Kind::kGaussMarkov)));
+    if (flicker == model.effects.end() || drifts < kGaussMarkovMax) continue;
+    root.complain(at_line(model.file, flicker->line),
+                  fmt::format("gyro {} has bias_instability beside {} effects of kind gauss_markov",
+                              gyro + 1, drifts),
+                  fmt::format("beside it there may be {}", kGaussMarkovMax - 1));
+  }
+}
+
 }  // namespace
 
 ModelResult parse_model(std::string_view text, const std::string& file) {
@@ -214,6 +232,7 @@ ModelResult parse_model(std::string_view text, const std::string& file) {
   }
   root.finish();
   check_count(root, Kind::kGaussMarkov, kGaussMarkovMax, model);
+  check_flicker(root, model);
   if (!errors.empty()) return tl::unexpected(std::move(errors));
   return model;
 }

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "model/catalogue.h"
+#include "model/flicker.h"
 
 namespace vgyro::simulation {
 
@@ -13,6 +14,12 @@ namespace {
 using model::Effect;
 using model::Kind;
 using model::Nature;
+
+// Of the terms that flicker noise is made of: from samples of the fastest gyro to days, a factor of
+// four apart. The same for every recording, so that a longer one begins as a shorter one does.
+constexpr std::size_t kFlickerTerms = 15;
+constexpr double kFlickerFrom_s = 1e-3;
+constexpr double kFlickerTo_s = 1e6;
 
 bool is_random(const Effect& effect) {
   return model::info(effect.kind).nature == Nature::kNoise || effect.kind == Kind::kSpikes;
@@ -48,12 +55,11 @@ double GyroChain::noise_dps(Random& random, double late_dps, double since_s) {
     case Kind::kRateRandomWalk:
       random.state_dps += p[0] * std::sqrt(since_s) * random.source.normal();
       return random.state_dps;
-    case Kind::kGaussMarkov: {
-      const double keep = begun_ ? std::exp(-since_s / p[1]) : 0.0;
-      random.state_dps =
-          keep * random.state_dps + p[0] * std::sqrt(1.0 - keep * keep) * random.source.normal();
+    case Kind::kGaussMarkov:
+      random.state_dps = correlated_dps(random.source, random.state_dps, p[0], p[1], since_s);
       return random.state_dps;
-    }
+    case Kind::kBiasInstability:
+      return flicker_dps(random, since_s);
     case Kind::kSpikes: {
       const bool hit = random.source.uniform() < -std::expm1(-p[0] * interval_s_);
       const double sign = random.source.uniform() < 0.5 ? -1.0 : 1.0;
@@ -63,6 +69,25 @@ double GyroChain::noise_dps(Random& random, double late_dps, double since_s) {
       assert(!is_random(random.effect));
       return 0.0;
   }
+}
+
+double GyroChain::correlated_dps(NoiseSource& source, double before_dps, double sigma_dps,
+                                 double tau_s, double since_s) const {
+  const double keep = begun_ ? std::exp(-since_s / tau_s) : 0.0;
+  return keep * before_dps + sigma_dps * std::sqrt(1.0 - keep * keep) * source.normal();
+}
+
+double GyroChain::flicker_dps(Random& random, double since_s) const {
+  random.flicker_dps.resize(kFlickerTerms);
+  double sum_dps = 0.0;
+  for (std::size_t i = 0; i < kFlickerTerms; ++i) {
+    const model::FlickerTerm term = model::flicker_term(
+        random.effect.parameters[0], i, kFlickerTerms, kFlickerFrom_s, kFlickerTo_s);
+    double& state_dps = random.flicker_dps[i];
+    state_dps = correlated_dps(random.source, state_dps, term.sigma_dps, term.tau_s, since_s);
+    sum_dps += state_dps;
+  }
+  return sum_dps;
 }
 
 double GyroChain::next(double late_dps, const model::Surroundings& surroundings) {

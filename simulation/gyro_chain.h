@@ -29,8 +29,12 @@ class GyroChain {
     model::Effect effect;
     NoiseSource source;
     double state_dps = 0.0;
+    std::vector<double> flicker_dps = {};  ///< of its terms
   };
   double noise_dps(Random& random, double late_dps, double since_s);
+  double flicker_dps(Random& random, double since_s) const;
+  double correlated_dps(NoiseSource& source, double before_dps, double sigma_dps, double tau_s,
+                        double since_s) const;
 
   model::Equation equation_;
   std::vector<model::Effect> stuck_;

@@ -25,17 +25,23 @@ constexpr std::size_t kRate = 1;
 constexpr std::size_t kTemperature = 2;
 constexpr std::size_t kAcceleration = 3;
 constexpr std::size_t kSupply = 6;
-constexpr std::array<Column, 7> kColumns{{{"t_s", -1e9, 1e9, true},
-                                          {"rate_dps", -1e5, 1e5, true},
-                                          {"temperature_c", -273.15, 1000.0, false},
-                                          {"acc_x_g", -1000.0, 1000.0, false},
-                                          {"acc_y_g", -1000.0, 1000.0, false},
-                                          {"acc_z_g", -1000.0, 1000.0, false},
-                                          {"supply_v", 0.0, 1000.0, false}}};
+constexpr std::size_t kOtherRates = 7;
+constexpr std::array<Column, 10> kColumns{{{"t_s", -1e9, 1e9, true},
+                                           {"rate_dps", -1e5, 1e5, true},
+                                           {"temperature_c", -273.15, 1000.0, false},
+                                           {"acc_x_g", -1000.0, 1000.0, false},
+                                           {"acc_y_g", -1000.0, 1000.0, false},
+                                           {"acc_z_g", -1000.0, 1000.0, false},
+                                           {"supply_v", 0.0, 1000.0, false},
+                                           {"rate_x_dps", -1e5, 1e5, false},
+                                           {"rate_y_dps", -1e5, 1e5, false},
+                                           {"rate_z_dps", -1e5, 1e5, false}}};
 static_assert(kColumns[kTemperature].name == "temperature_c" &&
-              kColumns[kAcceleration].name == "acc_x_g" && kColumns[kSupply].name == "supply_v");
+              kColumns[kAcceleration].name == "acc_x_g" && kColumns[kSupply].name == "supply_v" &&
+              kColumns[kOtherRates].name == "rate_x_dps");
 constexpr const char* kHeaderForm =
-    "t_s,rate_dps[,temperature_c][,acc_x_g,acc_y_g,acc_z_g][,supply_v]";
+    "t_s,rate_dps[,temperature_c][,acc_x_g,acc_y_g,acc_z_g][,supply_v]"
+    "[,rate_x_dps,rate_y_dps,rate_z_dps]";
 // Temperature, acceleration and voltage come from sensors with noise of their own.
 constexpr std::size_t kSlowPoints = 6;
 
@@ -197,12 +203,17 @@ Expected<Profile> parse_profile(std::string_view text, const std::string& file) 
                   .rate_dps = Curve(times_s, table.column(kRate)),
                   .temperature_c = {},
                   .acceleration_g = {},
-                  .supply_v = {}};
+                  .supply_v = {},
+                  .other_rate_dps = {}};
   if (table.has(kTemperature))
     profile.temperature_c = Curve(times_s, table.column(kTemperature), kSlowPoints);
   for (std::size_t axis = 0; axis < 3; ++axis) {
     if (!table.has(kAcceleration + axis)) continue;
     profile.acceleration_g[axis] = Curve(times_s, table.column(kAcceleration + axis), kSlowPoints);
+  }
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    if (table.has(kOtherRates + axis))
+      profile.other_rate_dps[axis] = Curve(times_s, table.column(kOtherRates + axis));
   }
   if (table.has(kSupply)) profile.supply_v = Curve(times_s, table.column(kSupply), kSlowPoints);
   return profile;

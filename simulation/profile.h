@@ -1,7 +1,7 @@
 #pragma once
 
-// A motion as a table: time, true rate, and, where they are known, temperature, acceleration and
-// supply voltage.
+// A motion as a table: time, true rate, and, where they are known, temperature, acceleration,
+// supply voltage and the rates about other axes.
 // Its text is CSV with a header line; docs/simulate.md describes it.
 
 #include <array>
@@ -25,6 +25,7 @@ struct Profile {
   std::optional<Curve> temperature_c;
   std::array<std::optional<Curve>, 3> acceleration_g;
   std::optional<Curve> supply_v;
+  std::array<std::optional<Curve>, 3> other_rate_dps;  ///< about x, y and z
 
   [[nodiscard]] bool has_acceleration() const;
 };

@@ -10,6 +10,7 @@
 
 #include "model/catalogue.h"
 #include "model/equation.h"
+#include "model/temperature_past.h"
 #include "simulation/gyro_chain.h"
 #include "simulation/low_pass.h"
 #include "simulation/noise_source.h"
@@ -126,6 +127,11 @@ std::string missing_supply(const Effect& /*effect*/, const Profile& profile) {
   return profile.supply_v ? "" : "supply_v";
 }
 
+std::string missing_other_rate(const Effect& effect, const Profile& profile) {
+  const auto axis = static_cast<std::size_t>(effect.parameters[0]);
+  return profile.other_rate_dps[axis] ? "" : fmt::format("rate_{}_dps", "xyz"[axis]);
+}
+
 struct InputColumn {
   model::Need need;
   /// Nothing where it is there.
@@ -133,7 +139,8 @@ struct InputColumn {
 };
 constexpr InputColumn kInputColumns[] = {{model::kNeedsTemperature, missing_temperature},
                                          {model::kNeedsAcceleration, missing_acceleration},
-                                         {model::kNeedsSupply, missing_supply}};
+                                         {model::kNeedsSupply, missing_supply},
+                                         {model::kNeedsOtherAxes, missing_other_rate}};
 static_assert(model::answers_each_need(kInputColumns));
 
 std::string missing_column(const Effect& effect, const Profile& profile) {
@@ -162,9 +169,10 @@ Expected<void> check_columns(const model::Model& model, const Profile& profile) 
 Expected<Simulator> Simulator::make(model::Model model, Profile profile, const Settings& settings) {
   if (const auto good = check_columns(model, profile); !good) return tl::unexpected(good.error());
   for (std::size_t gyro = 0; gyro < 2; ++gyro) {
-    const std::size_t count = model::Equation(effects_of(model, gyro)).cutoffs_hz().size();
+    const std::size_t count = LowPass::stages_of(model::Equation(effects_of(model, gyro)));
     if (count <= LowPass::kStagesMax) continue;
-    return fail(model.file, fmt::format("a gyro has {} effects of kind bandwidth", count),
+    return fail(model.file,
+                fmt::format("the low-passes of gyro {} are of order {} in all", gyro + 1, count),
                 fmt::format("at most {}", LowPass::kStagesMax));
   }
   for (const Timing& timing :
@@ -245,22 +253,66 @@ model::Surroundings Simulator::surroundings(double t_s) const {
   return s;
 }
 
+namespace {
+
+// The rates about other axes behind one gyro's delays and low-passes.
+class OtherAxes {
+ public:
+  OtherAxes(const Profile& profile, const model::Equation& equation) : equation_(equation) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const auto& curve = profile.other_rate_dps[axis];
+      if (curve) low_passes_[axis].emplace(*curve, equation);
+    }
+  }
+
+  /// Unknown where the profile does not have it. Precondition: t never goes back.
+  std::array<double, 3> at(double t_s) {
+    std::array<double, 3> rate_dps{};
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      rate_dps[axis] = low_passes_[axis] ? low_passes_[axis]->at(equation_.felt_at_s(t_s))
+                                         : model::Surroundings::kUnknown;
+    }
+    return rate_dps;
+  }
+
+ private:
+  const model::Equation& equation_;
+  std::array<std::optional<LowPass>, 3> low_passes_;
+};
+
+std::array<double, 3> known_or_0(std::array<double, 3> rate_dps) {
+  for (double& rate : rate_dps)
+    rate = std::isnan(rate) ? 0.0 : rate;
+  return rate_dps;
+}
+
+}  // namespace
+
 std::vector<GyroSample> Simulator::gyro(std::size_t index) const {
   const std::vector<Effect> effects = effects_of(model_, index);
   const Timing& timing = settings_.gyros[index];
   const model::Equation equation(effects);
-  LowPass low_pass(profile_.rate_dps, equation.cutoffs_hz());
+  LowPass low_pass(profile_.rate_dps, equation);
   const auto low_passed = [&](double t_s) { return low_pass.at(t_s); };
   GyroChain chain(effects, 1.0 / timing.rate_hz, settings_.seed);
   Stamps stamps(effects, settings_, kGyroSenders[index]);
   Losses losses(effects, settings_.seed);
+  OtherAxes other_axes(profile_, equation);
+  model::TemperaturePast past;
   std::vector<GyroSample> samples(sample_count(timing, profile_.length_s));
   for (std::size_t n = 0; n < samples.size(); ++n) {
     const double t_s = sample_time_s(timing, n);
     const double late_dps = equation.late_rate_dps(low_passed, t_s);
+    model::Surroundings around = surroundings(t_s);
+    if (profile_.temperature_c) {
+      past.add(around.temperature_c);
+      around.temperature_past = &past;
+    }
+    around.other_rate_dps = other_axes.at(t_s);
     samples[n] = {.t_s = t_s,
                   .stamp_s = stamps.next(t_s),
-                  .reading_dps = chain.next(late_dps, surroundings(t_s)),
+                  .reading_dps = chain.next(late_dps, around),
+                  .other_rate_dps = known_or_0(around.other_rate_dps),
                   .lost = losses.next()};
   }
   return samples;

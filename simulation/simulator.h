@@ -35,6 +35,9 @@ struct GyroSample {
   double t_s = 0.0;      ///< when it was taken, from the beginning of the motion
   double stamp_s = 0.0;  ///< what the log says of it; grows from sample to sample
   double reading_dps = 0.0;
+  /// About the other axes of the unit, as it feels them: as late as the reading, without its
+  /// errors. An axis that the profile does not have is 0.
+  std::array<double, 3> other_rate_dps{};
   bool lost = false;  ///< taken and counted, but its frame is not there
 };
 

@@ -63,6 +63,11 @@ std::string ramp_text(const NoiseFit& fit) {
   return fmt::format("none (± {:.1g})", fit.ramp_sigma_dps_s);
 }
 
+std::string markov_text(const NoiseFit& fit) {
+  if (!fit.markov) return "none";
+  return fmt::format("σ {:.3g}, τ about {:.2g}", fit.markov->sigma_dps, fit.markov->tau_s);
+}
+
 std::array<const SeriesNoise*, 3> columns(const AllanReport& report) {
   return {&report.noise.gyros[0], &report.noise.gyros[1], &report.noise.difference};
 }
@@ -95,6 +100,9 @@ std::string table(const AllanReport& report) {
                            : std::string("-");
         }));
   }
+  row(text, "drift that forgets", "deg/s, s", cells(report, [](const SeriesNoise& noise) {
+        return noise.fit ? markov_text(*noise.fit) : std::string("-");
+      }));
   row(text, "ramp", "deg/s²", cells(report, [](const SeriesNoise& noise) {
         return noise.fit ? ramp_text(*noise.fit) : std::string("-");
       }));
@@ -239,6 +247,9 @@ nlohmann::ordered_json fit_json(const NoiseFit& fit) {
   const bool asked = fit.quantisation_deg.resolved || fit.quantisation_deg.below > 0.0;
   json["quantisation_deg"] =
       asked ? estimate_json(fit.quantisation_deg, 1.0) : nlohmann::ordered_json(nullptr);
+  json["gauss_markov"] = fit.markov ? nlohmann::ordered_json{{"sigma_dps", fit.markov->sigma_dps},
+                                                             {"tau_s", fit.markov->tau_s}}
+                                    : nlohmann::ordered_json(nullptr);
   json["ramp_dps_s"] = {{"value", fit.ramp_dps_s}, {"sigma", fit.ramp_sigma_dps_s}};
   json["frequency_max_hz"] = fit.frequency_max_hz;
   json["describes"] = fit.describes;
@@ -310,6 +321,11 @@ std::string model_toml(const AllanReport& report) {
     if (fit.walk_dps_rts.resolved) {
       effect(text, i, "rate_random_walk",
              fmt::format("density_dps_rts = {:.4e}\n", fit.walk_dps_rts.value));
+    }
+    if (fit.markov) {
+      effect(text, i, "gauss_markov",
+             fmt::format("sigma_dps = {:.3e}\ntau_s = {:.3g}\n", fit.markov->sigma_dps,
+                         fit.markov->tau_s));
     }
     if (fit.flicker_dps.resolved) add_flicker(text, i, noise);
     if (fit.ramp_significance() > analysis::kRampSigmas) {

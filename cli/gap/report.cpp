@@ -142,7 +142,8 @@ Json effect_json(const gap::NamedEffect& named) {
 }
 
 Json unexplained_json(const gap::Unexplained& rest) {
-  Json json{{"signature", rest.signature}, {"gyro", gyro_number(rest.gyro)}};
+  Json json{{"signature", rest.signature}, {"gyro", nullptr}};
+  if (rest.gyro) json["gyro"] = gyro_number(*rest.gyro);
   if (rest.frequency_hz) json["frequency_hz"] = *rest.frequency_hz;
   if (rest.amplitude_dps) json["amplitude_dps"] = *rest.amplitude_dps;
   json["from_s"] = rest.from_s;
@@ -456,7 +457,8 @@ std::string gap_text(const GapSubject& subject, const gap::Result& result) {
   if (!result.starting.empty()) text += starting_text(subject, result);
   if (!result.effects.empty()) text += drop_table(subject, result) + experiments(result);
   for (const gap::Unexplained& rest : result.unexplained)
-    text += fmt::format("unexplained: {}: {}\n", subject.gyros[rest.gyro], rest.text);
+    text += fmt::format("unexplained: {}: {}\n",
+                        rest.gyro ? subject.gyros[*rest.gyro] : "the reference", rest.text);
   for (const NotTold& line : not_told(subject, result)) {
     text += fmt::format("not identifiable: {}: {}{}{}\n", line.who, line.why,
                         line.experiment.empty() ? "" : "; ", line.experiment);

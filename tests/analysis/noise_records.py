@@ -62,6 +62,7 @@ class Noise:
     q: float = 0.0
     ramp: float = 0.0
     bias: float = 0.01
+    markov: tuple = ()  # σ deg/s, τ s
 
 
 def flicker(rng, count, interval_s, b):
@@ -75,12 +76,23 @@ def flicker(rng, count, interval_s, b):
     return np.fft.irfft(shaped, size)[count : 2 * count]
 
 
+def gauss_markov(rng, count, interval_s, sigma, tau_s):
+    keeps = np.exp(-interval_s / tau_s)
+    values = np.empty(count)
+    value = sigma * rng.normal()
+    for i, shock in enumerate(rng.normal(size=count) * sigma * np.sqrt(1 - keeps**2)):
+        values[i] = value = keeps * value + shock
+    return values
+
+
 def rates(rng, noise, count, interval_s):
     white = rng.normal(size=count) * noise.n / np.sqrt(interval_s)
     walk = np.cumsum(rng.normal(size=count)) * noise.k * np.sqrt(interval_s)
     angle = rng.normal(size=count + 1) * noise.q
     t = np.arange(count) * interval_s
     rate = noise.bias + noise.ramp * t + white + walk + np.diff(angle) / interval_s
+    if noise.markov:
+        rate += gauss_markov(rng, count, interval_s, *noise.markov)
     return rate + flicker(rng, count, interval_s, noise.b) if noise.b else rate
 
 

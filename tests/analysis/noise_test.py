@@ -111,6 +111,31 @@ class Estimates(Allan):
         self.assertGreaterEqual(held, len(unresolved["k"]) - 1)
         self.assertLess(max(below for below, _ in unresolved["k"]), 5e-5)
 
+    def test_drift_that_forgets_itself_is_no_random_walk(self):
+        noises = (Noise(n=3e-3, markov=(0.02, 60.0)), Noise(n=5e-3, markov=(0.01, 30.0)))
+        for seed in range(340, 346):
+            self.record(seed, noises, 36_000, 0.1)
+            result = self.judge(self.log)
+            self.assertTrue(result["at_rest"], f"seed {seed}")
+            for gyro, noise in zip(result["gyros"], noises):
+                self.assertFalse(gyro["noise"]["rate_random_walk_dps_rts"]["resolved"], f"seed {seed}")
+                sigma, tau_s = noise.markov
+                found = gyro["noise"]["gauss_markov"]
+                self.assertAlmostEqual(math.log(found["sigma_dps"] / sigma), 0.0, delta=0.5)
+                self.assertAlmostEqual(math.log(found["tau_s"] / tau_s), 0.0, delta=1.0)
+            kinds = [effect["kind"] for effect in tomllib.loads(result["model_toml"])["effect"]]
+            self.assertEqual(kinds, ["white_noise", "gauss_markov"] * 2)
+
+    def test_no_bound_is_far_below_what_the_record_shows(self):
+        # A weak term that the criterion leaves out may still be likelier than none.
+        for seed in range(350, 390):
+            self.record(seed, (Noise(n=2e-3, b=3e-4), Noise(n=2e-3, k=2e-5)), 6_000, 0.1)
+            for gyro in self.judge(self.log)["gyros"]:
+                for name in ("bias_instability_dps", "rate_random_walk_dps_rts"):
+                    estimate = gyro["noise"][name]
+                    if not estimate["resolved"]:
+                        self.assertGreater(estimate["below"], 1e-6, f"seed {seed}, {name}")
+
     def test_difference_has_the_noise_of_both(self):
         noises = (Noise(n=2e-3, k=2e-4), Noise(n=6e-3, k=6e-4))
         # Half an interval apart, so that one of them is interpolated; and with lost frames.
@@ -192,6 +217,19 @@ class Motion(Allan):
         for gyro, noise in zip(result["gyros"], self.NOISES):
             white = gyro["noise"]["white_noise_dps_rthz"]
             self.assertLess(abs(white["value"] - noise.n), SIGMAS * white["sigma"])
+
+    def test_gentle_motion_behind_a_rest_is_none(self):
+        # Four seconds in which a turn begins gently; then it goes on.
+        t = np.arange(12_000) * 0.1 - 600.0
+        motion = np.where(t > 0, np.where(t < 4, 0.02 * t**2, 0.32 + 10 * np.sin(0.6 * (t - 4))), 0.0)
+        self.record(8, (Noise(n=2e-3), Noise(n=6e-3, bias=-0.2)), 12_000, 0.1, motion=motion)
+        result = self.judge(self.log)
+        self.assertEqual(result["rest"]["from_s"], 0.0)
+        self.assertGreater(result["rest"]["to_s"], 580.0)
+        self.assertLessEqual(result["rest"]["to_s"], 601.0)
+        for gyro in result["gyros"]:
+            self.assertFalse(gyro["noise"]["rate_random_walk_dps_rts"]["resolved"])
+            self.assertFalse(gyro["noise"]["bias_instability_dps"]["resolved"])
 
     def test_without_rest_only_the_difference_is_judged(self):
         motion = self.turning(12_000, 0.1, 0.0, 1e9)

@@ -30,6 +30,10 @@ CASES = [
     Case("single", 309, "dropped_frames", short=True),
     Case("single", 310, "scale_factor", reference=False, short=True),
     Case("single", 316, "supply_voltage_bias", short=True),
+    Case("single", 317, "run_in", short=True),
+    Case("single", 318, "temperature_hysteresis", short=True),
+    Case("single", 319, "cross_axis", short=True),
+    Case("single", 320, "bias_instability", 20.0, short=True),
     Case("pair", 315, short=True),
     Case("outside", 312, "loud_minute", short=True),
 ]

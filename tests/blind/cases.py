@@ -22,7 +22,8 @@ RIVALS = [
     {"delay", "bandwidth", "clock_skew", "timestamp_jitter"},
 ]
 # A seed goes on hiding what it hid: what the catalogue learned since hides alone.
-HIDE_ALONE = {"supply_voltage_bias"}
+HIDE_ALONE = {"supply_voltage_bias", "run_in", "temperature_hysteresis", "bias_instability", "cross_axis"}
+HIDE_ALONE |= {"bandwidth_second_order"}
 DECOYS = ["shuffled", "reversed", "flat", "common"]
 
 
@@ -113,6 +114,11 @@ def feed(world, rng):
     world.supplies = [surroundings.Supply(world.motion.duration_s, rng) for _ in range(2)]
 
 
+def sway(world, rng):
+    """Lets the platform roll, and each gyro tell it."""
+    world.roll = surroundings.Roll(rng)
+
+
 def hidden_in(case, world, rng):
     """(effects of the catalogue, functions outside it, name and gyro of what is outside)."""
     if case.world == "drive" and case.group != "decoy":
@@ -125,6 +131,8 @@ def hidden_in(case, world, rng):
             shake(world, rng)
         if kind == "supply_voltage_bias":
             feed(world, rng)
+        if kind == "cross_axis":
+            sway(world, rng)
         found.append(kinds.draw(kind, gyro, case.strength, world, rng))
         gyro = int(rng.integers(1, 3))
     if case.group == "outside":

@@ -8,14 +8,14 @@ import strength
 OFFSETS = [
     "bias", "bias_ramp", "bias_step", "warm_up", "temperature_bias", "temperature_bias_quadratic",
     "temperature_rate_bias", "g_sensitivity", "vibration_rectification", "angle_harmonic", "line",
-    "supply_voltage_bias",
+    "supply_voltage_bias", "run_in", "temperature_hysteresis", "cross_axis",
 ]  # fmt: skip
 RESPONSES = [
     "scale_factor", "scale_factor_asymmetry", "scale_factor_quadratic", "scale_factor_cubic",
     "scale_factor_temperature",
 ]  # fmt: skip
-LAGS = ["delay", "bandwidth"]
-NOISES = ["white_noise", "rate_random_walk", "gauss_markov", "rate_noise"]
+LAGS = ["delay", "bandwidth", "bandwidth_second_order"]
+NOISES = ["white_noise", "rate_random_walk", "gauss_markov", "rate_noise", "bias_instability"]
 CLIPS = ["saturation", "dead_band", "quantization"]
 DISTURBANCES = ["spikes", "stuck", "dropped_frames", "clock_skew", "timestamp_jitter"]
 KINDS = OFFSETS + RESPONSES + LAGS + NOISES + CLIPS + DISTURBANCES
@@ -34,6 +34,9 @@ SIZE = {
     "angle_harmonic": ("amplitude_dps", 0.002, 0.008),
     "line": ("amplitude_dps", 0.001, 0.006),
     "supply_voltage_bias": ("coefficient_dps_v", 0.005, 0.03),
+    "run_in": ("coefficient_dps", 0.002, 0.01),
+    "temperature_hysteresis": ("coefficient_dps_k", 1e-3, 5e-3),
+    "cross_axis": ("coefficient", 5e-4, 4e-3),
     "scale_factor": ("error", 2e-4, 2e-3),
     "scale_factor_asymmetry": ("error", 1e-4, 1e-3),
     "scale_factor_quadratic": ("coefficient_per_dps", 1e-6, 1e-5),
@@ -41,10 +44,12 @@ SIZE = {
     "scale_factor_temperature": ("coefficient_per_k", 2e-5, 2e-4),
     "delay": ("seconds", 5e-4, 2e-2),
     "bandwidth": ("cutoff_hz", 4.0, 60.0),
+    "bandwidth_second_order": ("cutoff_hz", 4.0, 15.0),
     "white_noise": ("density_dps_rthz", 3e-4, 1.2e-3),
     "rate_random_walk": ("density_dps_rts", 3e-5, 2e-4),
     "gauss_markov": ("sigma_dps", 1e-3, 4e-3),
     "rate_noise": ("ratio_rthz", 1e-5, 6e-5),
+    "bias_instability": ("coefficient_dps", 1e-3, 4e-3),
     "saturation": ("limit_dps", 60.0, 90.0),
     "dead_band": ("width_dps", 0.06, 0.4),
     "quantization": ("step_dps", 0.01, 0.05),
@@ -67,17 +72,25 @@ LEAST_DELAY_S = 3e-5
 HIGHEST_CUTOFF_HZ = 250.0
 
 
-def companions(kind, world, rng, plain):
+def companions(kind, gyro, world, rng, plain):
     """The parameters beside the size, drawn at random; `plain` where no strength is asked for."""
     duration_s = world.motion.duration_s
     if kind == "bias_step":
         return {"at_s": round(float(rng.uniform(0.2, 0.8) * duration_s), 1)}
     if kind == "warm_up":
         return {"tau_s": round(float(rng.uniform(25.0, 0.3 * duration_s)), 1)}
+    if kind == "run_in":
+        return {"tau_s": round(float(np.exp(rng.uniform(np.log(3.0), np.log(0.1 * duration_s)))), 1)}
     if kind in ("temperature_bias", "temperature_bias_quadratic", "scale_factor_temperature"):
         return {"reference_c": REFERENCE_C}
+    if kind == "temperature_hysteresis":
+        return {"play_k": round(float(rng.uniform(0.1, 0.25) * world.temperatures[gyro - 1].range_k(duration_s)), 2)}
     if kind == "supply_voltage_bias":
         return {"reference_v": REFERENCE_V}
+    if kind == "bandwidth_second_order":
+        return {"damping": round(float(rng.uniform(0.5, 0.9)), 3)}
+    if kind == "cross_axis":
+        return {"from": "x"}
     if kind == "g_sensitivity":
         return {"axis": str(rng.choice(["x", "y"]))}
     if kind == "angle_harmonic":
@@ -97,6 +110,13 @@ def companions(kind, world, rng, plain):
     return {}
 
 
+def lag_s(kind, p, size):
+    """By how much the reading comes late where the rate changes slowly."""
+    if kind == "delay":
+        return size
+    return (2 * p["damping"] if kind == "bandwidth_second_order" else 1.0) / (2 * np.pi * size)
+
+
 def shape(kind, p, gyro, t, world, late_rate=None):
     """What one unit of the effect adds to a reading at the instants t; a response to the late rate, which
     is the true one where nothing delays it."""
@@ -111,11 +131,15 @@ def shape(kind, p, gyro, t, world, late_rate=None):
         return -world.motion.acceleration(t)
     if kind.startswith("temperature"):
         temperature = world.temperatures[gyro - 1]
+        if kind == "temperature_hysteresis":
+            return temperature.with_play(t, p["play_k"]) - temperature.value(t)
         if kind == "temperature_rate_bias":
             return temperature.slope(t)
         return (temperature.value(t) - p["reference_c"]) ** (2 if kind.endswith("quadratic") else 1)
     if kind == "supply_voltage_bias":
         return world.supplies[gyro - 1].value(t) - p["reference_v"]
+    if kind == "cross_axis":
+        return world.roll.value(t)
     if kind == "bias":
         return np.ones_like(t)
     if kind == "bias_ramp":
@@ -124,6 +148,8 @@ def shape(kind, p, gyro, t, world, late_rate=None):
         return (t >= p["at_s"]).astype(float)
     if kind == "warm_up":
         return np.exp(-t / p["tau_s"])
+    if kind == "run_in":
+        return np.log1p(t / p["tau_s"])
     if kind == "g_sensitivity":
         return world.acceleration.value(t)[:, "xyz".index(p["axis"])]
     if kind == "vibration_rectification":
@@ -161,7 +187,10 @@ def _noise_strength(kind, p, gyro, world, size):
     if kind == "rate_random_walk":
         walks = np.hypot(walk_density, size), walk_density
         return against(*(strength.spectrum(f, interval_s, density, k) for k in walks))
-    new = strength.spectrum(f, interval_s, density, walk_density, size, p["tau_s"])
+    if kind == "bias_instability":
+        new = strength.spectrum(f, interval_s, density, walk_density) + size**2 / (2 * np.pi * f)
+    else:
+        new = strength.spectrum(f, interval_s, density, walk_density, size, p["tau_s"])
     rivals = [
         strength.spectrum(f, interval_s, density * more, walk_density * k)
         for k in [1.0, *np.geomspace(1.2, 300.0, 24)]
@@ -190,7 +219,7 @@ def _without_strength(kind, level, p, gyro, world, rng):
 
 def draw(kind, gyro, wanted_t, world, rng):
     """An effect of this kind as {"kind", "gyro", "parameters", "t"}; `wanted_t` None: as a bench meets it."""
-    p = companions(kind, world, rng, wanted_t is None)
+    p = companions(kind, gyro, world, rng, wanted_t is None)
     name, low, high = SIZE[kind]
     size_of_t = None
     if kind in CLIPS or kind in DISTURBANCES:
@@ -212,11 +241,11 @@ def draw(kind, gyro, wanted_t, world, rng):
             size = float(np.exp(rng.uniform(np.log(low), np.log(high))))
         elif kind == "delay":
             size = max(wanted_t / per_unit, LEAST_DELAY_S)
-        elif kind == "bandwidth":
-            size = min(per_unit / (2 * np.pi * wanted_t), HIGHEST_CUTOFF_HZ)
+        elif kind in LAGS:
+            size = min(per_unit * lag_s(kind, p, 1.0) / wanted_t, HIGHEST_CUTOFF_HZ)
         else:
             size = wanted_t / per_unit
-        size_of_t = lambda s: per_unit * (1 / (2 * np.pi * s) if kind == "bandwidth" else s)
+        size_of_t = lambda s: per_unit * (lag_s(kind, p, s) if kind in LAGS else s)
     t = None if size_of_t is None else round(float(size_of_t(size)), 2)
     if kind in SIGNED:
         size *= rng.choice([-1.0, 1.0])

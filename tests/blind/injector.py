@@ -37,6 +37,9 @@ def make(case, folder, answer_path, recordings=("measured", "fresh")):
     if any(e["kind"] == "supply_voltage_bias" for e in hidden):
         for world in worlds[1:]:
             cases.feed(world, np.random.default_rng([*root, 3]))
+    if any(e["kind"] == "cross_axis" for e in hidden):
+        for world in worlds[1:]:
+            cases.sway(world, np.random.default_rng([*root, 3]))
     (folder / "vgyro.toml").write_text(recording.config_text(worlds[0]))
     (folder / "bench.dbc").write_text(recording.dbc_text(worlds[0]))
     if not case.nothing_given:

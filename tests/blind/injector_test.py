@@ -38,6 +38,7 @@ def small_world(seed, rate_hz=4.0, reference=True):
         offset_s=0.0023,
         reference=reference,
         supplies=[surroundings.Supply(240.0, rng) for _ in range(2)],
+        roll=surroundings.Roll(rng),
     )
 
 
@@ -90,6 +91,7 @@ class Strength(unittest.TestCase):
         for kind, parameters, lag_s in (
             ("delay", {"seconds": 1e-4}, 1e-4),
             ("bandwidth", {"cutoff_hz": 1600.0}, 1 / (2 * np.pi * 1600.0)),
+            ("bandwidth_second_order", {"cutoff_hz": 1600.0, "damping": 0.6}, 0.6 / (np.pi * 1600.0)),
         ):
             e = {"kind": kind, "gyro": 1, "parameters": parameters}
             with_it, without = (
@@ -177,6 +179,17 @@ class Truth(unittest.TestCase):
             # A twentieth of the quietest gyro's noise a sample.
             np.testing.assert_allclose(m.low_passed(t[::40], cutoff_hz), out[::40], atol=5e-5)
 
+    def test_low_pass_of_second_order_turns_a_sine_as_its_formula_says(self):
+        m = small_world(SEED).motion
+        m.segments = [motion.Tones(-1e3, 1e3, 1.0, (1.3,), (50.0,), (0.4,))]
+        t = np.arange(100.0, 104.0, 0.01)
+        for cutoff_hz, damping in ((4.0, 0.5), (9.0, 0.9)):
+            x = 1j * 1.3 / cutoff_hz
+            sine = 50.0 * np.exp(1j * (2 * np.pi * 1.3 * (t + 1e3) + 0.4)) / (1 + 2 * damping * x + x * x)
+            np.testing.assert_allclose(
+                m.low_passed_twice(t, cutoff_hz, damping), sine.imag + motion.EARTH_DPS, atol=5e-5
+            )
+
     def test_motion_reaches_the_form_that_recordings_need(self):
         for seed in range(5):
             m = motion.Motion(480.0, 62.0, np.random.default_rng(seed))
@@ -192,6 +205,31 @@ class Truth(unittest.TestCase):
         T = small_world(SEED).temperatures[0]
         t = np.random.default_rng(SEED).uniform(3.0, 235.0, 2000)
         np.testing.assert_allclose((T.value(t + 1e-3) - T.value(t - 1e-3)) / 2e-3, T.slope(t), atol=1e-4)
+
+    def test_play_is_dragged_along_by_the_temperature_and_never_further_away(self):
+        T = small_world(SEED).temperatures[0]
+        t = np.arange(0.0, 240.0, 0.013)
+        now, held = T.value(t), T.with_play(t, 1.2)
+        self.assertLess(np.abs(now - held).max(), 1.2 + 1e-12)
+        self.assertGreater(np.abs(now - held).max(), 1.2 - 1e-9)
+        moved = np.diff(held)
+        dragged = np.abs(np.abs(now - held)[1:] - 1.2) < 1e-9
+        # But for what it was dragged by before the temperature turned round between two instants.
+        np.testing.assert_allclose(moved[~dragged], 0.0, atol=1e-4)
+        # Where it is dragged it goes where the temperature goes.
+        self.assertTrue(np.all(moved[dragged] * np.diff(now)[dragged] >= -1e-12))
+        self.assertEqual(held[0], now[0])
+
+    def test_flicker_has_the_allan_deviation_that_its_coefficient_says(self):
+        """0.664 B at every averaging time."""
+        rng, squares = np.random.default_rng(SEED), {4: [], 32: [], 256: []}
+        for _ in range(40):
+            y = truth.flicker(8192, 0.01, 3e-3, rng)
+            for n in squares:
+                means = y[: 8192 // n * n].reshape(-1, n).mean(axis=1)
+                squares[n].append(np.mean(np.diff(means) ** 2) / 2)
+        for n, values in squares.items():
+            self.assertAlmostEqual(np.sqrt(np.mean(values)) / (0.664 * 3e-3), 1.0, delta=0.04, msg=f"{n} samples")
 
     def test_vibration_is_the_variance_of_the_second_before(self):
         a = small_world(SEED).acceleration

@@ -13,7 +13,7 @@ import strangers
 
 # Drawn at random, a convention, or (of a frozen value) a matter of words by one sample: no truth to meet.
 WITHOUT_TRUTH = {"reference_c", "size_dps/spikes", "from_s", "to_s"}
-EXACT = {"axis", "harmonic"}
+EXACT = {"axis", "from", "harmonic"}
 # Statistical names beside the truth fit noise that is there; they are counted, but say nothing about the world.
 NOISE = {"white_noise", "rate_random_walk", "gauss_markov", "rate_noise", "bias_instability"}
 

@@ -108,6 +108,18 @@ class Motion:
         lag_s = 1.0 / (2.0 * np.pi * cutoff_hz)
         return sum(w * self.rate(t - x * lag_s) for x, w in zip(nodes, weights))
 
+    def low_passed_twice(self, t, cutoff_hz, damping):
+        """∫ h(s)·rate(t − s) ds with the response of w²/(p² + 2·damping·w·p + w²) to a shock, damping < 1: a sine that
+        dies away. Gauss–Laguerre takes the dying."""
+        nodes, weights = np.polynomial.laguerre.laggauss(40)
+        w = 2.0 * np.pi * cutoff_hz
+        rings = np.sqrt(1.0 - damping**2)
+        total = np.zeros_like(t)
+        for x, weight in zip(nodes, weights):
+            if weight > 1e-12:
+                total += weight * np.sin(rings / damping * x) / (rings * damping) * self.rate(t - x / (damping * w))
+        return total
+
     def angle_deg(self, t):
         """∫ of the rate since t = 0: Simpson on a grid, Hermite between its points."""
         count = int(np.ceil((self.duration_s + 2.0) * GRID_HZ))

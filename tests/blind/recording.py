@@ -32,12 +32,14 @@ BO_ 289 LEFT_GYRO: 8 STAND
  SG_ Celsius : 32|16@1- (@CELSIUS1,0) [-60|150] "degC" STAND
  SG_ Alive : 48|8@1+ (1,0) [0|255] "" STAND
  SG_ Vcc : 56|8@1+ (0.02,0) [0|5.1] "V" STAND
+ SG_ Roll : 48|16@1- (0.004,0) [-131|131] "deg/s" STAND
 
 BO_ 290 RIGHT_GYRO: 8 STAND
  SG_ YawRate : 7|32@0- (@RATE2,0) [-2000|2000] "deg/s" STAND
  SG_ Celsius : 39|16@0- (@CELSIUS2,0) [-60|150] "degC" STAND
  SG_ Alive : 48|8@1+ (1,0) [0|255] "" STAND
  SG_ Vcc : 56|8@1+ (0.02,0) [0|5.1] "V" STAND
+ SG_ Roll : 55|16@0- (0.004,0) [-131|131] "deg/s" STAND
 
 BO_ 416 RATE_TABLE: 8 STAND
  SG_ Speed : 0|32@1- (1E-06,0) [-2000|2000] "deg/s" STAND
@@ -66,7 +68,8 @@ def dbc_text(world):
 
 def config_text(world):
     gyro = '[[gyro]]\nname = "{0}"\nbus = "{1}"\ndbc = "bench.dbc"\nmessage = "{2}_GYRO"\nrate = "YawRate"\n'
-    gyro += 'temperature = "Celsius"\ncounter = "Alive"\n'
+    # Where a unit tells how it rolls its frame has no room for a counter.
+    gyro += 'temperature = "Celsius"\n' + ('rate_x = "Roll"\n' if world.roll else 'counter = "Alive"\n')
     gyro += 'supply_voltage = "Vcc"\n\n' if world.supplies else "\n"
     reference = '[reference]\nbus = "can0"\ndbc = "bench.dbc"\nmessage = "RATE_TABLE"\nrate = "Speed"\n\n'
     cube = '[accelerometer]\nbus = "can0"\ndbc = "bench.dbc"\nmessage = "CUBE"\nx = "Ax"\ny = "Ay"\nz = "Az"\n\n'
@@ -136,6 +139,9 @@ def streams(world, effects, strangers, recorded_temperatures, rng):
             _integers(recorded_temperatures[gyro - 1](t), world.gyros[gyro - 1].temperature_step, order + "i2"),
             (counter % 256).astype(np.uint8),
         ]
+        if world.roll:
+            roll = world.roll.value(t) + rng.standard_normal(len(t)) * world.roll.SIGMA_DPS
+            columns[2] = _integers(roll, world.roll.STEP_DPS, order + "i2")
         if world.supplies:
             columns.append(_integers(world.supplies[gyro - 1].value(t), truth.surroundings.Supply.STEP_V, "u1"))
         payloads = _payloads(*columns)

@@ -30,6 +30,26 @@ class Temperature:
     def value(self, t):
         return (self._area(t + self.HALF_S) - self._area(t - self.HALF_S)) / (2 * self.HALF_S)
 
+    GRID_S = 0.05
+
+    def range_k(self, duration_s):
+        return float(np.ptp(self.value(np.arange(0.0, duration_s, 1.0))))
+
+    def with_play(self, t, play_k):
+        """Where something stands that the temperature takes along only when it is `play_k` away from it."""
+        grid = np.arange(0.0, t[-1] + 2 * self.GRID_S, self.GRID_S)
+        out, at = [], None
+        for now in self.value(grid).tolist():
+            if at is None:
+                at = now
+            if abs(now - at) > play_k:
+                at = now - np.copysign(play_k, now - at)
+            out.append(at)
+        # Between two instants of the grid it is dragged or stands: the nearest place within the play.
+        before = np.array(out)[np.minimum((t / self.GRID_S).astype(int), len(out) - 1)]
+        now = self.value(t)
+        return now + np.clip(before - now, -play_k, play_k)
+
     def slope(self, t):
         line = lambda at: np.interp(at, self.t, self.c)
         return (line(t + self.HALF_S) - line(t - self.HALF_S)) / (2 * self.HALF_S)
@@ -59,6 +79,22 @@ class Supply:
 
     def value(self, t):
         return self.v[np.maximum(np.searchsorted(self.t, t, side="right") - 1, 0)]
+
+
+class Roll:
+    """Rate about the axis of travel in deg/s: a sway of several periods that comes and goes."""
+
+    STEP_DPS, SIGMA_DPS = 0.004, 0.01
+
+    def __init__(self, rng):
+        self.f = np.exp(rng.uniform(np.log(0.06), np.log(0.9), 6))
+        self.phase = rng.uniform(0, 2 * np.pi, 6)
+        self.size = rng.uniform(2.0, 9.0, 6)
+        self.slow = rng.uniform(25.0, 60.0)
+
+    def value(self, t):
+        sway = sum(a * np.sin(2 * np.pi * f * t + p) for a, f, p in zip(self.size, self.f, self.phase))
+        return sway * np.sin(np.pi * t / self.slow) ** 2
 
 
 class Acceleration:

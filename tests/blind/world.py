@@ -41,6 +41,7 @@ class World:
     offset_s: float  # of the second gyro's stamps
     reference: bool
     supplies: list | None = None  # None: the gyros do not tell it
+    roll: surroundings.Roll | None = None  # likewise
     reference_hz: float = REFERENCE_HZ
     reference_sigma: float = REFERENCE_SIGMA_DPS
     accelerometer: bool = True
@@ -94,7 +95,11 @@ def flicker(count, interval_s, coefficient, rng):
 def late_rate(world, t, effects, gyro):
     """What a gyro feels at the instants t, in deg/s: the rate behind its delays and its low-passes."""
     delay_s = sum(p["seconds"] for p in _of(effects, "delay"))
+    twice = _of(effects, "bandwidth_second_order")
     cutoffs = [*world.gyros[gyro - 1].filters_hz, *(p["cutoff_hz"] for p in _of(effects, "bandwidth"))]
+    assert not (twice and (cutoffs or len(twice) > 1))
+    if twice:
+        return world.motion.low_passed_twice(t - delay_s, twice[0]["cutoff_hz"], twice[0]["damping"])
     if cutoffs:
         return world.motion.low_passed(t - delay_s, *cutoffs)
     return world.motion.rate(t - delay_s)
@@ -122,6 +127,8 @@ def _noise(world, gyro, t, rate, effects, rng):
         total += correlated(len(t), 1.0 / rate_hz, sigma, tau_s, rng)
     if g.flicker > 0:
         total += flicker(len(t), 1.0 / rate_hz, g.flicker, rng)
+    for e in _of(effects, "bias_instability"):
+        total += flicker(len(t), 1.0 / rate_hz, e["coefficient_dps"], rng)
     for e in _of(effects, "rate_noise"):
         total += rng.standard_normal(len(t)) * e["ratio_rthz"] * np.abs(rate) * np.sqrt(rate_hz)
     return total

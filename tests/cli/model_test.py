@@ -20,7 +20,7 @@ class ModelList(bench.Bench):
     def test_says_of_every_kind_what_shows_it_and_names_only_kinds_it_may_be_taken_for(self):
         lines = self.good("model", "list").stdout.decode().splitlines()
         kinds = {line.split()[0] for line in lines if re.match(r"  \S", line)}
-        self.assertEqual(len(kinds), 31)
+        self.assertEqual(len(kinds), 36)
         self.assertEqual(sum(line.startswith("    shown by ") for line in lines), len(kinds))
         kind = ""
         for line in lines:

@@ -26,6 +26,9 @@ BO_ 257 GYRO_A: 8 RIG
  SG_ Temp : 32|16@1- (0.01,0) [-40|125] "degC" RIG
  SG_ Counter : 48|4@1+ (1,0) [0|15] "" RIG
  SG_ Volt : 56|8@1+ (50,0) [0|12000] "mV" RIG
+ SG_ Roll : 32|8@1- (1,0) [-100|100] "deg/s" RIG
+ SG_ Pitch : 40|8@1- (1,0) [-100|100] "deg/s" RIG
+ SG_ Yaw : 0|32@1- (1E-006,0) [-2000|2000] "deg/s" RIG
 
 BO_ 258 GYRO_B: 4 RIG
  SG_ Rate : 0|32@1- (1,0) [0|0] "deg/s" RIG
@@ -208,7 +211,9 @@ TEST_F(RecordingTest, HoldsEveryInputOfTheWorkflow) {
     log += fmt::format("({:.6f}) can0 104#E80300000CFE\n", t_s + 0.003);
   }
   std::string config(kConfig);
-  config.replace(config.find("counter ="), 0, "supply_voltage = \"Volt\"\n");
+  config.replace(
+      config.find("counter ="), 0,
+      "supply_voltage = \"Volt\"\nrate_x = \"Roll\"\nrate_y = \"Pitch\"\nrate_z = \"Yaw\"\n");
   const auto recording = read(log, config);
   ASSERT_TRUE(recording) << recording.error().message();
   const gap::GyroSeries& left = recording->gyros[0];
@@ -216,6 +221,10 @@ TEST_F(RecordingTest, HoldsEveryInputOfTheWorkflow) {
   EXPECT_NEAR(left.supply_v.front(), 5.0, 1e-12);
   EXPECT_NEAR(left.supply_v.back(), 4.8, 1e-12);
   EXPECT_TRUE(recording->gyros[1].supply_v.empty());
+  ASSERT_EQ(left.other_rate_dps[1].size(), left.t_s.size());
+  EXPECT_EQ(left.other_rate_dps[0].front(), -60.0);
+  EXPECT_EQ(left.other_rate_dps[1].front(), 9.0);
+  EXPECT_TRUE(recording->gyros[1].other_rate_dps[0].empty());
   gap::Signals signals;
   gap::set_circumstances(left, recording->acceleration, signals);
   signals.motion =

@@ -11,6 +11,7 @@
 #include "fusion/compensation.h"
 #include "model/catalogue.h"
 #include "model/equation.h"
+#include "model/temperature_past.h"
 #include "tests/fusion/random.h"
 
 namespace vgyro::fusion {
@@ -72,6 +73,13 @@ Effect drawn(const KindInfo& row, Random& random) {
   return effect;
 }
 
+model::TemperaturePast past_of(std::initializer_list<double> temperatures_c) {
+  model::TemperaturePast past;
+  for (const double temperature_c : temperatures_c)
+    past.add(temperature_c);
+  return past;
+}
+
 /// Each thing that may be unknown is, now and then.
 Surroundings somewhere(Random& random, bool may_be_unknown) {
   const auto known = [&](double from, double to) {
@@ -85,6 +93,10 @@ Surroundings somewhere(Random& random, bool may_be_unknown) {
     axis_g = known(-2.0, 2.0);
   s.vibration_g2 = known(0.0, 0.1);
   s.supply_v = known(3.0, 14.0);
+  for (double& rate_dps : s.other_rate_dps)
+    rate_dps = known(-100.0, 100.0);
+  static const model::TemperaturePast past = past_of({20.0, 90.0, -45.0, 30.0, 10.0});
+  s.temperature_past = may_be_unknown && random.below(4) == 0 ? nullptr : &past;
   return s;
 }
 
@@ -146,6 +158,8 @@ void expect_dated_back(const std::vector<Effect>& effects, const Surroundings& s
   double group_delay_s = 0.0;
   for (const double cutoff_hz : equation.cutoffs_hz())
     group_delay_s += 1.0 / (2.0 * std::numbers::pi * cutoff_hz);
+  for (const model::SecondOrder& second : equation.second_orders())
+    group_delay_s += second.damping / (std::numbers::pi * second.cutoff_hz);
   const auto low_passed = [&](double t_s) { return ramp(t_s - group_delay_s); };
   const double t_s = random.uniform(0.0, 1.0);
   const double rate_dps = compensation.correct(equation.late_rate_dps(low_passed, t_s), s);
@@ -220,6 +234,7 @@ Surroundings at_reference(const Effect& effect) {
   Surroundings s{.t_s = 10.0, .temperature_c = 25.0, .temperature_slope_c_s = 0.0};
   s.acceleration_g = {0.0, 0.0, 0.0};
   s.vibration_g2 = 0.0;
+  s.other_rate_dps = {0.0, 0.0, 0.0};
   const auto parameters = model::info(effect.kind).parameters;
   for (std::size_t i = 0; i < parameters.size(); ++i) {
     if (parameters[i].preset) s.temperature_c = s.supply_v = effect.parameters[i];

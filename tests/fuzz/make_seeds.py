@@ -128,7 +128,7 @@ def models():
         for name in re.findall(r"`([a-z_0-9]+)`", parameters):
             if name in ("x", "y", "z"):
                 continue
-            parts.append(f'{name} = "x"\n' if name == "axis" else f"{name} = {2 if name == 'harmonic' else 0.01}\n")
+            parts.append(f'{name} = "x"\n' if name in ("axis", "from") else f"{name} = {2 if name == 'harmonic' else 0.01}\n")
     yield "".join(parts).encode()
 
 

@@ -17,6 +17,8 @@ Recording where_all_stands_still() {
   for (GyroSeries& gyro : recording.gyros) {
     gyro.temperature_c.assign(gyro.t_s.size(), 25.0);
     gyro.supply_v.assign(gyro.t_s.size(), 5.0);
+    for (std::vector<double>& axis : gyro.other_rate_dps)
+      axis.assign(gyro.t_s.size(), 0.0);
   }
   recording.has_acceleration = true;
   recording.acceleration.t_s = recording.gyros[0].t_s;

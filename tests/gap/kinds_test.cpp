@@ -11,6 +11,7 @@
 #include "gap/evidence.h"
 #include "model/catalogue.h"
 #include "model/equation.h"
+#include "model/temperature_past.h"
 #include "tests/gap/made_study.h"
 
 namespace vgyro::gap {
@@ -27,17 +28,23 @@ Parameters usual(Kind kind) {
     case Kind::kBiasStep:
       return {0.01, 20.0};
     case Kind::kWarmUp:
+    case Kind::kRunIn:
       return {0.05, 12.0};
     case Kind::kTemperatureBias:
     case Kind::kTemperatureBiasQuadratic:
     case Kind::kScaleFactorTemperature:
       return {1e-3, 25.0};
+    case Kind::kTemperatureHysteresis:
+      return {1e-3, 1.0};
     case Kind::kGSensitivity:
+    case Kind::kCrossAxis:
       return {1.0, 0.01};
     case Kind::kDelay:
       return {0.012};
     case Kind::kBandwidth:
       return {5.0};
+    case Kind::kBandwidthSecondOrder:
+      return {5.0, 0.7};
     case Kind::kAngleHarmonic:
       return {3.0, 0.02, 1.1};
     case Kind::kLine:
@@ -109,6 +116,7 @@ TEST(Kinds, AreLinearInWhatTheirRowSays) {
         s.temperature_slope_c_s = 0.02;
         s.acceleration_g = {0.1, -0.2, 0.97};
         s.vibration_g2 = 2e-3;
+        s.other_rate_dps = {3.0, -2.0, 0.4};
         s.angle_rad = 0.7;
         const auto added = [&](double value) {
           Effect effect{0, its.kind, usual(its.kind), 0};
@@ -171,21 +179,23 @@ TEST(Kinds, EachIsLookedForBySomebody) {
         break;
     }
   }
-  EXPECT_EQ(parts,
-            (std::set<Random>{Random::kWhite, Random::kRatio, Random::kWalk, Random::kMarkov}));
+  EXPECT_EQ(parts, (std::set<Random>{Random::kWhite, Random::kRatio, Random::kWalk, Random::kMarkov,
+                                     Random::kFlicker}));
 }
 
 // What the equation needs to know must move, or nothing of it can be seen.
 TEST(Kinds, NeedWhatTheirEquationNeeds) {
-  const std::uint8_t temperature = bit(Input::kTemperature) | bit(Input::kTemperatureSlope);
-  const std::uint8_t acceleration = bit(Input::kAccelerationX) | bit(Input::kAccelerationY) |
-                                    bit(Input::kAccelerationZ) | bit(Input::kVibration);
+  const Inputs temperature = bit(Input::kTemperature) | bit(Input::kTemperatureSlope);
+  const Inputs acceleration = bit(Input::kAccelerationX) | bit(Input::kAccelerationY) |
+                              bit(Input::kAccelerationZ) | bit(Input::kVibration);
   for (const model::KindInfo& info : model::catalogue()) {
-    const std::uint8_t needs = row(info.kind).needs;
+    const Inputs needs = row(info.kind).needs;
     EXPECT_EQ((needs & temperature) != 0, (info.needs & model::kNeedsTemperature) != 0)
         << info.name;
     EXPECT_EQ((needs & acceleration) != 0, (info.needs & model::kNeedsAcceleration) != 0)
         << info.name;
+    const Inputs other_axes = bit(Input::kRateX) | bit(Input::kRateY) | bit(Input::kRateZ);
+    EXPECT_EQ((needs & other_axes) != 0, (info.needs & model::kNeedsOtherAxes) != 0) << info.name;
     const bool of_rate = info.nature == Nature::kResponse || info.nature == Nature::kLag;
     if (of_rate) {
       EXPECT_NE(needs & bit(Input::kRate), 0) << info.name;
@@ -215,7 +225,9 @@ TEST(Kinds, InputsAreReadWhereTheyStand) {
   s.acceleration_g = {0.1, 0.2, 0.3};
   s.vibration_g2 = 0.04;
   s.supply_v = 4.9;
-  const std::array<double, kInputCount> truth{7.0, 20.0, 0.5, 0.1, 0.2, 0.3, 0.04, 4.9};
+  s.other_rate_dps = {-3.0, -4.0, -5.0};
+  const std::array<double, kInputCount> truth{7.0,  20.0, 0.5,  0.1,  0.2, 0.3,
+                                              0.04, 4.9,  -3.0, -4.0, -5.0};
   for (std::size_t i = 0; i < kInputCount; ++i) {
     EXPECT_EQ(inputs()[i].value(7.0, s), truth[i]) << i;
     EXPECT_GT(inputs()[i].least, 0.0) << i;
@@ -292,12 +304,30 @@ TEST(Kinds, SameFormIsTheSameShapeOfTheSameGyro) {
   EXPECT_FALSE(same_form({0, Kind::kScaleFactor, {1.0}, 0}, {0, Kind::kBias, {1.0}, 0}));
 }
 
+// Observations of a gyro whose temperature swings.
+struct Warmed {
+  Observations data;
+  std::vector<model::TemperaturePast> past;
+
+  explicit Warmed(const Making& making) : data(*observations_of_one(making)) {
+    std::vector<model::Surroundings>& surroundings = data.surroundings[0];
+    past.reserve(surroundings.size());
+    for (model::Surroundings& s : surroundings) {
+      s.temperature_c = true_temperature_c(s.t_s);
+      past.push_back(past.empty() ? model::TemperaturePast{} : past.back());
+      past.back().add(s.temperature_c);
+      s.temperature_past = &past.back();
+    }
+  }
+};
+
 // A difference quotient is good where a step four times as wide gives the same.
 TEST(Kinds, StepsOfDerivativesAreSmallAndLargeEnough) {
   Making making;
   making.seconds = 60.0;
   making.rest_s = 10.0;
-  const auto data = observations_of_one(making);
+  const Warmed warmed(making);
+  const Observations* const data = &warmed.data;
   constexpr double kWider = 4.0;
   constexpr double kAgrees = 1e-4;
   for (const KindRow& its : kinds()) {
@@ -334,9 +364,9 @@ TEST(Kinds, TellPeopleWhatGaveThemAway) {
   std::set<std::string_view> experiments;
   for (const Experiment experiment :
        {Experiment::kFasterMotion, Experiment::kManyRates, Experiment::kTemperatureCycles,
-        Experiment::kTilt, Experiment::kLonger})
+        Experiment::kTilt, Experiment::kSupplySteps, Experiment::kOtherTurns, Experiment::kLonger})
     experiments.insert(experiment_text(experiment));
-  EXPECT_EQ(experiments.size(), 5U);
+  EXPECT_EQ(experiments.size(), 7U);
   EXPECT_FALSE(experiments.contains(""));
 }
 

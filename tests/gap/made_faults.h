@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "gap/recording.h"
+#include "gap/timing.h"
 #include "gap/transport.h"
 #include "tests/gap/made_recording.h"
 
@@ -43,6 +44,10 @@ inline std::array<Transport, 2> check_both(const Recording& recording,
     of_gyro[effect.gyro].push_back(effect);
   return {check_transport(recording.gyros[0], 0, of_gyro[0]),
           check_transport(recording.gyros[1], 1, of_gyro[1])};
+}
+
+inline Timing timing_of(const Recording& recording, const std::array<Transport, 2>& transports) {
+  return find_timing(recording, transports, {});
 }
 
 inline void add_spikes(GyroSeries& series, const std::vector<std::size_t>& at, double size_dps) {

@@ -426,7 +426,7 @@ TEST(Scan, ProposesNothingThatTheRecordingCouldNotShow) {
     EXPECT_EQ(score.effect.gyro, 1U);
     const Kind kind = score.effect.kind;
     EXPECT_TRUE(kind == Kind::kBias || kind == Kind::kBiasRamp || kind == Kind::kWarmUp ||
-                kind == Kind::kBiasStep || kind == Kind::kLine)
+                kind == Kind::kBiasStep || kind == Kind::kLine || kind == Kind::kRunIn)
         << text_of(score);
     // What dies away later than the recording ends cannot be told from a bias.
     if (kind == Kind::kWarmUp) {
@@ -437,6 +437,9 @@ TEST(Scan, ProposesNothingThatTheRecordingCouldNotShow) {
   EXPECT_TRUE(could_show(regression.data(), {1, Kind::kBias, {1.0}, 0}));
   EXPECT_FALSE(could_show(regression.data(), {1, Kind::kWarmUp, {1.0, 60.0}, 0}));
   EXPECT_TRUE(could_show(regression.data(), {1, Kind::kWarmUp, {1.0, 59.0}, 0}));
+  // A logarithm that hardly bends is a ramp.
+  EXPECT_FALSE(could_show(regression.data(), {1, Kind::kRunIn, {1.0, 6.1}, 0}));
+  EXPECT_TRUE(could_show(regression.data(), {1, Kind::kRunIn, {1.0, 5.9}, 0}));
 }
 
 TEST(Scan, StepsAreDistinctWhereABlockLiesBetweenThem) {

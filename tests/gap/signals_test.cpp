@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <complex>
 #include <numbers>
 
 #include <gtest/gtest.h>
@@ -45,6 +46,26 @@ TEST(Prediction, LowPassAnswersASineAsTheEquationSays) {
       // The rate is taken as straight over a quarter of a sample.
       const double bend = 2.0 * kPi * frequency_hz * kInterval_s / 4.0;
       EXPECT_NEAR(prediction.at(t), truth, 40.0 * (bend * bend / 8.0 + 2e-5));
+    }
+  }
+}
+
+TEST(Prediction, LowPassOfSecondOrderAnswersASineAsTheEquationSays) {
+  constexpr double kCutoff_hz = 4.0;
+  for (const double damping : {0.4, 0.7, 1.0, 1.5}) {
+    for (const double frequency_hz : {0.5, 2.0, 5.0}) {
+      const Signals signals = turning_at(frequency_hz, 40.0);
+      const std::array effects{
+          model::Effect{0, model::Kind::kBandwidthSecondOrder, {kCutoff_hz, damping}, 0}};
+      const Prediction prediction(effects, signals);
+      const std::complex<double> x(0.0, frequency_hz / kCutoff_hz);
+      const std::complex<double> gain = 40.0 / (1.0 + 2.0 * damping * x + x * x);
+      const double bend = 2.0 * kPi * frequency_hz * kInterval_s / 4.0;
+      for (double t = 5.0; t < 15.0; t += 0.0371) {
+        const double truth =
+            std::imag(gain * std::exp(std::complex<double>(0.0, 2.0 * kPi * frequency_hz * t)));
+        EXPECT_NEAR(prediction.at(t), truth, 40.0 * (bend * bend / 8.0 + 2e-5)) << damping;
+      }
     }
   }
 }
@@ -130,6 +151,41 @@ TEST(SupplyVoltage, IsWhatWasToldLast) {
   EXPECT_TRUE(without.supply_v.empty());
 }
 
+// Between two of them the motion is no straight line.
+TEST(OtherRates, AreFollowedBetweenSamples) {
+  GyroSeries gyro;
+  const auto truth = [](double t_s) { return 20.0 * std::sin(2.0 * kPi * 5.0 * t_s); };
+  for (int i = 0; i < 300; ++i) {
+    gyro.t_s.push_back(kInterval_s * i);
+    gyro.other_rate_dps[1].push_back(truth(gyro.t_s.back()));
+  }
+  Signals signals = turning_at(1.0, 3.0);
+  set_other_rates(gyro, signals);
+  for (double t_s = 0.5; t_s < 2.5; t_s += 0.0037)
+    EXPECT_NEAR(signals.at(t_s).other_rate_dps[1], truth(t_s), 0.02);
+  EXPECT_TRUE(std::isnan(signals.at(1.0).other_rate_dps[0]));
+}
+
+// The follower of a temperature with play, whatever the play: of the smoothed temperature.
+TEST(Temperature, ItsPastSaysWhatStaysBehind) {
+  GyroSeries gyro;
+  const auto truth = [](double t_s) { return 25.0 + 4.0 * std::sin(2.0 * kPi * t_s / 60.0); };
+  for (int i = 0; i < 9000; ++i) {
+    gyro.t_s.push_back(kInterval_s * i);
+    gyro.temperature_c.push_back(truth(gyro.t_s.back()));
+  }
+  Signals signals = turning_at(1.0, 90.0);
+  smooth_temperature(gyro, signals);
+  double followed_c = truth(0.0);
+  constexpr double kPlay_k = 1.5;
+  for (const double t_s : gyro.t_s) {
+    followed_c = std::clamp(followed_c, truth(t_s) - kPlay_k, truth(t_s) + kPlay_k);
+    const model::Surroundings s = signals.at(t_s);
+    ASSERT_NE(s.temperature_past, nullptr);
+    EXPECT_NEAR(s.temperature_past->followed_c(kPlay_k, s.temperature_c), followed_c, 0.01) << t_s;
+  }
+}
+
 // What a recording holds of an input reaches whoever asks for it. A new input is tried here without
 // being named.
 TEST(Signals, TellEveryInput) {
@@ -139,6 +195,8 @@ TEST(Signals, TellEveryInput) {
     gyro.t_s.push_back(kInterval_s * i);
     gyro.temperature_c.push_back(20.0 + 0.01 * i);
     gyro.supply_v.push_back(5.0);
+    for (std::vector<double>& axis : gyro.other_rate_dps)
+      axis.push_back(3.0);
     acceleration.t_s.push_back(kInterval_s * i);
     for (std::vector<double>& axis_g : acceleration.g)
       axis_g.push_back(0.5 + 0.1 * (i % 2));

@@ -79,7 +79,8 @@ TEST_P(Spikes, NoneAreFoundWhereNoneArePlanted) {
   for (const std::uint64_t seed : {21U, 22U, 23U, 24U, 25U}) {
     const Recording recording = clean(seed);
     std::array<Transport, 2> transports = check_both(recording);
-    EXPECT_TRUE(find_spikes(recording, transports, {}).empty()) << "seed " << seed;
+    EXPECT_TRUE(find_spikes(recording, timing_of(recording, transports), transports, {}).empty())
+        << "seed " << seed;
     for (const Transport& transport : transports)
       EXPECT_TRUE(masked_samples(transport).empty()) << "seed " << seed;
   }
@@ -89,7 +90,7 @@ TEST_P(Spikes, ThoseThatWerePlantedAreMaskedAndNoOthers) {
   for (const std::uint64_t seed : {1U, 2U, 3U}) {
     const Planted planted = plant(seed, GetParam());
     std::array<Transport, 2> transports = check_both(planted.recording);
-    find_spikes(planted.recording, transports, {});
+    find_spikes(planted.recording, timing_of(planted.recording, transports), transports, {});
     for (std::size_t gyro = 0; gyro < 2; ++gyro) {
       ASSERT_GT(planted.at[gyro].size(), 10U);
       EXPECT_EQ(masked_samples(transports[gyro]), planted.at[gyro])
@@ -101,7 +102,8 @@ TEST_P(Spikes, ThoseThatWerePlantedAreMaskedAndNoOthers) {
 TEST_P(Spikes, TheirRateSizeAndCostAreToldOfEachGyro) {
   const Planted planted = plant(4, GetParam());
   std::array<Transport, 2> transports = check_both(planted.recording);
-  const std::vector<Finding> findings = find_spikes(planted.recording, transports, {});
+  const std::vector<Finding> findings =
+      find_spikes(planted.recording, timing_of(planted.recording, transports), transports, {});
   ASSERT_EQ(findings.size(), 2U);
   for (std::size_t gyro = 0; gyro < 2; ++gyro) {
     const Finding* const finding = spikes_of(findings, gyro);
@@ -123,7 +125,8 @@ TEST_P(Spikes, WhatTheModelKnowsIsMaskedButNotFoundAgain) {
   const Planted planted = plant(5, GetParam());
   std::array<Transport, 2> transports = check_both(planted.recording);
   const std::vector<Finding> findings =
-      find_spikes(planted.recording, transports, {{0, Kind::kSpikes, {0.2, 0.4}, 0}});
+      find_spikes(planted.recording, timing_of(planted.recording, transports), transports,
+                  {{0, Kind::kSpikes, {0.2, 0.4}, 0}});
   EXPECT_EQ(spikes_of(findings, 0), nullptr);
   EXPECT_NE(spikes_of(findings, 1), nullptr);
   EXPECT_EQ(masked_samples(transports[0]), planted.at[0]);
@@ -136,7 +139,8 @@ TEST_P(Spikes, TwoAreAnAccidentAndThreeAreFound) {
     at.resize(count);
     add_spikes(recording.gyros[0], at, 0.5);
     std::array<Transport, 2> transports = check_both(recording);
-    EXPECT_EQ(find_spikes(recording, transports, {}).size(), count == 3 ? 1U : 0U);
+    EXPECT_EQ(find_spikes(recording, timing_of(recording, transports), transports, {}).size(),
+              count == 3 ? 1U : 0U);
     EXPECT_EQ(masked_samples(transports[0]), at);
   }
 }
@@ -150,7 +154,7 @@ TEST_P(Spikes, AStepIsNone) {
   };
   const Recording recording = recording_of(making, GetParam());
   std::array<Transport, 2> transports = check_both(recording);
-  EXPECT_TRUE(find_spikes(recording, transports, {}).empty());
+  EXPECT_TRUE(find_spikes(recording, timing_of(recording, transports), transports, {}).empty());
   EXPECT_LE(masked_samples(transports[0]).size() + masked_samples(transports[1]).size(), 2U);
 }
 
@@ -163,7 +167,7 @@ TEST_P(Spikes, OfWhatLastsForLongerOnlyTheEdgesAreMasked) {
       recording.gyros[1].rate_dps[from + k] += 1.0;
   }
   std::array<Transport, 2> transports = check_both(recording);
-  find_spikes(recording, transports, {});
+  find_spikes(recording, timing_of(recording, transports), transports, {});
   for (const std::size_t from : {3000U, 5000U, 7000U, 9000U}) {
     for (std::size_t k = 1; k + 1 < kLength; ++k)
       EXPECT_EQ(transports[1].masked[from + k], 0) << from + k;
@@ -179,7 +183,7 @@ TEST_P(Spikes, NoiseThatRisesWithTheRateIsNone) {
   };
   const Recording recording = recording_of(making, GetParam());
   std::array<Transport, 2> transports = check_both(recording);
-  EXPECT_TRUE(find_spikes(recording, transports, {}).empty());
+  EXPECT_TRUE(find_spikes(recording, timing_of(recording, transports), transports, {}).empty());
 }
 
 TEST_P(Spikes, NoneAreSeenAcrossMaskedSamples) {
@@ -187,9 +191,9 @@ TEST_P(Spikes, NoneAreSeenAcrossMaskedSamples) {
   add_spikes(recording.gyros[0], {4000, 6000, 8000}, 0.5);
   std::array<Transport, 2> transports = check_both(recording);
   transports[0].masked[4001] = 1;
-  find_spikes(recording, transports, {});
+  find_spikes(recording, timing_of(recording, transports), transports, {});
   EXPECT_EQ(transports[0].masked[4000], 0);
-  EXPECT_EQ(transports[0].masked[6000], 1);
+  EXPECT_NE(transports[0].masked[6000], 0);
 }
 
 // Against a reference each gyro is judged by itself, however near the other's spike is.
@@ -199,7 +203,7 @@ TEST(SpikesOfBoth, WhereTheyMeetAreBothFoundAgainstAReference) {
   add_spikes(recording.gyros[0], at, 0.4);
   add_spikes(recording.gyros[1], at, 0.9);
   std::array<Transport, 2> transports = check_both(recording);
-  EXPECT_EQ(find_spikes(recording, transports, {}).size(), 2U);
+  EXPECT_EQ(find_spikes(recording, timing_of(recording, transports), transports, {}).size(), 2U);
   for (const Transport& transport : transports)
     EXPECT_EQ(masked_samples(transport), at);
 }
@@ -212,7 +216,8 @@ TEST(SpikesOfBoth, OfTwoThatMeetTheLargerIsFoundWithoutAReference) {
     add_spikes(recording.gyros[larger], at, 3.0);
     add_spikes(recording.gyros[1 - larger], at, -0.8);
     std::array<Transport, 2> transports = check_both(recording);
-    const std::vector<Finding> findings = find_spikes(recording, transports, {});
+    const std::vector<Finding> findings =
+        find_spikes(recording, timing_of(recording, transports), transports, {});
     ASSERT_EQ(findings.size(), 1U);
     EXPECT_EQ(findings[0].effect.gyro, larger);
     EXPECT_EQ(masked_samples(transports[larger]), at);
@@ -227,7 +232,8 @@ TEST(SpikesOfBoth, AreOfTheGyroThatHasThem) {
     const std::vector<std::size_t> at = scattered(recording.gyros[0].t_s.size(), 40, 0.01, 13);
     add_spikes(recording.gyros[gyro], at, 1.5);
     std::array<Transport, 2> transports = check_both(recording);
-    const std::vector<Finding> findings = find_spikes(recording, transports, {});
+    const std::vector<Finding> findings =
+        find_spikes(recording, timing_of(recording, transports), transports, {});
     ASSERT_EQ(findings.size(), 1U);
     EXPECT_EQ(findings[0].effect.gyro, gyro);
     EXPECT_EQ(masked_samples(transports[gyro]), at);
@@ -246,7 +252,8 @@ TEST(SpikesOfBoth, AreMoreThanStepsOfTheLattice) {
   add_spikes(series, at, 2.0 * kStep_dps);
   std::array<Transport, 2> transports = check_both(recording);
   ASSERT_NEAR(transports[0].lattice_dps, kStep_dps, 1e-3 * kStep_dps);
-  EXPECT_EQ(spikes_of(find_spikes(recording, transports, {}), 0), nullptr);
+  EXPECT_EQ(spikes_of(find_spikes(recording, timing_of(recording, transports), transports, {}), 0),
+            nullptr);
 }
 
 // What clips is told with the cost of all that is masked, and spikes are masked after it was found.
@@ -260,7 +267,7 @@ TEST(SpikesOfBoth, CountInTheCostOfWhatClips) {
   ASSERT_EQ(transports[0].findings[0].effect.kind, Kind::kSaturation);
   const double clipped = static_cast<double>(masked_samples(transports[0]).size());
   EXPECT_DOUBLE_EQ(transports[0].findings[0].cost_nats, 0.5 * kSpikeNats * clipped);
-  find_spikes(recording, transports, {});
+  find_spikes(recording, timing_of(recording, transports), transports, {});
   const double masked = static_cast<double>(masked_samples(transports[0]).size());
   EXPECT_EQ(masked, clipped + 4.0);
   EXPECT_DOUBLE_EQ(transports[0].findings[0].cost_nats, 0.5 * kSpikeNats * masked);

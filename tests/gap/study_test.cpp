@@ -272,13 +272,18 @@ TEST(Study, RefusesAReferenceThatIsNotThere) {
             "the reference is there from 0.0 to 40.0 s only, the recording lasts 60.0 s; cut t");
 }
 
-// Without rest and reference nothing tells which gyro is wrong.
-TEST(Study, RefusesTurnsAloneWithoutAReference) {
+// Without rest and reference nothing tells which gyro is wrong: what they differ about remains.
+TEST(Study, SeesTheDifferenceAloneOfTurnsWithoutAReference) {
   Making making = short_making(167);
   making.rest_s = 0.0;
-  Recording recording = without_reference(make_recording(making));
-  EXPECT_EQ(refusal(recording).substr(0, 62),
-            "the recording holds no rest, and there is no reference; withou");
+  const MadeStudy made(without_reference(make_recording(making)), noise_effects(making));
+  ASSERT_NE(made.study(), nullptr);
+  for (const Channel channel : made.observations(0)->channel)
+    EXPECT_EQ(channel, Channel::kDifference);
+  ASSERT_EQ(made.study()->notes().size(), 1U);
+  EXPECT_EQ(made.study()->notes()[0].substr(0, 96),
+            "the recording holds no rest, and there is no reference: only the difference of the "
+            "gyros is judg");
 }
 
 // A sensor that has died has few values to be judged by.

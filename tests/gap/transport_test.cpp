@@ -329,6 +329,40 @@ TEST(Lattice, ThatTheModelKnowsIsUsedButNotFoundAgain) {
   EXPECT_NEAR(transport.lattice_dps, 0.0125, 1e-6);
 }
 
+// An adapter hands out ten frames at once: the counter has no gap, and nothing is lost.
+TEST(Bunches, AreNoLossAndNoLateness) {
+  for (const bool counted : {true, false}) {
+    GyroSeries series = clean(57);
+    const std::vector<double> truth_s = series.t_s;
+    for (std::size_t i = 0; i < kSamples; ++i) {
+      const std::size_t last = std::min(kSamples - 1, i / 10 * 10 + 9);
+      series.t_s[i] = truth_s[last] + 1e-4 * static_cast<double>(i % 10);
+    }
+    if (!counted) series.counter.clear(), series.counter_modulus = 0;
+    const Transport transport = check_transport(series, 0, {});
+    EXPECT_TRUE(transport.findings.empty()) << counted;
+    ASSERT_EQ(transport.notes.size(), 1U) << counted;
+    EXPECT_NE(transport.notes[0].find("bunches of 10"), std::string::npos) << transport.notes[0];
+    EXPECT_EQ(transport.lost_share, 0.0);
+    EXPECT_NEAR(transport.interval_s, kInterval_s, 1e-6);
+    // Of an even clock, at most the adapter's own time late.
+    for (std::size_t i = 0; i < kSamples; i += 97)
+      EXPECT_NEAR(transport.t_s[i], truth_s[i], 1.1e-3) << i;
+  }
+}
+
+// What is lost is told by the counter in bunches, too.
+TEST(Bunches, LoseFramesByTheCounter) {
+  GyroSeries series = clean(58);
+  for (std::size_t i = 0; i < kSamples; ++i)
+    series.t_s[i] = series.t_s[std::min(kSamples - 1, i / 10 * 10 + 9)];
+  const std::size_t lost = lose(series, [](std::size_t i) { return i % 53 == 7; });
+  const Transport transport = check_transport(series, 0, {});
+  const Finding* const finding = found(transport, Kind::kDroppedFrames);
+  ASSERT_NE(finding, nullptr);
+  EXPECT_NEAR(finding->effect.parameters[0], static_cast<double>(lost) / kSamples, 1e-6);
+}
+
 TEST(Stuck, EachFreezeIsFoundByItself) {
   GyroSeries series = clean(51);
   freeze(series, 9000, 9040);
@@ -364,6 +398,18 @@ TEST(Stuck, AFewRepeatsAreNone) {
   const Transport transport = check_transport(series, 0, {});
   EXPECT_TRUE(transport.findings.empty());
   EXPECT_TRUE(masked_samples(transport).empty());
+}
+
+// Again and again is a property of the sensor: six values alike, fourteen times, in turns.
+TEST(Stuck, BriefFreezesThatComeAgainAreFound) {
+  GyroSeries series = clean(56);
+  for (std::size_t k = 0; k < 14; ++k)
+    freeze(series, 9000 + 700 * k, 9006 + 700 * k);
+  const Transport transport = check_transport(series, 0, {});
+  ASSERT_EQ(transport.findings.size(), 14U);
+  for (const Finding& finding : transport.findings)
+    EXPECT_EQ(finding.effect.kind, Kind::kStuck);
+  EXPECT_EQ(masked_samples(transport).size(), 14U * 5U);
 }
 
 // A coarse sensor repeats itself at rest; what it does not do is to keep a value in a turn.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include <gtest/gtest.h>
 
@@ -111,12 +112,15 @@ TEST(ModelPlan, GivesLimitsToTheGyros) {
 TEST(ModelPlan, ComplainsAtTheModelsLineOfAnInputThatIsNotConfigured) {
   Plan plan = rig::two_gyros();
   plan.gyros[0].temperature = rig::quantity_of(rig::signal_of(32, 16));
+  plan.gyros[0].rate_x = rig::quantity_of(rig::signal_of(48, 16));
   const auto errors = apply(model_of({{0, Kind::kTemperatureBias, {1e-3, 25.0}, 3},
                                       {1, Kind::kTemperatureBias, {1e-3, 25.0}, 8},
                                       {0, Kind::kGSensitivity, {0.0, 1e-3}, 13},
-                                      {1, Kind::kSupplyVoltageBias, {1e-3, 5.0}, 18}}),
+                                      {1, Kind::kSupplyVoltageBias, {1e-3, 5.0}, 18},
+                                      {0, Kind::kCrossAxis, {0.0, 1e-3}, 23},
+                                      {0, Kind::kCrossAxis, {1.0, 1e-3}, 28}}),
                             plan);
-  ASSERT_EQ(errors.size(), 3U);
+  ASSERT_EQ(errors.size(), 4U);
   EXPECT_EQ(errors[0].where, "known.toml:8");
   EXPECT_NE(errors[0].message().find("gyro b"), std::string::npos);
   EXPECT_NE(errors[0].remedy.find("temperature = "), std::string::npos);
@@ -124,6 +128,35 @@ TEST(ModelPlan, ComplainsAtTheModelsLineOfAnInputThatIsNotConfigured) {
   EXPECT_NE(errors[1].remedy.find("[accelerometer]"), std::string::npos);
   EXPECT_EQ(errors[2].where, "known.toml:18");
   EXPECT_NE(errors[2].remedy.find("supply_voltage = "), std::string::npos);
+  // The axis counts: it is y that is not there.
+  EXPECT_EQ(errors[3].where, "known.toml:28");
+  EXPECT_NE(errors[3].message().find("the rate of gyro a about y"), std::string::npos);
+  EXPECT_NE(errors[3].remedy.find("rate_x, rate_y or rate_z = "), std::string::npos);
+}
+
+// Three correlated drifts a decade apart, less where the model has some already.
+TEST(ModelPlan, GivesFlickerToTheCorrectorAsTheDriftsThatItHasRoomFor) {
+  Plan plan = rig::two_gyros();
+  EXPECT_TRUE(apply(model_of({{0, Kind::kBiasInstability, {3e-3}, 3},
+                              {0, Kind::kBiasInstability, {4e-3}, 6},
+                              {1, Kind::kBiasInstability, {5e-3}, 9},
+                              {1, Kind::kGaussMarkov, {1e-3, 40.0}, 12},
+                              {1, Kind::kGaussMarkov, {2e-3, 7.0}, 15}}),
+                    plan)
+                  .empty());
+  // Independent noises add in squares.
+  const fusion::GyroParameters& a = plan.corrector.gyros[0];
+  ASSERT_EQ(a.gauss_markov_count, 3U);
+  for (std::size_t i = 0; i < 3; ++i) {
+    EXPECT_NEAR(a.gauss_markov[i].sigma_dps, 5e-3 * std::sqrt(std::log(10.0) / std::numbers::pi),
+                1e-12);
+    EXPECT_NEAR(a.gauss_markov[i].tau_s, 3.0 * std::pow(10.0, static_cast<double>(i) + 0.5), 1e-9);
+  }
+  const fusion::GyroParameters& b = plan.corrector.gyros[1];
+  ASSERT_EQ(b.gauss_markov_count, 3U);
+  EXPECT_EQ(b.gauss_markov[0].tau_s, 40.0);
+  EXPECT_EQ(b.gauss_markov[1].tau_s, 7.0);
+  EXPECT_NEAR(b.gauss_markov[2].tau_s, std::sqrt(3.0 * 3000.0), 1e-9);
 }
 
 TEST(ModelPlan, RefusesMoreLagThanTheBuffersHold) {

@@ -29,6 +29,8 @@ Plan with_everything() {
   Plan plan = rig::two_gyros();
   plan.gyros[0].temperature = rig::quantity_of(rig::signal_of(32, 16, 0.01));
   plan.gyros[0].supply_voltage = rig::quantity_of(rig::signal_of(48, 16, 0.001), 32.0);
+  for (const auto axis : kOtherAxes)
+    plan.gyros[0].*axis = rig::quantity_of(rig::signal_of(40, 8, 1.0), 100.0);
   plan.accelerometer = AccelerometerPlan{"can0",
                                          "ACCEL",
                                          {0, kIdAccelerometer, can::kStandardIdMax, false},
@@ -119,6 +121,31 @@ TEST_F(SurroundingsTest, HoldTheSupplyVoltage) {
   EXPECT_DOUBLE_EQ(surroundings_.at(0, at_ms(1000)).supply_v, 4.8);
   EXPECT_TRUE(std::isnan(surroundings_.at(1, at_ms(1000)).supply_v));
   EXPECT_EQ(surroundings_.missing(1, model::kNeedsSupply), model::kNeedsSupply);
+}
+
+// They are of the frame that the rate is of: an axis that tells nothing is not what it was before.
+TEST_F(SurroundingsTest, TellTheRatesAboutOtherAxesOfTheNewestFrame) {
+  surroundings_.set_other_rates(1, {1.0, 2.0, std::nan("")});
+  EXPECT_DOUBLE_EQ(surroundings_.at(1, at_ms(0)).other_rate_dps[1], 2.0);
+  EXPECT_EQ(surroundings_.missing(1, model::kNeedsOtherAxes), model::kNeedsNothing);
+  surroundings_.set_other_rates(1, {1.0, std::nan(""), std::nan("")});
+  EXPECT_TRUE(std::isnan(surroundings_.at(1, at_ms(10)).other_rate_dps[1]));
+  EXPECT_EQ(surroundings_.missing(0, model::kNeedsOtherAxes), model::kNeedsOtherAxes);
+}
+
+// What stays behind of a temperature that rises by 12 K and falls by 2: with a play of 5 K it is
+// 5 K below at the top, 3 K below after that.
+TEST_F(SurroundingsTest, RememberWhereTheTemperatureHasBeen) {
+  EXPECT_EQ(surroundings_.at(0, at_ms(0)).temperature_past, nullptr);
+  const auto warm = [&](double t_s) {
+    return t_s < 120.0 ? 20.0 + 0.1 * t_s : 32.0 - 0.1 * (t_s - 120.0);
+  };
+  for (int i = 0; i <= 1400; ++i)
+    surroundings_.add_temperature(0, at_ms(100 * i), warm(0.1 * i));
+  const model::Surroundings s = surroundings_.at(0, at_ms(140'000));
+  ASSERT_NE(s.temperature_past, nullptr);
+  EXPECT_NEAR(s.temperature_c, 30.0, 0.1);
+  EXPECT_NEAR(s.temperature_past->followed_c(5.0, s.temperature_c), 27.0, 0.15);
 }
 
 // One frame with a hole in it must not become part of every rate from then on.

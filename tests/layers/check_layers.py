@@ -19,7 +19,7 @@ ARROWS = {
     "simulation": {"base", "model", "simulation"},
     "fusion": {"base", "model", "fusion"},
     "analysis": {"base", "analysis"},
-    "gap": {"base", "model", "gap"},
+    "gap": {"base", "model", "analysis", "gap"},
     "gateway": {"base", "can", "dbc", "model", "fusion", "gateway"},
     "daemon": {"base", "can", "dbc", "gateway", "daemon"},
     "cli": {"base", "can", "canlog", "dbc", "model", "simulation", "fusion", "analysis", "gap", "gateway", "cli"},
@@ -30,7 +30,7 @@ ARROWS = {
 GAP_BASE = {"curve", "median", "recording", "result", "kinds"}
 GAP_DATA = GAP_BASE | {"noise", "signals", "observations", "unseen_motion"}
 GAP_REGRESSION = GAP_DATA | {"least_squares", "regression", "found"}
-GAP_STUDY = GAP_DATA | {"transport", "study"}
+GAP_STUDY = GAP_DATA | {"transport", "timing", "study"}
 GAP_ARROWS = {
     "curve": {"median"}, "median": set(), "recording": set(), "result": set(), "least_squares": set(), "kinds": set(),
     "wiener": {"curve", "median"},
@@ -40,8 +40,9 @@ GAP_ARROWS = {
     "found": {"result"},
     "evidence": {"kinds"},
     "transport": {"median", "recording", "result"},
-    "spikes": {"curve", "median", "recording", "result", "transport"},
-    "rest": {"median", "recording", "transport"},
+    "timing": {"curve", "median", "recording", "result", "transport", "wiener", "unseen_motion"},
+    "spikes": {"curve", "median", "recording", "result", "timing", "transport"},
+    "rest": {"recording", "transport"},
     "observations": GAP_DATA - {"observations"},
     "regression": GAP_DATA | {"least_squares"},
     "periodogram": GAP_DATA,
@@ -52,7 +53,7 @@ GAP_ARROWS = {
     "acceptance": {"result", "found"},
     "steadiness": GAP_REGRESSION,
     "robust": GAP_REGRESSION,
-    "study": GAP_DATA | {"rest", "spikes", "transport", "wiener"},
+    "study": GAP_DATA | {"rest", "spikes", "timing", "transport", "wiener"},
     "identifiable": GAP_STUDY,
     "score": GAP_STUDY,
     "figures": GAP_STUDY | {"views"},

@@ -6,16 +6,31 @@
 
 #include <gtest/gtest.h>
 
+#include "model/temperature_past.h"
+
 namespace vgyro::model {
 namespace {
+
+/// Up to 35 degC and back to 31: 4 K below the highest, 11 K above the first.
+const TemperaturePast& a_day_so_far() {
+  static const TemperaturePast past = [] {
+    TemperaturePast day;
+    for (const double temperature_c : {20.0, 35.0, 31.0})
+      day.add(temperature_c);
+    return day;
+  }();
+  return past;
+}
 
 Surroundings a_day_in_the_car() {
   return {.t_s = 20.0,
           .temperature_c = 31.0,
           .temperature_slope_c_s = 0.02,
+          .temperature_past = &a_day_so_far(),
           .acceleration_g = {0.1, -0.2, 0.98},
           .vibration_g2 = 0.004,
           .supply_v = 5.2,
+          .other_rate_dps = {3.0, -7.0, 0.5},
           .angle_rad = 0.7};
 }
 
@@ -31,15 +46,21 @@ TEST(Catalogue, AddsWhatTheTableSays) {
   EXPECT_DOUBLE_EQ(added(Kind::kBiasStep, {0.5, 20.0}, -5.0), 0.5);
   EXPECT_DOUBLE_EQ(added(Kind::kBiasStep, {0.5, 20.001}, -5.0), 0.0);
   EXPECT_DOUBLE_EQ(added(Kind::kWarmUp, {0.2, 10.0}, -5.0), 0.2 * std::exp(-2.0));
+  EXPECT_DOUBLE_EQ(added(Kind::kRunIn, {0.2, 10.0}, -5.0), 0.2 * std::log(3.0));
   EXPECT_DOUBLE_EQ(added(Kind::kTemperatureBias, {1e-3, 25.0}, -5.0), 6e-3);
   EXPECT_DOUBLE_EQ(added(Kind::kTemperatureBiasQuadratic, {1e-3, 41.0}, -5.0), 0.1);
   EXPECT_DOUBLE_EQ(added(Kind::kTemperatureRateBias, {0.5}, -5.0), 0.01);
+  // With a play of 3 K it was dragged to 32 and stands there, with 1 K it was dragged back.
+  EXPECT_DOUBLE_EQ(added(Kind::kTemperatureHysteresis, {1e-3, 3.0}, -5.0), 1e-3);
+  EXPECT_DOUBLE_EQ(added(Kind::kTemperatureHysteresis, {1e-3, 1.0}, -5.0), 1e-3);
+  EXPECT_DOUBLE_EQ(added(Kind::kTemperatureHysteresis, {1e-3, 14.0}, -5.0), -10e-3);
   EXPECT_DOUBLE_EQ(added(Kind::kScaleFactor, {1e-3}, -5.0), -5e-3);
   EXPECT_DOUBLE_EQ(added(Kind::kScaleFactorAsymmetry, {1e-3}, -5.0), 5e-3);
   EXPECT_DOUBLE_EQ(added(Kind::kScaleFactorQuadratic, {1e-3}, -5.0), 25e-3);
   EXPECT_DOUBLE_EQ(added(Kind::kScaleFactorCubic, {1e-3}, -5.0), -125e-3);
   EXPECT_DOUBLE_EQ(added(Kind::kScaleFactorTemperature, {1e-3, 21.0}, -5.0), -0.05);
   EXPECT_DOUBLE_EQ(added(Kind::kGSensitivity, {1.0, 0.01}, -5.0), -0.002);
+  EXPECT_DOUBLE_EQ(added(Kind::kCrossAxis, {1.0, 0.01}, -5.0), -0.07);
   EXPECT_DOUBLE_EQ(added(Kind::kVibrationRectification, {2.0}, -5.0), 0.008);
   EXPECT_NEAR(added(Kind::kSupplyVoltageBias, {0.03, 5.0}, -5.0), 0.006, 1e-15);
   EXPECT_DOUBLE_EQ(added(Kind::kAngleHarmonic, {4.0, 0.1, 1.0}, -5.0), 0.1 * std::cos(3.8));
@@ -87,6 +108,9 @@ TEST(Catalogue, LagOfALowPassIsItsGroupDelay) {
   EXPECT_DOUBLE_EQ(lag_s({.gyro = 0, .kind = Kind::kDelay, .parameters = {0.004}}), 0.004);
   EXPECT_DOUBLE_EQ(lag_s({.gyro = 0, .kind = Kind::kBandwidth, .parameters = {10.0}}),
                    1.0 / (20.0 * std::numbers::pi));
+  EXPECT_DOUBLE_EQ(
+      lag_s({.gyro = 0, .kind = Kind::kBandwidthSecondOrder, .parameters = {10.0, 0.7}}),
+      0.7 / (10.0 * std::numbers::pi));
 }
 
 // Every parameter at either end of what it may be, in any surroundings: nothing overflows.
@@ -138,7 +162,10 @@ TEST(Catalogue, KeepsTheNamesOfTheFormat) {
             "rate_random_walk: density_dps_rts\ngauss_markov: sigma_dps tau_s\n"
             "rate_noise: ratio_rthz\nspikes: rate_hz size_dps\nstuck: from_s to_s\n"
             "dropped_frames: fraction\nclock_skew: ppm\ntimestamp_jitter: sigma_s\n"
-            "supply_voltage_bias: coefficient_dps_v reference_v\n");
+            "supply_voltage_bias: coefficient_dps_v reference_v\n"
+            "run_in: coefficient_dps tau_s\ntemperature_hysteresis: coefficient_dps_k play_k\n"
+            "bias_instability: coefficient_dps\ncross_axis: from coefficient\n"
+            "bandwidth_second_order: cutoff_hz damping\n");
 }
 
 }  // namespace

@@ -1,6 +1,8 @@
 #include "model/equation.h"
 
 #include <cmath>
+#include <complex>
+#include <numbers>
 
 #include <gtest/gtest.h>
 
@@ -63,6 +65,19 @@ TEST(Equation, ClipsActInTheirOrderWhateverTheFilesOrder) {
 }
 
 // A ramp lags a first-order low-pass by 1 / (2 pi cutoff), once it is old.
+// The two poles are those of w² / (s² + 2·damping·w·s + w²), whatever the damping.
+TEST(Equation, PolesOfASecondOrderHaveItsSumAndProduct) {
+  for (const double damping : {0.02, 0.5, 0.999, 1.0, 1.4, 9.0}) {
+    const SecondOrder second{3.0, damping};
+    const auto [a, b] = second.poles();
+    const double w = 2.0 * std::numbers::pi * 3.0;
+    EXPECT_NEAR(std::real(a + b) / (2.0 * damping * w), 1.0, 1e-6) << damping;
+    EXPECT_NEAR(std::abs(a * b / (w * w) - 1.0), 0.0, 1e-12) << damping;
+    EXPECT_GT(std::real(a), 0.0);
+    EXPECT_GT(std::abs(a - b), 1e-3 * w) << "somebody divides by it";
+  }
+}
+
 TEST(Equation, IsLateByDelaysThenLowPassesOfTheTrueTime) {
   const Equation equation(mixed());
   EXPECT_TRUE(equation.is_late());

@@ -238,5 +238,23 @@ TEST(ModelFile, NamesAFileThatIsNotThere) {
   EXPECT_EQ(result.error().front().where, "/nowhere/m.toml");
 }
 
+// The corrector has three correlated drifts for a gyro, of which flicker takes what is left.
+TEST(ModelFile, KeepsRoomForFlicker) {
+  const auto with_drifts = [](int drifts) {
+    std::string text =
+        "format = 1\n[[effect]]\ngyro = 1\nkind = \"bias_instability\"\ncoefficient_dps = 1e-3\n";
+    for (int i = 0; i < drifts; ++i) {
+      text += "[[effect]]\ngyro = 1\nkind = \"gauss_markov\"\nsigma_dps = 1e-3\ntau_s = 30\n";
+    }
+    return parse_model(text, "m.toml");
+  };
+  EXPECT_TRUE(with_drifts(2));
+  const auto refused = with_drifts(3);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error()[0].where, "m.toml:2");
+  EXPECT_NE(refused.error()[0].message().find("beside it there may be 2"), std::string::npos)
+      << refused.error()[0].message();
+}
+
 }  // namespace
 }  // namespace vgyro::model

@@ -79,11 +79,15 @@ class Equations(unittest.TestCase):
         self.check(plus(lambda t: -2e-3 * t), effect("bias_ramp", slope_dps_s=-2e-3))
         self.check(plus(lambda t: 0.1 * (t >= 7.0)), effect("bias_step", size_dps=0.1, at_s=7.0))
         self.check(plus(lambda t: 0.3 * np.exp(-t / 6.0)), effect("warm_up", amplitude_dps=0.3, tau_s=6.0))
+        self.check(plus(lambda t: 0.2 * np.log(1 + t / 0.7)), effect("run_in", coefficient_dps=0.2, tau_s=0.7))
         self.check(plus(lambda t: 0.02 * (rig.temperature(t) - t_ref)),
                    effect("temperature_bias", coefficient_dps_k=0.02, reference_c=t_ref))
         self.check(plus(lambda t: 0.01 * (rig.temperature(t) - 25.0) ** 2),
                    effect("temperature_bias_quadratic", coefficient_dps_k2=0.01))
         self.check(plus(lambda t: 0.05 * rig.temperature_slope(t)), effect("temperature_rate_bias", coefficient_dps_s_k=0.05))
+        for play_k in (0.7, 2.5):
+            self.check(plus(lambda t: 0.05 * (rig.follow(rig.temperature(t), play_k) - rig.temperature(t))),
+                       effect("temperature_hysteresis", coefficient_dps_k=0.05, play_k=play_k))
         self.check(plus(lambda t: 0.3 * (rig.supply(t) - 4.5)),
                    effect("supply_voltage_bias", coefficient_dps_v=0.3, reference_v=4.5))
         self.check(plus(lambda t: -0.3 * (rig.supply(t) - 5.0)), effect("supply_voltage_bias", coefficient_dps_v=-0.3))
@@ -95,6 +99,26 @@ class Equations(unittest.TestCase):
                    effect("angle_harmonic", harmonic=2, amplitude_dps=0.2, phase_rad=0.4), close=2e-6)
         self.check(plus(lambda t: 0.2 * np.sin(2 * np.pi * 33.3 * t + 1.0)),
                    effect("line", frequency_hz=33.3, amplitude_dps=0.2, phase_rad=1.0))
+
+    def test_other_axes(self):
+        """Of the second gyro, whose frame tells them; they come as late as its own rate, in the reading and in the frame."""
+        for axis, coefficient, other in (("x", 0.03, rig.roll), ("y", -0.2, rig.pitch)):
+            known = effect("cross_axis", 2, **{"from": axis}, coefficient=coefficient)
+            self.check_second(lambda t: rig.rate(t) + coefficient * other(t), rig.roll, known)
+        late = effect("cross_axis", 2, **{"from": "x"}, coefficient=0.03), effect("delay", 2, seconds=0.02), effect("bandwidth", 2, cutoff_hz=8.0)
+        low_passed = lambda t, sines: rig.low_passed_sines(t - 0.02, sines, 8.0)
+        self.check_second(lambda t: low_passed(t, rig.SINES) + 0.03 * low_passed(t, rig.ROLL_SINES),
+                          lambda t: low_passed(t, rig.ROLL_SINES), *late)
+
+    def check_second(self, wanted, roll, *effects):
+        with tempfile.TemporaryDirectory() as folder:
+            frames = rig.Frames(rig.simulate(folder, effects, rig.profile(LENGTH_S)), 0x102)
+        inside = self.inside(frames.t)
+        # A stamp ends at the microsecond, the reading is of the instant itself.
+        t = (np.arange(len(frames.t)) + 0.23) / RATE_HZ
+        np.testing.assert_allclose(frames.t, t, atol=1e-6)
+        np.testing.assert_allclose(frames.rate()[inside], wanted(t)[inside], rtol=0, atol=1.5 * CLOSE_DPS)
+        np.testing.assert_allclose(frames.roll()[inside], roll(t)[inside], rtol=0, atol=0.51 * rig.ROLL_STEP_DPS)
 
     def test_vibration(self):
         self.check(lambda t: rig.rate(t) + 2.0 * vibration(t, self.accelerometer.t),
@@ -115,6 +139,8 @@ class Equations(unittest.TestCase):
         self.check(lambda t: rig.rate(t + 0.004), effect("delay", seconds=-0.004))
         self.check(lambda t: rig.low_passed(t, 5.0), effect("bandwidth", cutoff_hz=5.0))
         self.check(lambda t: rig.low_passed(t, 60.0), effect("bandwidth", cutoff_hz=60.0))
+        for damping in (0.3, 0.7):
+            self.check(lambda t: rig.low_passed_twice(t, 6.0, damping), effect("bandwidth_second_order", cutoff_hz=6.0, damping=damping))
         self.check(lambda t: 1.01 * rig.low_passed(t - 0.005, 60.0), effect("bandwidth", cutoff_hz=60.0),
                    effect("delay", seconds=0.005), effect("scale_factor", error=0.01))
 
@@ -174,6 +200,18 @@ class Chance(unittest.TestCase):
             wanted = math.exp(-lag / RATE_HZ / 0.5)
             self.assertAlmostEqual(np.mean(y[lag:] * y[:-lag]) / 5e-3**2, wanted, delta=SIGMAS * math.sqrt(2 / independent))
 
+    def test_bias_instability(self):
+        """Flicker: the Allan deviation lies at 0.664 B, whatever it is averaged over."""
+        a, _ = self.frames(4000, effect("bias_instability", coefficient_dps=5e-3))
+        sums = np.concatenate([[0.0], np.cumsum(a.rate())])
+        for samples in (4, 20, 100, 500, 2000):
+            means = np.diff(sums[::samples]) / samples
+            steps = np.diff(means)
+            # Neighbouring steps of flicker hang together a little: half of them count.
+            self.expect_variance(steps / math.sqrt(2), (0.664 * 5e-3) ** 2, degrees=len(steps) / 2)
+        # At the sampling rate the spectrum has ended: what is quicker than 10 Hz is less than 1/f.
+        self.assertLess(np.mean(np.diff(a.rate())**2) / 2, (0.664 * 5e-3) ** 2)
+
     def test_rate_noise(self):
         text = rig.profile(300)
         a, b = self.frames(300, effect("rate_noise", ratio_rthz=1e-4), text=text)
@@ -230,7 +268,8 @@ class Streams(unittest.TestCase):
 
     def setUp(self):
         effects = [effect("white_noise", density_dps_rthz=2e-4), effect("rate_random_walk", density_dps_rts=1e-3),
-                   effect("gauss_markov", sigma_dps=5e-3, tau_s=0.5), effect("white_noise", density_dps_rthz=3e-4),
+                   effect("gauss_markov", sigma_dps=5e-3, tau_s=0.5), effect("bias_instability", coefficient_dps=4e-3),
+                   effect("white_noise", density_dps_rthz=3e-4),
                    effect("spikes", rate_hz=4.0, size_dps=3.0), effect("timestamp_jitter", sigma_s=3e-4),
                    effect("white_noise", 2, density_dps_rthz=2e-4), effect("rate_noise", 2, ratio_rthz=1e-4),
                    effect("dropped_frames", 2, fraction=0.2), effect("bias", 2, value_dps=1.0)]
@@ -264,6 +303,15 @@ class Streams(unittest.TestCase):
         for i, normal in enumerate(self.normals(n, "gyro 1", "gauss_markov")):
             drift = 5e-3 * normal if i == 0 else keep * drift + 5e-3 * math.sqrt(1 - keep**2) * normal
             wanted[i] += drift
+        # 15 terms, each for a factor of exp(step) of time from a millisecond to a million seconds.
+        step = math.log(1e9) / 15
+        keeps = [math.exp(-1 / RATE_HZ / (1e-3 * math.exp((k + 0.5) * step))) for k in range(15)]
+        sigma, terms = 4e-3 * math.sqrt(step / math.pi), [0.0] * 15
+        for i, normals in enumerate(self.normals(15 * n, "gyro 1", "bias_instability").reshape(n, 15).tolist()):
+            for k, (keep, normal) in enumerate(zip(keeps, normals)):
+                keep = keep if i else 0.0
+                terms[k] = keep * terms[k] + sigma * math.sqrt(1 - keep**2) * normal
+            wanted[i] += sum(terms)
         spikes = Stream(self.SEED, "gyro 1", "spikes")
         for i in range(n):
             hit, sign = spikes.uniform() < 1 - math.exp(-4.0 / RATE_HZ), -1 if spikes.uniform() < 0.5 else 1

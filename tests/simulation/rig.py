@@ -14,6 +14,7 @@ RATE_STEP_DPS = 1e-6
 ACCELERATION_STEP_G = 1e-4
 TEMPERATURE_STEP_C = 0.01
 SUPPLY_STEP_V = 0.05
+ROLL_STEP_DPS = 1e-3
 
 DBC = """\
 VERSION ""
@@ -28,7 +29,9 @@ BO_ 257 GYRO_A: 8 RIG
 
 BO_ 258 GYRO_B: 8 RIG
  SG_ Rate : 0|32@1- (1E-006,0) [-2000|2000] "deg/s" RIG
+ SG_ Roll : 32|16@1- (0.001,0) [-32|32] "deg/s" RIG
  SG_ Counter : 48|8@1+ (1,0) [0|255] "" RIG
+ SG_ Pitch : 56|8@1- (0.1,0) [-12|12] "deg/s" RIG
 
 BO_ 512 TABLE: 8 RIG
  SG_ Rate : 0|32@1- (1E-006,0) [-2000|2000] "deg/s" RIG
@@ -56,6 +59,8 @@ bus = "can1"
 dbc = "rig.dbc"
 message = "GYRO_B"
 rate = "Rate"
+rate_x = "Roll"
+rate_y = "Pitch"
 counter = "Counter"
 
 [reference]
@@ -83,6 +88,7 @@ fd = true
 
 # Amplitude in deg/s and frequency in Hz of the sines that make up the motion: all begin at their zero.
 SINES = ((20.0, 0.7), (3.0, 3.1))
+ROLL_SINES = ((15.0, 0.9), (4.0, 2.3))
 
 
 def rate(t):
@@ -95,13 +101,39 @@ def angle_rad(t):
 
 
 def low_passed(t, cutoff_hz):
-    """y' = w (rate - y), y(0) = 0, solved by hand for each sine."""
+    return low_passed_sines(t, SINES, cutoff_hz)
+
+
+def low_passed_sines(t, sines, cutoff_hz):
+    """y' = w (input - y), y(0) = 0, solved by hand for each sine."""
     w = 2 * np.pi * cutoff_hz
     total = 0.0
-    for a, f in SINES:
+    for a, f in sines:
         v = 2 * np.pi * f
         total = total + a * w / (w * w + v * v) * (w * np.sin(v * t) - v * np.cos(v * t) + v * np.exp(-w * t))
     return total
+
+
+def low_passed_twice(t, cutoff_hz, damping):
+    """y''/w² + 2 damping y'/w + y = rate, y(0) = y'(0) = 0, damping < 1, solved by hand for each sine."""
+    w = 2 * np.pi * cutoff_hz
+    rings, total = w * np.sqrt(1 - damping**2), 0.0
+    for a, f in SINES:
+        v = 2 * np.pi * f
+        gain = w * w / (w * w - v * v + 2j * damping * w * v)
+        cosine = -gain.imag
+        sine = (damping * w * cosine - v * gain.real) / rings
+        free = np.exp(-damping * w * t) * (cosine * np.cos(rings * t) + sine * np.sin(rings * t))
+        total = total + a * ((gain * np.exp(1j * v * t)).imag + free)
+    return total
+
+
+def roll(t):
+    return sum(a * np.sin(2 * np.pi * f * t) for a, f in ROLL_SINES)
+
+
+def pitch(t):
+    return 9.0 * np.sin(2 * np.pi * 0.41 * t)
 
 
 def temperature(t):
@@ -110,6 +142,15 @@ def temperature(t):
 
 def temperature_slope(t):
     return 4.0 * 2 * np.pi / 40.0 * np.cos(2 * np.pi * t / 40.0)
+
+
+def follow(values, play):
+    """What is dragged along by `values` once they are further from it than the play."""
+    out, at = [], None
+    for value in values.tolist():
+        at = value if at is None else min(max(at, value - play), value + play)
+        out.append(at)
+    return np.array(out)
 
 
 def supply(t):
@@ -125,9 +166,9 @@ def acceleration(t):
 
 def profile(seconds, rate_hz=50.0, motion=rate):
     t = np.arange(round(seconds * rate_hz) + 1) / rate_hz
-    columns = np.column_stack([t, motion(t), temperature(t), *acceleration(t), supply(t)])
+    columns = np.column_stack([t, motion(t), temperature(t), *acceleration(t), supply(t), roll(t), pitch(t)])
     rows = [",".join(map(repr, row)) for row in columns.tolist()]
-    return "\n".join(["t_s,rate_dps,temperature_c,acc_x_g,acc_y_g,acc_z_g,supply_v", *rows]) + "\n"
+    return "\n".join(["t_s,rate_dps,temperature_c,acc_x_g,acc_y_g,acc_z_g,supply_v,rate_x_dps,rate_y_dps", *rows]) + "\n"
 
 
 def rest(seconds):
@@ -165,6 +206,9 @@ class Frames:
 
     def supply(self):
         return self.bytes[:, 7] * SUPPLY_STEP_V
+
+    def roll(self):
+        return np.ascontiguousarray(self.bytes[:, 4:6]).view("<i2")[:, 0] * ROLL_STEP_DPS
 
     def acceleration(self):
         return np.ascontiguousarray(self.bytes[:, 0:6]).view("<i2").T * ACCELERATION_STEP_G

@@ -61,6 +61,34 @@ TEST(Simulator, LowPassAndDelayTurnASineAsTheyShould) {
   }
 }
 
+// Ringing, as flat as can be, at the limit, and two real poles; alone and behind another one.
+TEST(Simulator, SecondOrderTurnsASineAsItShould) {
+  constexpr double kW = 2.0 * std::numbers::pi * 3.0;
+  const Profile sine = sampled([](double t_s) { return std::sin(kW * t_s); }, 1200);
+  for (const double damping : {0.2, std::numbers::sqrt2 / 2.0, 1.0, 1.6}) {
+    for (const bool behind : {false, true}) {
+      model::Model model{
+          .file = "m.toml",
+          .effects = {{.kind = Kind::kBandwidthSecondOrder, .parameters = {4.0, damping}}}};
+      const std::complex<double> x(0.0, 3.0 / 4.0);
+      std::complex<double> gain = 1.0 / (1.0 + 2.0 * damping * x + x * x);
+      if (behind) {
+        model.effects.push_back({.kind = Kind::kBandwidth, .parameters = {9.0}});
+        gain /= std::complex<double>(1.0, 3.0 / 9.0);
+      }
+      const auto simulator = Simulator::make(model, sine, {});
+      ASSERT_TRUE(simulator) << simulator.error().message();
+      const std::vector<GyroSample> samples = simulator->gyro(0);
+      // Equal poles are moved apart by a thousandth.
+      const double tolerance = damping == 1.0 ? 1e-5 : 1e-8;
+      for (std::size_t i = 700; i < 1190; ++i) {
+        const auto answer = std::exp(std::complex<double>(0.0, kW * samples[i].t_s)) * gain;
+        ASSERT_NEAR(samples[i].reading_dps, answer.imag(), tolerance) << "damping " << damping;
+      }
+    }
+  }
+}
+
 TEST(Simulator, RefusesMoreLowPassesThanCanBeToldApart) {
   const Effect low_pass{.kind = Kind::kBandwidth, .parameters = {10.0}};
   const Profile rest = sampled([](double) { return 0.0; }, 3);
@@ -81,10 +109,12 @@ TEST(Simulator, RefusesMoreLowPassesThanCanBeToldApart) {
 // A kind whose input is no column, or a column that does not reach the effects, would add nothing.
 // A new kind is tried here without being named.
 TEST(Simulator, EveryKindThatNeedsAnInputIsMovedByIt) {
-  std::string text = "t_s,rate_dps,temperature_c,acc_x_g,acc_y_g,acc_z_g,supply_v\n";
+  std::string text =
+      "t_s,rate_dps,temperature_c,acc_x_g,acc_y_g,acc_z_g,supply_v,rate_x_dps,"
+      "rate_y_dps,rate_z_dps\n";
   for (int i = 0; i < 200; ++i) {
     const double t_s = i / kRate_hz;
-    text += fmt::format("{},10,{},0.1,0.2,{},{}\n", t_s, 20.0 + t_s, 0.5 + 0.1 * (i % 2),
+    text += fmt::format("{},10,{},0.1,0.2,{},{},2,3,4\n", t_s, 20.0 + t_s, 0.5 + 0.1 * (i % 2),
                         4.5 + 0.1 * t_s);
   }
   const auto profile = parse_profile(text, "p.csv");

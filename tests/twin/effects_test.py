@@ -82,6 +82,9 @@ class Effects(unittest.TestCase):
     def test_warm_up(self):
         self.judge([effect("warm_up", 2, amplitude_dps=0.03, tau_s=60.0)])
 
+    def test_run_in(self):
+        self.judge([effect("run_in", coefficient_dps=0.02, tau_s=8.0)])
+
     def test_temperature_bias(self):
         self.judge([effect("temperature_bias", coefficient_dps_k=1.5e-3, reference_c=20.0)])
 
@@ -90,6 +93,9 @@ class Effects(unittest.TestCase):
 
     def test_temperature_rate_bias(self):
         self.judge([effect("temperature_rate_bias", coefficient_dps_s_k=0.03)])
+
+    def test_temperature_hysteresis(self):
+        self.judge([effect("temperature_hysteresis", 2, coefficient_dps_k=6e-3, play_k=1.5)])
 
     def test_scale_factor(self):
         self.judge([effect("scale_factor", error=5e-4)])
@@ -108,6 +114,9 @@ class Effects(unittest.TestCase):
 
     def test_scale_factor_temperature(self):
         self.judge([effect("scale_factor_temperature", coefficient_per_k=1e-4, reference_c=30.0)])
+
+    def test_cross_axis(self):
+        self.judge([effect("cross_axis", **{"from": "x"}, coefficient=1e-3)])
 
     def test_g_sensitivity(self):
         self.judge([effect("g_sensitivity", axis="x", coefficient_dps_g=0.02)])
@@ -135,6 +144,9 @@ class Effects(unittest.TestCase):
     def test_bandwidth(self):
         # A group delay leaves what is of second order in rate/cutoff.
         self.judge([effect("bandwidth", 2, cutoff_hz=40.0)], good=2.0)
+
+    def test_bandwidth_of_second_order(self):
+        self.judge([effect("bandwidth_second_order", 2, cutoff_hz=40.0, damping=0.7)], good=2.0)
 
     def test_many_at_once(self):
         # They depend on one another: the response is of the rate that is left when the offsets are off.

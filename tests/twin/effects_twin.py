@@ -2,6 +2,7 @@
 with turns both ways, a swing of temperature and a rough road. Shares nothing with the product, so that it
 can judge what the product takes back."""
 
+import cmath
 import dataclasses
 import math
 import sys
@@ -20,6 +21,7 @@ REST_S = 30.0
 RATE_STEP_DPS = 1e-6
 TEMPERATURE_STEP_C = 0.01
 ACCELERATION_STEP_G = 1e-4
+ROLL_STEP_DPS = 2e-3
 WHITE = (2e-4, 3e-4)  # N of gyro 1 and 2, deg/s/sqrt(Hz)
 PHASES_S = (0.0, 0.0013)  # of the gyros' samples
 ACCELEROMETER_PHASE_S = -0.0004
@@ -32,10 +34,12 @@ BU_: RIG
 BO_ 257 GYRO_A: 8 RIG
  SG_ Rate : 0|32@1- (1E-006,0) [-2000|2000] "deg/s" RIG
  SG_ Temperature : 32|16@1- (0.01,0) [-40|125] "degC" RIG
+ SG_ Roll : 48|16@1- (0.002,0) [-65|65] "deg/s" RIG
 
 BO_ 258 GYRO_B: 8 RIG
  SG_ Rate : 7|32@0- (1E-006,0) [-2000|2000] "deg/s" RIG
  SG_ Temperature : 39|16@0- (0.01,0) [-40|125] "degC" RIG
+ SG_ Roll : 55|16@0- (0.002,0) [-65|65] "deg/s" RIG
 
 BO_ 528 ACCEL: 8 RIG
  SG_ AccX : 0|16@1- (0.0001,0) [-3|3] "g" RIG
@@ -51,6 +55,7 @@ dbc = "effects.dbc"
 message = "GYRO_A"
 rate = "Rate"
 temperature = "Temperature"
+rate_x = "Roll"
 
 [[gyro]]
 name = "b"
@@ -59,6 +64,7 @@ dbc = "effects.dbc"
 message = "GYRO_B"
 rate = "Rate"
 temperature = "Temperature"
+rate_x = "Roll"
 
 [accelerometer]
 bus = "can0"
@@ -87,8 +93,25 @@ def rate_of(t, top_dps):
     return EARTH_DPS + np.where(after > 0.0, top_dps * ease * swing, 0.0)
 
 
+def roll_of(t):
+    """About the axis of the road, driving over its waves."""
+    return 14.0 * np.sin(2 * np.pi * t / 7.3) + 6.0 * np.sin(2 * np.pi * t / 1.9)
+
+
 def temperature_of(t, gyro):
     return 28.0 + 2.0 * gyro + 6.0 * np.sin(2 * np.pi * t / 240.0 + 0.5 * gyro)
+
+
+def followed(temperature, play_k):
+    """Dragged along by the temperature, once that is further away than the play."""
+    out, at = np.empty_like(temperature), temperature[0]
+    for i, now in enumerate(temperature):
+        if now - at > play_k:
+            at = now - play_k
+        elif at - now > play_k:
+            at = now + play_k
+        out[i] = at
+    return out
 
 
 def temperature_slope_of(t, gyro):
@@ -144,12 +167,18 @@ def added(effect, t, rate, truth, gyro, acceleration, vibration):
         return p["size_dps"] * (t >= p["at_s"])
     if kind == "warm_up":
         return p["amplitude_dps"] * np.exp(-t / p["tau_s"])
+    if kind == "run_in":
+        return p["coefficient_dps"] * np.log(1.0 + t / p["tau_s"])
     if kind == "temperature_bias":
         return p["coefficient_dps_k"] * excess
     if kind == "temperature_bias_quadratic":
         return p["coefficient_dps_k2"] * excess**2
     if kind == "temperature_rate_bias":
         return p["coefficient_dps_s_k"] * temperature_slope_of(t, gyro)
+    if kind == "temperature_hysteresis":
+        return p["coefficient_dps_k"] * (followed(temperature, p["play_k"]) - temperature)
+    if kind == "cross_axis":
+        return p["coefficient"] * {"x": roll_of}[p["from"]](t)
     if kind == "scale_factor":
         return p["error"] * rate
     if kind == "scale_factor_asymmetry":
@@ -169,9 +198,20 @@ def added(effect, t, rate, truth, gyro, acceleration, vibration):
         return p["amplitude_dps"] * np.cos(p["harmonic"] * angle + p["phase_rad"])
     if kind == "line":
         return p["amplitude_dps"] * np.sin(2 * np.pi * p["frequency_hz"] * t + p["phase_rad"])
-    if kind in ("delay", "bandwidth"):
+    if kind in ("delay", "bandwidth", "bandwidth_second_order"):
         return np.zeros_like(t)
     raise ValueError(kind)
+
+
+def second_order(rate, dt, cutoff_hz, damping):
+    """y'' = w² (rate - y) - 2 damping w y', damping < 1: z' = p (rate - z) with the complex p, of which y is a part."""
+    w = 2 * math.pi * cutoff_hz
+    p = w * complex(damping, math.sqrt(1.0 - damping**2))
+    keep, z, out = cmath.exp(-p * dt), complex(rate[0]), np.empty_like(rate)
+    for i, value in enumerate((0.5 * (rate + np.concatenate([rate[:1], rate[:-1]]))).tolist()):
+        z = keep * z + (1.0 - keep) * value
+        out[i] = (p.conjugate() * z).imag / -p.imag
+    return out
 
 
 def sensed_rate(effects, truth, t):
@@ -188,6 +228,8 @@ def sensed_rate(effects, truth, t):
                 state = keep * state + (1.0 - keep) * value
                 out[i] = state
             rate = out
+        if effect["kind"] == "bandwidth_second_order":
+            rate = second_order(rate, dt, effect["cutoff_hz"], effect["damping"])
     late = sum(e["seconds"] for e in effects if e["kind"] == "delay")
     return np.interp(t - late, truth.t_s, rate)
 
@@ -225,6 +267,8 @@ def make(effects, length_s=150.0, top_dps=60.0, seed=1):
         payload[:, 0:4] = np.rint(reading / RATE_STEP_DPS).astype(order + "i4").view(np.uint8).reshape(-1, 4)
         temperature = np.rint(temperature_of(t, gyro) / TEMPERATURE_STEP_C)
         payload[:, 4:6] = temperature.astype(order + "i2").view(np.uint8).reshape(-1, 2)
+        roll = np.rint(roll_of(t) / ROLL_STEP_DPS)
+        payload[:, 6:8] = roll.astype(order + "i2").view(np.uint8).reshape(-1, 2)
         streams.append(canlog.Stream(f"can{gyro}", 0x101 + gyro, stamps(t), payload))
     return Recording(streams, truth, START_US)
 

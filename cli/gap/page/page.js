@@ -48,7 +48,7 @@ function table(head, rows) {
 }
 
 const sentence = (text) => text.replace(/^what /, "What ").replace(/\.?$/, "."); // it may begin with a sensor's name
-const gyroName = (gyro) => data.gyros[gyro - 1];
+const gyroName = (gyro) => (gyro ? data.gyros[gyro - 1] : "the reference");
 const effectName = (effect) => `${effect.kind}, gyro ${gyroName(effect.gyro)}`;
 const readings = (effect) => effect.ambiguous_with.map(effectName).join("; ");
 const stretch = (from, to) => `${number(from, 4)} to ${number(to, 4)} s`;

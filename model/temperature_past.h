@@ -1,0 +1,42 @@
+#pragma once
+
+// What of the temperatures that a gyro went through still acts: enough to tell, for any play, where
+// a follower with that play stands. The follower begins at the first temperature, stays where it is
+// while the temperature is within the play to both sides of it, and is dragged along beyond that.
+//
+// Of all temperatures only the extremes count that no larger swing has wiped out. They are kept as
+// the follower's position over the play, which bends at each of them. A fixed number of bends is
+// kept; of more, the one that matters least goes. Adding allocates nothing.
+
+#include <array>
+#include <cstddef>
+
+namespace vgyro::model {
+
+class TemperaturePast {
+ public:
+  /// Swings that are kept, each smaller than the one before it. A road leaves three or four.
+  static constexpr std::size_t kBendsMax = 16;
+
+  [[nodiscard]] bool empty() const { return count_ == 0; }
+
+  /// Precondition: finite.
+  void add(double temperature_c);
+
+  /// Where the follower stands once the temperature has gone on from the newest to `now_c`, in
+  /// degC. Preconditions: not empty; play_k >= 0.
+  [[nodiscard]] double followed_c(double play_k, double now_c) const;
+
+ private:
+  struct Bend {
+    double play_k = 0.0;
+    double followed_c = 0.0;
+  };
+  static std::size_t least_of(const std::array<Bend, kBendsMax + 1>& bends);
+
+  /// The first is the newest temperature; plays rise; beyond the last it is where it began.
+  std::array<Bend, kBendsMax> bends_{};
+  std::size_t count_ = 0;
+};
+
+}  // namespace vgyro::model
