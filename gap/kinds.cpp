@@ -129,9 +129,8 @@ constexpr double kRunInPenalty = 8.0;
 constexpr double kPlayPenalty = 5.0;
 constexpr double kAxisPenalty = 1.0;
 constexpr double kCutoffPenalty = 2.0;
-// Four starts and a free damping; and where a first order, or a delay, explains as much, it is
-// that.
-// It has a lag and a low-pass for free, and passes for either: it must be far better than they are.
+// Four starts and a free damping. It has a lag and a low-pass for free, and passes for either: it
+// must be far better than they are.
 constexpr double kSecondOrderPenalty = 40.0;
 constexpr double kHarmonicPenalty = 7.0;
 // Two parameters more than a walk, one of which means nothing where the other is 0.

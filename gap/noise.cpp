@@ -35,7 +35,7 @@ constexpr double kLogOf0 = 1e-300;
 // whole recording: there the likelihood need not be known better than a fiftieth of a nat.
 constexpr int kFastEvaluations = 150;
 constexpr double kFastTolerance = 1e-3;
-constexpr int kSlowEvaluations = 40;  ///< for each unknown
+constexpr int kSlowEvaluations = 60;  ///< for each unknown
 constexpr double kSlowTolerance = 2e-2;
 
 // Bounds of a fitted logarithm, about that of the density by which samples scatter within their
@@ -69,6 +69,11 @@ constexpr double kFrequencySame = 1e-6;
 // sensor. Wider would cost digits and gain nothing.
 constexpr double kOtherStart_dps = 1.0;
 
+// Half a block.
+constexpr double kQuickTerm_s = 0.5 * kBlock_s;
+// Of a mean's white noise this much is left in the filter at the least: it keeps variances above 0.
+constexpr double kOwnShare = 0.1;
+
 constexpr std::size_t kTermsMax = 1 + kFlickerTerms + kMarkovMax;
 constexpr std::size_t kStatesMax = 2 * kTermsMax;
 
@@ -81,6 +86,18 @@ struct States {
   std::array<double, kStatesMax> tau_s{};       ///< 0: a walk
   std::array<double, kStatesMax> stationary{};  ///< of a Markov term
 };
+
+// Variance of a correlated term's mean over `seconds`, over its own.
+double share_of_mean(const MarkovTerm& term, double seconds) {
+  const double x = seconds / term.tau_s;
+  return x > kShortMemories ? 2.0 / (x * x) * (x - 1.0 + std::exp(-x))
+                            : 1.0 - x / 3.0 + x * x / 12.0;
+}
+
+// It forgets within a block: blocks hardly know of each other by it.
+bool is_quick(const MarkovTerm& term) {
+  return term.tau_s < kQuickTerm_s;
+}
 
 States states_of(const PairNoise& noise, const Layout& layout) {
   std::array<bool, 2> used{};
@@ -100,7 +117,9 @@ States states_of(const PairNoise& noise, const Layout& layout) {
       if (states.count == kStatesMax || term.sigma_dps <= 0.0) return;
       states.gyro[states.count] = gyro;
       states.tau_s[states.count] = term.tau_s;
-      states.stationary[states.count] = term.sigma_dps * term.sigma_dps;
+      states.stationary[states.count] =
+          term.sigma_dps * term.sigma_dps *
+          (is_quick(term) ? share_of_mean(term, layout.block_s) : 1.0);
       states.start_variance[states.count] = states.stationary[states.count];
       ++states.count;
     });
@@ -155,21 +174,20 @@ double white_variance(const std::array<double, 3>& gain, double rate_square, con
 
 // Variance about its mean of a drift over `seconds`: of a walk K²T/6, of a correlated term its
 // variance less that of its mean.
-double drift_within(const NoiseTerms& terms, double seconds) {
+double drift_within(const NoiseTerms& terms, double seconds, bool with_quick) {
   double variance = terms.walk_dps_rts * terms.walk_dps_rts * seconds / 6.0;
   terms.each_correlated([&](const MarkovTerm& term) {
-    const double x = seconds / term.tau_s;
-    const double of_mean = x > kShortMemories ? 2.0 / (x * x) * (x - 1.0 + std::exp(-x))
-                                              : 1.0 - x / 3.0 + x * x / 12.0;
-    variance += term.sigma_dps * term.sigma_dps * (1.0 - of_mean);
+    if (!with_quick && is_quick(term)) return;
+    variance += term.sigma_dps * term.sigma_dps * (1.0 - share_of_mean(term, seconds));
   });
   return variance;
 }
 
-double drift_within(Channel channel, const PairNoise& noise, double seconds) {
+double drift_within(Channel channel, const PairNoise& noise, double seconds,
+                    bool with_quick = true) {
   double variance = 0.0;
   for (std::size_t gyro = 0; gyro < 2; ++gyro) {
-    if (share_of(channel, gyro) != 0.0) variance += drift_within(noise[gyro], seconds);
+    if (share_of(channel, gyro) != 0.0) variance += drift_within(noise[gyro], seconds, with_quick);
   }
   return variance;
 }
@@ -291,12 +309,13 @@ class DriftFilter {
 
   void predict(double step_s) {
     const std::size_t n = states_.count;
+    set_decays(step_s);
     for (std::size_t i = 0; i < n; ++i) {
       if (states_.tau_s[i] == 0.0) {
         p_[i][i] += states_.growth[i] * step_s;
         continue;
       }
-      const double decay = std::exp(-step_s / states_.tau_s[i]);
+      const double decay = decay_[i];
       for (std::size_t j = 0; j < n; ++j) {
         p_[i][j] *= decay;
         p_[j][i] *= decay;
@@ -325,6 +344,14 @@ class DriftFilter {
   }
 
  private:
+  // Most blocks are as far apart as the last two.
+  void set_decays(double step_s) {
+    if (step_s == step_s_) return;
+    step_s_ = step_s;
+    for (std::size_t i = 0; i < states_.count; ++i)
+      decay_[i] = states_.tau_s[i] == 0.0 ? 1.0 : std::exp(-step_s / states_.tau_s[i]);
+  }
+
   // Takes the expected drift off; sets P·h. Returns the variance with that of the drift.
   double expect(Channel channel, double variance, double* observation) {
     const std::size_t n = states_.count;
@@ -351,9 +378,12 @@ class DriftFilter {
   Matrix x_;
   std::array<double, kStatesMax> h_{};
   std::array<double, kStatesMax> ph_{};
+  double step_s_ = -1.0;
+  std::array<double, kStatesMax> decay_{};
 };
 
-// drift_within of blocks one after the other: it is dear, and most are as long as the last.
+// drift_within of blocks one after the other, without quick terms: it is dear, and most are as long
+// as the last.
 class BlockDrift {
  public:
   BlockDrift(const PairNoise& noise, const Layout& layout) : noise_(noise), layout_(layout) {}
@@ -362,7 +392,7 @@ class BlockDrift {
     if (block.channel != channel_ || block.count != count_) {
       channel_ = block.channel;
       count_ = block.count;
-      variance_ = drift_within(channel_, noise_, seconds_of(block, layout_));
+      variance_ = drift_within(channel_, noise_, seconds_of(block, layout_), false);
     }
     return variance_;
   }
@@ -394,7 +424,9 @@ double whiten_means(Matrix& means, const Layout& layout, const PairNoise& noise,
     last_s = std::max(last_s, block.t_s);
     // A mean's increments are less than those of the drift at its middle, by as much as the drift
     // scatters within a block: then both variance and covariance of the means are right.
-    const double own_variance = mean_variance(block, noise, layout) - drift.variance(block);
+    // Of quick terms the states are means themselves.
+    const double white = mean_variance(block, noise, layout);
+    const double own_variance = std::max(white - drift.variance(block), kOwnShare * white);
     double* const innovation = means.data() + b * width;
     const double variance = filter.take(block.channel, own_variance, innovation);
     if (counts(block, part)) log_likelihood -= 0.5 * std::log(variance);

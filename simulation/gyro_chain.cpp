@@ -15,11 +15,12 @@ using model::Effect;
 using model::Kind;
 using model::Nature;
 
-// Of the terms that flicker noise is made of: from samples of the fastest gyro to days, a factor of
-// four apart. The same for every recording, so that a longer one begins as a shorter one does.
+// Of the terms that flicker noise is made of: a factor of four apart, from less than a sample to
+// days. Quicker ones would only fold into white noise, which a sensor's filter keeps out. The same
+// for every length of a recording, so that a longer one begins as a shorter one does.
 constexpr std::size_t kFlickerTerms = 15;
-constexpr double kFlickerFrom_s = 1e-3;
-constexpr double kFlickerTo_s = 1e6;
+constexpr double kFlickerFrom = 0.4;  // of a sample
+constexpr double kFlickerSpan = 1e9;
 
 bool is_random(const Effect& effect) {
   return model::info(effect.kind).nature == Nature::kNoise || effect.kind == Kind::kSpikes;
@@ -79,10 +80,11 @@ double GyroChain::correlated_dps(NoiseSource& source, double before_dps, double 
 
 double GyroChain::flicker_dps(Random& random, double since_s) const {
   random.flicker_dps.resize(kFlickerTerms);
+  const double from_s = kFlickerFrom * interval_s_;
   double sum_dps = 0.0;
   for (std::size_t i = 0; i < kFlickerTerms; ++i) {
     const model::FlickerTerm term = model::flicker_term(
-        random.effect.parameters[0], i, kFlickerTerms, kFlickerFrom_s, kFlickerTo_s);
+        random.effect.parameters[0], i, kFlickerTerms, from_s, kFlickerSpan * from_s);
     double& state_dps = random.flicker_dps[i];
     state_dps = correlated_dps(random.source, state_dps, term.sigma_dps, term.tau_s, since_s);
     sum_dps += state_dps;

@@ -246,7 +246,7 @@ def draw(kind, gyro, wanted_t, world, rng):
             p[name] = float(f"{max(p[name], 3.0 * sigma):.4g}")
         return effect
     see = drive_strength.Visible(world, gyro)
-    p = kinds.companions(kind, world, rng, wanted_t is None)
+    p = kinds.companions(kind, gyro, world, rng, wanted_t is None)
     if kind == "line":
         p["frequency_hz"] = round(min(p["frequency_hz"], 0.45 * see.rate_hz), 3)
     wanted = float(np.exp(rng.uniform(np.log(15.0), np.log(80.0)))) if wanted_t is None else wanted_t

@@ -281,7 +281,8 @@ class Gap(GapBench):
         # Which gyro has the scale error nobody can tell.
         scale = [effect for effect in result["effects"] if effect["kind"] == "scale_factor"]
         self.assertEqual(len(scale), 1)
-        self.assertEqual(scale[0]["ambiguous_with"], [{"kind": "scale_factor", "gyro": 3 - scale[0]["gyro"]}])
+        readings = [(reading["kind"], reading["gyro"]) for reading in scale[0]["ambiguous_with"]]
+        self.assertEqual(readings, [("scale_factor", 3 - scale[0]["gyro"])])
 
 
 class Ambiguous(GapBench):
