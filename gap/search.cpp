@@ -61,6 +61,7 @@ constexpr double kStartingNoiseDoubt = 0.01;
 // Shares of a timing effect's statistic that interpolation leaves behind.
 constexpr double kTimingLeaves = 2e-3;
 constexpr double kJitterLeaves = 2e-2;
+constexpr double kQuickDrift_s = 1.0;
 // Each turn learns the motion from the last fit. The rivals are only compared, and all after as
 // many.
 constexpr int kMotionTurns = 3;
@@ -76,6 +77,11 @@ constexpr double kShareNoise = 0.85;
 
 bool is_noise(const Found& found) {
   return row(found.effect.kind).finder == Finder::kNoise;
+}
+
+// What hangs together over less than some blocks is what late stamps make of motion, too.
+bool is_quick_drift(const Effect& effect) {
+  return row(effect.kind).random == Random::kMarkov && effect.parameters[1] < kQuickDrift_s;
 }
 
 bool is_timing(const Effect& effect) {
@@ -294,14 +300,16 @@ std::vector<Found> Search::refitted(std::size_t place, const Fit& null, const Pa
 bool Search::is_left_of_timing(const Found& one) const {
   const Effect& effect = one.effect;
   const bool knows_rate = study_->recording().has_reference;
-  if (knows_rate ? !is_timing(effect) : !row(effect.kind).is_fast) return false;
+  const bool is_quick = is_quick_drift(effect);
+  if (!is_quick && (knows_rate ? !is_timing(effect) : !row(effect.kind).is_fast)) return false;
   const bool of_found = std::any_of(found_.begin(), found_.end(), [&](const Found& found) {
-    return is_timing(found.effect) && (!knows_rate || found.effect.gyro == effect.gyro) &&
+    return !is_quick && is_timing(found.effect) &&
+           (!knows_rate || found.effect.gyro == effect.gyro) &&
            one.statistic < kTimingLeaves * found.statistic;
   });
   const auto& findings = study_->findings();
   const bool of_jitter = std::any_of(findings.begin(), findings.end(), [&](const Finding& finding) {
-    return is_timing(effect) && finding.effect.kind == Kind::kTimestampJitter &&
+    return (is_quick || is_timing(effect)) && finding.effect.kind == Kind::kTimestampJitter &&
            finding.effect.gyro == effect.gyro && one.statistic < kJitterLeaves * finding.statistic;
   });
   return of_found || of_jitter;

@@ -9,6 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "gap/score.h"
+#include "model/catalogue.h"
 #include "tests/gap/made_study.h"
 
 namespace vgyro::gap {
@@ -33,7 +34,8 @@ std::string names_of(const std::vector<Found>& found) {
   for (const Found& one : found) {
     text += std::string(text.empty() ? "" : ", ") + "kind " +
             std::to_string(static_cast<int>(one.effect.kind)) + " of gyro " +
-            std::to_string(one.effect.gyro) + " by " + std::to_string(one.statistic);
+            std::to_string(one.effect.gyro) + " (" + model::parameters_text(one.effect) + ") by " +
+            std::to_string(one.statistic);
   }
   return text;
 }
