@@ -49,6 +49,15 @@ class Road(unittest.TestCase):
         at_samples = drive_.rate(fine[::80])
         np.testing.assert_allclose(at_samples, values[::80], atol=1e-9)
 
+    def test_is_as_large_between_the_points_of_its_grid_as_at_them(self):
+        """Two gyros sample at different places between them: a gain of its own there would be a scale factor."""
+        drive_ = small_drive()
+        at = np.arange(20.0, 100.0, 1.0 / road.GRID_HZ)
+        turns = np.sin(2 * np.pi * 1.7 * drive_._grid)
+        for share in (0.1, 0.3, 0.5, 0.6):
+            t = at + share / road.GRID_HZ
+            np.testing.assert_allclose(drive_._read(turns, t), np.sin(2 * np.pi * 1.7 * t), atol=5e-7)
+
     def test_folds_what_is_beyond_half_the_sampling_rate(self):
         """Of samples at 50 Hz the power below 25 Hz is all of the road's, not only what lies there."""
         drive_ = small_drive(spectrum=road.Spectrum(1.0, 60.0, 4.0))

@@ -11,8 +11,8 @@ from motion import EARTH_DPS, smooth_step
 
 GRID_HZ = 2000
 GUARD_S = 3.0  # of the grid before the first and behind the last instant: lags and the sinc reach there
-HIGHEST_HZ = 240.0  # of road noise; an eighth of the grid's rate, where the sinc is exact to 1e-4
-TAPS, KAISER = 16, 9.0
+HIGHEST_HZ = 240.0  # of road noise; an eighth of the grid's rate, where the sinc is exact to 3e-6
+TAPS, KAISER = 24, 12.0
 SLOW_HZ = 1.0  # turns are below, road noise is above
 
 
@@ -168,12 +168,13 @@ class Drive:
         at = (np.asarray(t, dtype=float) + GUARD_S) * GRID_HZ
         first = np.floor(at).astype(int) - TAPS // 2 + 1
         first = np.clip(first, 0, len(values) - TAPS)
-        out = np.zeros(len(at))
+        out, weights = np.zeros(len(at)), np.zeros(len(at))
         for k in range(TAPS):
             x = at - (first + k)
-            window = np.i0(KAISER * np.sqrt(np.maximum(0.0, 1.0 - (x / (TAPS / 2)) ** 2))) / np.i0(KAISER)
-            out += values[first + k] * np.sinc(x) * window
-        return out
+            weight = np.sinc(x) * np.i0(KAISER * np.sqrt(np.maximum(0.0, 1.0 - (x / (TAPS / 2)) ** 2)))
+            out += values[first + k] * weight
+            weights += weight
+        return out / weights
 
     def _filtered(self, response):
         f = np.fft.rfftfreq(len(self._fine), 1.0 / GRID_HZ)
