@@ -121,13 +121,10 @@ Place place_of(double phase) {
 }
 
 double product(const Row& a, const Row& b, double share, const double* values) {
-  double first = 0.0;
-  double second = 0.0;
-  for (std::size_t i = 0; i < SampledCurve::kPointsMax; ++i) {
-    first += a[i] * values[i];
-    second += b[i] * values[i];
-  }
-  return first + share * (second - first);
+  using Points = Eigen::Array<double, SampledCurve::kPointsMax, 1>;
+  const Eigen::Map<const Points> first(a.data());
+  const Eigen::Map<const Points> second(b.data());
+  return ((first + share * (second - first)) * Eigen::Map<const Points>(values)).sum();
 }
 
 }  // namespace
@@ -192,6 +189,38 @@ SampledCurve::Point SampledCurve::at(double t_s) const {
   const Table& weights = table();
   return {product(weights.value[row], weights.value[row + 1], share, values),
           product(weights.slope[row], weights.slope[row + 1], share, values) / step_s};
+}
+
+double SampledCurve::value_at(double t_s) const {
+  if (t_s <= t_s_.front()) return value_.front();
+  if (t_s >= t_s_.back()) return value_.back();
+  const std::size_t before = index_before(t_s);
+  if (!is_even_about(before)) return polynomial_at(t_s).value;
+  const auto [row, share] = place_of((t_s - t_s_[before]) / (t_s_[before + 1] - t_s_[before]));
+  const Table& weights = table();
+  return product(weights.value[row], weights.value[row + 1], share, &value_[before + 1 - kReach]);
+}
+
+std::vector<double> SampledCurve::quarters() const {
+  using Points = Eigen::Array<double, kPointsMax, 1>;
+  std::vector<double> values;
+  values.reserve(kQuarters * t_s_.size());
+  for (std::size_t i = 0; i + 1 < t_s_.size(); ++i) {
+    values.push_back(value_[i]);
+    const bool even = is_even_about(i);
+    for (std::size_t part = 1; part < kQuarters; ++part) {
+      if (!even) {
+        const double share = static_cast<double>(part) / kQuarters;
+        values.push_back(polynomial_at(t_s_[i] + share * (t_s_[i + 1] - t_s_[i])).value);
+        continue;
+      }
+      const Row& row = table().value[part * kPhases / kQuarters];
+      const Eigen::Map<const Points> about(&value_[i + 1 - kReach]);
+      values.push_back((Eigen::Map<const Points>(row.data()) * about).sum());
+    }
+  }
+  if (!value_.empty()) values.push_back(value_.back());
+  return values;
 }
 
 SampledCurve::Point SampledCurve::nearby(double t_s) const {

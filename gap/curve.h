@@ -40,6 +40,11 @@ class SampledCurve {
   [[nodiscard]] Weights weights_at(double t_s) const;
   /// Beyond the ends the outermost value, slope 0.
   [[nodiscard]] Point at(double t_s) const;
+  /// Its value, in a third of the time.
+  [[nodiscard]] double value_at(double t_s) const;
+  /// At the quarters of each interval, kQuarters values for each, and at the last sample.
+  static constexpr std::size_t kQuarters = 4;
+  [[nodiscard]] std::vector<double> quarters() const;
   /// The same by the nearest six samples alone: for what may hold spikes, which a sinc spreads.
   [[nodiscard]] Point nearby(double t_s) const;
   /// Straight between neighbours: for what steps.

@@ -62,8 +62,8 @@ constexpr double kTauStart_s = 10.0;
 // be seen to forget. Of a recording however short the bounds stay apart.
 constexpr double kMarkovSpans = 8.0;
 constexpr double kTauMaxLeast_s = 2.0;
-// A cosine that lies on a limit, but for rounding, lies beyond it.
-constexpr double kFrequencySame = 1e-6;
+// A cosine that lies on a limit, but for what clocks are off and blocks are uneven, lies beyond it.
+constexpr double kFrequencySame = 0.02;
 
 // From one switch-on to the next a gyro's bias is another one: some tenths of a deg/s for a cheap
 // sensor. Wider would cost digits and gain nothing.

@@ -27,8 +27,8 @@ struct MarkovTerm {
   double tau_s = 1.0;
 };
 
-/// Flicker noise is looked at as so many terms, a decade apart: quicker ones than a sample of 100 Hz
-/// would fold into white noise, slower ones are a bias.
+/// Flicker noise is looked at as so many terms, a decade apart: quicker ones than a sample of 100
+/// Hz would fold into white noise, slower ones are a bias.
 inline constexpr std::size_t kFlickerTerms = 6;
 inline constexpr double kFlickerFrom_s = 0.004;
 inline constexpr double kFlickerTo_s = 4000.0;

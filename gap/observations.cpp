@@ -348,11 +348,13 @@ Eigen::VectorXd Observations::lateness_dps(std::size_t gyro, const Effects& movi
   if (found != remembered_.end()) return found->values;
   Eigen::VectorXd lateness = Eigen::VectorXd::Zero(size());
   for (const Drive& drive : is_one() ? std::vector<Drive>{whole()} : drives) {
-    const Prediction prediction(moving, *drive.signals[gyro]);
+    const Signals& signals = *drive.signals[gyro];
+    const Prediction prediction(moving, signals);
     for (std::size_t place = drive.first; place < drive.first + drive.count; ++place) {
       if (share_of(channel[place], gyro) == 0.0) continue;
+      const double at_s = t_s[place] - drive.from_s;
       lateness[static_cast<Eigen::Index>(place)] =
-          prediction.late_dps(t_s[place] - drive.from_s) - rate[gyro][place].value;
+          prediction.late_dps(at_s) - signals.on_time().curve().value_at(at_s);
     }
   }
   Remembered one{gyro, moving, lateness};

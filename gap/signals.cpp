@@ -26,22 +26,9 @@ constexpr double kSteppedScatter = 1.5 / 12.0;
 constexpr double kFollows = 1.2;
 constexpr double kGridStep_s = 0.25;
 
-// Values at the quarters of each interval of a curve, kQuarters for each.
-constexpr std::size_t kQuarters = 4;
-std::vector<double> quarters_of(const SampledCurve& curve) {
-  const std::span<const double> t_s = curve.times_s();
-  std::vector<double> value;
-  value.reserve(kQuarters * t_s.size());
-  for (std::size_t i = 0; i + 1 < t_s.size(); ++i) {
-    value.push_back(curve.values()[i]);
-    for (std::size_t part = 1; part < kQuarters; ++part) {
-      const double share = static_cast<double>(part) / kQuarters;
-      value.push_back(curve.at(t_s[i] + share * (t_s[i + 1] - t_s[i])).value);
-    }
-  }
-  if (!t_s.empty()) value.push_back(curve.values().back());
-  return value;
-}
+constexpr std::size_t kQuarters = SampledCurve::kQuarters;
+// A pair's gyros have a low-pass each, and a search tries others beside them.
+constexpr std::size_t kFilteredMax = 4;
 
 // First-order low-pass with a real or a complex pole, exact for a rate that is a parabola in each
 // half of an interval.
@@ -152,39 +139,56 @@ SampledCurve known_of(const std::vector<double>& t_s, const std::vector<double>&
 
 }  // namespace
 
-Motion::Motion(SampledCurve rate_dps) : rate_dps_(std::move(rate_dps)) {
+const std::vector<double>& Motion::quarters() const {
+  if (!quarters_) quarters_ = std::make_shared<const std::vector<double>>(rate_dps_.quarters());
+  return *quarters_;
+}
+
+// Simpson's rule over each interval, from time 0.
+const std::vector<double>& Motion::angle_deg() const {
+  if (angle_deg_) return *angle_deg_;
   const std::span<const double> t_s = rate_dps_.times_s();
   const std::span<const double> rate = rate_dps_.values();
-  angle_deg_.resize(t_s.size());
-  if (t_s.empty()) return;
-  double angle_deg = rate[0] * t_s[0];
-  angle_deg_[0] = angle_deg;
+  std::vector<double> angle_deg(t_s.size());
+  angle_deg[0] = rate[0] * t_s[0];
   for (std::size_t i = 1; i < t_s.size(); ++i) {
-    const double step_s = t_s[i] - t_s[i - 1];
-    const double middle = rate_dps_.at(0.5 * (t_s[i - 1] + t_s[i])).value;
-    angle_deg += step_s * (rate[i - 1] + 4.0 * middle + rate[i]) / 6.0;
-    angle_deg_[i] = angle_deg;
+    const double middle = quarters()[kQuarters * (i - 1) + kQuarters / 2];
+    angle_deg[i] =
+        angle_deg[i - 1] + (t_s[i] - t_s[i - 1]) * (rate[i - 1] + 4.0 * middle + rate[i]) / 6.0;
   }
+  angle_deg_ = std::make_shared<const std::vector<double>>(std::move(angle_deg));
+  return *angle_deg_;
 }
 
 double Motion::angle_rad(double t_s) const {
   const std::span<const double> times_s = rate_dps_.times_s();
   const auto after = std::upper_bound(times_s.begin(), times_s.end(), t_s);
   if (after == times_s.begin()) {
-    return kDegree * (angle_deg_.front() + rate_dps_.values().front() * (t_s - times_s.front()));
+    return kDegree * (angle_deg().front() + rate_dps_.values().front() * (t_s - times_s.front()));
   }
   const auto i = static_cast<std::size_t>(after - times_s.begin()) - 1;
   const double step_s = t_s - times_s[i];
-  const SampledCurve::Point half = rate_dps_.at(times_s[i] + 0.5 * step_s);
-  return kDegree * (angle_deg_[i] + half.value * step_s);
+  return kDegree * (angle_deg()[i] + rate_dps_.value_at(times_s[i] + 0.5 * step_s) * step_s);
 }
 
-SampledCurve Motion::low_passed(double cutoff_hz) const {
-  return low_pass(rate_dps_, quarters_of(rate_dps_), cutoff_hz);
+template <class Filter>
+std::shared_ptr<const Motion> Motion::remembered(double cutoff_hz, double damping,
+                                                 const Filter& filter) const {
+  for (const Filtered& one : filtered_)
+    if (one.cutoff_hz == cutoff_hz && one.damping == damping) return one.motion;
+  if (filtered_.size() == kFilteredMax) filtered_.erase(filtered_.begin());
+  filtered_.push_back({cutoff_hz, damping, std::make_shared<const Motion>(filter())});
+  return filtered_.back().motion;
 }
 
-SampledCurve Motion::low_passed(const model::SecondOrder& second) const {
-  return low_pass(rate_dps_, quarters_of(rate_dps_), second);
+std::shared_ptr<const Motion> Motion::low_passed(double cutoff_hz) const {
+  return remembered(cutoff_hz, 0.0,
+                    [&] { return Motion(low_pass(rate_dps_, quarters(), cutoff_hz)); });
+}
+
+std::shared_ptr<const Motion> Motion::low_passed(const model::SecondOrder& second) const {
+  return remembered(second.cutoff_hz, second.damping,
+                    [&] { return Motion(low_pass(rate_dps_, quarters(), second)); });
 }
 
 namespace {
@@ -221,7 +225,7 @@ model::Surroundings Signals::without_motion_at(double t_s) const {
   }
   if (!supply_v.empty()) s.supply_v = supply_v.linear(t_s);
   for (std::size_t axis = 0; axis < other_rate_dps.size(); ++axis) {
-    if (!other_rate_dps[axis].empty()) s.other_rate_dps[axis] = other_rate_dps[axis].at(t_s).value;
+    if (!other_rate_dps[axis].empty()) s.other_rate_dps[axis] = other_rate_dps[axis].value_at(t_s);
   }
   return s;
 }
@@ -357,9 +361,7 @@ void set_circumstances(const GyroSeries& gyro, const AccelerationSeries& acceler
 Prediction::Prediction(std::span<const model::Effect> effects, const Signals& signals)
     : equation_(effects), signals_(signals) {
   const auto pass = [&](const auto& filter) {
-    low_passed_.push_back(low_passed_.empty() ? signals.motion.low_passed(filter)
-                                              : low_pass(low_passed_.back(),
-                                                         quarters_of(low_passed_.back()), filter));
+    low_passed_ = (low_passed_ ? *low_passed_ : signals.on_time()).low_passed(filter);
   };
   for (const double cutoff_hz : equation_.cutoffs_hz())
     pass(cutoff_hz);
@@ -368,11 +370,9 @@ Prediction::Prediction(std::span<const model::Effect> effects, const Signals& si
 }
 
 double Prediction::late_dps(double t_s) const {
-  const auto low_passed = [&](double felt_at_s) {
-    return low_passed_.empty() ? signals_.motion.rate(felt_at_s).value
-                               : low_passed_.back().at(felt_at_s).value;
-  };
-  return equation_.late_rate_dps(low_passed, equation_.true_time_s(t_s));
+  const SampledCurve& felt = (low_passed_ ? *low_passed_ : signals_.on_time()).curve();
+  return equation_.late_rate_dps([&](double felt_at_s) { return felt.value_at(felt_at_s); },
+                                 equation_.true_time_s(t_s));
 }
 
 double Prediction::at(double t_s) const {

@@ -5,7 +5,9 @@
 // what a gyro should read.
 
 #include <array>
+#include <memory>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "gap/curve.h"
@@ -20,22 +22,46 @@ namespace vgyro::gap {
 class Motion {
  public:
   Motion() = default;
-  explicit Motion(SampledCurve rate_dps);
+  explicit Motion(SampledCurve rate_dps) : rate_dps_(std::move(rate_dps)) {}
 
   [[nodiscard]] SampledCurve::Point rate(double t_s) const { return rate_dps_.at(t_s); }
   [[nodiscard]] double angle_rad(double t_s) const;
-  /// The rate through a first-order low-pass.
-  [[nodiscard]] SampledCurve low_passed(double cutoff_hz) const;
-  [[nodiscard]] SampledCurve low_passed(const model::SecondOrder& second) const;
+  /// What a first-order low-pass makes of it, and one of second order. The last answers are kept:
+  /// what the model knows is asked for again and again.
+  [[nodiscard]] std::shared_ptr<const Motion> low_passed(double cutoff_hz) const;
+  [[nodiscard]] std::shared_ptr<const Motion> low_passed(const model::SecondOrder& second) const;
   [[nodiscard]] const SampledCurve& curve() const { return rate_dps_; }
 
  private:
+  using Values = std::shared_ptr<const std::vector<double>>;
+  [[nodiscard]] const std::vector<double>& quarters() const;
+  [[nodiscard]] const std::vector<double>& angle_deg() const;
+
   SampledCurve rate_dps_;
-  std::vector<double> angle_deg_;  ///< at the curve's samples, from time 0
+  // Made when they are first asked for; copies share them.
+  mutable Values quarters_;   ///< at the quarters of each interval
+  mutable Values angle_deg_;  ///< at the curve's samples, from time 0
+  struct Filtered {
+    double cutoff_hz = 0.0;
+    double damping = 0.0;  ///< 0: of first order
+    std::shared_ptr<const Motion> motion;
+  };
+  template <class Filter>
+  std::shared_ptr<const Motion> remembered(double cutoff_hz, double damping,
+                                           const Filter& filter) const;
+  mutable std::vector<Filtered> filtered_;
 };
 
 struct Signals {
   Motion motion;  ///< as this gyro is judged against
+  /// As the other gyro alone tells it; empty where the motion is known otherwise. What comes late
+  /// is compared with it: in a mean of both, noise that is late and noise that is not would cancel,
+  /// or add up, at high frequencies.
+  Motion motion_by_other;
+  /// By which lateness is reckoned.
+  [[nodiscard]] const Motion& on_time() const {
+    return motion_by_other.curve().empty() ? motion : motion_by_other;
+  }
   SampledCurve temperature_c;
   SampledCurve temperature_slope_c_s;
   double temperature_step_c = 0.0;  ///< of its values; 0: it never changed
@@ -77,7 +103,7 @@ class Prediction {
  private:
   model::Equation equation_;
   const Signals& signals_;
-  std::vector<SampledCurve> low_passed_;  ///< one after the other
+  std::shared_ptr<const Motion> low_passed_;  ///< behind all low-passes; none: the motion itself
 };
 
 }  // namespace vgyro::gap

@@ -47,7 +47,7 @@ struct Study::Facts {
     quiet = {quiet_variance(readings[0]), quiet_variance(readings[1]), quiet_variance(reference)};
     if (!recording.has_reference) {
       for (const double t_s : readings[0].times_s())
-        second_dps.push_back(readings[1].at(t_s).value);
+        second_dps.push_back(readings[1].value_at(t_s));
       fast[0] = FastMotion(readings[0], readings[1]);
       return;
     }
@@ -78,7 +78,7 @@ constexpr double kPauseMost_s = 3600.0;
 constexpr double kRestMin_s = 10.0;
 // Share of samples that repeat the last one.
 constexpr double kCoarseRepeats = 0.2;
-// Late readings converge by half their phase a round.
+// Where both come late each round takes off what the other's lateness left of the last.
 constexpr int kMotionRounds = 16;
 constexpr double kMotionSame_dps = 2e-6;
 constexpr double kMotionSameShare = 0.01;  // of the noise of a sample
@@ -440,27 +440,28 @@ class Beside {
       surroundings_.push_back(signals.without_motion_at(equation_.true_time_s(at_s)));
   }
 
-  // Takes `weight` times it off the values. Of the first guess, which knows no motion, the offsets.
-  void take_off(const Motion& motion, const Signals& signals, double weight,
-                std::vector<double>& values) {
-    if (effects_.empty()) return;
-    if (motion.curve().empty()) {
+  // The readings without it. Of the first guess, which knows no motion, without the offsets.
+  [[nodiscard]] std::vector<double> taken_off(std::vector<double> values, const Signals& signals) {
+    if (effects_.empty()) return values;
+    const SampledCurve& on_time = signals.on_time().curve();
+    if (on_time.empty()) {
       for (std::size_t i = 0; i < surroundings_.size(); ++i)
-        values[i] -= weight * equation_.offset_dps(surroundings_[i]);
-      return;
+        values[i] -= equation_.offset_dps(surroundings_[i]);
+      return values;
     }
     const Prediction prediction(effects_, signals);
     for (std::size_t i = 0; i < values.size(); ++i) {
-      const double rate_dps = motion.rate(t_s_[i]).value;
-      const double late_dps = equation_.is_late() ? prediction.late_dps(t_s_[i]) : rate_dps;
-      double added_dps = late_dps - rate_dps;
+      double added_dps =
+          equation_.is_late() ? prediction.late_dps(t_s_[i]) - on_time.value_at(t_s_[i]) : 0.0;
       if (equation_.adds()) {
+        const double late_dps = signals.motion.curve().value_at(t_s_[i]) + added_dps;
         if (needs_angle_)
-          surroundings_[i].angle_rad = motion.angle_rad(equation_.true_time_s(t_s_[i]));
+          surroundings_[i].angle_rad = signals.motion.angle_rad(equation_.true_time_s(t_s_[i]));
         added_dps += equation_.added_dps(late_dps, surroundings_[i]);
       }
-      values[i] -= weight * added_dps;
+      values[i] -= added_dps;
     }
+    return values;
   }
 
  private:
@@ -484,38 +485,46 @@ void Study::learn_motion_of_reference() {
 }
 
 // The first guess knows no lateness; each further one takes off what the effects say at the last,
-// until nothing changes.
+// until nothing changes. What one gyro says is what the other one's lateness is reckoned by.
 void Study::learn_motion_of_pair(const Effects& effects) {
   const std::array<double, 2> weight = weights(noise_of(effects));
   const std::array<Effects, 2> mine{of_gyro(effects, 0), of_gyro(effects, 1)};
   const std::span<const double> t_s = facts_->readings[0].times_s();
+  const std::array<std::vector<double>, 2> readings{
+      std::vector<double>(facts_->readings[0].values().begin(), facts_->readings[0].values().end()),
+      facts_->second_dps};
   std::array<std::shared_ptr<Signals>, 2> signals;
   std::vector<Beside> beside;
   double quiet = 0.0;
   for (std::size_t gyro = 0; gyro < 2; ++gyro) {
     signals[gyro] = std::make_shared<Signals>(*signals_[gyro]);
-    signals[gyro]->motion = Motion();
+    signals[gyro]->motion = signals[gyro]->motion_by_other = Motion();
     signals_[gyro] = signals[gyro];
     beside.emplace_back(mine[gyro], *signals[gyro], t_s);
     quiet += weight[gyro] * weight[gyro] * facts_->quiet[gyro];
   }
+  // Noise must not pass for motion, or what the effects make of it would come on top.
+  const auto motion_of = [&](std::vector<double>& rate_dps, double variance) {
+    for (std::size_t i = 0; i < t_s.size(); ++i)
+      if (facts_->rest.at(t_s[i])) rate_dps[i] = recording().rest_rate_dps;
+    return Motion{without_noise(SampledCurve(t_s, rate_dps), variance)};
+  };
   const double same_dps = std::max(kMotionSame_dps, kMotionSameShare * std::sqrt(quiet));
   std::vector<double> rate_dps;
   for (int round = 0; round < kMotionRounds; ++round) {
+    std::array<std::vector<double>, 2> told;
+    for (std::size_t gyro = 0; gyro < 2; ++gyro)
+      told[gyro] = beside[gyro].taken_off(readings[gyro], *signals[gyro]);
     std::vector<double> next_dps(t_s.size());
     for (std::size_t i = 0; i < t_s.size(); ++i)
-      next_dps[i] = weight[0] * facts_->readings[0].values()[i] + weight[1] * facts_->second_dps[i];
-    for (std::size_t gyro = 0; gyro < 2; ++gyro)
-      beside[gyro].take_off(signals[gyro]->motion, *signals[gyro], weight[gyro], next_dps);
-    for (std::size_t i = 0; i < t_s.size(); ++i) {
-      if (facts_->rest.at(t_s[i])) next_dps[i] = recording().rest_rate_dps;
+      next_dps[i] = weight[0] * told[0][i] + weight[1] * told[1][i];
+    const Motion motion = motion_of(next_dps, quiet);
+    for (std::size_t gyro = 0; gyro < 2; ++gyro) {
+      signals[gyro]->motion = motion;
+      signals[gyro]->motion_by_other = motion_of(told[1 - gyro], facts_->quiet[1 - gyro]);
     }
     const bool settled = round > 0 && greatest_change(next_dps, rate_dps) < same_dps;
     rate_dps = std::move(next_dps);
-    // Noise must not pass for motion, or what the effects make of it would come on top.
-    const Motion motion{without_noise(SampledCurve(t_s, rate_dps), quiet)};
-    for (const auto& its : signals)
-      its->motion = motion;
     if (settled) break;
   }
 }
@@ -547,8 +556,8 @@ Observations Study::against_reference(std::size_t gyro) const {
     const double t_s = transport(gyro).t_s[i];
     if (transport(gyro).masked[i] != 0 || reference.hole_at(t_s, reach_s)) continue;
     if (t_s < reference.from_s() || t_s > reference.to_s()) continue;
-    samples.push_back({t_s, channel_of(gyro), series.rate_dps[i] - reference.at(t_s).value,
-                       motion.rate(t_s).value});
+    samples.push_back({t_s, channel_of(gyro), series.rate_dps[i] - reference.value_at(t_s),
+                       motion.curve().value_at(t_s)});
   }
   return make_observations(std::move(samples), circumstances(), {gyro == 0, gyro == 1},
                            {&reference, 2}, facts_->quiet[2], for_fit_);
@@ -573,7 +582,7 @@ Observations Study::of_pair() const {
     if (facts_->rest.at(t_s[i]) || readings[1].hole_at(t_s[i], reach_s)) continue;
     samples.push_back({t_s[i], Channel::kDifference,
                        readings[0].values()[i] - facts_->second_dps[i],
-                       signals_[0]->motion.rate(t_s[i]).value});
+                       signals_[0]->motion.curve().value_at(t_s[i])});
   }
   return make_observations(std::move(samples), circumstances(), {true, true}, {&readings[1], 1},
                            0.0, for_fit_);

@@ -61,7 +61,7 @@ class EvenCurve {
   explicit EvenCurve(const SampledCurve& curve) : from_s_(curve.from_s()) {
     const auto count = static_cast<std::size_t>((curve.to_s() - from_s_) / kStep_s) + 1;
     for (std::size_t i = 0; i < count; ++i)
-      value_.push_back(curve.at(from_s_ + kStep_s * static_cast<double>(i)).value);
+      value_.push_back(curve.value_at(from_s_ + kStep_s * static_cast<double>(i)));
   }
   /// At the nearest of them; nothing beyond the ends.
   [[nodiscard]] const double* near(double t_s) const {

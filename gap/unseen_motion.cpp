@@ -213,7 +213,7 @@ SampledCurve at_instants(const SampledCurve& curve, const SampledCurve& slower) 
   for (const double t : slower.times_s()) {
     if (curve.hole_at(t, kAlike * curve.interval_s())) continue;
     t_s.push_back(t);
-    value.push_back(curve.at(t).value);
+    value.push_back(curve.value_at(t));
   }
   return {t_s, value};
 }

@@ -29,6 +29,9 @@ constexpr std::array<std::size_t, 3> kLowest{6, 20, 60};
 constexpr std::array<std::size_t, 3> kSlopes{15, 40, 120};
 constexpr std::size_t kInnovationsMin = 64;
 constexpr double kFourthPowersMin = 30.0;
+// Road noise is louder and quieter within a second: where motion between the samples is more than
+// this share of a mean's variance, fourth powers are its own.
+constexpr double kUnseenShare = 0.1;
 // A block with fewer samples tells little of neighbours.
 constexpr std::uint32_t kNeighboursMin = 5;
 
@@ -89,6 +92,7 @@ struct Sums {
   };
   std::vector<Stretch> stretches;
   std::vector<double> innovations;
+  std::vector<double> steady;  ///< of these, where hardly any motion is unseen
   std::vector<double> samples;
   double product = 0.0;  ///< of neighbours
   double expected = 0.0;
@@ -131,6 +135,9 @@ Sums sums_of(const Observations& data, std::size_t gyro, const Effects& effects)
     stretch.slow += innovation * innovation;
     stretch.slow_freedom += 1.0;
     sums.innovations.push_back(innovation);
+    const double unseen = data.layout.unseen.mean * block.motion_power;
+    if (unseen <= kUnseenShare * mean_variance(block, noise, data.layout))
+      sums.steady.push_back(innovation);
     // Interpolation colours a difference.
     if (block.channel == Channel::kDifference || block.count < kNeighboursMin) continue;
     if (block.motion_power > 0.0) continue;  // its rows are no samples
@@ -201,7 +208,7 @@ Whiteness whiteness_of(const Observations& data, std::size_t gyro, const Effects
     whiteness.colour = std::abs(sums.product - sums.expected) / std::sqrt(sums.pairs);
   whiteness.spiky = heaviness(sums.samples);
   if (sums.innovations.size() < kInnovationsMin) return whiteness;
-  whiteness.heavy = heaviest_sums(sums.innovations);
+  whiteness.heavy = heaviest_sums(sums.steady);
   const std::vector<double> power = spectrum_of(sums.innovations);
   for (const std::size_t count : kLowest)
     whiteness.low = std::max(whiteness.low, low_excess(power, count));
