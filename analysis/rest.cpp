@@ -26,6 +26,10 @@ constexpr double kCommonMost = 3.0;
 // And beyond what is usual at rest by this, and by so many standard errors of a scatter.
 constexpr double kSteady = 1.5;
 constexpr double kScatterSigmas = 4.0;
+// Of one gyro alone, whose noise changes less than the two's ratio; and of how many blocks its
+// quiet is told.
+constexpr double kSteadyAlone = 1.15;
+constexpr std::size_t kAloneBlocksMin = 10;
 // A block whose difference is livelier than the quiet ones by more than this is no measure.
 constexpr double kLively = 3.0;
 // The lower decile of a scatter of five values, in its standard deviation.
@@ -103,11 +107,14 @@ class RestSearch {
       : blocks_(blocks),
         block_s_(block_s),
         rate_dps_(settings.rate_dps),
+        by_each_alone_(settings.by_each_alone),
+        own_step_dps_(settings.step_dps),
         step_dps_(std::hypot(settings.step_dps[0], settings.step_dps[1])) {}
 
   [[nodiscard]] std::vector<Run> run() {
     set_quiet();
     mark_steady();
+    if (by_each_alone_) unmark_unsteady_alone();
     set_lags();
     set_bends();
     std::vector<Run> runs;
@@ -167,6 +174,34 @@ class RestSearch {
           is_steady(block.common_slow_dps, block.apart_slow_dps, slow_dps_, kFifthsCount);
       if (steady) steady_[i] = 1;
     }
+  }
+
+  // What one gyro scatters by at rest is its own noise: more is motion that the other one's hides.
+  void unmark_unsteady_alone() {
+    for (std::size_t gyro = 0; gyro < 2; ++gyro) {
+      std::vector<double> scatters;
+      std::vector<double> slow;
+      for (std::size_t i = 0; i < size(); ++i) {
+        if (steady_[i] == 0) continue;
+        scatters.push_back(blocks_[i].own_scatter_dps[gyro]);
+        slow.push_back(blocks_[i].own_slow_dps[gyro]);
+      }
+      if (scatters.size() < kAloneBlocksMin) continue;
+      const double least_dps = kStepShare * own_step_dps_[gyro];
+      const double quiet_dps = std::max(quantile(scatters, kQuietOneIn), least_dps);
+      const double slow_dps = std::max(quantile(slow, kQuietOneIn), least_dps);
+      for (std::size_t i = 0; i < size(); ++i) {
+        const RestBlock& block = blocks_[i];
+        if (block.own_scatter_dps[gyro] >
+                most_alone(quiet_dps / decile_of_scatter(), block.count) ||
+            block.own_slow_dps[gyro] > most_alone(slow_dps / kFifthsDecile, kFifthsCount))
+          steady_[i] = 0;
+      }
+    }
+  }
+
+  static double most_alone(double quiet_dps, double count) {
+    return quiet_dps * (kSteadyAlone + kScatterSigmas / std::sqrt(2.0 * (count - 1.0)));
   }
 
   // Of so many values, where the difference scatters by `quiet_dps` when nothing moves.
@@ -238,20 +273,28 @@ class RestSearch {
     return sum_dps / static_cast<double>(width);
   }
 
-  // What is usual of it in the difference.
+  // What is usual of it in the difference, and in each gyro.
   void set_bends() {
     for (std::size_t e = 0; e < kEdges.size(); ++e) {
-      const std::size_t width = kEdges[e];
-      std::vector<double> bends;
-      std::size_t steady = 0;
-      for (std::size_t i = 0; i < size(); ++i) {
-        steady = steady_[i] != 0 ? steady + 1 : 0;
-        if (steady < 3 * width) continue;
-        const auto apart = [&](std::size_t k) { return blocks_[i - k].apart_dps; };
-        bends.push_back(std::abs(bend_of(width, apart)));
+      bend_dps_[e] = usual_bend([](const RestBlock& block) { return block.apart_dps; }, kEdges[e]);
+      for (std::size_t gyro = 0; gyro < 2; ++gyro) {
+        own_bend_dps_[gyro][e] =
+            usual_bend([&](const RestBlock& block) { return block.own_dps(gyro); }, kEdges[e]);
       }
-      bend_dps_[e] = kSigmaPerMedian * median(std::move(bends));
     }
+  }
+
+  template <class Value>
+  [[nodiscard]] double usual_bend(const Value& value_of, std::size_t width) const {
+    std::vector<double> bends;
+    std::size_t steady = 0;
+    for (std::size_t i = 0; i < size(); ++i) {
+      steady = steady_[i] != 0 ? steady + 1 : 0;
+      if (steady < 3 * width) continue;
+      bends.push_back(
+          std::abs(bend_of(width, [&](std::size_t k) { return value_of(blocks_[i - k]); })));
+    }
+    return kSigmaPerMedian * median(std::move(bends));
   }
 
   // How many blocks of an edge are off what lies inside of them: `at(k)` is the k-th from the edge.
@@ -261,21 +304,36 @@ class RestSearch {
     for (std::size_t e = 0; e < kEdges.size(); ++e) {
       const std::size_t width = kEdges[e];
       if (off + 3 * width > length || off + width > kEdgeMost) break;
-      const double common_dps =
-          bend_of(width, [&](std::size_t k) { return at(off + k).common_dps; });
-      const double own_dps = bend_of(width, [&](std::size_t k) { return at(off + k).apart_dps; });
-      if (std::abs(common_dps) >
-          kEdgeSigmas * common_ * bend_dps_[e] + std::abs(own_dps) + kSway_dps + 0.5 * step_dps_)
-        off += width;
+      if (is_off(e, [&](std::size_t k) -> const RestBlock& { return at(off + k); })) off += width;
     }
     return off;
+  }
+
+  template <class At>
+  [[nodiscard]] bool is_off(std::size_t e, const At& at) const {
+    const std::size_t width = kEdges[e];
+    const double common_dps = bend_of(width, [&](std::size_t k) { return at(k).common_dps; });
+    const double apart_dps = bend_of(width, [&](std::size_t k) { return at(k).apart_dps; });
+    if (std::abs(common_dps) >
+        kEdgeSigmas * common_ * bend_dps_[e] + std::abs(apart_dps) + kSway_dps + 0.5 * step_dps_)
+      return true;
+    for (std::size_t gyro = 0; gyro < 2 && by_each_alone_; ++gyro) {
+      const double own_dps = bend_of(width, [&](std::size_t k) { return at(k).own_dps(gyro); });
+      if (std::abs(own_dps) > kEdgeSigmas * own_bend_dps_[gyro][e] + 0.5 * own_step_dps_[gyro])
+        return true;
+    }
+    return false;
   }
 
   // Without what may hold a motion's end; before the recording begins and after it ends there is
   // none.
   [[nodiscard]] Run trimmed(const Run& run) const {
-    const auto from_front = [&](std::size_t k) { return blocks_[run.first + k]; };
-    const auto from_back = [&](std::size_t k) { return blocks_[run.end - 1 - k]; };
+    const auto from_front = [&](std::size_t k) -> const RestBlock& {
+      return blocks_[run.first + k];
+    };
+    const auto from_back = [&](std::size_t k) -> const RestBlock& {
+      return blocks_[run.end - 1 - k];
+    };
     std::size_t front = off_edge(run.length(), from_front);
     std::size_t back = off_edge(run.length(), from_back);
     if (run.first > 0) front += kMarginBlocks;
@@ -336,12 +394,15 @@ class RestSearch {
   const Blocks& blocks_;
   double block_s_;
   double rate_dps_;
+  bool by_each_alone_;
+  std::array<double, 2> own_step_dps_;
   double step_dps_;  ///< of both
   double quiet_dps_ = 0.0;
   double slow_dps_ = 0.0;  ///< likewise of the means of fifths
   double common_ = 1.0;    ///< scatter of the mean over that of the difference, at rest
   std::array<double, kLags.size()> lag_dps_{};
   std::array<double, kEdges.size()> bend_dps_{};
+  std::array<std::array<double, kEdges.size()>, 2> own_bend_dps_{};
   std::vector<std::uint8_t> steady_;
 };
 
@@ -371,6 +432,8 @@ void RestFinder::add(double t_s, const std::array<double, 2>& rate_dps) {
   open_.apart_dps += y;
   open_.common_scatter_dps += x * x;
   open_.apart_scatter_dps += y * y;
+  open_.own_scatter_dps[0] += (x + y) * (x + y);
+  open_.own_scatter_dps[1] += (x - y) * (x - y);
   const double share = (t_s - from_s) / block_s_ * static_cast<double>(kFifths);
   Sums& fifth = fifths_[std::min(kFifths - 1, static_cast<std::size_t>(share))];
   fifth.count += 1.0;
@@ -378,27 +441,38 @@ void RestFinder::add(double t_s, const std::array<double, 2>& rate_dps) {
   fifth.apart_dps += y;
 }
 
-void RestFinder::close_block() {
-  if (open_.count < kPairsMin) return;
-  RestBlock block = open_;
+// Sums about a pivot → means and scatters about it.
+RestBlock RestFinder::closed(const RestBlock& open, const std::array<Sums, kFifths>& fifths) {
+  RestBlock block = open;
   const auto scatter = [&](double mean, double squares) {
     return std::sqrt(std::max(0.0, squares / block.count - mean * mean));
   };
   block.common_dps /= block.count;
   block.apart_dps /= block.count;
-  block.common_scatter_dps = scatter(block.common_dps, open_.common_scatter_dps);
-  block.apart_scatter_dps = scatter(block.apart_dps, open_.apart_scatter_dps);
+  block.common_scatter_dps = scatter(block.common_dps, open.common_scatter_dps);
+  block.apart_scatter_dps = scatter(block.apart_dps, open.apart_scatter_dps);
+  for (std::size_t gyro = 0; gyro < 2; ++gyro)
+    block.own_scatter_dps[gyro] = scatter(block.own_dps(gyro), open.own_scatter_dps[gyro]);
   double cells = 0.0;
-  for (const Sums& fifth : fifths_) {
+  for (const Sums& fifth : fifths) {
     if (fifth.count == 0.0) continue;
     cells += 1.0;
     const double common_off = fifth.common_dps / fifth.count - block.common_dps;
     const double apart_off = fifth.apart_dps / fifth.count - block.apart_dps;
     block.common_slow_dps += common_off * common_off;
     block.apart_slow_dps += apart_off * apart_off;
+    block.own_slow_dps[0] += (common_off + apart_off) * (common_off + apart_off);
+    block.own_slow_dps[1] += (common_off - apart_off) * (common_off - apart_off);
   }
-  block.common_slow_dps = std::sqrt(block.common_slow_dps / cells);
-  block.apart_slow_dps = std::sqrt(block.apart_slow_dps / cells);
+  for (double* square : {&block.common_slow_dps, &block.apart_slow_dps, &block.own_slow_dps[0],
+                         &block.own_slow_dps[1]})
+    *square = std::sqrt(*square / cells);
+  return block;
+}
+
+void RestFinder::close_block() {
+  if (open_.count < kPairsMin) return;
+  RestBlock block = closed(open_, fifths_);
   block.common_dps += pivot_[0];
   block.apart_dps += pivot_[1];
   blocks_.push_back(block);

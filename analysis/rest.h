@@ -39,6 +39,12 @@ struct RestBlock {
   double apart_scatter_dps = 0.0;
   double common_slow_dps = 0.0;  ///< likewise of the means of its fifths
   double apart_slow_dps = 0.0;
+  std::array<double, 2> own_scatter_dps{};  ///< likewise, of each gyro
+  std::array<double, 2> own_slow_dps{};
+
+  [[nodiscard]] double own_dps(std::size_t gyro) const {
+    return gyro == 0 ? common_dps + apart_dps : common_dps - apart_dps;
+  }
 };
 
 /// Pairs of rates in the order of time → rests. Memory: 64 bytes a second.
@@ -48,6 +54,9 @@ class RestFinder {
     double interval_s = 0.01;          ///< of the pairs
     std::array<double, 2> step_dps{};  ///< between a gyro's values; 0: unknown, or none
     double rate_dps = 0.0;             ///< true rate at rest
+    /// What only the finer gyro feels is motion too: for who takes each gyro's reading at rest for
+    /// its error.
+    bool by_each_alone = false;
   };
   explicit RestFinder(const Settings& settings);
 
@@ -70,6 +79,8 @@ class RestFinder {
     double common_dps = 0.0;
     double apart_dps = 0.0;
   };
+  [[nodiscard]] static RestBlock closed(const RestBlock& open,
+                                        const std::array<Sums, kFifths>& fifths);
   RestBlock open_;  ///< holds sums, about the first pair
   std::array<double, 2> pivot_{};
   std::array<Sums, kFifths> fifths_{};

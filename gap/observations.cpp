@@ -172,6 +172,8 @@ void set_surroundings(Observations& data, std::size_t gyro) {
   for (std::size_t i = 0; i < n; ++i) {
     data.rate[gyro][i] = signals.motion.rate(data.t_s[i]);
     data.surroundings[gyro][i] = signals.at(data.t_s[i]);
+    if (!signals.motion_by_other.curve().empty())
+      data.rate_by_other_dps[gyro].push_back(signals.motion_by_other.curve().value_at(data.t_s[i]));
   }
   data.excitation[gyro] = excitation_of(data, gyro);
 }
@@ -273,6 +275,7 @@ void append_part(const Observations& part, double from_s, Observations& all) {
   for (std::size_t gyro = 0; gyro < 2; ++gyro) {
     append(all.rate[gyro], part.rate[gyro]);
     append(all.surroundings[gyro], part.surroundings[gyro]);
+    append(all.rate_by_other_dps[gyro], part.rate_by_other_dps[gyro]);
     all.about.coarse[gyro] = all.about.coarse[gyro] || part.about.coarse[gyro];
   }
   const Eigen::Index before = all.observed_dps.size();
@@ -348,13 +351,13 @@ Eigen::VectorXd Observations::lateness_dps(std::size_t gyro, const Effects& movi
   if (found != remembered_.end()) return found->values;
   Eigen::VectorXd lateness = Eigen::VectorXd::Zero(size());
   for (const Drive& drive : is_one() ? std::vector<Drive>{whole()} : drives) {
-    const Signals& signals = *drive.signals[gyro];
-    const Prediction prediction(moving, signals);
+    const Prediction prediction(moving, *drive.signals[gyro]);
+    const bool by_other = &prediction.on_time() == &drive.signals[gyro]->motion_by_other;
     for (std::size_t place = drive.first; place < drive.first + drive.count; ++place) {
       if (share_of(channel[place], gyro) == 0.0) continue;
-      const double at_s = t_s[place] - drive.from_s;
       lateness[static_cast<Eigen::Index>(place)] =
-          prediction.late_dps(at_s) - signals.on_time().curve().value_at(at_s);
+          prediction.late_dps(t_s[place] - drive.from_s) -
+          (by_other ? rate_by_other_dps[gyro][place] : rate[gyro][place].value);
     }
   }
   Remembered one{gyro, moving, lateness};

@@ -78,6 +78,7 @@ class Observations {
   /// What the error of gyro k depends on, at each sample.
   std::array<std::vector<SampledCurve::Point>, 2> rate;
   std::array<std::vector<model::Surroundings>, 2> surroundings;
+  std::array<std::vector<double>, 2> rate_by_other_dps;  ///< empty where `rate` is by no gyro
   std::array<Excitation, 2> excitation;
   std::vector<Drive> drives;  ///< empty: one recording, with the signals of `about`
 

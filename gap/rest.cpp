@@ -72,11 +72,16 @@ bool RestingSeconds::at(double t_s) const {
   return cell < rests_.size() && rests_[cell] != 0;
 }
 
+bool RestingSeconds::deep_at(double t_s) const {
+  return at(t_s - kEdge_s) && at(t_s) && at(t_s + kEdge_s);
+}
+
 RestingSeconds find_rest(const Recording& recording, const std::array<Transport, 2>& transports) {
   analysis::RestFinder finder(
       {.interval_s = std::max(transports[0].interval_s, transports[1].interval_s),
        .step_dps = {transports[0].lattice_dps, transports[1].lattice_dps},
-       .rate_dps = recording.rest_rate_dps});
+       .rate_dps = recording.rest_rate_dps,
+       .by_each_alone = true});
   Pairs(recording, transports).offer(finder);
   std::vector<std::uint8_t> resting(static_cast<std::size_t>(recording.seconds) + 1, 0);
   for (const analysis::RestPart& part : finder.find()) {

@@ -22,9 +22,12 @@ class RestingSeconds {
 
   /// Times before 0 are of the first second; beyond the last second nothing rests.
   [[nodiscard]] bool at(double t_s) const;
+  /// And half a second before and behind: what is late there is of the rest, too.
+  [[nodiscard]] bool deep_at(double t_s) const;
   [[nodiscard]] double count() const { return count_; }
 
  private:
+  static constexpr double kEdge_s = 0.5;
   std::vector<std::uint8_t> rests_;
   double count_ = 0.0;
 };

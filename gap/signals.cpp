@@ -361,7 +361,7 @@ void set_circumstances(const GyroSeries& gyro, const AccelerationSeries& acceler
 Prediction::Prediction(std::span<const model::Effect> effects, const Signals& signals)
     : equation_(effects), signals_(signals) {
   const auto pass = [&](const auto& filter) {
-    low_passed_ = (low_passed_ ? *low_passed_ : signals.on_time()).low_passed(filter);
+    low_passed_ = (low_passed_ ? *low_passed_ : on_time()).low_passed(filter);
   };
   for (const double cutoff_hz : equation_.cutoffs_hz())
     pass(cutoff_hz);
@@ -370,7 +370,7 @@ Prediction::Prediction(std::span<const model::Effect> effects, const Signals& si
 }
 
 double Prediction::late_dps(double t_s) const {
-  const SampledCurve& felt = (low_passed_ ? *low_passed_ : signals_.on_time()).curve();
+  const SampledCurve& felt = (low_passed_ ? *low_passed_ : on_time()).curve();
   return equation_.late_rate_dps([&](double felt_at_s) { return felt.value_at(felt_at_s); },
                                  equation_.true_time_s(t_s));
 }

@@ -54,13 +54,14 @@ class Motion {
 
 struct Signals {
   Motion motion;  ///< as this gyro is judged against
-  /// As the other gyro alone tells it; empty where the motion is known otherwise. What comes late
-  /// is compared with it: in a mean of both, noise that is late and noise that is not would cancel,
-  /// or add up, at high frequencies.
+  /// As the other gyro alone tells it; empty where the motion is known otherwise. A delay is
+  /// reckoned by it: of a mean of both, the noise that is late and that which is not would add up
+  /// at high frequencies. A low-pass is not: it would take the other's noise off.
   Motion motion_by_other;
-  /// By which lateness is reckoned.
-  [[nodiscard]] const Motion& on_time() const {
-    return motion_by_other.curve().empty() ? motion : motion_by_other;
+  /// By which what the equation says of lateness is reckoned.
+  [[nodiscard]] const Motion& on_time(const model::Equation& equation) const {
+    const bool passes_low = !equation.cutoffs_hz().empty() || !equation.second_orders().empty();
+    return passes_low || motion_by_other.curve().empty() ? motion : motion_by_other;
   }
   SampledCurve temperature_c;
   SampledCurve temperature_slope_c_s;
@@ -95,6 +96,8 @@ class Prediction {
  public:
   /// `effects` of this gyro. The signals must live as long.
   Prediction(std::span<const model::Effect> effects, const Signals& signals);
+  /// By which lateness is reckoned.
+  [[nodiscard]] const Motion& on_time() const { return signals_.on_time(equation_); }
   /// Ω' of what is stamped `t_s`.
   [[nodiscard]] double late_dps(double t_s) const;
   /// The reading that is stamped `t_s`.

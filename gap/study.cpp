@@ -79,9 +79,9 @@ constexpr double kRestMin_s = 10.0;
 // Share of samples that repeat the last one.
 constexpr double kCoarseRepeats = 0.2;
 // Where both come late each round takes off what the other's lateness left of the last.
-constexpr int kMotionRounds = 16;
+constexpr int kMotionRounds = 8;
 constexpr double kMotionSame_dps = 2e-6;
-constexpr double kMotionSameShare = 0.01;  // of the noise of a sample
+constexpr double kMotionSameShare = 0.03;  // of the noise of a sample
 // Of samples a curve may lack before what lies between is not known: a reference is smooth, a gyro
 // is not.
 constexpr double kReferenceHole = 3.0;
@@ -443,7 +443,7 @@ class Beside {
   // The readings without it. Of the first guess, which knows no motion, without the offsets.
   [[nodiscard]] std::vector<double> taken_off(std::vector<double> values, const Signals& signals) {
     if (effects_.empty()) return values;
-    const SampledCurve& on_time = signals.on_time().curve();
+    const SampledCurve& on_time = signals.on_time(equation_).curve();
     if (on_time.empty()) {
       for (std::size_t i = 0; i < surroundings_.size(); ++i)
         values[i] -= equation_.offset_dps(surroundings_[i]);
@@ -571,7 +571,7 @@ Observations Study::of_pair() const {
     const std::span<const double> t_s = readings[gyro].times_s();
     const double rest_dps = recording().rest_rate_dps;
     for (std::size_t i = 0; i < t_s.size(); ++i) {
-      if (!facts_->rest.at(t_s[i])) continue;
+      if (!facts_->rest.deep_at(t_s[i])) continue;
       samples.push_back(
           {t_s[i], channel_of(gyro), readings[gyro].values()[i] - rest_dps, rest_dps});
     }
@@ -579,7 +579,7 @@ Observations Study::of_pair() const {
   const std::span<const double> t_s = readings[0].times_s();
   const double reach_s = kGyroHole * readings[1].interval_s();
   for (std::size_t i = 0; i < t_s.size(); ++i) {
-    if (facts_->rest.at(t_s[i]) || readings[1].hole_at(t_s[i], reach_s)) continue;
+    if (facts_->rest.deep_at(t_s[i]) || readings[1].hole_at(t_s[i], reach_s)) continue;
     samples.push_back({t_s[i], Channel::kDifference,
                        readings[0].values()[i] - facts_->second_dps[i],
                        signals_[0]->motion.curve().value_at(t_s[i])});
