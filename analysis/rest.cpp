@@ -182,7 +182,8 @@ class RestSearch {
       std::vector<double> scatters;
       std::vector<double> slow;
       for (std::size_t i = 0; i < size(); ++i) {
-        if (steady_[i] == 0) continue;
+        // At its limit a gyro scatters by nothing.
+        if (steady_[i] == 0 || turns({blocks_[i].common_dps, blocks_[i].apart_dps})) continue;
         scatters.push_back(blocks_[i].own_scatter_dps[gyro]);
         slow.push_back(blocks_[i].own_slow_dps[gyro]);
       }
@@ -289,7 +290,8 @@ class RestSearch {
     std::vector<double> bends;
     std::size_t steady = 0;
     for (std::size_t i = 0; i < size(); ++i) {
-      steady = steady_[i] != 0 ? steady + 1 : 0;
+      const bool rests = steady_[i] != 0 && !turns({blocks_[i].common_dps, blocks_[i].apart_dps});
+      steady = rests ? steady + 1 : 0;
       if (steady < 3 * width) continue;
       bends.push_back(
           std::abs(bend_of(width, [&](std::size_t k) { return value_of(blocks_[i - k]); })));

@@ -104,6 +104,7 @@ class Leftovers {
       what.text = fmt::format(
           "neighbouring samples hang together, by {:.0f} standard errors: the noise is not white",
           whiteness.colour);
+      what.is_soft = whiteness.soft;
       // Coloured fast noise is no drift either.
       withdraw(is_drift);
     } else if (flaws.spiky) {

@@ -94,6 +94,8 @@ struct Unexplained {
   double from_s = 0.0;
   double to_s = 0.0;
   std::string text;  ///< "line at 37.02 ± 0.01 Hz, 0.001 deg/s, 0 to 300 s"
+  bool is_soft =
+      false;  ///< noise that hangs together, as behind a filter, and is not too much else
 };
 
 struct NotIdentifiable {

@@ -204,6 +204,7 @@ Whiteness whiteness_of(const Observations& data, std::size_t gyro, const Effects
   const Sums sums = sums_of(data, gyro, effects);
   Whiteness whiteness;
   find_worst_stretches(sums, data.about.seconds, whiteness);
+  whiteness.soft = sums.product > sums.expected;
   if (sums.pairs > 0.0)
     whiteness.colour = std::abs(sums.product - sums.expected) / std::sqrt(sums.pairs);
   whiteness.spiky = heaviness(sums.samples);

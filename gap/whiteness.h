@@ -14,6 +14,7 @@ struct Whiteness {
   double slow = 0.0;  ///< worst stretch's excess of the drift filter's innovations
   Where slow_at;
   double colour = 0.0;  ///< of neighbouring samples
+  bool soft = false;    ///< they are alike, as behind a low-pass
   double spiky = 0.0;   ///< excess of the samples' fourth powers over a Gaussian's
   double heavy = 0.0;   ///< excess of fourth powers in sums of innovations over a Gaussian's
   double low = 0.0;     ///< excess of low frequencies in the innovations

@@ -124,6 +124,19 @@ void score(const Study& study, const Effects& given, const Effects& first, std::
   result.gap.of_model = all ? gap : gap_of(study, result.model.effects, floor, Part::kHeldOut);
 }
 
+// A sensor's own filter makes its noise soft: where it is no more than the model says, in all, that
+// is worth a note and no doubt.
+void note_soft_noise(const Recording& recording, Result& result) {
+  if (result.gap.after > result.gap.band95[1]) return;
+  const auto soft = std::stable_partition(result.unexplained.begin(), result.unexplained.end(),
+                                          [](const Unexplained& one) { return !one.is_soft; });
+  for (auto one = soft; one != result.unexplained.end(); ++one) {
+    result.notes.push_back(recording.gyros[one->gyro.value_or(0)].name + ": " + one->text +
+                           ", as behind a filter; in all it is what the model says");
+  }
+  result.unexplained.erase(soft, result.unexplained.end());
+}
+
 // What is no fault of the gyros.
 void add_reference(const Study& study, std::vector<Unexplained>& list) {
   if (study.reference_late_s() == 0.0) return;
@@ -199,6 +212,7 @@ Expected<Result> find_gap(const std::vector<Recording>& recordings, const model:
     if (effect.applied) result.model.effects.push_back(effect.effect);
   }
   score(study, model.effects, search.first_starting(), settings.seed, result);
+  note_soft_noise(study.recording(), result);
   result.verdict = verdict_of(result);
 
   tell("drawing", kShareDrawing);
