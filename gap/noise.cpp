@@ -37,6 +37,9 @@ constexpr int kFastEvaluations = 150;
 constexpr double kFastTolerance = 1e-3;
 constexpr int kSlowEvaluations = 60;  ///< for each unknown
 constexpr double kSlowTolerance = 2e-2;
+// Drift is fitted by the means of so many blocks; a memory of less than some such means is not.
+constexpr double kCoarseBlocks = 5.0;
+constexpr double kCoarseTau_s = 2.0;
 
 // Bounds of a fitted logarithm, about that of the density by which samples scatter within their
 // blocks; and where the search may begin, times that density. A walk's density is per √s of it.
@@ -69,8 +72,8 @@ constexpr double kFrequencySame = 0.02;
 // sensor. Wider would cost digits and gain nothing.
 constexpr double kOtherStart_dps = 1.0;
 
-// Half a block.
-constexpr double kQuickTerm_s = 0.5 * kBlock_s;
+// Of a block.
+constexpr double kQuickTerm = 0.5;
 // Of a mean's white noise this much is left in the filter at the least: it keeps variances above 0.
 constexpr double kOwnShare = 0.1;
 
@@ -95,8 +98,8 @@ double share_of_mean(const MarkovTerm& term, double seconds) {
 }
 
 // It forgets within a block: blocks hardly know of each other by it.
-bool is_quick(const MarkovTerm& term) {
-  return term.tau_s < kQuickTerm_s;
+bool is_quick(const MarkovTerm& term, double block_s) {
+  return term.tau_s < kQuickTerm * block_s;
 }
 
 States states_of(const PairNoise& noise, const Layout& layout) {
@@ -119,7 +122,7 @@ States states_of(const PairNoise& noise, const Layout& layout) {
       states.tau_s[states.count] = term.tau_s;
       states.stationary[states.count] =
           term.sigma_dps * term.sigma_dps *
-          (is_quick(term) ? share_of_mean(term, layout.block_s) : 1.0);
+          (is_quick(term, layout.block_s) ? share_of_mean(term, layout.block_s) : 1.0);
       states.start_variance[states.count] = states.stationary[states.count];
       ++states.count;
     });
@@ -174,20 +177,22 @@ double white_variance(const std::array<double, 3>& gain, double rate_square, con
 
 // Variance about its mean of a drift over `seconds`: of a walk K²T/6, of a correlated term its
 // variance less that of its mean.
-double drift_within(const NoiseTerms& terms, double seconds, bool with_quick) {
+// `without_quick_s`: of a block so long, without what is quick in it; 0: all.
+double drift_within(const NoiseTerms& terms, double seconds, double without_quick_s) {
   double variance = terms.walk_dps_rts * terms.walk_dps_rts * seconds / 6.0;
   terms.each_correlated([&](const MarkovTerm& term) {
-    if (!with_quick && is_quick(term)) return;
+    if (is_quick(term, without_quick_s)) return;
     variance += term.sigma_dps * term.sigma_dps * (1.0 - share_of_mean(term, seconds));
   });
   return variance;
 }
 
 double drift_within(Channel channel, const PairNoise& noise, double seconds,
-                    bool with_quick = true) {
+                    double without_quick_s = 0.0) {
   double variance = 0.0;
   for (std::size_t gyro = 0; gyro < 2; ++gyro) {
-    if (share_of(channel, gyro) != 0.0) variance += drift_within(noise[gyro], seconds, with_quick);
+    if (share_of(channel, gyro) != 0.0)
+      variance += drift_within(noise[gyro], seconds, without_quick_s);
   }
   return variance;
 }
@@ -392,7 +397,7 @@ class BlockDrift {
     if (block.channel != channel_ || block.count != count_) {
       channel_ = block.channel;
       count_ = block.count;
-      variance_ = drift_within(channel_, noise_, seconds_of(block, layout_), false);
+      variance_ = drift_within(channel_, noise_, seconds_of(block, layout_), layout_.block_s);
     }
     return variance_;
   }
@@ -736,6 +741,93 @@ void set_drift_free(NoiseTerms& terms, std::size_t gyro, double density, double 
 
 }  // namespace
 
+namespace {
+
+// Means of some blocks that follow each other: a drift of seconds and more is as plain in them, and
+// a filter over them costs a part.
+struct CoarseMeans {
+  Layout layout;
+  Eigen::VectorXd means;
+};
+
+class Coarsening {
+ public:
+  Coarsening(const Layout& layout, const Eigen::VectorXd& means) : from_(layout), means_(means) {
+    coarse_.layout.interval_s = layout.interval_s;
+    coarse_.layout.reference_variance = layout.reference_variance;
+    coarse_.layout.unseen = layout.unseen;
+    coarse_.layout.block_s = kCoarseBlocks * layout.block_s;
+  }
+
+  CoarseMeans of_all() {
+    for (std::size_t b = 0; b < from_.blocks.size(); ++b) {
+      const Block& block = from_.blocks[b];
+      const double cell = std::floor(block.t_s / coarse_.layout.block_s);
+      if (b == 0 || cell != cell_ || block.begins || block.channel != open_.channel ||
+          block.held_out != open_.held_out)
+        begin(block, cell);
+      add(block, means_[static_cast<Eigen::Index>(b)]);
+    }
+    close();
+    coarse_.means =
+        Eigen::Map<const Eigen::VectorXd>(sums_.data(), static_cast<Eigen::Index>(sums_.size()));
+    return std::move(coarse_);
+  }
+
+ private:
+  void begin(const Block& block, double cell) {
+    close();
+    cell_ = cell;
+    open_ = {};
+    open_.channel = block.channel;
+    open_.held_out = block.held_out;
+    open_.begins = block.begins;
+    mean_ = 0.0;
+  }
+
+  // Sums weighed by counts, until it is closed.
+  void add(const Block& block, double mean) {
+    const auto weight = static_cast<double>(block.count);
+    open_.count += block.count;
+    open_.t_s += weight * block.t_s;
+    open_.rate_square += weight * block.rate_square;
+    for (std::size_t i = 0; i < open_.mean_gain.size(); ++i)
+      open_.mean_gain[i] += weight * weight * block.mean_gain[i];
+    open_.motion_power += weight * weight * block.motion_power;
+    mean_ += weight * mean;
+  }
+
+  void close() {
+    if (open_.count == 0) return;
+    const auto count = static_cast<double>(open_.count);
+    open_.t_s /= count;
+    open_.rate_square /= count;
+    for (double& gain : open_.mean_gain)
+      gain /= count * count;
+    open_.motion_power /= count * count;
+    coarse_.layout.blocks.push_back(open_);
+    sums_.push_back(mean_ / count);
+  }
+
+  const Layout& from_;
+  const Eigen::VectorXd& means_;
+  CoarseMeans coarse_;
+  std::vector<double> sums_;
+  Block open_;
+  double mean_ = 0.0;
+  double cell_ = 0.0;
+};
+
+// A correlated term that blocks of half a second would blur.
+bool has_quick_term(const PairNoise& noise) {
+  const auto is = [](const MarkovTerm& term) { return term.tau_s < kCoarseTau_s; };
+  return std::any_of(noise.begin(), noise.end(), [&](const NoiseTerms& terms) {
+    return std::any_of(terms.markov.begin(), terms.markov.end(), is);
+  });
+}
+
+}  // namespace
+
 NoiseFitResult fit_pair_noise(const Eigen::VectorXd& residual, const Layout& layout,
                               const PairNoise& start, const std::array<Freedom, 2>& free,
                               const std::array<bool, 2>& used, Part part) {
@@ -758,15 +850,25 @@ NoiseFitResult fit_pair_noise(const Eigen::VectorXd& residual, const Layout& lay
   const auto both = [&](const PairNoise& noise) {
     return within(noise) + means_log_likelihood(means, layout, noise, part);
   };
-  const auto fit_once = [&] {
-    maximise(result.noise, fast, kFastEvaluations, kFastTolerance, within);
-    const int evaluations = kSlowEvaluations * static_cast<int>(slow.size());
-    result.log_likelihood = maximise(result.noise, slow, evaluations, kSlowTolerance, both);
+  const CoarseMeans coarse = Coarsening(layout, means).of_all();
+  const auto coarsely = [&](const PairNoise& noise) {
+    return within(noise) + means_log_likelihood(coarse.means, coarse.layout, noise, part);
   };
-  fit_once();
+  const int evaluations = kSlowEvaluations * static_cast<int>(slow.size());
+  const auto fit_once = [&](const auto& log_likelihood_of) {
+    maximise(result.noise, fast, kFastEvaluations, kFastTolerance, within);
+    maximise(result.noise, slow, evaluations, kSlowTolerance, log_likelihood_of);
+  };
+  fit_once(coarsely);
   // A correlated term of short memory shares its variance with the white noise; and from where the
   // search begins size and memory are a long way for one go.
-  if (free[0].markov || free[1].markov) fit_once();
+  if (free[0].markov || free[1].markov) {
+    if (has_quick_term(result.noise))
+      fit_once(both);
+    else
+      fit_once(coarsely);
+  }
+  result.log_likelihood = both(result.noise);
   return result;
 }
 

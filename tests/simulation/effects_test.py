@@ -303,9 +303,9 @@ class Streams(unittest.TestCase):
         for i, normal in enumerate(self.normals(n, "gyro 1", "gauss_markov")):
             drift = 5e-3 * normal if i == 0 else keep * drift + 5e-3 * math.sqrt(1 - keep**2) * normal
             wanted[i] += drift
-        # 15 terms, each for a factor of exp(step) of time from a millisecond to a million seconds.
+        # 15 terms, each for a factor of exp(step) of time, from 0.4 samples on, over nine decades.
         step = math.log(1e9) / 15
-        keeps = [math.exp(-1 / RATE_HZ / (1e-3 * math.exp((k + 0.5) * step))) for k in range(15)]
+        keeps = [math.exp(-1 / RATE_HZ / (0.4 / RATE_HZ * math.exp((k + 0.5) * step))) for k in range(15)]
         sigma, terms = 4e-3 * math.sqrt(step / math.pi), [0.0] * 15
         for i, normals in enumerate(self.normals(15 * n, "gyro 1", "bias_instability").reshape(n, 15).tolist()):
             for k, (keep, normal) in enumerate(zip(keeps, normals)):
