@@ -37,9 +37,8 @@ constexpr int kFastEvaluations = 150;
 constexpr double kFastTolerance = 1e-3;
 constexpr int kSlowEvaluations = 60;  ///< for each unknown
 constexpr double kSlowTolerance = 2e-2;
-// Drift is fitted by the means of so many blocks; a memory of less than some such means is not.
+// Drift is fitted by the means of so many blocks first; a memory that may be short then by all.
 constexpr double kCoarseBlocks = 5.0;
-constexpr double kCoarseTau_s = 2.0;
 
 // Bounds of a fitted logarithm, about that of the density by which samples scatter within their
 // blocks; and where the search may begin, times that density. A walk's density is per √s of it.
@@ -818,14 +817,6 @@ class Coarsening {
   double cell_ = 0.0;
 };
 
-// A correlated term that blocks of half a second would blur.
-bool has_quick_term(const PairNoise& noise) {
-  const auto is = [](const MarkovTerm& term) { return term.tau_s < kCoarseTau_s; };
-  return std::any_of(noise.begin(), noise.end(), [&](const NoiseTerms& terms) {
-    return std::any_of(terms.markov.begin(), terms.markov.end(), is);
-  });
-}
-
 }  // namespace
 
 NoiseFitResult fit_pair_noise(const Eigen::VectorXd& residual, const Layout& layout,
@@ -862,12 +853,7 @@ NoiseFitResult fit_pair_noise(const Eigen::VectorXd& residual, const Layout& lay
   fit_once(coarsely);
   // A correlated term of short memory shares its variance with the white noise; and from where the
   // search begins size and memory are a long way for one go.
-  if (free[0].markov || free[1].markov) {
-    if (has_quick_term(result.noise))
-      fit_once(both);
-    else
-      fit_once(coarsely);
-  }
+  if (free[0].markov || free[1].markov) fit_once(both);
   result.log_likelihood = both(result.noise);
   return result;
 }

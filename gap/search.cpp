@@ -97,6 +97,22 @@ void sort_by_weight(std::vector<Found>& list) {
             [](const Found& a, const Found& b) { return a.adjusted() > b.adjusted(); });
 }
 
+// Of several that are as good, the plainest: the catalogue's first.
+std::vector<Found>::const_iterator likeliest(const std::vector<Found>& candidates) {
+  const auto top =
+      std::max_element(candidates.begin(), candidates.end(),
+                       [](const Found& a, const Found& b) { return a.margin() < b.margin(); });
+  if (top == candidates.end()) return top;
+  return std::min_element(
+      candidates.begin(), candidates.end(), [&](const Found& a, const Found& b) {
+        const bool a_far = a.margin() < top->margin() - kBetter;
+        const bool b_far = b.margin() < top->margin() - kBetter;
+        if (a_far != b_far) return b_far;
+        return !a_far && (a.effect.kind != b.effect.kind ? a.effect.kind < b.effect.kind
+                                                         : a.margin() > b.margin());
+      });
+}
+
 // One clock that is fast, or the other one as slow.
 Reading other_clock_of(const Effect& skew) {
   return {Kind::kClockSkew, 1 - skew.gyro, {-skew.parameters[0]}};
@@ -351,9 +367,7 @@ bool Search::add_round() {
     leave_open("whether there are further effects");
     return false;
   }
-  const auto best =
-      std::max_element(round.candidates.begin(), round.candidates.end(),
-                       [](const Found& a, const Found& b) { return a.margin() < b.margin(); });
+  const auto best = likeliest(round.candidates);
   if (best == round.candidates.end() || best->margin() < 0.0) return false;
   const bool judged = is_timing(best->effect) && !study_->recording().has_reference;
   Found taken = judged ? judge_timing(*best, round.timing) : *best;
