@@ -5,6 +5,7 @@
 
 #include <fmt/core.h>
 
+#include "gap/score.h"
 #include "gap/whiteness.h"
 #include "model/catalogue.h"
 
@@ -158,6 +159,40 @@ std::vector<Unexplained> leftovers(const Search& search, std::vector<Found>& fou
     if (study.is_coarse(gyro)) continue;
     Leftovers(gyro, seconds, found, list)
         .judge(whiteness_of(study.observations_of(gyro), gyro, effects));
+  }
+  return list;
+}
+
+namespace {
+
+double held_out_nats(const Study& study, Effects effects, const std::vector<Found>& found,
+                     std::size_t left_out) {
+  for (std::size_t i = 0; i < found.size(); ++i)
+    if (i != left_out) effects.push_back(found[i].effect);
+  return observed(study, effects, Part::kHeldOut).nats;
+}
+
+}  // namespace
+
+std::vector<Unexplained> unproven(const Study& study, const Effects& others,
+                                  std::vector<Found>& found) {
+  std::vector<Unexplained> list;
+  while (!found.empty()) {
+    const double with = held_out_nats(study, others, found, found.size());
+    std::size_t worst = found.size();
+    double least = with;
+    for (std::size_t i = 0; i < found.size(); ++i) {
+      const double without = held_out_nats(study, others, found, i);
+      if (without <= least) least = without, worst = i;
+    }
+    if (worst == found.size()) break;
+    Unexplained left = resembling(found[worst], study.recording().seconds);
+    const model::Effect& effect = found[worst].effect;
+    left.text =
+        fmt::format("resembles {} ({}), but the samples that were set aside do not bear it out",
+                    model::info(effect.kind).name, model::parameters_text(effect));
+    list.push_back(std::move(left));
+    found.erase(found.begin() + static_cast<std::ptrdiff_t>(worst));
   }
   return list;
 }

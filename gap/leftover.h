@@ -14,4 +14,9 @@ namespace vgyro::gap {
 /// `found` may lose effects.
 std::vector<Unexplained> leftovers(const Search& search, std::vector<Found>& found);
 
+/// Takes back, one after the other, the names without which the samples that were set aside are as
+/// likely. `others`: all effects that stay.
+std::vector<Unexplained> unproven(const Study& study, const Effects& others,
+                                  std::vector<Found>& found);
+
 }  // namespace vgyro::gap

@@ -199,6 +199,11 @@ Expected<Result> find_gap(const std::vector<Recording>& recordings, const model:
   fill_facts(study, result.held_out, result.samples);
   std::vector<Found> found = search.found();
   result.unexplained = leftovers(search, found);
+  Effects others = known_effects(model.effects, study.findings());
+  for (const Found& one : search.starting())
+    others.push_back(one.effect);
+  for (Unexplained& one : unproven(study, others, found))
+    result.unexplained.push_back(std::move(one));
   add_reference(study, result.unexplained);
   for (const Finding& finding : study.findings())
     result.effects.push_back(named(finding, result.with_reference));

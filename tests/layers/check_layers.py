@@ -60,7 +60,7 @@ GAP_ARROWS = {
     "describe": GAP_STUDY | {"views", "evidence"},
     "differences": GAP_STUDY | GAP_REGRESSION | {"scan", "views", "evidence"},
     "search": GAP_STUDY | GAP_REGRESSION | {"acceptance", "scan", "noise_search", "robust", "steadiness"},
-    "leftover": GAP_STUDY | {"search", "whiteness"},
+    "leftover": GAP_STUDY | {"score", "search", "whiteness"},
     "workflow": GAP_STUDY | {"acceptance", "describe", "differences", "figures", "identifiable", "leftover", "score", "search"},
 }
 
