@@ -25,9 +25,10 @@ struct Found {
   double penalty = 0.0;
   double needed = 0.0;  ///< of statistic less penalty
   std::vector<Reading> ambiguous_with;
-  bool starting = false;   ///< of the starting model: what every gyro has, and no name
-  bool accepted = false;   ///< ambiguous, and the caller chose this reading
-  bool unchecked = false;  ///< the time was over before all that speaks against it was tried
+  bool starting = false;      ///< of the starting model: what every gyro has, and no name
+  bool of_reference = false;  ///< a bias that says at which temperature a gyro's own is none
+  bool accepted = false;      ///< ambiguous, and the caller chose this reading
+  bool unchecked = false;     ///< the time was over before all that speaks against it was tried
   [[nodiscard]] double adjusted() const { return statistic - penalty; }
   [[nodiscard]] double margin() const { return adjusted() - needed; }
 };

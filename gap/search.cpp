@@ -170,7 +170,17 @@ Effects Search::effects() const {
 std::vector<Found> Search::found() const {
   std::vector<Found> names;
   std::copy_if(found_.begin(), found_.end(), std::back_inserter(names),
-               [](const Found& one) { return !one.starting; });
+               [](const Found& one) { return !one.starting && !one.of_reference; });
+  // c·(T − T₀) + b is c·(T − (T₀ − b/c)).
+  for (const Found& bias : found_) {
+    if (!bias.of_reference) continue;
+    for (Found& one : names) {
+      if (one.effect.kind != Kind::kTemperatureBias || one.effect.gyro != bias.effect.gyro)
+        continue;
+      one.effect.parameters[1] -= bias.effect.parameters[0] / one.effect.parameters[0];
+      one.sigma[1] = bias.sigma[0] / std::abs(one.effect.parameters[0]);
+    }
+  }
   return names;
 }
 
@@ -373,10 +383,62 @@ bool Search::add_round() {
   Found taken = judged ? judge_timing(*best, round.timing) : *best;
   if (taken.margin() < 0.0 || is_left_of_timing(taken)) return false;
   found_.push_back(std::move(taken));
+  free_reference();
   const bool is_step = row(found_.back().effect.kind).finder == Finder::kStep;
   settle();
   if (is_step) place_again();
   return true;
+}
+
+// Of what goes with the temperature the zero is no gyro's own: where a line, or a line and a
+// parabola, with a bias beside them are far better, the one that was found last is a piece of them.
+void Search::free_reference() {
+  const Effect last = found_.back().effect;
+  if (last.kind != Kind::kTemperatureBias && last.kind != Kind::kTemperatureBiasQuadratic) return;
+  const std::size_t place = place_of(last);
+  const Regression& regression = regressions_[place];
+  const Effects before = terms(place, found_.size() - 1);
+  const bool again = std::any_of(before.begin(), before.end(), [&](const Effect& effect) {
+    return effect.gyro == last.gyro && (effect.kind == Kind::kBias || effect.kind == last.kind);
+  });
+  if (again) return;
+  const Effect line{last.gyro, Kind::kTemperatureBias, {0.0, last.parameters[1]}, 0};
+  const Effect parabola{last.gyro, Kind::kTemperatureBiasQuadratic, {0.0, last.parameters[1]}, 0};
+  const Effect bias{last.gyro, Kind::kBias, {0.0}, 0};
+  const double single = regression.fit(terms(place), noise_).log_likelihood;
+  double best_gain = 0.0;
+  Effects best;
+  for (const Effects& more : {Effects{line, bias}, Effects{line, parabola, bias}}) {
+    Effects with = before;
+    with.insert(with.end(), more.begin(), more.end());
+    const double gain = 2.0 * (regression.fit(with, noise_).log_likelihood - single) -
+                        kStatisticMin * (static_cast<double>(more.size()) - 1.0);
+    if (gain <= best_gain) continue;
+    best_gain = gain;
+    best = more;
+  }
+  if (best.empty()) return;
+  const Found found = found_.back();
+  found_.pop_back();
+  for (const Effect& effect : best) {
+    found_.push_back(found);
+    found_.back().effect = effect;
+    found_.back().of_reference = effect.kind == Kind::kBias;
+  }
+}
+
+// Without a line there is no reference to be told.
+void Search::drop_lone_references() {
+  const auto is_lone = [&](const Found& bias) {
+    return bias.of_reference && std::none_of(found_.begin(), found_.end(), [&](const Found& one) {
+             return one.effect.kind == Kind::kTemperatureBias &&
+                    one.effect.gyro == bias.effect.gyro;
+           });
+  };
+  std::vector<Found> kept;
+  std::copy_if(found_.begin(), found_.end(), std::back_inserter(kept),
+               [&](const Found& one) { return !is_lone(one); });
+  found_ = std::move(kept);
 }
 
 // The terms with the motion that they give, each from the other in turn, on studies of their own.
@@ -438,6 +500,7 @@ Found Search::judge_timing(Found best, const std::vector<Score>& scores) const {
 
 // All found terms together, with their noise.
 void Search::settle() {
+  drop_lone_references();
   renew_motion();
   for (std::size_t place = 0; place < regressions_.size(); ++place)
     settle(place);
@@ -489,7 +552,7 @@ void Search::replace_round() {
 }
 
 void Search::replace(std::size_t index) {
-  if (found_[index].starting) return;
+  if (found_[index].starting || found_[index].of_reference) return;
   Found& mine = found_[index];
   const std::size_t place = place_of(mine.effect);
   const Regression& regression = regressions_[place];
@@ -528,7 +591,7 @@ void Search::replace(std::size_t index) {
 
 void Search::delete_backward() {
   for (std::size_t i = 0; i < found_.size();) {
-    if (found_[i].starting || found_[i].margin() >= kFallen) {
+    if (found_[i].starting || found_[i].of_reference || found_[i].margin() >= kFallen) {
       ++i;
       continue;
     }
@@ -546,7 +609,8 @@ void Search::reject_unsteady() {
   for (std::size_t i = 0; i < found_.size(); ++i) {
     const Found& one = found_[i];
     if (is_over(kLeftToScore)) found_[i].unchecked = true;
-    if (wrong[i] || one.starting || found_[i].unchecked || !row(one.effect.kind).keeps_size)
+    if (wrong[i] || one.starting || one.of_reference || found_[i].unchecked ||
+        !row(one.effect.kind).keeps_size)
       continue;
     const std::size_t place = place_of(one.effect);
     const Effects all = terms(place);
@@ -595,7 +659,7 @@ void Search::reject_unproven() {
     const double expected = found_[i].statistic * kHeldOutShare;
     const double chance = 2.0 * kProofSigmas * std::sqrt(std::max(0.0, expected));
     const double needed = std::max(0.0, expected - std::max(chance, kProofShare * expected));
-    if (found_[i].starting || is_noise(found_[i]) ||
+    if (found_[i].starting || found_[i].of_reference || is_noise(found_[i]) ||
         (is_sure_by_residual(i) && held_out_gain(i) >= needed)) {
       ++i;
       continue;
@@ -645,7 +709,8 @@ bool Search::reject_beside_noise() {
   for (std::size_t i = 0; i < found_.size(); ++i) {
     const Found& one = found_[i];
     const double drift = drift_statistic(one.effect.gyro);
-    if (drift == 0.0 || is_noise(one) || one.starting || one.needed >= kStatisticMin) {
+    if (drift == 0.0 || is_noise(one) || one.starting || one.of_reference ||
+        one.needed >= kStatisticMin) {
       kept.push_back(one);
       continue;
     }

@@ -83,6 +83,8 @@ class Search {
                                const Score& score) const;
   void look(std::size_t place, Round& round);
   bool add_round();
+  void free_reference();
+  void drop_lone_references();
   [[nodiscard]] bool is_left_of_timing(const Found& one) const;
   [[nodiscard]] Fit fit_with_motion(Effects terms) const;
   [[nodiscard]] std::vector<Found> timing_rivals(const Found& best,
