@@ -2,6 +2,7 @@
 
 // Value types of the search: what the scan proposes, and what the search has named.
 
+#include <optional>
 #include <vector>
 
 #include "gap/result.h"
@@ -25,6 +26,7 @@ struct Found {
   double penalty = 0.0;
   double needed = 0.0;  ///< of statistic less penalty
   std::vector<Reading> ambiguous_with;
+  std::optional<model::Effect> companion;  ///< a bias that is taken with it
   bool starting = false;      ///< of the starting model: what every gyro has, and no name
   bool of_reference = false;  ///< a bias that says at which temperature a gyro's own is none
   bool accepted = false;      ///< ambiguous, and the caller chose this reading

@@ -25,6 +25,9 @@ constexpr double kNoiseMin = 24.0;
 constexpr double kStatisticMinAgainstNoise = 13.0;
 // Of great effects the arithmetic of interpolation is not sure to better than this share.
 constexpr double kLeadShare = 3e-3;
+// A free reference is one more parameter; the catalogue's, where it is as good, is preferred.
+constexpr double kReferencePenalty = 18.0;
+constexpr double kReference_c = 25.0;
 // Beyond that a recording is no longer explained, only described.
 constexpr std::size_t kFoundMax = 10;
 constexpr int kNoiseRoundsMax = 6;
@@ -341,6 +344,34 @@ bool Search::is_left_of_timing(const Found& one) const {
   return of_found || of_jitter;
 }
 
+// A line over the temperature with a bias beside it: where a gyro's own zero is at another
+// temperature than the catalogue's, the line alone is none of its best names.
+void Search::look_at_temperature(std::size_t place, const Fit& null, const PairNoise& start,
+                                 std::vector<Found>& found) const {
+  const Regression& regression = regressions_[place];
+  for (std::size_t gyro = 0; gyro < 2; ++gyro) {
+    const Effect line{gyro, Kind::kTemperatureBias, {0.0, kReference_c}, 0};
+    const Effect bias{gyro, Kind::kBias, {0.0}, 0};
+    const bool again = std::any_of(null.terms.begin(), null.terms.end(), [&](const Effect& effect) {
+      return effect.gyro == gyro && (effect.kind == bias.kind || effect.kind == line.kind);
+    });
+    if (again || regression.data().about.coarse[gyro] || !could_show(regression.data(), line) ||
+        is_over(kLeftToScore))
+      continue;
+    Effects with = null.terms;
+    with.push_back(bias);
+    with.push_back(line);
+    const Fit fit = regression.fit_beside(std::move(with), start, null);
+    Found one;
+    one.effect = fit.terms.back();
+    one.companion = fit.terms[fit.terms.size() - 2];
+    one.statistic = 2.0 * (fit.log_likelihood - null.log_likelihood);
+    one.penalty = kReferencePenalty;
+    one.needed = kStatisticMin;
+    found.push_back(std::move(one));
+  }
+}
+
 // At the fitted noise and at the model's.
 void Search::look(std::size_t place, Round& round) {
   const Regression& regression = regressions_[place];
@@ -352,6 +383,7 @@ void Search::look(std::size_t place, Round& round) {
   }
   if (scores.size() > kWordsEach * kRefitsMax) scores.resize(kWordsEach * kRefitsMax);
   std::vector<Found> found = refitted(place, null, null.noise, scores, kRefitsMax);
+  look_at_temperature(place, null, null.noise, found);
   const bool grown = has_grown(place, null);
   // Where the noise has not grown the model's would show the same.
   if (grown || knows_no_noise(place)) {
@@ -383,6 +415,12 @@ bool Search::add_round() {
   Found taken = judged ? judge_timing(*best, round.timing) : *best;
   if (taken.margin() < 0.0 || is_left_of_timing(taken)) return false;
   found_.push_back(std::move(taken));
+  if (found_.back().companion) {
+    found_.push_back(found_.back());
+    found_.back().effect = *found_.back().companion;
+    found_.back().of_reference = true;
+    std::swap(found_.back(), *(found_.end() - 2));
+  }
   free_reference();
   const bool is_step = row(found_.back().effect.kind).finder == Finder::kStep;
   settle();

@@ -82,6 +82,8 @@ class Search {
   [[nodiscard]] Found refitted(std::size_t place, const Fit& null, const PairNoise& start,
                                const Score& score) const;
   void look(std::size_t place, Round& round);
+  void look_at_temperature(std::size_t place, const Fit& null, const PairNoise& start,
+                           std::vector<Found>& found) const;
   bool add_round();
   void free_reference();
   void drop_lone_references();

@@ -221,5 +221,35 @@ TEST(Search, KeepsStudyAndEffectsTogetherWhereALateGyroComesToNothing) {
   expect_of_one_motion(search, made.recording(), noise_effects(making));
 }
 
+// A line over the temperature that is 0 where the recording begins is no parabola that is 0 at 25
+// °C.
+TEST(Search, TellsAtWhichTemperatureABiasIsNone) {
+  Making making = making_of(49);
+  constexpr double kPerK = 4e-3;
+  constexpr double kNone_c = 18.0;
+  const auto temperature_c = [](double t_s) { return kNone_c - 20.0 * std::sin(0.05 * t_s); };
+  making.error = [&](std::size_t gyro, double t_s, double) {
+    return gyro == 1 ? kPerK * (temperature_c(t_s) - kNone_c) : 0.0;
+  };
+  Recording recording = make_recording(making);
+  for (GyroSeries& gyro : recording.gyros) {
+    for (const double t_s : gyro.t_s)
+      gyro.temperature_c.push_back(temperature_c(t_s));
+  }
+  Effects known = noise_effects(making);
+  known.push_back({1, Kind::kBias, {0.0}, 0});
+  const MadeStudy made(std::move(recording), known);
+  ASSERT_NE(made.study(), nullptr);
+  Search search(made.study(), known);
+  search.run();
+  ASSERT_EQ(search.found().size(), 1U) << "seed 49: " << names_of(search.found());
+  const Found found = search.found().front();
+  EXPECT_EQ(found.effect.kind, Kind::kTemperatureBias) << names_of(search.found());
+  EXPECT_EQ(found.effect.gyro, 1U);
+  EXPECT_NEAR(found.effect.parameters[0], kPerK, kSigmas * found.sigma[0]);
+  EXPECT_NEAR(found.effect.parameters[1], kNone_c, kSigmas * found.sigma[1]);
+  EXPECT_LT(found.sigma[1], 3.0);
+}
+
 }  // namespace
 }  // namespace vgyro::gap
