@@ -150,7 +150,7 @@ const std::vector<double>& Motion::angle_deg() const {
   const std::span<const double> t_s = rate_dps_.times_s();
   const std::span<const double> rate = rate_dps_.values();
   std::vector<double> angle_deg(t_s.size());
-  angle_deg[0] = rate[0] * t_s[0];
+  if (!t_s.empty()) angle_deg[0] = rate[0] * t_s[0];
   for (std::size_t i = 1; i < t_s.size(); ++i) {
     const double middle = quarters()[kQuarters * (i - 1) + kQuarters / 2];
     angle_deg[i] =
@@ -193,9 +193,10 @@ std::shared_ptr<const Motion> Motion::low_passed(const model::SecondOrder& secon
 
 namespace {
 
-// Of the last sample before: between two it goes on straight.
+// Of the last sample before: between two it goes on straight. Nothing where no past is kept.
 const model::TemperaturePast* past_at(const SampledCurve& temperature_c,
                                       const std::vector<model::TemperaturePast>& past, double t_s) {
+  if (past.empty()) return nullptr;
   const std::span<const double> times_s = temperature_c.times_s();
   const auto after = std::upper_bound(times_s.begin(), times_s.end(), t_s) - times_s.begin();
   return &past[static_cast<std::size_t>(std::max<std::ptrdiff_t>(after - 1, 0))];
