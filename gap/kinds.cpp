@@ -148,6 +148,7 @@ constexpr KindRow added(Kind kind, Inputs needs, std::span<const Parameters> sta
           .finder = Finder::kShape,
           .needs = needs,
           .by_axis = false,
+          .by_turns = false,
           .free = std::span<const Free>(kFirst),
           .form = Form::kSize,
           .starts = starts,
@@ -177,6 +178,7 @@ constexpr KindRow timing(Kind kind, std::span<const Free> free, Form form,
           .finder = Finder::kShape,
           .needs = kRate,
           .by_axis = false,
+          .by_turns = false,
           .free = free,
           .form = form,
           .starts = starts,
@@ -203,6 +205,7 @@ constexpr KindRow random(Kind kind, Random part, double penalty, bool fast,
           .finder = Finder::kNoise,
           .needs = kNothing,
           .by_axis = false,
+          .by_turns = false,
           .free = std::span<const Free>(kNoFree),
           .form = Form::kNone,
           .starts = std::span<const Parameters>(kNoStart),
@@ -229,6 +232,7 @@ constexpr KindRow frames(Kind kind, std::string_view against, Random part = Rand
           .finder = Finder::kFrames,
           .needs = kNothing,
           .by_axis = false,
+          .by_turns = false,
           .free = std::span<const Free>(kNoFree),
           .form = Form::kNone,
           .starts = std::span<const Parameters>(kNoStart),
@@ -280,11 +284,22 @@ constexpr KindRow run_in() {
   return row;
 }
 
+constexpr KindRow temperature_rate_bias() {
+  KindRow row =
+      added(Kind::kTemperatureRateBias, bit(Input::kTemperatureSlope), kUnit,
+            Axis::kTemperatureSlope, Experiment::kTemperatureCycles, "temperature", "temperature",
+            "the residual of {name} follows the change of its temperature: {p0:+.3g} "
+            "deg/s per K/s");
+  row.by_turns = true;
+  return speaking(row);
+}
+
 constexpr KindRow temperature_hysteresis() {
   KindRow row = added(Kind::kTemperatureHysteresis, kTemperature, kPlays, Axis::kTemperatureLag,
                       Experiment::kTemperatureCycles, "temperature", "temperature",
                       "the residual of {name} goes another way when its temperature turns round: "
                       "{p0:+.3g} deg/s per K that a play of {p1:.3g} K to both sides leaves");
+  row.by_turns = true;
   row.free = std::span<const Free>(kPlayFree);
   row.penalty = kPlayPenalty;
   row.bounds = std::span<const Bound>(kPlayBound);
@@ -367,11 +382,7 @@ constexpr KindRow kKinds[] = {
                    Axis::kTemperature, Experiment::kTemperatureCycles, "temperature", "temperature",
                    "the residual of {name} follows the square of its temperature less {p1:.4g} °C: "
                    "{p0:+.3g} deg/s per K²")),
-    speaking(added(Kind::kTemperatureRateBias, bit(Input::kTemperatureSlope), kUnit,
-                   Axis::kTemperatureSlope, Experiment::kTemperatureCycles, "temperature",
-                   "temperature",
-                   "the residual of {name} follows the change of its temperature: {p0:+.3g} deg/s "
-                   "per K/s")),
+    temperature_rate_bias(),
     speaking(added(Kind::kScaleFactor, kRate, kUnit, Axis::kRate, Experiment::kManyRates, "rate",
                    "rate", "the residual of {name} follows the rate: {p0:+.3g} of it")),
     added(Kind::kScaleFactorAsymmetry, kRate, kUnit, Axis::kRate, Experiment::kManyRates, "rate",

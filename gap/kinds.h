@@ -144,8 +144,9 @@ class Given {
 struct KindRow {
   Given<model::Kind> kind;
   Given<Finder> finder;
-  Given<Inputs> needs;  ///< inputs that must move, by bits
-  Given<bool> by_axis;  ///< parameter 0 is the axis of the input that it needs
+  Given<Inputs> needs;   ///< inputs that must move, by bits
+  Given<bool> by_axis;   ///< parameter 0 is the axis of the input that it needs
+  Given<bool> by_turns;  ///< by how the temperature changes, which coarse steps do not tell
   Given<std::span<const Free>> free;
   Given<Form> form;
   Given<std::span<const model::Parameters>> starts;  ///< of the scan, of size 1

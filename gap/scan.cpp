@@ -98,10 +98,9 @@ bool enough(const Effects& terms, Kind kind) {
 bool could_show(const Observations& data, const Effect& effect) {
   if (!data.holds[effect.gyro] || !data.excitation[effect.gyro].moves(needs_of(effect)))
     return false;
-  const bool by_slope =
-      effect.kind == Kind::kTemperatureHysteresis || effect.kind == Kind::kTemperatureRateBias;
   const auto& signals = data.about.signals[effect.gyro];
-  if (by_slope && signals && signals->temperature_step_c >= Signals::kCoarseTemperature_c)
+  if (row(effect.kind).by_turns && signals &&
+      signals->temperature_step_c >= Signals::kCoarseTemperature_c)
     return false;
   const auto limits = *row(effect.kind).limits;
   return std::all_of(limits.begin(), limits.end(), [&](const Limit& limit) {

@@ -27,7 +27,6 @@ constexpr double kStatisticMinAgainstNoise = 13.0;
 constexpr double kLeadShare = 3e-3;
 // A free reference is one more parameter; the catalogue's, where it is as good, is preferred.
 constexpr double kReferencePenalty = 18.0;
-constexpr double kReference_c = 25.0;
 // Beyond that a recording is no longer explained, only described.
 constexpr std::size_t kFoundMax = 10;
 constexpr int kNoiseRoundsMax = 6;
@@ -64,7 +63,7 @@ constexpr double kStartingNoiseDoubt = 0.01;
 // Shares of a timing effect's statistic that interpolation leaves behind.
 constexpr double kTimingLeaves = 2e-3;
 constexpr double kJitterLeaves = 2e-2;
-constexpr double kQuickDrift_s = 1.0;
+constexpr double kJitterMemory_s = 1.0;
 // Each turn learns the motion from the last fit. The rivals are only compared, and all after as
 // many.
 constexpr int kMotionTurns = 3;
@@ -83,8 +82,8 @@ bool is_noise(const Found& found) {
 }
 
 // What hangs together over less than some blocks is what late stamps make of motion, too.
-bool is_quick_drift(const Effect& effect) {
-  return row(effect.kind).random == Random::kMarkov && effect.parameters[1] < kQuickDrift_s;
+bool is_like_jitter(const Effect& effect) {
+  return row(effect.kind).random == Random::kMarkov && effect.parameters[1] < kJitterMemory_s;
 }
 
 bool is_timing(const Effect& effect) {
@@ -329,7 +328,7 @@ std::vector<Found> Search::refitted(std::size_t place, const Fit& null, const Pa
 bool Search::is_left_of_timing(const Found& one) const {
   const Effect& effect = one.effect;
   const bool knows_rate = study_->recording().has_reference;
-  const bool is_quick = is_quick_drift(effect);
+  const bool is_quick = is_like_jitter(effect);
   if (!is_quick && (knows_rate ? !is_timing(effect) : !row(effect.kind).is_fast)) return false;
   const bool of_found = std::any_of(found_.begin(), found_.end(), [&](const Found& found) {
     return !is_quick && is_timing(found.effect) &&
@@ -350,7 +349,8 @@ void Search::look_at_temperature(std::size_t place, const Fit& null, const PairN
                                  std::vector<Found>& found) const {
   const Regression& regression = regressions_[place];
   for (std::size_t gyro = 0; gyro < 2; ++gyro) {
-    const Effect line{gyro, Kind::kTemperatureBias, {0.0, kReference_c}, 0};
+    Effect line{gyro, Kind::kTemperatureBias, (*row(Kind::kTemperatureBias).starts)[0], 0};
+    line.parameters[0] = 0.0;
     const Effect bias{gyro, Kind::kBias, {0.0}, 0};
     const bool again = std::any_of(null.terms.begin(), null.terms.end(), [&](const Effect& effect) {
       return effect.gyro == gyro && (effect.kind == bias.kind || effect.kind == line.kind);

@@ -169,17 +169,6 @@ Expected<void> check(const Recording& recording) {
   return {};
 }
 
-SampledCurve unmasked(const GyroSeries& series, const Transport& transport) {
-  std::vector<double> t_s;
-  std::vector<double> rate_dps;
-  for (std::size_t i = 0; i < series.t_s.size(); ++i) {
-    if (transport.masked[i] != 0) continue;
-    t_s.push_back(transport.t_s[i]);
-    rate_dps.push_back(series.rate_dps[i]);
-  }
-  return {t_s, rate_dps};
-}
-
 // Weights of the two readings in their mean: by their white noise, where it is known.
 std::array<double, 2> weights(const PairNoise& noise) {
   const double a = noise[0].white_dps_rthz;
@@ -259,7 +248,8 @@ Expected<std::shared_ptr<const Study>> Study::begin(const Recording& recording,
       find_spikes(recording, facts->timing, facts->transports, effects);
   facts->gather(spikes);
   for (std::size_t gyro = 0; gyro < 2; ++gyro) {
-    facts->readings[gyro] = unmasked(recording.gyros[gyro], facts->transports[gyro]);
+    const ScalarSeries good = usable(recording.gyros[gyro], facts->transports[gyro]);
+    facts->readings[gyro] = SampledCurve(good.t_s, good.value);
     const std::size_t left = facts->readings[gyro].times_s().size();
     if (left >= kSamplesMin) continue;
     return fail("",

@@ -275,36 +275,20 @@ std::optional<Lag> lag_behind(const SampledCurve& curve, std::span<const double>
 
 namespace {
 
-// One gyro's usable samples.
-struct Usable {
-  std::vector<double> t_s;
-  std::vector<double> rate_dps;
-};
-
-Usable usable(const GyroSeries& series, const Transport& transport) {
-  Usable good;
-  for (std::size_t i = 0; i < series.t_s.size(); ++i) {
-    if (transport.masked[i] != 0) continue;
-    good.t_s.push_back(transport.t_s[i]);
-    good.rate_dps.push_back(series.rate_dps[i]);
-  }
-  return good;
-}
-
 // Without its noise: that is less between samples than at them, and where the others' instants keep
 // to one place between them, its slope would pass for a lag.
-SampledCurve curve_of(const Usable& rate) {
-  const SampledCurve curve(rate.t_s, rate.rate_dps);
+SampledCurve curve_of(const ScalarSeries& rate) {
+  const SampledCurve curve(rate.t_s, rate.value);
   return without_noise(curve, quiet_variance(curve));
 }
 
 // Of the first behind the second; the one with more samples makes the curve, for it is known better
 // between them.
-std::optional<Lag> lag_between(const Usable& first, const Usable& second) {
+std::optional<Lag> lag_between(const ScalarSeries& first, const ScalarSeries& second) {
   if (first.t_s.size() < kWindowSamplesMin || second.t_s.size() < kWindowSamplesMin) return {};
   if (first.t_s.size() <= second.t_s.size())
-    return lag_behind(curve_of(second), first.t_s, first.rate_dps);
-  auto lag = lag_behind(curve_of(first), second.t_s, second.rate_dps);
+    return lag_behind(curve_of(second), first.t_s, first.value);
+  auto lag = lag_behind(curve_of(first), second.t_s, second.value);
   if (!lag) return {};
   // second(t) = first(t − start − drift·t): the other way round.
   const double rate = 1.0 - lag->drift;
@@ -387,9 +371,8 @@ Timing find_timing(const Recording& recording, const std::array<Transport, 2>& t
   const std::array equations{equation_of(known, 0), equation_of(known, 1)};
   std::array<std::optional<Lag>, 2> lags;
   if (recording.has_reference) {
-    const Usable reference{recording.reference_dps.t_s, recording.reference_dps.value};
     for (std::size_t gyro = 0; gyro < 2; ++gyro)
-      lags[gyro] = lag_between(good[gyro], reference);
+      lags[gyro] = lag_between(good[gyro], recording.reference_dps);
     timing.reference_late_s = lateness_of_reference(lags, equations);
   } else {
     lags[1] = lag_between(good[1], good[0]);

@@ -836,4 +836,14 @@ Transport check_transport(const GyroSeries& series, std::size_t gyro,
   return Check(series, gyro, known).run();
 }
 
+ScalarSeries usable(const GyroSeries& series, const Transport& transport) {
+  ScalarSeries good;
+  for (std::size_t i = 0; i < series.t_s.size(); ++i) {
+    if (transport.masked[i] != 0) continue;
+    good.t_s.push_back(transport.t_s[i]);
+    good.value.push_back(series.rate_dps[i]);
+  }
+  return good;
+}
+
 }  // namespace vgyro::gap

@@ -53,6 +53,9 @@ struct Transport {
 Transport check_transport(const GyroSeries& series, std::size_t gyro,
                           const std::vector<model::Effect>& known);
 
+/// Its samples that are to be used, at their instants.
+ScalarSeries usable(const GyroSeries& series, const Transport& transport);
+
 /// What clips, or vanishes in a dead band, costs what all masked samples of its gyro cost: counts
 /// them. To be called again when something else has masked more.
 void count_masked(Transport& transport);
