@@ -2,9 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <numbers>
 #include <tuple>
+#include <type_traits>
+#include <utility>
 
 #include <nlopt.hpp>
 
@@ -37,6 +40,8 @@ constexpr int kFastEvaluations = 150;
 constexpr double kFastTolerance = 1e-3;
 constexpr int kSlowEvaluations = 60;  ///< for each unknown
 constexpr double kSlowTolerance = 2e-2;
+constexpr int kAgainMax = 4;
+constexpr double kAgainGain = 2.5;  ///< times the tolerance
 // Drift is fitted by the means of so many blocks first; a memory that may be short then by all.
 constexpr double kCoarseBlocks = 5.0;
 
@@ -60,6 +65,10 @@ constexpr Range kSigmaRange{9.0, 6.0, 0.1, 0.1};
 // Below half a second blocks of a tenth cannot tell it from white noise.
 constexpr double kTauMin_s = 0.5;
 constexpr double kTauStart_s = 10.0;
+// The search for a correlated term climbs one hill: it begins at the best of these memories, with
+// the size by which the means scatter, and with little walk beside it.
+constexpr std::array kTausTried_s{1.0, 4.0, 16.0, 64.0};
+constexpr double kWalkBeside = 0.2;
 // A term whose memory is longer than this part of the recording is a bias or a walk: it would never
 // be seen to forget. Of a recording however short the bounds stay apart.
 constexpr double kMarkovSpans = 8.0;
@@ -70,6 +79,11 @@ constexpr double kFrequencySame = 0.02;
 // From one switch-on to the next a gyro's bias is another one: some tenths of a deg/s for a cheap
 // sensor. Wider would cost digits and gain nothing.
 constexpr double kOtherStart_dps = 1.0;
+
+// Steps from block to block that differ by less have exponentials that follow from each other.
+constexpr double kStepGrain_s = 1e-4;
+// Blocks of two channels follow each other at so many intervals, and some to spare.
+constexpr std::size_t kStepsKept = 8;
 
 // Of a block.
 constexpr double kQuickTerm = 0.5;
@@ -287,103 +301,145 @@ Matrix block_means(const Matrix& columns, const Layout& layout) {
 
 namespace {
 
-// The Kalman filter of the drifts: one covariance, and a mean of the states for each column,
-// because all columns have the same noise.
+// The Kalman filter of at most N drift states: one covariance, and a mean of the states for each
+// column, because all columns have the same noise. It runs some thousand times in a search over the
+// noise: N is known when it is compiled, and states that are not there are zeros.
+template <int N>
 class DriftFilter {
  public:
-  DriftFilter(const States& states, std::size_t columns)
+  DriftFilter(const States& states, Eigen::Index columns)
       : states_(states),
         width_(columns),
-        x_(Matrix::Zero(static_cast<Eigen::Index>(states.count),
-                        static_cast<Eigen::Index>(columns))) {
-    for (std::size_t i = 0; i < states_.count; ++i)
-      p_[i][i] = states_.start_variance[i];
-  }
-
-  /// A further recording: nothing is left of the drift but what the gyros are.
-  void begin_anew() {
-    const std::size_t n = states_.count;
-    for (std::size_t i = 0; i < n; ++i) {
-      p_[i].fill(0.0);
-      const bool is_walk = states_.tau_s[i] == 0.0;
-      p_[i][i] = is_walk ? kOtherStart_dps * kOtherStart_dps : states_.start_variance[i];
+        count_(static_cast<int>(states.count)),
+        x_(columns == 1 ? 0 : count_, columns) {
+    for (int i = 0; i < count_; ++i) {
+      const auto at = static_cast<std::size_t>(i);
+      p_(i, i) = states_.start_variance[at];
+      walk_[i] = states_.growth[at];
+      stationary_[i] = states_.stationary[at];
+      rate_[i] = is_walk(i) ? 0.0 : 1.0 / states_.tau_s[at];
+      for (const Channel channel : {Channel::kGyro1, Channel::kGyro2, Channel::kDifference})
+        share_[static_cast<std::size_t>(channel)][i] = share_of(channel, states_.gyro[at]);
     }
     x_.setZero();
   }
 
+  /// A further recording: nothing is left of the drift but what the gyros are.
+  void begin_anew() {
+    p_.setZero();
+    for (int i = 0; i < count_; ++i) {
+      p_(i, i) = is_walk(i) ? kOtherStart_dps * kOtherStart_dps
+                            : states_.start_variance[static_cast<std::size_t>(i)];
+    }
+    x_.setZero();
+    of_one_.setZero();
+  }
+
   void predict(double step_s) {
-    const std::size_t n = states_.count;
-    set_decays(step_s);
-    for (std::size_t i = 0; i < n; ++i) {
-      if (states_.tau_s[i] == 0.0) {
-        p_[i][i] += states_.growth[i] * step_s;
-        continue;
-      }
-      const double decay = decay_[i];
-      for (std::size_t j = 0; j < n; ++j) {
-        p_[i][j] *= decay;
-        p_[j][i] *= decay;
-      }
-      p_[i][i] += states_.stationary[i] * (1.0 - decay * decay);
-      x_.row(static_cast<Eigen::Index>(i)) *= decay;
+    set_step(step_s);
+    p_.array() *= (decay_ * decay_.transpose()).array();
+    p_.diagonal() += growth_;
+    if (width_ == 1) {
+      of_one_.array() *= decay_.array();
+    } else {
+      x_.array().colwise() *= decay_.head(count_).array();
     }
   }
 
-  // Observations of a channel, one for each column → innovations, in place; the states take them
-  // in. Returns the innovations' variance; `variance` is what the observation has beside the drift.
+  // Observations of a channel, one for each column → normalised innovations, in place; the states
+  // take them in. Returns the innovations' variance; `variance` is what the observation has beside
+  // the drift.
   double take(Channel channel, double variance, double* observation) {
-    variance = std::max(expect(channel, variance, observation), kVarianceMin);
-    const std::size_t n = states_.count;
-    for (std::size_t i = 0; i < n; ++i) {
-      const double gain = ph_[i] / variance;
-      double* const state = x_.data() + i * width_;
-      for (std::size_t c = 0; c < width_; ++c)
-        state[c] += gain * observation[c];
-      for (std::size_t j = 0; j <= i; ++j) {
-        p_[i][j] -= gain * ph_[j];
-        p_[j][i] = p_[i][j];
-      }
+    const Vector& share = share_[static_cast<std::size_t>(channel)];
+    Vector gain;
+    gain.noalias() = p_.lazyProduct(share);
+    variance = std::max(variance + share.dot(gain), kVarianceMin);
+    const double scale = 1.0 / std::sqrt(variance);
+    gain *= scale;
+    p_ -= gain.lazyProduct(gain.transpose());
+    if (width_ == 1) {
+      *observation = scale * (*observation - share.dot(of_one_));
+      of_one_ += *observation * gain;
+      return variance;
     }
+    Eigen::Map<Eigen::RowVectorXd> all(observation, width_);
+    for (int i = 0; i < count_; ++i)
+      if (share[i] != 0.0) all -= share[i] * x_.row(i);
+    all *= scale;
+    for (int i = 0; i < count_; ++i)
+      x_.row(i) += gain[i] * all;
     return variance;
   }
 
  private:
-  // Most blocks are as far apart as the last two.
-  void set_decays(double step_s) {
-    if (step_s == step_s_) return;
-    step_s_ = step_s;
-    for (std::size_t i = 0; i < states_.count; ++i)
-      decay_[i] = states_.tau_s[i] == 0.0 ? 1.0 : std::exp(-step_s / states_.tau_s[i]);
+  using Vector = Eigen::Matrix<double, N, 1>;
+
+  struct Near {
+    std::size_t grain = static_cast<std::size_t>(-1);
+    double step_s = 0.0;
+    Vector decay = Vector::Zero();
+  };
+
+  [[nodiscard]] bool is_walk(int state) const {
+    return states_.tau_s[static_cast<std::size_t>(state)] == 0.0;
   }
 
-  // Takes the expected drift off; sets P·h. Returns the variance with that of the drift.
-  double expect(Channel channel, double variance, double* observation) {
-    const std::size_t n = states_.count;
-    for (std::size_t i = 0; i < n; ++i)
-      h_[i] = share_of(channel, states_.gyro[i]);
-    for (std::size_t i = 0; i < n; ++i) {
-      double sum = 0.0;
-      for (std::size_t j = 0; j < n; ++j)
-        sum += p_[i][j] * h_[j];
-      ph_[i] = sum;
-      const double share = h_[i];
-      variance += share * sum;
-      if (share == 0.0) continue;
-      const double* const state = x_.data() + i * width_;
-      for (std::size_t c = 0; c < width_; ++c)
-        observation[c] -= share * state[c];
+  // An exponential is dear: it is known from one of the last few steps, which was about as long.
+  void set_step(double step_s) {
+    const auto grain = static_cast<std::size_t>(step_s / kStepGrain_s);
+    Near& near = near_[grain % near_.size()];
+    if (near.grain != grain) {
+      near.grain = grain;
+      near.step_s = step_s;
+      for (int i = 0; i < count_; ++i)
+        near.decay[i] = std::exp(-step_s * rate_[i]);
     }
-    return variance;
+    // Its series to the third power: less than a grain is short beside every memory of which
+    // something is left after a step.
+    const Vector x = (step_s - near.step_s) * rate_;
+    decay_ = near.decay.array() * (1.0 - x.array() * (1.0 - x.array() * (0.5 - x.array() / 6.0)));
+    growth_ = walk_.array() * step_s + stationary_.array() * (1.0 - decay_.array().square());
   }
 
   const States& states_;
-  std::size_t width_;
-  std::array<std::array<double, kStatesMax>, kStatesMax> p_{};
-  Matrix x_;
-  std::array<double, kStatesMax> h_{};
-  std::array<double, kStatesMax> ph_{};
-  double step_s_ = -1.0;
-  std::array<double, kStatesMax> decay_{};
+  Eigen::Index width_;
+  int count_;
+  Eigen::Matrix<double, N, N> p_ = Eigen::Matrix<double, N, N>::Zero();
+  Matrix x_;  // of several columns, states × columns
+  Vector of_one_ = Vector::Zero();
+  std::array<Vector, 3> share_{Vector::Zero(), Vector::Zero(), Vector::Zero()};  // by channel
+  Vector rate_ = Vector::Zero();  // 1/τ; of a walk 0
+  Vector walk_ = Vector::Zero();
+  Vector stationary_ = Vector::Zero();
+  Vector decay_ = Vector::Zero();  // by the present step, as growth_
+  Vector growth_ = Vector::Zero();
+  std::array<Near, kStepsKept> near_;
+};
+
+// −½ Σ log of variances: a logarithm of some together is one.
+class HalfLogs {
+ public:
+  void add(double variance) {
+    product_ *= variance;
+    if (product_ > kProductMin && product_ < 1.0 / kProductMin) return;
+    close();
+  }
+  double sum() {
+    close();
+    return sum_;
+  }
+
+ private:
+  // Far from what a double cannot hold, with one more variance in it.
+  static constexpr double kProductMin = 1e-200;
+
+  void close() {
+    sum_ -= 0.5 * std::log(product_);
+    product_ = 1.0;
+  }
+
+  double sum_ = 0.0;
+  double product_ = 1.0;
 };
 
 // drift_within of blocks one after the other, without quick terms: it is dear, and most are as long
@@ -393,30 +449,37 @@ class BlockDrift {
   BlockDrift(const PairNoise& noise, const Layout& layout) : noise_(noise), layout_(layout) {}
 
   double variance(const Block& block) {
-    if (block.channel != channel_ || block.count != count_) {
-      channel_ = block.channel;
-      count_ = block.count;
-      variance_ = drift_within(channel_, noise_, seconds_of(block, layout_), layout_.block_s);
+    Last& last = last_[static_cast<std::size_t>(block.channel)];
+    if (block.count != last.count) {
+      last.count = block.count;
+      last.variance =
+          drift_within(block.channel, noise_, seconds_of(block, layout_), layout_.block_s);
     }
-    return variance_;
+    return last.variance;
   }
 
  private:
+  struct Last {
+    std::uint32_t count = 0;  // of no block
+    double variance = 0.0;
+  };
+
   const PairNoise& noise_;
   const Layout& layout_;
-  Channel channel_ = Channel::kGyro1;
-  std::uint32_t count_ = 0;  // of no block
-  double variance_ = 0.0;
+  std::array<Last, 3> last_{};  // by channel
 };
 
 }  // namespace
 
-double whiten_means(Matrix& means, const Layout& layout, const PairNoise& noise, Part part) {
-  const States states = states_of(noise, layout);
+namespace {
+
+template <int N>
+double whiten_means(Matrix& means, const Layout& layout, const PairNoise& noise, Part part,
+                    const States& states) {
   const auto width = static_cast<std::size_t>(means.cols());
-  DriftFilter filter(states, width);
+  DriftFilter<N> filter(states, means.cols());
   BlockDrift drift(noise, layout);
-  double log_likelihood = 0.0;
+  HalfLogs logs;
   double last_s = 0.0;
   for (std::size_t b = 0; b < layout.blocks.size(); ++b) {
     const Block& block = layout.blocks[b];
@@ -433,12 +496,33 @@ double whiten_means(Matrix& means, const Layout& layout, const PairNoise& noise,
     const double own_variance = std::max(white - drift.variance(block), kOwnShare * white);
     double* const innovation = means.data() + b * width;
     const double variance = filter.take(block.channel, own_variance, innovation);
-    if (counts(block, part)) log_likelihood -= 0.5 * std::log(variance);
-    const double scale = counts(block, part) ? 1.0 / std::sqrt(variance) : 0.0;
-    for (std::size_t c = 0; c < width; ++c)
-      innovation[c] *= scale;
+    if (counts(block, part)) {
+      logs.add(variance);
+    } else {
+      std::fill(innovation, innovation + width, 0.0);
+    }
   }
-  return log_likelihood;
+  return logs.sum();
+}
+
+template <int N>
+using Most = std::integral_constant<int, N>;
+
+}  // namespace
+
+double whiten_means(Matrix& means, const Layout& layout, const PairNoise& noise, Part part) {
+  const States states = states_of(noise, layout);
+  const auto with = [&](auto most) {
+    return whiten_means<decltype(most)::value>(means, layout, noise, part, states);
+  };
+  // Even numbers: the machine works on two at a time.
+  if (states.count <= 2) return with(Most<2>());
+  if (states.count <= 4) return with(Most<4>());
+  if (states.count <= 6) return with(Most<6>());
+  if (states.count <= 8) return with(Most<8>());
+  if (states.count <= 10) return with(Most<10>());
+  if (states.count <= 14) return with(Most<14>());
+  return with(Most<kStatesMax>());
 }
 
 double whiten_within(Matrix& columns, const Layout& layout, const PairNoise& noise, Part part) {
@@ -656,7 +740,8 @@ double maximise(PairNoise& noise, const std::vector<Unknown>& unknowns, int eval
       value_of(to.noise, unknown) = std::exp(at[i]);
     }
   };
-  nlopt::opt search(nlopt::LN_SBPLX, count);
+  // Quadratic models need a third of a simplex's looks; they need two directions at least.
+  nlopt::opt search(count > 1 ? nlopt::LN_BOBYQA : nlopt::LN_SBPLX, count);
   search.set_lower_bounds(low);
   search.set_upper_bounds(high);
   search.set_initial_step(kFirstStep);
@@ -673,11 +758,18 @@ double maximise(PairNoise& noise, const std::vector<Unknown>& unknowns, int eval
         return (*c.context->log_likelihood_of)(c.context->noise);
       },
       &call);
-  double best = 0.0;
-  try {
-    search.optimize(x, best);
-  } catch (const std::exception&) {
-    // The best point so far is in x.
+  double best = std::numeric_limits<double>::lowest();
+  // A model that fits badly ends a search early: begun anew it finds what is left.
+  for (int again = 0; again < kAgainMax; ++again) {
+    const double before = best;
+    try {
+      search.optimize(x, best);
+    } catch (const std::exception&) {
+      // The best point so far is in x.
+    }
+    if (count == 1 || best - before < kAgainGain * tolerance) break;
+    for (unsigned i = 0; i < count; ++i)
+      x[i] = std::clamp(x[i], low[i] + kBoundMargin, high[i] - kBoundMargin);
   }
   apply(x, context);
   noise = context.noise;
@@ -762,60 +854,89 @@ class Coarsening {
     for (std::size_t b = 0; b < from_.blocks.size(); ++b) {
       const Block& block = from_.blocks[b];
       const double cell = std::floor(block.t_s / coarse_.layout.block_s);
-      if (b == 0 || cell != cell_ || block.begins || block.channel != open_.channel ||
-          block.held_out != open_.held_out)
-        begin(block, cell);
-      add(block, means_[static_cast<Eigen::Index>(b)]);
+      if (cell != cell_ || block.begins) close();
+      cell_ = cell;
+      begins_ = begins_ || block.begins;
+      Open& open = open_[static_cast<std::size_t>(block.channel)];
+      if (open.block.count > 0 && open.block.held_out != block.held_out) close(open);
+      add(block, means_[static_cast<Eigen::Index>(b)], open);
     }
     close();
-    coarse_.means =
-        Eigen::Map<const Eigen::VectorXd>(sums_.data(), static_cast<Eigen::Index>(sums_.size()));
+    coarse_.means = Eigen::Map<const Eigen::VectorXd>(means_of_.data(),
+                                                      static_cast<Eigen::Index>(means_of_.size()));
     return std::move(coarse_);
   }
 
  private:
-  void begin(const Block& block, double cell) {
-    close();
-    cell_ = cell;
-    open_ = {};
-    open_.channel = block.channel;
-    open_.held_out = block.held_out;
-    open_.begins = block.begins;
-    mean_ = 0.0;
-  }
-
   // Sums weighed by counts, until it is closed.
-  void add(const Block& block, double mean) {
+  struct Open {
+    Block block;
+    double mean = 0.0;
+  };
+
+  static void add(const Block& block, double mean, Open& open) {
     const auto weight = static_cast<double>(block.count);
-    open_.count += block.count;
-    open_.t_s += weight * block.t_s;
-    open_.rate_square += weight * block.rate_square;
-    for (std::size_t i = 0; i < open_.mean_gain.size(); ++i)
-      open_.mean_gain[i] += weight * weight * block.mean_gain[i];
-    open_.motion_power += weight * weight * block.motion_power;
-    mean_ += weight * mean;
+    Block& sum = open.block;
+    sum.channel = block.channel;
+    sum.held_out = block.held_out;
+    sum.count += block.count;
+    sum.t_s += weight * block.t_s;
+    sum.rate_square += weight * block.rate_square;
+    for (std::size_t i = 0; i < sum.mean_gain.size(); ++i)
+      sum.mean_gain[i] += weight * weight * block.mean_gain[i];
+    sum.motion_power += weight * weight * block.motion_power;
+    open.mean += weight * mean;
   }
 
+  // Channels follow each other block by block, as the gyros' samples do at rest.
   void close() {
-    if (open_.count == 0) return;
-    const auto count = static_cast<double>(open_.count);
-    open_.t_s /= count;
-    open_.rate_square /= count;
-    for (double& gain : open_.mean_gain)
+    for (Open& open : open_)
+      close(open);
+  }
+
+  void close(Open& open) {
+    Block& block = open.block;
+    if (block.count == 0) return;
+    const auto count = static_cast<double>(block.count);
+    block.t_s /= count;
+    block.rate_square /= count;
+    for (double& gain : block.mean_gain)
       gain /= count * count;
-    open_.motion_power /= count * count;
-    coarse_.layout.blocks.push_back(open_);
-    sums_.push_back(mean_ / count);
+    block.motion_power /= count * count;
+    block.begins = std::exchange(begins_, false);
+    coarse_.layout.blocks.push_back(block);
+    means_of_.push_back(open.mean / count);
+    open = {};
   }
 
   const Layout& from_;
   const Eigen::VectorXd& means_;
   CoarseMeans coarse_;
-  std::vector<double> sums_;
-  Block open_;
-  double mean_ = 0.0;
-  double cell_ = 0.0;
+  std::vector<double> means_of_;
+  std::array<Open, 3> open_;  // by channel
+  double cell_ = -1.0;
+  bool begins_ = false;  // what is closed next is a recording's first
 };
+
+}  // namespace
+
+namespace {
+
+// Standard deviation of the means that a gyro is in.
+double scatter_of_means(const CoarseMeans& coarse, std::size_t gyro) {
+  double count = 0.0;
+  double sum = 0.0;
+  double squares = 0.0;
+  for (std::size_t b = 0; b < coarse.layout.blocks.size(); ++b) {
+    if (share_of(coarse.layout.blocks[b].channel, gyro) == 0.0) continue;
+    const double mean = coarse.means[static_cast<Eigen::Index>(b)];
+    count += 1.0;
+    sum += mean;
+    squares += mean * mean;
+  }
+  count = std::max(count, 1.0);
+  return std::sqrt(std::max(squares / count - sum / count * sum / count, kVarianceMin));
+}
 
 }  // namespace
 
@@ -845,6 +966,23 @@ NoiseFitResult fit_pair_noise(const Eigen::VectorXd& residual, const Layout& lay
   const auto coarsely = [&](const PairNoise& noise) {
     return within(noise) + means_log_likelihood(coarse.means, coarse.layout, noise, part);
   };
+  const auto begin_drift = [&](std::size_t gyro) {
+    if (!used[gyro] || !free[gyro].markov) return;
+    PairNoise best = result.noise;
+    double top = coarsely(best);
+    for (const double tau_s : kTausTried_s) {
+      PairNoise trial = result.noise;
+      trial[gyro].markov.back() = {scatter_of_means(coarse, gyro), tau_s};
+      if (free[gyro].walk) trial[gyro].walk_dps_rts *= kWalkBeside;
+      const double now = coarsely(trial);
+      if (now <= top) continue;
+      top = now;
+      best = trial;
+    }
+    result.noise = best;
+  };
+  begin_drift(0);
+  begin_drift(1);
   const int evaluations = kSlowEvaluations * static_cast<int>(slow.size());
   const auto fit_once = [&](const auto& log_likelihood_of) {
     maximise(result.noise, fast, kFastEvaluations, kFastTolerance, within);
