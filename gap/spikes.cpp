@@ -31,10 +31,27 @@ constexpr std::size_t kNeighbours = 2;
 constexpr double kStretch_s = 0.75;
 constexpr double kStretchSamplesMin = 20.0;
 constexpr double kStretchSamplesMax = 1000.0;
-// With fewer samples that can be judged a stretch's median says nothing.
+// With fewer samples that can be judged a stretch's median says nothing; with fewer in one place it
+// says too little to be preferred.
 constexpr std::size_t kJudgedMin = 10;
+constexpr std::size_t kJudgedOfPlaceMin = 20;
+// What interpolation errs by depends on where between two samples one looks: at one of them,
+// half-way, or in between. A reference half as fast as a gyro is right at every second sample, and
+// folds the road at the others.
+constexpr std::size_t kPlaces = 3;
 // Standard deviation of normal noise over the median of its magnitude.
 constexpr double kSigmaPerMedian = 1.4826;
+// The tail begins where five of a hundred are beyond: more than ever were spikes.
+constexpr double kTailShare = 0.05;
+// Of normal noise: its tail begins at so many medians.
+constexpr double kTailPerMedian = 2.906;
+// Normal noise has its median here when it is judged by the widest of three stretches. It is less
+// where rounding leaves most deviations nothing, which says nothing of the tail.
+constexpr double kMedianMin_sigmas = 0.54;
+// What stands out of both gyros at once is the reference's: in the other one it is no chance, and
+// of a like size. What is between two samples of one may be on a sample of the other.
+constexpr double kCommonSigmas = 4.0;
+constexpr double kCommonShare = 0.5;
 // Samples about an instant whose own neighbours tell how well the curve is known there, and what of
 // that is noise: three standard deviations.
 constexpr std::size_t kUnsureReach = 3;
@@ -49,6 +66,9 @@ struct Standing {
   std::vector<double> out_dps;     // deviation from their median; 0: cannot be judged
   std::vector<double> sigma_dps;   // scatter of the deviations about there; 0: nothing stands out
   std::vector<double> unsure_dps;  // what it is seen against is no better known there
+  std::vector<std::size_t> place;  // where between two samples of what it is seen against
+  std::array<double, kPlaces> tail{};  // by place: how much further deviations reach than normal
+  double against_s = 0.0;              // interval of what it is seen against
 };
 
 // What gyro k is seen against.
@@ -83,36 +103,91 @@ std::vector<double> deviations_dps(const GyroSeries& series, const Transport& tr
   return out;
 }
 
-// Of each stretch of so many samples; 0 where too few can be judged.
-std::vector<double> stretch_sigmas_dps(const std::vector<double>& out, std::size_t stretch) {
+// Where each sample falls between two of what it is seen against.
+std::vector<std::size_t> places_of(const Transport& transport, const SampledCurve& truth,
+                                   const Lag& lag) {
+  const std::span<const double> truth_s = truth.times_s();
+  std::vector<std::size_t> places(transport.t_s.size(), 0);
+  if (truth.empty()) return places;
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    const double felt_s = transport.t_s[i] - lag.at(transport.t_s[i]);
+    const auto behind = std::lower_bound(truth_s.begin() + 1, truth_s.end() - 1, felt_s);
+    const double apart_s = std::min(std::abs(felt_s - *(behind - 1)), std::abs(*behind - felt_s));
+    const double half_s = 0.5 * truth.interval_s();
+    places[i] = static_cast<std::size_t>(std::min(kPlaces - 1.0, kPlaces * apart_s / half_s));
+  }
+  return places;
+}
+
+// A sample is judged by the widest of its stretch and the two beside, because noise may rise with
+// the rate. 0: nowhere near enough good neighbours.
+std::vector<double> widest_of_three(const std::vector<double>& sigmas) {
+  std::vector<double> widest = sigmas;
+  for (std::size_t i = 0; i < sigmas.size(); ++i) {
+    if (sigmas[i] <= 0.0) continue;
+    if (i > 0) widest[i] = std::max(widest[i], sigmas[i - 1]);
+    if (i + 1 < sigmas.size()) widest[i] = std::max(widest[i], sigmas[i + 1]);
+  }
+  return widest;
+}
+
+// Of each stretch of so many samples, of those in it that count; 0 where fewer than `least` can be
+// judged.
+template <typename Counts>
+std::vector<double> stretch_sigmas_dps(const std::vector<double>& out, std::size_t stretch,
+                                       std::size_t least, const Counts& counts) {
   std::vector<double> sigmas;
   std::vector<double> sizes;
   for (std::size_t from = 0; from < out.size(); from += stretch) {
     sizes.clear();
     for (std::size_t i = from; i < std::min(out.size(), from + stretch); ++i) {
-      if (out[i] != 0.0) sizes.push_back(std::abs(out[i]));
+      if (out[i] != 0.0 && counts(i)) sizes.push_back(std::abs(out[i]));
     }
-    sigmas.push_back(sizes.size() < kJudgedMin ? 0.0 : kSigmaPerMedian * median_of(sizes));
+    sigmas.push_back(sizes.size() < least ? 0.0 : kSigmaPerMedian * median_of(sizes));
+  }
+  return widest_of_three(sigmas);
+}
+
+// At each sample, by what lies in the same place; at least what rounding makes.
+std::vector<double> sigmas_dps(const std::vector<double>& out,
+                               const std::vector<std::size_t>& places, double interval_s,
+                               double lattice_dps) {
+  const auto stretch = static_cast<std::size_t>(
+      std::clamp(kStretch_s / interval_s, kStretchSamplesMin, kStretchSamplesMax));
+  const std::vector<double> of_all =
+      stretch_sigmas_dps(out, stretch, kJudgedMin, [](std::size_t) { return true; });
+  std::array<std::vector<double>, kPlaces> of_place;
+  for (std::size_t place = 0; place < kPlaces; ++place) {
+    of_place[place] = stretch_sigmas_dps(out, stretch, kJudgedOfPlaceMin,
+                                         [&](std::size_t i) { return places[i] == place; });
+  }
+  std::vector<double> sigmas(out.size(), 0.0);
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    const double of_like = of_place[places[i]][i / stretch];
+    const double sigma = of_like > 0.0 ? of_like : of_all[i / stretch];
+    if (sigma > 0.0) sigmas[i] = std::max(sigma, kSpikeLatticeSteps / kSpikeSigmas * lattice_dps);
   }
   return sigmas;
 }
 
-// A sample is judged by the widest of its stretch and the two beside, because noise may rise with
-// the rate.
-std::vector<double> sigmas_dps(const std::vector<double>& out, double interval_s) {
-  const auto stretch = static_cast<std::size_t>(
-      std::clamp(kStretch_s / interval_s, kStretchSamplesMin, kStretchSamplesMax));
-  const std::vector<double> of_stretch = stretch_sigmas_dps(out, stretch);
-  std::vector<double> sigmas(out.size(), 0.0);
+// How much further than normal noise the deviations in one place reach, as far out as a spike must
+// stand, by the law exp(-(x/a)^k) through their median and where their tail begins. It grows with
+// the 2.1th power of how much further the tail begins: with the square.
+double tail_of(const Standing& standing, std::size_t place) {
+  const std::vector<double>& out = standing.out_dps;
+  const std::vector<double>& sigma = standing.sigma_dps;
+  std::vector<double> sizes;
   for (std::size_t i = 0; i < out.size(); ++i) {
-    const std::size_t own = i / stretch;
-    // Nowhere near enough good neighbours: nothing stands out.
-    if (of_stretch[own] <= 0.0) continue;
-    sigmas[i] = of_stretch[own];
-    if (own > 0) sigmas[i] = std::max(sigmas[i], of_stretch[own - 1]);
-    if (own + 1 < of_stretch.size()) sigmas[i] = std::max(sigmas[i], of_stretch[own + 1]);
+    if (standing.place[i] == place && out[i] != 0.0 && sigma[i] > 0.0)
+      sizes.push_back(std::abs(out[i]) / sigma[i]);
   }
-  return sigmas;
+  if (sizes.empty()) return 1.0;
+  const double median = std::max(kMedianMin_sigmas, median_of(sizes));
+  const auto beyond = static_cast<std::ptrdiff_t>(kTailShare * static_cast<double>(sizes.size()));
+  const auto begins = sizes.end() - 1 - beyond;
+  std::nth_element(sizes.begin(), begins, sizes.end());
+  const double further = std::max(1.0, *begins / (kTailPerMedian * median));
+  return further * further;
 }
 
 // How far each sample of a curve is from what its six neighbours let expect, beyond its noise: in a
@@ -161,16 +236,24 @@ Standing standing_of(const Recording& recording, const Timing& timing,
   const Lag& lag = timing.lag[gyro];
   standing.out_dps = deviations_dps(recording.gyros[gyro], transports[gyro], truth, lag);
   standing.unsure_dps = unsure_at(transports[gyro], truth, lag);
-  standing.sigma_dps = sigmas_dps(standing.out_dps, transports[gyro].interval_s);
+  // Without a reference the other's steps show as its own do.
+  const double lattice_dps =
+      std::max(transports[gyro].lattice_dps,
+               recording.has_reference ? 0.0 : transports[1 - gyro].lattice_dps);
+  standing.place = places_of(transports[gyro], truth, lag);
+  standing.sigma_dps =
+      sigmas_dps(standing.out_dps, standing.place, transports[gyro].interval_s, lattice_dps);
+  standing.against_s = truth.interval_s();
+  for (std::size_t place = 0; place < kPlaces; ++place)
+    standing.tail[place] = tail_of(standing, place);
   return standing;
 }
 
-bool stands_out(const Standing& standing, std::size_t i, double lattice_dps) {
+bool stands_out(const Standing& standing, std::size_t i) {
   if (standing.sigma_dps[i] <= 0.0) return false;
   const double size = std::abs(standing.out_dps[i]);
-  if (size < std::max({kSpikeSigmas * standing.sigma_dps[i], kSpikeLatticeSteps * lattice_dps,
-                       standing.unsure_dps[i]}))
-    return false;
+  const double reached_dps = standing.tail[standing.place[i]] * standing.sigma_dps[i];
+  if (size < std::max(kSpikeSigmas * reached_dps, standing.unsure_dps[i])) return false;
   return size >= std::abs(standing.out_dps[i - 1]) && size >= std::abs(standing.out_dps[i + 1]);
 }
 
@@ -191,6 +274,22 @@ bool is_others(const Standing& others, const Transport& transport, double at_s, 
   return false;
 }
 
+// Whether the other gyro shows alike, at about `at_s` of its own time, what stands out of one.
+bool is_references(const Standing& others, const std::vector<double>& t_s, double at_s,
+                   double out_dps) {
+  const auto from = std::lower_bound(t_s.begin(), t_s.end(), at_s - others.against_s);
+  const auto to = std::upper_bound(from, t_s.end(), at_s + others.against_s);
+  const auto last = static_cast<std::size_t>(to - t_s.begin());
+  for (auto j = static_cast<std::size_t>(from - t_s.begin()); j < last; ++j) {
+    const double other_dps = std::copysign(1.0, out_dps) * others.out_dps[j];
+    const double size_dps = std::abs(out_dps);
+    const bool like = other_dps > kCommonShare * size_dps && size_dps > kCommonShare * other_dps;
+    const double sigma_dps = others.sigma_dps[j];
+    if (like && sigma_dps > 0.0 && other_dps > kCommonSigmas * sigma_dps) return true;
+  }
+  return false;
+}
+
 // Indices of a gyro's spikes, which are masked.
 std::vector<std::size_t> mask_spikes(const Recording& recording, const Timing& timing,
                                      std::array<Transport, 2>& transports,
@@ -199,13 +298,15 @@ std::vector<std::size_t> mask_spikes(const Recording& recording, const Timing& t
   const std::size_t other = 1 - gyro;
   std::vector<std::size_t> spikes;
   for (std::size_t i = kNeighbours; i + kNeighbours < transport.t_s.size(); ++i) {
-    if (transport.masked[i] != 0 || !stands_out(standings[gyro], i, transport.lattice_dps))
+    if (transport.masked[i] != 0 || !stands_out(standings[gyro], i)) continue;
+    const double out_dps = standings[gyro].out_dps[i];
+    const double felt_s = transport.t_s[i] - timing.lag[gyro].at(transport.t_s[i]);
+    if (recording.has_reference) {
+      const double others_s = felt_s + timing.lag[other].at(felt_s);
+      if (is_references(standings[other], transports[other].t_s, others_s, out_dps)) continue;
+    } else if (is_others(standings[other], transports[other], felt_s, std::abs(out_dps))) {
       continue;
-    const double size_dps = std::abs(standings[gyro].out_dps[i]);
-    if (!recording.has_reference &&
-        is_others(standings[other], transports[other],
-                  transport.t_s[i] - timing.lag[gyro].at(transport.t_s[i]), size_dps))
-      continue;
+    }
     transport.masked[i] = kSpike;
     spikes.push_back(i);
   }

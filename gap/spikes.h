@@ -3,8 +3,11 @@
 // Single samples that stand out from their neighbours: glitches of a sensor or of its bus. A sample
 // is seen against the reference, or, where there is none, against the other gyro; then whichever of
 // the two stands out further has the spike. That is told by what interpolation leaves of it in the
-// other: gyros that sample at the very same instants show a spike alike. What stands out for longer
-// loses its edges at most, and is left to the regression.
+// other: gyros that sample at the very same instants show a spike alike. What both gyros show alike
+// against a reference is the reference's. How far deviations reach without a spike is learnt from
+// the recording: in each stretch, by where the sample falls between two of what it is seen against,
+// and with a tail as long as theirs. What stands out for longer loses its edges at most, and is
+// left to the regression.
 
 #include <array>
 #include <vector>

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <random>
 
 #include <gtest/gtest.h>
 
@@ -248,12 +250,147 @@ TEST(SpikesOfBoth, AreMoreThanStepsOfTheLattice) {
   GyroSeries& series = recording.gyros[0];
   for (double& rate_dps : series.rate_dps)
     rate_dps = kStep_dps * std::round(rate_dps / kStep_dps);
-  const std::vector<std::size_t> at{1000, 1500, 2000, 2500};
+  const std::vector<std::size_t> at{4000, 5500, 7000, 9000};
   add_spikes(series, at, 2.0 * kStep_dps);
   std::array<Transport, 2> transports = check_both(recording);
   ASSERT_NEAR(transports[0].lattice_dps, kStep_dps, 1e-3 * kStep_dps);
   EXPECT_EQ(spikes_of(find_spikes(recording, timing_of(recording, transports), transports, {}), 0),
             nullptr);
+  add_spikes(series, at, 4.0 * kStep_dps);
+  transports = check_both(recording);
+  find_spikes(recording, timing_of(recording, transports), transports, {});
+  EXPECT_EQ(masked_samples(transports[0]), at);
+}
+
+// Rate of a vehicle on a road: a Gaussian process of 2 to 60 Hz, as a sum of waves, while it moves.
+std::function<double(double)> road_dps(double rms_dps, double from_s, std::uint64_t seed) {
+  struct Wave {
+    double rate_rad_s, phase_rad;
+  };
+  constexpr int kWaves = 150;
+  std::mt19937_64 random(seed);
+  std::uniform_real_distribution<double> frequency_hz(2.0, 60.0);
+  std::uniform_real_distribution<double> phase_rad(0.0, 2.0 * kPi);
+  std::vector<Wave> waves;
+  for (int k = 0; k < kWaves; ++k)
+    waves.push_back({2.0 * kPi * frequency_hz(random), phase_rad(random)});
+  const double amplitude_dps = rms_dps * std::sqrt(2.0 / kWaves);
+  return [=](double t_s) {
+    double sum = 0.0;
+    if (t_s < from_s) return sum;
+    for (const Wave& wave : waves)
+      sum += std::sin(wave.rate_rad_s * t_s + wave.phase_rad);
+    return amplitude_dps * sum;
+  };
+}
+
+// Of every second instant.
+void thin(ScalarSeries& series) {
+  for (std::size_t i = 0; 2 * i < series.t_s.size(); ++i) {
+    series.t_s[i] = series.t_s[2 * i];
+    series.value[i] = series.value[2 * i];
+  }
+  series.t_s.resize((series.t_s.size() + 1) / 2);
+  series.value.resize(series.t_s.size());
+}
+
+// A quiet gyro and a rough one, and a reference that samples half as often: every second sample of
+// a gyro stands between two of the reference's, where the road folds.
+Recording on_a_road(std::uint64_t seed) {
+  constexpr double kRoad_dps = 0.3;
+  Making making = making_of(seed);
+  making.white_dps_rthz = {3e-5, 5e-3};
+  Recording recording = recording_of(making, true);
+  const auto road = road_dps(kRoad_dps, making.rest_s, seed);
+  for (GyroSeries& series : recording.gyros) {
+    for (std::size_t i = 0; i < series.t_s.size(); ++i)
+      series.rate_dps[i] += road(series.t_s[i]);
+  }
+  ScalarSeries& reference = recording.reference_dps;
+  for (std::size_t i = 0; i < reference.t_s.size(); ++i)
+    reference.value[i] += road(reference.t_s[i]);
+  thin(reference);
+  return recording;
+}
+
+TEST(SpikesOnARoad, WhatASlowReferenceFoldsIsNone) {
+  for (const std::uint64_t seed : {31U, 32U, 33U}) {
+    const Recording recording = on_a_road(seed);
+    std::array<Transport, 2> transports = check_both(recording);
+    EXPECT_TRUE(find_spikes(recording, timing_of(recording, transports), transports, {}).empty())
+        << "seed " << seed;
+    for (const Transport& transport : transports)
+      EXPECT_TRUE(masked_samples(transport).empty()) << "seed " << seed;
+  }
+}
+
+TEST(SpikesOnARoad, AreFoundBesideWhatASlowReferenceFolds) {
+  for (const std::size_t gyro : {0U, 1U}) {
+    constexpr double kSize_dps = 6.0;
+    Recording recording = on_a_road(34);
+    const std::vector<std::size_t> at =
+        scattered(recording.gyros[gyro].t_s.size(), kApart, kSpikeShare, 34);
+    add_spikes(recording.gyros[gyro], at, kSize_dps);
+    std::array<Transport, 2> transports = check_both(recording);
+    const std::vector<Finding> findings =
+        find_spikes(recording, timing_of(recording, transports), transports, {});
+    ASSERT_EQ(findings.size(), 1U);
+    EXPECT_EQ(findings[0].effect.gyro, gyro);
+    EXPECT_NEAR(findings[0].effect.parameters[1], kSize_dps, 5.0 * findings[0].sigma[1]);
+    EXPECT_EQ(masked_samples(transports[gyro]), at);
+    EXPECT_TRUE(masked_samples(transports[1 - gyro]).empty());
+  }
+}
+
+// Of a law whose tail is longer than that of e^-|x|.
+TEST_P(Spikes, NoiseWithALongTailIsNone) {
+  for (const std::uint64_t seed : {41U, 42U, 43U}) {
+    Making making = making_of(seed);
+    std::mt19937_64 random(seed);
+    std::exponential_distribution<double> size;
+    std::bernoulli_distribution up;
+    making.error = [&](std::size_t, double, double) {
+      const double size_dps = 0.1 * std::pow(size(random), 1.4);
+      return up(random) ? size_dps : -size_dps;
+    };
+    const Recording recording = recording_of(making, GetParam());
+    std::array<Transport, 2> transports = check_both(recording);
+    EXPECT_TRUE(find_spikes(recording, timing_of(recording, transports), transports, {}).empty())
+        << "seed " << seed;
+  }
+}
+
+// A reference that goes wrong for two of its samples is as sure of itself as ever.
+TEST(SpikesOfBoth, AreTheReferencesWhereTheyAreAlike) {
+  Recording recording = recording_of(making_of(16), true);
+  for (GyroSeries& series : recording.gyros) {
+    ScalarSeries slow{series.t_s, series.rate_dps};
+    thin(slow);
+    series.t_s = slow.t_s;
+    series.rate_dps = slow.value;
+  }
+  std::vector<double>& reference = recording.reference_dps.value;
+  double off_dps = 2.0;
+  for (const std::size_t at : scattered(reference.size(), 60, 0.01, 16)) {
+    for (std::size_t k = 0; k < 3; ++k)
+      reference[at + k] += off_dps;
+    off_dps = -off_dps;
+  }
+  std::array<Transport, 2> transports = check_both(recording);
+  EXPECT_TRUE(find_spikes(recording, timing_of(recording, transports), transports, {}).empty());
+}
+
+// A step of the coarse gyro's lattice stands far out of what the fine one reads.
+TEST(SpikesOfBoth, AreNoStepsOfTheOthersLattice) {
+  constexpr double kStep_dps = 0.37;
+  Making making = making_of(17);
+  making.white_dps_rthz = {1e-4, 1.2e-2};
+  Recording recording = recording_of(making, false);
+  for (double& rate_dps : recording.gyros[1].rate_dps)
+    rate_dps = kStep_dps * std::round(rate_dps / kStep_dps);
+  std::array<Transport, 2> transports = check_both(recording);
+  ASSERT_NEAR(transports[1].lattice_dps, kStep_dps, 1e-3 * kStep_dps);
+  EXPECT_TRUE(find_spikes(recording, timing_of(recording, transports), transports, {}).empty());
 }
 
 // What clips is told with the cost of all that is masked, and spikes are masked after it was found.
