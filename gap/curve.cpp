@@ -21,6 +21,9 @@ constexpr double kKaiser = 8.0;
 constexpr std::size_t kPhases = 512;
 // Polynomials up to the fifth degree pass unchanged: a turn is large and slow.
 constexpr int kMoments = 6;
+// Pauses are not cut into cells without end: what lies beyond is looked for from the last cell on.
+constexpr double kCellsPerSample = 16.0;
+constexpr double kRounding = 1e-3;
 // A step that is further from the median than this share of it is uneven.
 constexpr double kUneven = 0.02;
 
@@ -129,62 +132,96 @@ double product(const Row& a, const Row& b, double share, const double* values) {
 
 }  // namespace
 
-SampledCurve::SampledCurve(std::span<const double> t_s, std::span<const double> value) {
-  t_s_.reserve(t_s.size());
-  value_.reserve(t_s.size());
-  for (std::size_t i = 0; i < t_s.size(); ++i) {
-    if (!t_s_.empty() && t_s[i] <= t_s_.back()) continue;
-    t_s_.push_back(t_s[i]);
-    value_.push_back(value[i]);
-  }
-  if (t_s_.size() < 2) return;
-  std::vector<double> steps_s(t_s_.size() - 1);
-  for (std::size_t i = 0; i + 1 < t_s_.size(); ++i)
-    steps_s[i] = t_s_[i + 1] - t_s_[i];
-  interval_s_ = median_of(steps_s);
-  set_even_steps();
+const std::shared_ptr<const SampledCurve::Times>& SampledCurve::no_times() {
+  static const auto kNone = std::make_shared<const Times>();
+  return kNone;
 }
 
+SampledCurve::SampledCurve(std::span<const double> t_s, std::span<const double> value) {
+  auto times = std::make_shared<Times>();
+  times->t_s.reserve(t_s.size());
+  value_.reserve(t_s.size());
+  for (std::size_t i = 0; i < t_s.size(); ++i) {
+    if (!times->t_s.empty() && t_s[i] <= times->t_s.back()) continue;
+    times->t_s.push_back(t_s[i]);
+    value_.push_back(value[i]);
+  }
+  if (value_.size() > 1) times->set_even_steps();
+  times_ = std::move(times);
+}
+
+SampledCurve SampledCurve::with_values(std::vector<double> value) const {
+  SampledCurve other;
+  other.times_ = times_;
+  other.value_ = std::move(value);
+  return other;
+}
+
+// Cells of an interval's length hold the place of what came before them: from there it is a step or
+// two, where samples are even and where some are missing.
 std::size_t SampledCurve::index_before(double t_s) const {
-  // Even sampling: the place is nearly known.
-  const double place = (t_s - t_s_.front()) / interval_s_;
-  auto i = static_cast<std::size_t>(std::clamp(place, 0.0, static_cast<double>(t_s_.size() - 2)));
-  if (t_s_[i] <= t_s && t_s < t_s_[i + 1]) return i;
-  const auto after = std::upper_bound(t_s_.begin(), t_s_.end(), t_s);
-  const auto index = static_cast<std::size_t>(after - t_s_.begin());
-  return std::clamp<std::size_t>(index, 1, t_s_.size() - 1) - 1;
+  const std::vector<double>& times_s = times_->t_s;
+  const std::vector<std::uint32_t>& first = times_->first_of_cell;
+  const double at = (t_s - times_s.front()) / times_->interval_s;
+  const auto cell =
+      static_cast<std::size_t>(std::clamp(at, 0.0, static_cast<double>(first.size() - 1)));
+  std::size_t i = first[cell];
+  while (i + 2 < times_s.size() && times_s[i + 1] <= t_s)
+    ++i;
+  return i;
 }
 
 // The first of the points about an instant.
 std::size_t SampledCurve::first_about(double t_s) const {
-  const std::size_t count = std::min(kPoints, t_s_.size());
+  const std::size_t count = std::min(kPoints, times_->t_s.size());
   const std::size_t before = index_before(t_s);
   const std::size_t first = before + 1 > count / 2 ? before + 1 - count / 2 : 0;
-  return std::min(first, t_s_.size() - count);
+  return std::min(first, times_->t_s.size() - count);
 }
 
-void SampledCurve::set_even_steps() {
-  even_steps_.assign(t_s_.size(), 0);
-  for (std::size_t i = 1; i < t_s_.size(); ++i) {
-    const double step_s = t_s_[i] - t_s_[i - 1];
-    const bool even = std::abs(step_s - interval_s_) <= kUneven * interval_s_;
-    const int led = even_steps_[i - 1] + 1;
-    even_steps_[i] = even ? static_cast<std::uint8_t>(std::min<int>(led, kPointsMax)) : 0;
+// The last sample that is not behind the cell's beginning, and has another one behind it.
+void SampledCurve::Times::set_cells() {
+  const double cells = std::min((t_s.back() - t_s.front()) / interval_s,
+                                kCellsPerSample * static_cast<double>(t_s.size()));
+  first_of_cell.resize(static_cast<std::size_t>(cells) + 1);
+  std::size_t i = 0;
+  for (std::size_t cell = 0; cell < first_of_cell.size(); ++cell) {
+    // A little early: a time that is divided by the interval may be rounded into the next cell.
+    const double from_s = t_s.front() + (static_cast<double>(cell) - kRounding) * interval_s;
+    while (i + 2 < t_s.size() && t_s[i + 1] <= from_s)
+      ++i;
+    first_of_cell[cell] = static_cast<std::uint32_t>(i);
+  }
+}
+
+void SampledCurve::Times::set_even_steps() {
+  std::vector<double> steps_s(t_s.size() - 1);
+  for (std::size_t i = 0; i + 1 < t_s.size(); ++i)
+    steps_s[i] = t_s[i + 1] - t_s[i];
+  interval_s = median_of(steps_s);
+  set_cells();
+  even_steps.assign(t_s.size(), 0);
+  for (std::size_t i = 1; i < t_s.size(); ++i) {
+    const double step_s = t_s[i] - t_s[i - 1];
+    const bool even = std::abs(step_s - interval_s) <= kUneven * interval_s;
+    const int led = even_steps[i - 1] + 1;
+    even_steps[i] = even ? static_cast<std::uint8_t>(std::min<int>(led, kPointsMax)) : 0;
   }
 }
 
 bool SampledCurve::is_even_about(std::size_t before) const {
   const std::size_t last = before + kReach;
-  return before + 1 >= kReach && last < t_s_.size() && even_steps_[last] >= kPointsMax - 1;
+  return before + 1 >= kReach && last < times_->t_s.size() &&
+         times_->even_steps[last] >= kPointsMax - 1;
 }
 
 SampledCurve::Point SampledCurve::at(double t_s) const {
-  if (t_s <= t_s_.front()) return {value_.front(), 0.0};
-  if (t_s >= t_s_.back()) return {value_.back(), 0.0};
+  if (t_s <= times_->t_s.front()) return {value_.front(), 0.0};
+  if (t_s >= times_->t_s.back()) return {value_.back(), 0.0};
   const std::size_t before = index_before(t_s);
   if (!is_even_about(before)) return polynomial_at(t_s);
-  const double step_s = t_s_[before + 1] - t_s_[before];
-  const auto [row, share] = place_of((t_s - t_s_[before]) / step_s);
+  const double step_s = times_->t_s[before + 1] - times_->t_s[before];
+  const auto [row, share] = place_of((t_s - times_->t_s[before]) / step_s);
   const double* values = &value_[before + 1 - kReach];
   const Table& weights = table();
   return {product(weights.value[row], weights.value[row + 1], share, values),
@@ -192,11 +229,12 @@ SampledCurve::Point SampledCurve::at(double t_s) const {
 }
 
 double SampledCurve::value_at(double t_s) const {
-  if (t_s <= t_s_.front()) return value_.front();
-  if (t_s >= t_s_.back()) return value_.back();
+  if (t_s <= times_->t_s.front()) return value_.front();
+  if (t_s >= times_->t_s.back()) return value_.back();
   const std::size_t before = index_before(t_s);
   if (!is_even_about(before)) return polynomial_at(t_s).value;
-  const auto [row, share] = place_of((t_s - t_s_[before]) / (t_s_[before + 1] - t_s_[before]));
+  const auto [row, share] =
+      place_of((t_s - times_->t_s[before]) / (times_->t_s[before + 1] - times_->t_s[before]));
   const Table& weights = table();
   return product(weights.value[row], weights.value[row + 1], share, &value_[before + 1 - kReach]);
 }
@@ -204,14 +242,15 @@ double SampledCurve::value_at(double t_s) const {
 std::vector<double> SampledCurve::quarters() const {
   using Points = Eigen::Array<double, kPointsMax, 1>;
   std::vector<double> values;
-  values.reserve(kQuarters * t_s_.size());
-  for (std::size_t i = 0; i + 1 < t_s_.size(); ++i) {
+  values.reserve(kQuarters * times_->t_s.size());
+  for (std::size_t i = 0; i + 1 < times_->t_s.size(); ++i) {
     values.push_back(value_[i]);
     const bool even = is_even_about(i);
     for (std::size_t part = 1; part < kQuarters; ++part) {
       if (!even) {
         const double share = static_cast<double>(part) / kQuarters;
-        values.push_back(polynomial_at(t_s_[i] + share * (t_s_[i + 1] - t_s_[i])).value);
+        values.push_back(
+            polynomial_at(times_->t_s[i] + share * (times_->t_s[i + 1] - times_->t_s[i])).value);
         continue;
       }
       const Row& row = table().value[part * kPhases / kQuarters];
@@ -224,18 +263,18 @@ std::vector<double> SampledCurve::quarters() const {
 }
 
 SampledCurve::Point SampledCurve::nearby(double t_s) const {
-  if (t_s <= t_s_.front()) return {value_.front(), 0.0};
-  if (t_s >= t_s_.back()) return {value_.back(), 0.0};
+  if (t_s <= times_->t_s.front()) return {value_.front(), 0.0};
+  if (t_s >= times_->t_s.back()) return {value_.back(), 0.0};
   return polynomial_at(t_s);
 }
 
 // Lagrange's polynomials; times in intervals keep the products small.
 SampledCurve::Point SampledCurve::polynomial_at(double t_s) const {
-  const std::size_t count = std::min(kPoints, t_s_.size());
+  const std::size_t count = std::min(kPoints, times_->t_s.size());
   const std::size_t first = first_about(t_s);
   std::array<double, kPoints> x{};
   for (std::size_t i = 0; i < count; ++i)
-    x[i] = (t_s - t_s_[first + i]) / interval_s_;
+    x[i] = (t_s - times_->t_s[first + i]) / times_->interval_s;
   const auto weight = lagrange_weights(x, count);
   Point point{0.0, 0.0};
   for (std::size_t i = 0; i < count; ++i) {
@@ -250,20 +289,20 @@ SampledCurve::Point SampledCurve::polynomial_at(double t_s) const {
     point.value += product * value;
     point.slope += slope * value;
   }
-  point.slope /= interval_s_;
+  point.slope /= times_->interval_s;
   return point;
 }
 
 SampledCurve::Weights SampledCurve::weights_at(double t_s) const {
   Weights weights;
-  const std::size_t count = std::min(kPoints, t_s_.size());
+  const std::size_t count = std::min(kPoints, times_->t_s.size());
   weights.count = count;
-  if (t_s <= t_s_.front()) {
+  if (t_s <= times_->t_s.front()) {
     weights.value[0] = 1.0;
     return weights;
   }
-  if (t_s >= t_s_.back()) {
-    weights.first = t_s_.size() - count;
+  if (t_s >= times_->t_s.back()) {
+    weights.first = times_->t_s.size() - count;
     weights.value[count - 1] = 1.0;
     return weights;
   }
@@ -271,7 +310,8 @@ SampledCurve::Weights SampledCurve::weights_at(double t_s) const {
   if (is_even_about(before)) {
     weights.first = before + 1 - kReach;
     weights.count = kPointsMax;
-    const auto [row, share] = place_of((t_s - t_s_[before]) / (t_s_[before + 1] - t_s_[before]));
+    const auto [row, share] =
+        place_of((t_s - times_->t_s[before]) / (times_->t_s[before + 1] - times_->t_s[before]));
     for (std::size_t i = 0; i < kPointsMax; ++i)
       weights.value[i] = std::lerp(table().value[row][i], table().value[row + 1][i], share);
     return weights;
@@ -279,7 +319,7 @@ SampledCurve::Weights SampledCurve::weights_at(double t_s) const {
   weights.first = first_about(t_s);
   std::array<double, kPoints> x{};
   for (std::size_t i = 0; i < count; ++i)
-    x[i] = (t_s - t_s_[weights.first + i]) / interval_s_;
+    x[i] = (t_s - times_->t_s[weights.first + i]) / times_->interval_s;
   const auto polynomial = lagrange_weights(x, count);
   for (std::size_t i = 0; i < count; ++i) {
     weights.value[i] = polynomial[i];
@@ -291,10 +331,10 @@ SampledCurve::Weights SampledCurve::weights_at(double t_s) const {
 }
 
 double SampledCurve::linear(double t_s) const {
-  if (t_s <= t_s_.front()) return value_.front();
-  if (t_s >= t_s_.back()) return value_.back();
+  if (t_s <= times_->t_s.front()) return value_.front();
+  if (t_s >= times_->t_s.back()) return value_.back();
   const std::size_t i = index_before(t_s);
-  const double share = (t_s - t_s_[i]) / (t_s_[i + 1] - t_s_[i]);
+  const double share = (t_s - times_->t_s[i]) / (times_->t_s[i + 1] - times_->t_s[i]);
   return value_[i] + share * (value_[i + 1] - value_[i]);
 }
 
@@ -302,7 +342,7 @@ bool SampledCurve::hole_at(double t_s, double reach_s) const {
   if (empty() || t_s < from_s() - reach_s || t_s > to_s() + reach_s) return true;
   if (t_s <= from_s() || t_s >= to_s()) return false;
   const std::size_t before = index_before(t_s);
-  return t_s_[before + 1] - t_s_[before] > 2.0 * reach_s;
+  return times_->t_s[before + 1] - times_->t_s[before] > 2.0 * reach_s;
 }
 
 }  // namespace vgyro::gap

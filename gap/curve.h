@@ -6,6 +6,7 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -20,11 +21,14 @@ class SampledCurve {
   /// Times that do not increase are passed over. Memory: a copy.
   SampledCurve(std::span<const double> t_s, std::span<const double> value);
 
-  [[nodiscard]] bool empty() const { return t_s_.size() < 2; }
-  [[nodiscard]] double from_s() const { return t_s_.front(); }
-  [[nodiscard]] double to_s() const { return t_s_.back(); }
-  [[nodiscard]] double interval_s() const { return interval_s_; }
-  [[nodiscard]] std::span<const double> times_s() const { return t_s_; }
+  /// Another quantity at the same times, which both share.
+  [[nodiscard]] SampledCurve with_values(std::vector<double> value) const;
+
+  [[nodiscard]] bool empty() const { return value_.size() < 2; }
+  [[nodiscard]] double from_s() const { return times_->t_s.front(); }
+  [[nodiscard]] double to_s() const { return times_->t_s.back(); }
+  [[nodiscard]] double interval_s() const { return times_->interval_s; }
+  [[nodiscard]] std::span<const double> times_s() const { return times_->t_s; }
   [[nodiscard]] std::span<const double> values() const { return value_; }
 
   struct Point {
@@ -58,13 +62,19 @@ class SampledCurve {
   [[nodiscard]] Point polynomial_at(double t_s) const;
   /// The samples about the interval behind `before` are evenly spaced.
   [[nodiscard]] bool is_even_about(std::size_t before) const;
-  void set_even_steps();
 
-  std::vector<double> t_s_;
+  struct Times {
+    std::vector<double> t_s;
+    std::vector<std::uint8_t> even_steps;  ///< that led up to each sample, as far as it matters
+    double interval_s = 0.0;               ///< median
+    std::vector<std::uint32_t> first_of_cell;
+    void set_even_steps();
+    void set_cells();
+  };
+  static const std::shared_ptr<const Times>& no_times();
+
+  std::shared_ptr<const Times> times_ = no_times();
   std::vector<double> value_;
-  std::vector<double> weights_;           ///< of the polynomials, by their first place
-  std::vector<std::uint8_t> even_steps_;  ///< how many led up to each sample, as far as it matters
-  double interval_s_ = 0.0;               ///< median
 };
 
 }  // namespace vgyro::gap

@@ -18,6 +18,8 @@ constexpr double kShorter = 0.4;
 // Of the sum of squares in units of the noise: rounding, and what no longer matters.
 constexpr double kSame = 1e-9;
 constexpr double kSettledGain = 0.01;
+// Slopes are dear; a step that gained less than this moved too little to change them.
+constexpr double kSlopesStay = 1.0;
 // Terms and noise in turn, until the likelihood stands.
 constexpr int kTurns = 3;
 constexpr double kSettledLikelihood = 0.05;
@@ -149,43 +151,83 @@ double Regression::log_likelihood(const Effects& terms, const PairNoise& noise) 
   return gap::log_likelihood(residual(terms), data_->layout, noise, part_);
 }
 
-// One step, shortened until it makes nothing worse. False: this was the last.
-bool Regression::step(Fit& fit, double& square) const {
-  const Matrix white = whitened(columns(fit.terms), fit.noise);
-  const Solution solution = explain_first(white.transpose() * white);
-  fit.covariance = solution.covariance;
-  double scale = 1.0;
-  for (int shorter = 0; shorter < kShorterMax; ++shorter, scale *= kShorter) {
-    Effects trial = moved(fit.terms, solution.x, scale);
-    for (Effect& term : trial)
-      keep_in_bounds(term);
-    const double now = whitened(Matrix(residual(trial)), fit.noise).squaredNorm();
-    if (now > square + kSame) continue;
-    const double gained = square - now;
-    fit.terms = std::move(trial);
-    square = now;
-    return gained >= kSettledGain;
+// Gauss-Newton's steps, each from where the last one ended: what is left of the observations, and
+// what the free parameters move.
+class Regression::Descent {
+ public:
+  Descent(const Regression& regression, const Effects& terms)
+      : regression_(regression),
+        is_linear_(vgyro::gap::is_linear(terms)),
+        columns_(regression.data().size(), 1 + free_count(terms)) {
+    columns_.col(0) = regression.residual(terms);
   }
-  return false;
-}
 
-// One step is all.
-void Regression::solve_linear(Fit& fit) const {
-  const Matrix white = whitened(columns(fit.terms), fit.noise);
-  const Solution solution = explain_first(white.transpose() * white);
-  fit.covariance = solution.covariance;
-  fit.terms = moved(fit.terms, solution.x, 1.0);
-  for (Effect& term : fit.terms)
-    keep_in_bounds(term);
-}
+  [[nodiscard]] Eigen::VectorXd residual() const { return columns_.col(0); }
+  void set_residual(const Eigen::VectorXd& residual) { columns_.col(0) = residual; }
+
+  /// Precondition: the residual is that of the fit's terms.
+  void settle(Fit& fit) {
+    if (fit.terms.empty()) return;
+    double before = 0.0;
+    for (int i = 0; i < kStepsMax; ++i) {
+      const bool fresh = !slopes_known_;
+      if (fresh) learn_slopes(fit.terms);
+      const double gained = step(fit);
+      // What is as good as linear is solved; else gains shrink by the same share or faster.
+      if (is_linear_) return;
+      if (gained < kSettledGain || gained * gained < kSettledGain * before) {
+        if (fresh || gained > 0.0) return;
+        slopes_known_ = false;
+        continue;
+      }
+      if (gained > kSlopesStay) slopes_known_ = false;
+      before = gained;
+    }
+  }
+
+ private:
+  void learn_slopes(const Effects& terms) {
+    Eigen::Index at = 1;
+    for (std::size_t i = 0; i < terms.size(); ++i) {
+      const Eigen::Index count = free_count({terms[i]});
+      if (count == 0) continue;
+      columns_.middleCols(at, count) = regression_.derivatives(terms, i);
+      at += count;
+    }
+    slopes_known_ = true;
+  }
+
+  // Shortened until it makes nothing worse. Returns what it gained of the sum of squares; 0: it was
+  // not taken.
+  double step(Fit& fit) {
+    const Matrix white = regression_.whitened(columns_, fit.noise);
+    const Solution solution = explain_first(white.transpose() * white);
+    fit.covariance = solution.covariance;
+    const double square = white.col(0).squaredNorm();
+    double scale = 1.0;
+    for (int shorter = 0; shorter < kShorterMax; ++shorter, scale *= kShorter) {
+      Effects trial = moved(fit.terms, solution.x, scale);
+      for (Effect& term : trial)
+        regression_.keep_in_bounds(term);
+      const Eigen::VectorXd residual = regression_.residual(trial);
+      const double now = regression_.whitened(Matrix(residual), fit.noise).squaredNorm();
+      if (now > square + kSame) continue;
+      fit.terms = std::move(trial);
+      columns_.col(0) = residual;
+      return square - now;
+    }
+    return 0.0;
+  }
+
+  const Regression& regression_;
+  bool is_linear_;
+  Matrix columns_;
+  bool slopes_known_ = false;
+};
 
 void Regression::improve(Fit& fit) const {
   if (fit.terms.empty()) return;
-  if (is_linear(fit.terms)) return solve_linear(fit);
-  double square = whitened(Matrix(residual(fit.terms)), fit.noise).squaredNorm();
-  for (int i = 0; i < kStepsMax; ++i) {
-    if (!step(fit, square)) return;
-  }
+  Descent(*this, fit.terms).settle(fit);
 }
 
 // White noise, that of the rate, and walk; correlated drift as the model has it.
@@ -200,18 +242,24 @@ void Regression::fit_noise(Fit& fit, const Eigen::VectorXd& residual) const {
 }
 
 // Drift of a few seconds' or minutes' memory must not pass for an effect.
-void Regression::allow_drift(Fit& fit, std::size_t gyro) const {
+void Regression::allow_drift(Fit& fit, std::size_t gyro, Descent& descent) const {
   if (!data_->holds[gyro] || fit.noise[gyro].markov.size() >= kMarkovMax) return;
   std::array<Freedom, 2> free;
   free[gyro].markov = true;
+  const Eigen::VectorXd residual = descent.residual();
   const NoiseFitResult with =
-      fit_pair_noise(residual(fit.terms), data_->layout, fit.noise, free, data_->holds, part_);
+      fit_pair_noise(residual, data_->layout, fit.noise, free, data_->holds, part_);
   if (with.log_likelihood < fit.log_likelihood + kDriftGain) return;
   Fit richer = fit;
   richer.noise = with.noise;
-  improve(richer);
-  richer.log_likelihood = log_likelihood(richer.terms, richer.noise);
-  if (richer.log_likelihood > fit.log_likelihood) fit = std::move(richer);
+  descent.settle(richer);
+  richer.log_likelihood =
+      gap::log_likelihood(descent.residual(), data_->layout, richer.noise, part_);
+  if (richer.log_likelihood > fit.log_likelihood) {
+    fit = std::move(richer);
+  } else {
+    descent.set_residual(residual);
+  }
 }
 
 Fit Regression::fit_linearised(Effects terms, const PairNoise& start, const Fit& null) const {
@@ -249,22 +297,23 @@ Fit Regression::fit_linearised(Effects terms, const PairNoise& start, const Fit&
   return fit;
 }
 
-Fit Regression::fit_in_turns(Effects terms, const PairNoise& start) const {
+Fit Regression::fit_in_turns(Effects terms, const PairNoise& start, Descent& descent) const {
   Fit fit{std::move(terms), start, 0.0, {}};
   const int turns = fit.terms.empty() ? 1 : kTurns;
   for (int turn = 0; turn < turns; ++turn) {
-    improve(fit);
+    descent.settle(fit);
     const double before = fit.log_likelihood;
-    fit_noise(fit, residual(fit.terms));
+    fit_noise(fit, descent.residual());
     if (turn > 0 && std::abs(fit.log_likelihood - before) < kSettledLikelihood) break;
   }
   return fit;
 }
 
 Fit Regression::fit(Effects terms, const PairNoise& start) const {
-  Fit fit = fit_in_turns(std::move(terms), start);
+  Descent descent(*this, terms);
+  Fit fit = fit_in_turns(std::move(terms), start, descent);
   for (std::size_t gyro = 0; gyro < 2; ++gyro)
-    allow_drift(fit, gyro);
+    allow_drift(fit, gyro, descent);
   return fit;
 }
 
@@ -277,9 +326,10 @@ Fit Regression::fit_beside(Effects terms, const PairNoise& start, const Fit& nul
   // What the others are moved by it is little: their slopes serve.
   if (!terms.empty() && is_linear({terms.back()}))
     return fit_linearised(std::move(terms), start, null);
-  Fit fit = fit_in_turns(std::move(terms), start);
+  Descent descent(*this, terms);
+  Fit fit = fit_in_turns(std::move(terms), start, descent);
   for (std::size_t gyro = 0; gyro < 2; ++gyro) {
-    if (needs_drift(null, gyro)) allow_drift(fit, gyro);
+    if (needs_drift(null, gyro)) allow_drift(fit, gyro, descent);
   }
   return fit;
 }

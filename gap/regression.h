@@ -66,13 +66,13 @@ class Regression {
   void keep_in_bounds(model::Effect& effect) const;
 
  private:
-  bool step(Fit& fit, double& square) const;
-  void solve_linear(Fit& fit) const;
-  [[nodiscard]] Fit fit_in_turns(Effects terms, const PairNoise& start) const;
+  class Descent;
+
+  [[nodiscard]] Fit fit_in_turns(Effects terms, const PairNoise& start, Descent& descent) const;
   [[nodiscard]] bool needs_drift(const Fit& fit, std::size_t gyro) const;
   void fit_noise(Fit& fit, const Eigen::VectorXd& residual) const;
   [[nodiscard]] Fit fit_linearised(Effects terms, const PairNoise& start, const Fit& null) const;
-  void allow_drift(Fit& fit, std::size_t gyro) const;
+  void allow_drift(Fit& fit, std::size_t gyro, Descent& descent) const;
 
   std::shared_ptr<const Observations> data_;
   Effects known_;

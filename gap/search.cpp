@@ -67,6 +67,10 @@ constexpr double kJitterMemory_s = 1.0;
 // Each turn learns the motion from the last fit. The rivals are only compared, and all after as
 // many.
 constexpr int kMotionTurns = 3;
+// Of the log-likelihood from one turn to the next: nothing moves any more; or the motion that the
+// terms give contradicts them, and further turns would only lead farther off.
+constexpr double kTurnsAlike = 0.1;
+constexpr double kTurnFails = 500.0;
 // What must be left of a bounded time: names are worth nothing before they were checked, which
 // takes about as long as finding them; and what was found must be scored and drawn.
 constexpr double kLeftToCheck = 0.5;
@@ -223,8 +227,11 @@ void Search::start() {
     found_.back().starting = true;
   }
   if (!unknown_noise_[0] && !unknown_noise_[1]) return;
-  // Twice: of the first motion a bias was no part.
+  // Twice: of the first motion a bias was no part, and both gyros weighed the same in it. What is
+  // late is reckoned by a mean: were it not the one with the least noise, a false low-pass would
+  // seem to take some off.
   settle();
+  starting_noise_ = noise_effects(noise_);
   settle();
   for (const Found& one : found_)
     first_starting_.push_back(one.effect);
@@ -483,10 +490,16 @@ void Search::drop_lone_references() {
 Fit Search::fit_with_motion(Effects terms) const {
   Fit fitted;
   fitted.terms = std::move(terms);
+  std::shared_ptr<const Study> trial;
   for (int turn = 0; turn < kMotionTurns; ++turn) {
-    const auto trial = study_->with_motion_on_trial(regressions_.front().with_known(fitted.terms));
+    Effects effects = regressions_.front().with_known(fitted.terms);
+    effects.insert(effects.end(), starting_noise_.begin(), starting_noise_.end());
+    trial = trial ? trial->with_motion_moved(effects) : study_->with_motion_on_trial(effects);
     const Regression regression(trial->observations().front(), known_, Part::kFit);
+    const double before = fitted.log_likelihood;
     fitted = regression.fit_beside(fitted.terms, noise_, Fit{{}, noise_, 0.0, {}});
+    const double gained = fitted.log_likelihood - before;
+    if (turn > 0 && (std::abs(gained) < kTurnsAlike || gained < -kTurnFails)) break;
   }
   return fitted;
 }

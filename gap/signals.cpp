@@ -27,6 +27,9 @@ constexpr double kFollows = 1.2;
 constexpr double kGridStep_s = 0.25;
 
 constexpr std::size_t kQuarters = SampledCurve::kQuarters;
+// Steps that differ by less than this share have exponentials that follow from each other: they are
+// right to half its square.
+constexpr double kSameStep = 1e-6;
 // A pair's gyros have a low-pass each, and a search tries others beside them.
 constexpr std::size_t kFilteredMax = 4;
 
@@ -39,17 +42,25 @@ std::vector<Number> behind_pole(const SampledCurve& curve, const std::vector<dou
   std::vector<Number> value(t_s.size());
   Number state = curve.values().front();
   value[0] = state;
+  // An exponential is dear, and most steps are as long as the last but for a stamp's rounding.
+  double last_s = 0.0;
+  Number last_decay = 1.0;
+  const Number memory = 1.0 / pole;
   for (std::size_t i = 0; i + 1 < t_s.size(); ++i) {
     const double half_s = 0.5 * (t_s[i + 1] - t_s[i]);
-    const Number decay = std::exp(-pole * half_s);
+    if (std::abs(half_s - last_s) > kSameStep * half_s) {
+      last_s = half_s;
+      last_decay = std::exp(-pole * half_s);
+    }
+    const Number decay = last_decay * (1.0 - pole * (half_s - last_s));
     for (std::size_t half = 0; half < 2; ++half) {
       const double* u = &quarters[kQuarters * i + 2 * half];
       const double bend = 2.0 * (u[0] - 2.0 * u[1] + u[2]) / (half_s * half_s);
       const double slope = (u[2] - u[0]) / half_s - bend * half_s;
       // y' = pole·(u − y) is met by a parabola and what decays.
       const double c = bend;
-      const Number b = slope - 2.0 * c / pole;
-      const Number a = u[0] - b / pole;
+      const Number b = slope - 2.0 * c * memory;
+      const Number a = u[0] - b * memory;
       state = a + (b + c * half_s) * half_s + (state - a) * decay;
     }
     value[i + 1] = state;
@@ -59,19 +70,27 @@ std::vector<Number> behind_pole(const SampledCurve& curve, const std::vector<dou
 
 SampledCurve low_pass(const SampledCurve& curve, const std::vector<double>& quarters,
                       double cutoff_hz) {
-  return {curve.times_s(), behind_pole(curve, quarters, 2.0 * std::numbers::pi * cutoff_hz)};
+  return curve.with_values(behind_pole(curve, quarters, 2.0 * std::numbers::pi * cutoff_hz));
 }
 
 // Two of first order, one behind the other, as a weighted sum of both side by side.
 SampledCurve low_pass(const SampledCurve& curve, const std::vector<double>& quarters,
                       const model::SecondOrder& second) {
   const auto [a, b] = second.poles();
-  const std::vector<std::complex<double>> of_a = behind_pole(curve, quarters, a);
-  const std::vector<std::complex<double>> of_b = behind_pole(curve, quarters, b);
-  std::vector<double> value(of_a.size());
+  std::vector<double> value(curve.values().size());
+  if (a.imag() != 0.0) {
+    // What comes of the other is its conjugate.
+    const std::vector<std::complex<double>> of_a = behind_pole(curve, quarters, a);
+    const std::complex<double> weight = b / (b - a);
+    for (std::size_t i = 0; i < value.size(); ++i)
+      value[i] = 2.0 * std::real(weight * of_a[i]);
+    return curve.with_values(std::move(value));
+  }
+  const std::vector<double> of_a = behind_pole(curve, quarters, a.real());
+  const std::vector<double> of_b = behind_pole(curve, quarters, b.real());
   for (std::size_t i = 0; i < value.size(); ++i)
-    value[i] = std::real((b * of_a[i] - a * of_b[i]) / (b - a));
-  return {curve.times_s(), value};
+    value[i] = (b.real() * of_a[i] - a.real() * of_b[i]) / (b.real() - a.real());
+  return curve.with_values(std::move(value));
 }
 
 struct Parabola {

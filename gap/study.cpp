@@ -169,14 +169,15 @@ Expected<void> check(const Recording& recording) {
   return {};
 }
 
-// Weights of the two readings in their mean: by their white noise, where it is known.
-std::array<double, 2> weights(const PairNoise& noise) {
-  const double a = noise[0].white_dps_rthz;
-  const double b = noise[1].white_dps_rthz;
-  if (a <= 0.0 || b <= 0.0) return {0.5, 0.5};
-  const double first = 1.0 / (a * a);
-  const double second = 1.0 / (b * b);
-  return {first / (first + second), second / (first + second)};
+// Weights of the two readings in their mean: by their noise, where it is known.
+std::array<double, 2> weights(const PairNoise& noise, const std::array<double, 2>& interval_s) {
+  std::array<double, 2> density{};
+  for (std::size_t gyro = 0; gyro < 2; ++gyro) {
+    if (noise[gyro].white_dps_rthz <= 0.0) return {0.5, 0.5};
+    density[gyro] = noise[gyro].variance(0.0, interval_s[gyro]) * interval_s[gyro];
+  }
+  const double sum = density[0] + density[1];
+  return {density[1] / sum, density[0] / sum};
 }
 
 double greatest_change(const std::vector<double>& a, const std::vector<double>& b) {
@@ -394,9 +395,16 @@ std::shared_ptr<const Study> Study::with_motion(const Effects& effects) const {
 }
 
 std::shared_ptr<const Study> Study::with_motion_on_trial(const Effects& effects) const {
+  return on_trial(effects, true);
+}
+std::shared_ptr<const Study> Study::with_motion_moved(const Effects& effects) const {
+  return on_trial(effects, false);
+}
+
+std::shared_ptr<const Study> Study::on_trial(const Effects& effects, bool anew) const {
   if (joint_) return with_motion(effects);
   const std::shared_ptr<Study> study(new Study(*this));
-  study->learn_motion(effects);
+  study->learn_motion(effects, anew);
   std::vector<Observations> list = study->observed();
   for (std::size_t place = 0; place < list.size(); ++place) {
     list[place].layout = observations_[place]->layout;
@@ -476,8 +484,9 @@ void Study::learn_motion_of_reference() {
 
 // The first guess knows no lateness; each further one takes off what the effects say at the last,
 // until nothing changes. What one gyro says is what the other one's lateness is reckoned by.
-void Study::learn_motion_of_pair(const Effects& effects) {
-  const std::array<double, 2> weight = weights(noise_of(effects));
+void Study::learn_motion_of_pair(const Effects& effects, bool anew) {
+  const std::array<double, 2> weight =
+      weights(noise_of(effects), {transport(0).interval_s, transport(1).interval_s});
   const std::array<Effects, 2> mine{of_gyro(effects, 0), of_gyro(effects, 1)};
   const std::span<const double> t_s = facts_->readings[0].times_s();
   const std::array<std::vector<double>, 2> readings{
@@ -488,7 +497,7 @@ void Study::learn_motion_of_pair(const Effects& effects) {
   double quiet = 0.0;
   for (std::size_t gyro = 0; gyro < 2; ++gyro) {
     signals[gyro] = std::make_shared<Signals>(*signals_[gyro]);
-    signals[gyro]->motion = signals[gyro]->motion_by_other = Motion();
+    if (anew) signals[gyro]->motion = signals[gyro]->motion_by_other = Motion();
     signals_[gyro] = signals[gyro];
     beside.emplace_back(mine[gyro], *signals[gyro], t_s);
     quiet += weight[gyro] * weight[gyro] * facts_->quiet[gyro];
@@ -519,11 +528,11 @@ void Study::learn_motion_of_pair(const Effects& effects) {
   }
 }
 
-void Study::learn_motion(const Effects& effects) {
+void Study::learn_motion(const Effects& effects, bool anew) {
   if (recording().has_reference) {
     learn_motion_of_reference();
   } else {
-    learn_motion_of_pair(effects);
+    learn_motion_of_pair(effects, anew);
   }
 }
 

@@ -64,6 +64,8 @@ class Study {
   /// The same to try effects by: what is known of the motion between the samples stays, so that
   /// trials can be compared.
   [[nodiscard]] std::shared_ptr<const Study> with_motion_on_trial(const Effects& effects) const;
+  /// The same for effects that are little else than those of this one: it begins with its motion.
+  [[nodiscard]] std::shared_ptr<const Study> with_motion_moved(const Effects& effects) const;
 
   /// What was set aside of these seconds is no longer.
   [[nodiscard]] std::shared_ptr<const Study> with_used_for_fit(Span span) const;
@@ -79,9 +81,10 @@ class Study {
   void observe(const Effects& effects);
   [[nodiscard]] std::vector<Observations> observed() const;
   void set_signals(const Recording& recording);
-  void learn_motion(const Effects& effects);
+  void learn_motion(const Effects& effects, bool anew = true);
   void learn_motion_of_reference();
-  void learn_motion_of_pair(const Effects& effects);
+  void learn_motion_of_pair(const Effects& effects, bool anew);
+  [[nodiscard]] std::shared_ptr<const Study> on_trial(const Effects& effects, bool anew) const;
   [[nodiscard]] Observations against_reference(std::size_t gyro) const;
   [[nodiscard]] Observations of_pair() const;
   [[nodiscard]] Circumstances circumstances() const;

@@ -317,8 +317,9 @@ struct Cosine {
   [[nodiscard]] std::vector<Seen> leftovers() const {
     Eigen::Matrix2d gram = Eigen::Matrix2d::Zero();
     Eigen::Vector2d right = Eigen::Vector2d::Zero();
+    const double typical = typical_power();
     for (std::size_t i = 0; i < values.size(); ++i) {
-      const double weight = 1.0 / (power[i] + typical_power());
+      const double weight = 1.0 / (power[i] + typical);
       const Eigen::Vector2d motion = values[i].tail<2>();
       gram += weight * motion * motion.transpose();
       right += weight * motion * values[i][0];
