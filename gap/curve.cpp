@@ -21,9 +21,6 @@ constexpr double kKaiser = 8.0;
 constexpr std::size_t kPhases = 512;
 // Polynomials up to the fifth degree pass unchanged: a turn is large and slow.
 constexpr int kMoments = 6;
-// Pauses are not cut into cells without end: what lies beyond is looked for from the last cell on.
-constexpr double kCellsPerSample = 16.0;
-constexpr double kRounding = 1e-3;
 // A step that is further from the median than this share of it is uneven.
 constexpr double kUneven = 0.02;
 
@@ -146,7 +143,7 @@ SampledCurve::SampledCurve(std::span<const double> t_s, std::span<const double> 
     times->t_s.push_back(t_s[i]);
     value_.push_back(value[i]);
   }
-  if (value_.size() > 1) times->set_even_steps();
+  if (value_.size() > 1) times->measure_steps();
   times_ = std::move(times);
 }
 
@@ -157,18 +154,16 @@ SampledCurve SampledCurve::with_values(std::vector<double> value) const {
   return other;
 }
 
-// Cells of an interval's length hold the place of what came before them: from there it is a step or
-// two, where samples are even and where some are missing.
 std::size_t SampledCurve::index_before(double t_s) const {
   const std::vector<double>& times_s = times_->t_s;
-  const std::vector<std::uint32_t>& first = times_->first_of_cell;
-  const double at = (t_s - times_s.front()) / times_->interval_s;
-  const auto cell =
-      static_cast<std::size_t>(std::clamp(at, 0.0, static_cast<double>(first.size() - 1)));
-  std::size_t i = first[cell];
-  while (i + 2 < times_s.size() && times_s[i + 1] <= t_s)
-    ++i;
-  return i;
+  // Even sampling: the place is nearly known.
+  const double place = (t_s - times_s.front()) / times_->interval_s;
+  const auto i =
+      static_cast<std::size_t>(std::clamp(place, 0.0, static_cast<double>(times_s.size() - 2)));
+  if (times_s[i] <= t_s && t_s < times_s[i + 1]) return i;
+  const auto after = std::upper_bound(times_s.begin(), times_s.end(), t_s);
+  const auto index = static_cast<std::size_t>(after - times_s.begin());
+  return std::clamp<std::size_t>(index, 1, times_s.size() - 1) - 1;
 }
 
 // The first of the points about an instant.
@@ -179,27 +174,11 @@ std::size_t SampledCurve::first_about(double t_s) const {
   return std::min(first, times_->t_s.size() - count);
 }
 
-// The last sample that is not behind the cell's beginning, and has another one behind it.
-void SampledCurve::Times::set_cells() {
-  const double cells = std::min((t_s.back() - t_s.front()) / interval_s,
-                                kCellsPerSample * static_cast<double>(t_s.size()));
-  first_of_cell.resize(static_cast<std::size_t>(cells) + 1);
-  std::size_t i = 0;
-  for (std::size_t cell = 0; cell < first_of_cell.size(); ++cell) {
-    // A little early: a time that is divided by the interval may be rounded into the next cell.
-    const double from_s = t_s.front() + (static_cast<double>(cell) - kRounding) * interval_s;
-    while (i + 2 < t_s.size() && t_s[i + 1] <= from_s)
-      ++i;
-    first_of_cell[cell] = static_cast<std::uint32_t>(i);
-  }
-}
-
-void SampledCurve::Times::set_even_steps() {
+void SampledCurve::Times::measure_steps() {
   std::vector<double> steps_s(t_s.size() - 1);
   for (std::size_t i = 0; i + 1 < t_s.size(); ++i)
     steps_s[i] = t_s[i + 1] - t_s[i];
   interval_s = median_of(steps_s);
-  set_cells();
   even_steps.assign(t_s.size(), 0);
   for (std::size_t i = 1; i < t_s.size(); ++i) {
     const double step_s = t_s[i] - t_s[i - 1];

@@ -67,9 +67,8 @@ class SampledCurve {
     std::vector<double> t_s;
     std::vector<std::uint8_t> even_steps;  ///< that led up to each sample, as far as it matters
     double interval_s = 0.0;               ///< median
-    std::vector<std::uint32_t> first_of_cell;
-    void set_even_steps();
-    void set_cells();
+    /// Sets the others from the times. Precondition: two or more.
+    void measure_steps();
   };
   static const std::shared_ptr<const Times>& no_times();
 

@@ -31,6 +31,8 @@ struct Found {
   bool of_reference = false;  ///< a bias that says at which temperature a gyro's own is none
   bool accepted = false;      ///< ambiguous, and the caller chose this reading
   bool unchecked = false;     ///< the time was over before all that speaks against it was tried
+  /// What is told, and has to stand by itself.
+  [[nodiscard]] bool is_name() const { return !starting && !of_reference; }
   [[nodiscard]] double adjusted() const { return statistic - penalty; }
   [[nodiscard]] double margin() const { return adjusted() - needed; }
 };

@@ -40,6 +40,8 @@ constexpr int kFastEvaluations = 150;
 constexpr double kFastTolerance = 1e-3;
 constexpr int kSlowEvaluations = 60;  ///< for each unknown
 constexpr double kSlowTolerance = 2e-2;
+// A search that ended early is begun anew where it ended, while that gains more than its own
+// tolerance explains; three times was enough.
 constexpr int kAgainMax = 4;
 constexpr double kAgainGain = 2.5;  ///< times the tolerance
 // Drift is fitted by the means of so many blocks first; a memory that may be short then by all.
@@ -311,7 +313,7 @@ class DriftFilter {
       : states_(states),
         width_(columns),
         count_(static_cast<int>(states.count)),
-        x_(columns == 1 ? 0 : count_, columns) {
+        x_(Columns::Zero(N, columns)) {
     for (int i = 0; i < count_; ++i) {
       const auto at = static_cast<std::size_t>(i);
       p_(i, i) = states_.start_variance[at];
@@ -321,7 +323,6 @@ class DriftFilter {
       for (const Channel channel : {Channel::kGyro1, Channel::kGyro2, Channel::kDifference})
         share_[static_cast<std::size_t>(channel)][i] = share_of(channel, states_.gyro[at]);
     }
-    x_.setZero();
   }
 
   /// A further recording: nothing is left of the drift but what the gyros are.
@@ -332,18 +333,13 @@ class DriftFilter {
                             : states_.start_variance[static_cast<std::size_t>(i)];
     }
     x_.setZero();
-    of_one_.setZero();
   }
 
   void predict(double step_s) {
     set_step(step_s);
     p_.array() *= (decay_ * decay_.transpose()).array();
     p_.diagonal() += growth_;
-    if (width_ == 1) {
-      of_one_.array() *= decay_.array();
-    } else {
-      x_.array().colwise() *= decay_.head(count_).array();
-    }
+    x_.array().colwise() *= decay_.array();
   }
 
   // Observations of a channel, one for each column → normalised innovations, in place; the states
@@ -357,22 +353,16 @@ class DriftFilter {
     const double scale = 1.0 / std::sqrt(variance);
     gain *= scale;
     p_ -= gain.lazyProduct(gain.transpose());
-    if (width_ == 1) {
-      *observation = scale * (*observation - share.dot(of_one_));
-      of_one_ += *observation * gain;
-      return variance;
+    for (Eigen::Index c = 0; c < width_; ++c) {
+      observation[c] = scale * (observation[c] - share.dot(x_.col(c)));
+      x_.col(c) += observation[c] * gain;
     }
-    Eigen::Map<Eigen::RowVectorXd> all(observation, width_);
-    for (int i = 0; i < count_; ++i)
-      if (share[i] != 0.0) all -= share[i] * x_.row(i);
-    all *= scale;
-    for (int i = 0; i < count_; ++i)
-      x_.row(i) += gain[i] * all;
     return variance;
   }
 
  private:
   using Vector = Eigen::Matrix<double, N, 1>;
+  using Columns = Eigen::Matrix<double, N, Eigen::Dynamic>;
 
   struct Near {
     std::size_t grain = static_cast<std::size_t>(-1);
@@ -405,8 +395,7 @@ class DriftFilter {
   Eigen::Index width_;
   int count_;
   Eigen::Matrix<double, N, N> p_ = Eigen::Matrix<double, N, N>::Zero();
-  Matrix x_;  // of several columns, states × columns
-  Vector of_one_ = Vector::Zero();
+  Columns x_;
   std::array<Vector, 3> share_{Vector::Zero(), Vector::Zero(), Vector::Zero()};  // by channel
   Vector rate_ = Vector::Zero();  // 1/τ; of a walk 0
   Vector walk_ = Vector::Zero();
@@ -468,10 +457,6 @@ class BlockDrift {
   const Layout& layout_;
   std::array<Last, 3> last_{};  // by channel
 };
-
-}  // namespace
-
-namespace {
 
 template <int N>
 double whiten_means(Matrix& means, const Layout& layout, const PairNoise& noise, Part part,
@@ -918,10 +903,6 @@ class Coarsening {
   bool begins_ = false;  // what is closed next is a recording's first
 };
 
-}  // namespace
-
-namespace {
-
 // Standard deviation of the means that a gyro is in.
 double scatter_of_means(const CoarseMeans& coarse, std::size_t gyro) {
   double count = 0.0;
@@ -936,6 +917,23 @@ double scatter_of_means(const CoarseMeans& coarse, std::size_t gyro) {
   }
   count = std::max(count, 1.0);
   return std::sqrt(std::max(squares / count - sum / count * sum / count, kVarianceMin));
+}
+
+// Where the search for the newest correlated term begins: where it was, or at a memory that is
+// likelier.
+template <class LogLikelihood>
+void set_likely_memory(PairNoise& noise, std::size_t gyro, const Freedom& free, double sigma_dps,
+                       const LogLikelihood& log_likelihood_of) {
+  PairNoise trial = noise;
+  if (free.walk) trial[gyro].walk_dps_rts *= kWalkBeside;
+  double top = log_likelihood_of(noise);
+  for (const double tau_s : kTausTried_s) {
+    trial[gyro].markov.back() = {sigma_dps, tau_s};
+    const double now = log_likelihood_of(trial);
+    if (now <= top) continue;
+    top = now;
+    noise = trial;
+  }
 }
 
 }  // namespace
@@ -966,23 +964,10 @@ NoiseFitResult fit_pair_noise(const Eigen::VectorXd& residual, const Layout& lay
   const auto coarsely = [&](const PairNoise& noise) {
     return within(noise) + means_log_likelihood(coarse.means, coarse.layout, noise, part);
   };
-  const auto begin_drift = [&](std::size_t gyro) {
-    if (!used[gyro] || !free[gyro].markov) return;
-    PairNoise best = result.noise;
-    double top = coarsely(best);
-    for (const double tau_s : kTausTried_s) {
-      PairNoise trial = result.noise;
-      trial[gyro].markov.back() = {scatter_of_means(coarse, gyro), tau_s};
-      if (free[gyro].walk) trial[gyro].walk_dps_rts *= kWalkBeside;
-      const double now = coarsely(trial);
-      if (now <= top) continue;
-      top = now;
-      best = trial;
-    }
-    result.noise = best;
-  };
-  begin_drift(0);
-  begin_drift(1);
+  for (std::size_t gyro = 0; gyro < 2; ++gyro) {
+    if (used[gyro] && free[gyro].markov)
+      set_likely_memory(result.noise, gyro, free[gyro], scatter_of_means(coarse, gyro), coarsely);
+  }
   const int evaluations = kSlowEvaluations * static_cast<int>(slow.size());
   const auto fit_once = [&](const auto& log_likelihood_of) {
     maximise(result.noise, fast, kFastEvaluations, kFastTolerance, within);

@@ -133,6 +133,11 @@ Matrix Regression::columns(const Effects& terms, Eigen::Index spare, std::size_t
   if (left_out != kNone) width -= free_count({terms[left_out]});
   Matrix columns = Matrix::Zero(data_->size(), width);
   columns.col(0) = residual(terms);
+  set_slopes(terms, left_out, columns);
+  return columns;
+}
+
+void Regression::set_slopes(const Effects& terms, std::size_t left_out, Matrix& columns) const {
   Eigen::Index at = 1;
   for (std::size_t i = 0; i < terms.size(); ++i) {
     const Eigen::Index count = free_count({terms[i]});
@@ -140,7 +145,6 @@ Matrix Regression::columns(const Effects& terms, Eigen::Index spare, std::size_t
     columns.middleCols(at, count) = derivatives(terms, i);
     at += count;
   }
-  return columns;
 }
 
 Matrix Regression::whitened(const Matrix& columns, const PairNoise& noise) const {
@@ -171,7 +175,8 @@ class Regression::Descent {
     double before = 0.0;
     for (int i = 0; i < kStepsMax; ++i) {
       const bool fresh = !slopes_known_;
-      if (fresh) learn_slopes(fit.terms);
+      if (fresh) regression_.set_slopes(fit.terms, kNone, columns_);
+      slopes_known_ = true;
       const double gained = step(fit);
       // What is as good as linear is solved; else gains shrink by the same share or faster.
       if (is_linear_) return;
@@ -186,17 +191,6 @@ class Regression::Descent {
   }
 
  private:
-  void learn_slopes(const Effects& terms) {
-    Eigen::Index at = 1;
-    for (std::size_t i = 0; i < terms.size(); ++i) {
-      const Eigen::Index count = free_count({terms[i]});
-      if (count == 0) continue;
-      columns_.middleCols(at, count) = regression_.derivatives(terms, i);
-      at += count;
-    }
-    slopes_known_ = true;
-  }
-
   // Shortened until it makes nothing worse. Returns what it gained of the sum of squares; 0: it was
   // not taken.
   double step(Fit& fit) {

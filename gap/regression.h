@@ -68,6 +68,8 @@ class Regression {
  private:
   class Descent;
 
+  /// What the free parameters move, from column 1 on.
+  void set_slopes(const Effects& terms, std::size_t left_out, Matrix& columns) const;
   [[nodiscard]] Fit fit_in_turns(Effects terms, const PairNoise& start, Descent& descent) const;
   [[nodiscard]] bool needs_drift(const Fit& fit, std::size_t gyro) const;
   void fit_noise(Fit& fit, const Eigen::VectorXd& residual) const;

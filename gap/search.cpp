@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <initializer_list>
 #include <iterator>
 
 #include "gap/noise_search.h"
@@ -64,8 +65,8 @@ constexpr double kStartingNoiseDoubt = 0.01;
 constexpr double kTimingLeaves = 2e-3;
 constexpr double kJitterLeaves = 2e-2;
 constexpr double kJitterMemory_s = 1.0;
-// Each turn learns the motion from the last fit. The rivals are only compared, and all after as
-// many.
+// Each turn learns the motion from the last fit. The rivals are only compared: all after as many,
+// or when theirs stand still.
 constexpr int kMotionTurns = 3;
 // Of the log-likelihood from one turn to the next: nothing moves any more; or the motion that the
 // terms give contradicts them, and further turns would only lead farther off.
@@ -92,6 +93,12 @@ bool is_like_jitter(const Effect& effect) {
 
 bool is_timing(const Effect& effect) {
   return model::moves_in_time(effect.kind);
+}
+
+bool has_any(const Effects& effects, std::size_t gyro, std::initializer_list<Kind> kinds) {
+  return std::any_of(effects.begin(), effects.end(), [&](const Effect& effect) {
+    return effect.gyro == gyro && std::find(kinds.begin(), kinds.end(), effect.kind) != kinds.end();
+  });
 }
 
 bool same_reading(const Reading& a, const Reading& b) {
@@ -176,7 +183,7 @@ Effects Search::effects() const {
 std::vector<Found> Search::found() const {
   std::vector<Found> names;
   std::copy_if(found_.begin(), found_.end(), std::back_inserter(names),
-               [](const Found& one) { return !one.starting && !one.of_reference; });
+               [](const Found& one) { return one.is_name(); });
   // c·(T − T₀) + b is c·(T − (T₀ − b/c)).
   for (const Found& bias : found_) {
     if (!bias.of_reference) continue;
@@ -218,10 +225,7 @@ Effects Search::noise_effects(const PairNoise& noise) const {
 // gap counts from there.
 void Search::start() {
   for (std::size_t gyro = 0; gyro < 2; ++gyro) {
-    const bool knows_bias = std::any_of(known_.begin(), known_.end(), [&](const Effect& effect) {
-      return effect.gyro == gyro && effect.kind == Kind::kBias;
-    });
-    if (!unknown_noise_[gyro] || knows_bias) continue;
+    if (!unknown_noise_[gyro] || has_any(known_, gyro, {Kind::kBias})) continue;
     found_.push_back({});
     found_.back().effect = {gyro, Kind::kBias, {0.0}, 0};
     found_.back().starting = true;
@@ -359,11 +363,8 @@ void Search::look_at_temperature(std::size_t place, const Fit& null, const PairN
     Effect line{gyro, Kind::kTemperatureBias, (*row(Kind::kTemperatureBias).starts)[0], 0};
     line.parameters[0] = 0.0;
     const Effect bias{gyro, Kind::kBias, {0.0}, 0};
-    const bool again = std::any_of(null.terms.begin(), null.terms.end(), [&](const Effect& effect) {
-      return effect.gyro == gyro && (effect.kind == bias.kind || effect.kind == line.kind);
-    });
-    if (again || regression.data().about.coarse[gyro] || !could_show(regression.data(), line) ||
-        is_over(kLeftToScore))
+    if (has_any(null.terms, gyro, {bias.kind, line.kind}) || regression.data().about.coarse[gyro] ||
+        !could_show(regression.data(), line) || is_over(kLeftToScore))
       continue;
     Effects with = null.terms;
     with.push_back(bias);
@@ -421,13 +422,12 @@ bool Search::add_round() {
   const bool judged = is_timing(best->effect) && !study_->recording().has_reference;
   Found taken = judged ? judge_timing(*best, round.timing) : *best;
   if (taken.margin() < 0.0 || is_left_of_timing(taken)) return false;
-  found_.push_back(std::move(taken));
-  if (found_.back().companion) {
-    found_.push_back(found_.back());
-    found_.back().effect = *found_.back().companion;
+  if (taken.companion) {
+    found_.push_back(taken);
+    found_.back().effect = *taken.companion;
     found_.back().of_reference = true;
-    std::swap(found_.back(), *(found_.end() - 2));
   }
+  found_.push_back(std::move(taken));
   free_reference();
   const bool is_step = row(found_.back().effect.kind).finder == Finder::kStep;
   settle();
@@ -443,10 +443,7 @@ void Search::free_reference() {
   const std::size_t place = place_of(last);
   const Regression& regression = regressions_[place];
   const Effects before = terms(place, found_.size() - 1);
-  const bool again = std::any_of(before.begin(), before.end(), [&](const Effect& effect) {
-    return effect.gyro == last.gyro && (effect.kind == Kind::kBias || effect.kind == last.kind);
-  });
-  if (again) return;
+  if (has_any(before, last.gyro, {Kind::kBias, last.kind})) return;
   const Effect line{last.gyro, Kind::kTemperatureBias, {0.0, last.parameters[1]}, 0};
   const Effect parabola{last.gyro, Kind::kTemperatureBiasQuadratic, {0.0, last.parameters[1]}, 0};
   const Effect bias{last.gyro, Kind::kBias, {0.0}, 0};
@@ -603,7 +600,7 @@ void Search::replace_round() {
 }
 
 void Search::replace(std::size_t index) {
-  if (found_[index].starting || found_[index].of_reference) return;
+  if (!found_[index].is_name()) return;
   Found& mine = found_[index];
   const std::size_t place = place_of(mine.effect);
   const Regression& regression = regressions_[place];
@@ -642,7 +639,7 @@ void Search::replace(std::size_t index) {
 
 void Search::delete_backward() {
   for (std::size_t i = 0; i < found_.size();) {
-    if (found_[i].starting || found_[i].of_reference || found_[i].margin() >= kFallen) {
+    if (!found_[i].is_name() || found_[i].margin() >= kFallen) {
       ++i;
       continue;
     }
@@ -660,8 +657,7 @@ void Search::reject_unsteady() {
   for (std::size_t i = 0; i < found_.size(); ++i) {
     const Found& one = found_[i];
     if (is_over(kLeftToScore)) found_[i].unchecked = true;
-    if (wrong[i] || one.starting || one.of_reference || found_[i].unchecked ||
-        !row(one.effect.kind).keeps_size)
+    if (wrong[i] || !one.is_name() || found_[i].unchecked || !row(one.effect.kind).keeps_size)
       continue;
     const std::size_t place = place_of(one.effect);
     const Effects all = terms(place);
@@ -710,7 +706,7 @@ void Search::reject_unproven() {
     const double expected = found_[i].statistic * kHeldOutShare;
     const double chance = 2.0 * kProofSigmas * std::sqrt(std::max(0.0, expected));
     const double needed = std::max(0.0, expected - std::max(chance, kProofShare * expected));
-    if (found_[i].starting || found_[i].of_reference || is_noise(found_[i]) ||
+    if (!found_[i].is_name() || is_noise(found_[i]) ||
         (is_sure_by_residual(i) && held_out_gain(i) >= needed)) {
       ++i;
       continue;
@@ -760,8 +756,7 @@ bool Search::reject_beside_noise() {
   for (std::size_t i = 0; i < found_.size(); ++i) {
     const Found& one = found_[i];
     const double drift = drift_statistic(one.effect.gyro);
-    if (drift == 0.0 || is_noise(one) || one.starting || one.of_reference ||
-        one.needed >= kStatisticMin) {
+    if (drift == 0.0 || is_noise(one) || !one.is_name() || one.needed >= kStatisticMin) {
       kept.push_back(one);
       continue;
     }

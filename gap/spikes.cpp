@@ -109,11 +109,11 @@ std::vector<std::size_t> places_of(const Transport& transport, const SampledCurv
   const std::span<const double> truth_s = truth.times_s();
   std::vector<std::size_t> places(transport.t_s.size(), 0);
   if (truth.empty()) return places;
+  const double half_s = 0.5 * truth.interval_s();
   for (std::size_t i = 0; i < places.size(); ++i) {
     const double felt_s = transport.t_s[i] - lag.at(transport.t_s[i]);
     const auto behind = std::lower_bound(truth_s.begin() + 1, truth_s.end() - 1, felt_s);
     const double apart_s = std::min(std::abs(felt_s - *(behind - 1)), std::abs(*behind - felt_s));
-    const double half_s = 0.5 * truth.interval_s();
     places[i] = static_cast<std::size_t>(std::min(kPlaces - 1.0, kPlaces * apart_s / half_s));
   }
   return places;

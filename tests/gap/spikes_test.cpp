@@ -67,6 +67,14 @@ const Finding* spikes_of(const std::vector<Finding>& findings, std::size_t gyro)
   return nullptr;
 }
 
+// None found, and none masked.
+void expect_no_spikes(const Recording& recording) {
+  std::array<Transport, 2> transports = check_both(recording);
+  EXPECT_TRUE(find_spikes(recording, timing_of(recording, transports), transports, {}).empty());
+  for (const Transport& transport : transports)
+    EXPECT_TRUE(masked_samples(transport).empty());
+}
+
 class Spikes : public testing::TestWithParam<bool> {
  protected:
   [[nodiscard]] static Recording clean(std::uint64_t seed) {
@@ -79,12 +87,8 @@ INSTANTIATE_TEST_SUITE_P(WithAndWithoutAReference, Spikes, testing::Bool(), [](c
 
 TEST_P(Spikes, NoneAreFoundWhereNoneArePlanted) {
   for (const std::uint64_t seed : {21U, 22U, 23U, 24U, 25U}) {
-    const Recording recording = clean(seed);
-    std::array<Transport, 2> transports = check_both(recording);
-    EXPECT_TRUE(find_spikes(recording, timing_of(recording, transports), transports, {}).empty())
-        << "seed " << seed;
-    for (const Transport& transport : transports)
-      EXPECT_TRUE(masked_samples(transport).empty()) << "seed " << seed;
+    SCOPED_TRACE(seed);
+    expect_no_spikes(clean(seed));
   }
 }
 
@@ -315,12 +319,8 @@ Recording on_a_road(std::uint64_t seed) {
 
 TEST(SpikesOnARoad, WhatASlowReferenceFoldsIsNone) {
   for (const std::uint64_t seed : {31U, 32U, 33U}) {
-    const Recording recording = on_a_road(seed);
-    std::array<Transport, 2> transports = check_both(recording);
-    EXPECT_TRUE(find_spikes(recording, timing_of(recording, transports), transports, {}).empty())
-        << "seed " << seed;
-    for (const Transport& transport : transports)
-      EXPECT_TRUE(masked_samples(transport).empty()) << "seed " << seed;
+    SCOPED_TRACE(seed);
+    expect_no_spikes(on_a_road(seed));
   }
 }
 
