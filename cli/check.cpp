@@ -79,10 +79,10 @@ void print_mount(const gateway::Mount& mount) {
            fmt::format("vehicle's {} = {:+.6f} x {:+.6f} y {:+.6f} z", gateway::kAxisNames[axis],
                        mount.at(axis, 0), mount.at(axis, 1), mount.at(axis, 2)));
   }
-  detail("", mount.corrected == 0.0
-                 ? std::string("a rotation, exactly")
-                 : fmt::format("as given up to {:.2g} from a rotation in an element",
-                               mount.corrected));
+  detail("",
+         mount.corrected == 0.0
+             ? std::string("a rotation, exactly")
+             : fmt::format("as given up to {:.2g} from a rotation in an element", mount.corrected));
 }
 
 void print_gyro(const gateway::GyroPlan& gyro) {

@@ -80,7 +80,7 @@ struct SimulatedMessage {
   const FrameMatch* match = nullptr;
   std::vector<Part> parts{};
   const gateway::Quantity* page = nullptr;  ///< set: only this, and what else stands on its page
-  double after_s = 0.0;  ///< behind the first message of its unit
+  double after_s = 0.0;                     ///< behind the first message of its unit
   std::size_t next = 0;
   double stamp_s = 0.0;
 };
@@ -96,7 +96,6 @@ using Sensors = std::array<std::vector<Sensor>, 2>;
 std::span<const gateway::GyroPlan> sensors_of(const gateway::GyroPlan& gyro) {
   return gyro.axes.empty() ? std::span(&gyro, 1) : std::span(gyro.axes);
 }
-
 
 bool same_message(const FrameMatch& a, const FrameMatch& b) {
   return a.bus == b.bus && a.id == b.id && a.extended == b.extended;
@@ -234,11 +233,9 @@ double Recording::stamp_s(Part part, std::size_t n) const {
 }
 
 bool Recording::lost(const SimulatedMessage& message) const {
-  return std::any_of(message.parts.begin(), message.parts.end(),
-                     [&](Part part) {
-                       return part <= kGyroB &&
-                              sensors_[part].front().samples[message.next].lost;
-                     });
+  return std::any_of(message.parts.begin(), message.parts.end(), [&](Part part) {
+    return part <= kGyroB && sensors_[part].front().samples[message.next].lost;
+  });
 }
 
 // From message.next on; false where there is none.
@@ -281,9 +278,9 @@ void Recording::put_sensors(Part part, const FrameMatch& match, std::size_t n, c
 }
 
 const Sensor& Recording::sensor_in(Part part, const FrameMatch& match) const {
-  return *std::find_if(
-      sensors_[part].begin(), sensors_[part].end(),
-      [&](const Sensor& sensor) { return same_message(sensor.plan->match, match); });
+  return *std::find_if(sensors_[part].begin(), sensors_[part].end(), [&](const Sensor& sensor) {
+    return same_message(sensor.plan->match, match);
+  });
 }
 
 // Beside a rate that stands on every page those on pages of their own take turns.
@@ -306,8 +303,8 @@ void Recording::put_page(Part part, std::size_t n, const gateway::Quantity& page
   for (const Beside& beside : kBesides) {
     const auto& quantity = plan_.gyros[part].*beside.quantity;
     if (!quantity || !quantity->presence.holds(frame.payload())) continue;
-    gateway::put_quantity(*quantity,
-                          beside.value(simulator_, sensors_[part].front().samples[n]), frame);
+    gateway::put_quantity(*quantity, beside.value(simulator_, sensors_[part].front().samples[n]),
+                          frame);
   }
 }
 
@@ -401,8 +398,7 @@ void Recording::warn_of_limits() const {
       warn({"gyro " + sensor.plan->name,
             fmt::format("{} readings are beyond the {:g} deg/s that its signal {} can carry; they "
                         "were sent as that",
-                        sensor.beyond, gateway::carried_dps(*sensor.plan),
-                        sensor.plan->rate.name),
+                        sensor.beyond, gateway::carried_dps(*sensor.plan), sensor.plan->rate.name),
             {}});
     }
   }
@@ -433,8 +429,8 @@ Expected<Sensors> simulate_units(const Plan& plan, const model::Model& model,
   Sensors sensors;
   for (std::size_t gyro = 0; gyro < 2; ++gyro) {
     for (const gateway::GyroPlan& axis : plan.gyros[gyro].axes) {
-      const auto simulator = axis_simulator(plan.gyros[gyro], gyro, axis.sensor_axis, model,
-                                            profile, settings);
+      const auto simulator =
+          axis_simulator(plan.gyros[gyro], gyro, axis.sensor_axis, model, profile, settings);
       if (!simulator) return tl::unexpected(simulator.error());
       sensors[gyro].push_back({.plan = &axis, .samples = simulator->gyro(gyro)});
     }

@@ -546,8 +546,8 @@ VirtualRate OptimalCorrector::update(const RatePair& pair) {
       (fast_noise_ + kFastNoise * rate_density(rate) / interval + cross_variance_);
   // A single value may be no measurement at all.
   const double sudden =
-      squared(first - second) - squared(kSuddenSigma) * (noise_1 - 2.0 * noise_12 + noise_2 +
-                                                         fast_noise_ + cross_variance_);
+      squared(first - second) -
+      squared(kSuddenSigma) * (noise_1 - 2.0 * noise_12 + noise_2 + fast_noise_ + cross_variance_);
   variance += blame_ * std::max({contradiction - allowed, sudden, 0.0});
   const VirtualRate out{rate, std::sqrt(variance), {first, second}};
   if (blind_[0] + blind_[1] < kBlindMin) return out;
@@ -725,7 +725,8 @@ void OptimalCorrector::close_block(const CellBlock& complete) {
   }
   apply_temperature();
   auto steadiness = StopDetector::Steadiness::kMoving;
-  if (settings_.stop_rate_dps) steadiness = detector_.judge(level_of(block), wheels_, elsewhere_.moves);
+  if (settings_.stop_rate_dps)
+    steadiness = detector_.judge(level_of(block), wheels_, elsewhere_.moves);
   const bool steady = steadiness == StopDetector::Steadiness::kSteady;
   // All held blocks but the last belong to a run that has just become sure, or to none.
   const bool waits = steadiness == StopDetector::Steadiness::kUnsure && held_count_ < kHeldMax;

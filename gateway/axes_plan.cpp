@@ -189,11 +189,11 @@ void find_axes(TomlReader& root, Plan& plan) {
   }
   std::array<std::vector<std::size_t>, 2> axes{axes_of(plan.gyros[0]), axes_of(plan.gyros[1])};
   if (axes[0] != axes[1]) {
-    root.complain(root.where("gyro"),
-                  fmt::format("gyro {} tells the vehicle's axes {}, and gyro {} tells {}",
-                              plan.gyros[0].name, names_of(axes[0]), plan.gyros[1].name,
-                              names_of(axes[1])),
-                  "the same axes of both, as mounted: name the missing one, or leave it out of both");
+    root.complain(
+        root.where("gyro"),
+        fmt::format("gyro {} tells the vehicle's axes {}, and gyro {} tells {}", plan.gyros[0].name,
+                    names_of(axes[0]), plan.gyros[1].name, names_of(axes[1])),
+        "the same axes of both, as mounted: name the missing one, or leave it out of both");
     return;
   }
   if (axes[0].size() < 2) {

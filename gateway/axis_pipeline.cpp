@@ -42,7 +42,7 @@ AxisPipeline::AxisPipeline(const Plan& the_plan, std::unique_ptr<fusion::Correct
     : plan_(the_plan),
       router_(plan_),
       inputs_{GyroIntake(0, GyroInput(plan_.gyros[0]), Timed::kSickToo),
-             GyroIntake(1, GyroInput(plan_.gyros[1]), Timed::kSickToo)},
+              GyroIntake(1, GyroInput(plan_.gyros[1]), Timed::kSickToo)},
       surroundings_(plan_),
       known_effects_(plan_),
       aligner_({known_effects_.lag(0), known_effects_.lag(1)}),
@@ -58,7 +58,7 @@ AxisPipeline::AxisPipeline(const Plan& the_plan, std::unique_ptr<fusion::Correct
 // --- frames in -----------------------------------------------------------------------------------
 
 void AxisPipeline::receive(can::BusIndex bus, const can::Frame& frame, TimePoint stamp,
-                             FrameSink& sink) {
+                           FrameSink& sink) {
   const std::uint8_t roles = router_.roles(bus, frame);
   // Most frames of a car's bus are nobody's, and nothing is due.
   if (roles == 0 && guard_.can_be_time(stamp) && stamp + guard_.offset() < deadline_) return;
@@ -163,7 +163,7 @@ double AxisPipeline::take_back(TimePoint t, double reading_dps) {
 }
 
 void AxisPipeline::receive_surroundings(std::uint8_t roles, const can::Frame& frame,
-                                          TimePoint stamp) {
+                                        TimePoint stamp) {
   const bool timely = guard_.can_be_time(stamp);
   const TimePoint raw = whole_microseconds(stamp);
   if ((roles & kAccelerometer) != 0) {
@@ -331,8 +331,9 @@ void AxisPipeline::tell_surroundings(TimePoint t, double rate_dps, bool valid) {
 // What was taken off the readings may be wrong, and the corrector cannot see it: the gyros agree.
 void AxisPipeline::add_doubt(fusion::VirtualRate& rate, TimePoint t) {
   if (estimator_.condition().stopped) known_effects_.settle(surroundings_, t);
-  rate.sigma_dps = std::hypot(
-      rate.sigma_dps, known_effects_.doubt_dps(rate.rate_dps, estimator_.shares(), surroundings_, t));
+  rate.sigma_dps =
+      std::hypot(rate.sigma_dps,
+                 known_effects_.doubt_dps(rate.rate_dps, estimator_.shares(), surroundings_, t));
 }
 
 void AxisPipeline::set_cross(double rate_dps, double variance_dps2) {
@@ -353,9 +354,9 @@ bool AxisPipeline::is_parallel_enough(const fusion::AlignedPair& pair) const {
 // Neither the other unit's tilt nor the Earth's rate can be seen by a corrector of one axis.
 void AxisPipeline::add_cross_doubt(fusion::VirtualRate& rate) const {
   const double share = estimator_.shares()[1];
-  rate.sigma_dps = std::sqrt(rate.sigma_dps * rate.sigma_dps +
-                             share * share * cross_variance_dps2_ +
-                             plan_.calibration.doubt_dps * plan_.calibration.doubt_dps);
+  rate.sigma_dps =
+      std::sqrt(rate.sigma_dps * rate.sigma_dps + share * share * cross_variance_dps2_ +
+                plan_.calibration.doubt_dps * plan_.calibration.doubt_dps);
 }
 
 // The corrector's opinion of both; of one gyro alone it has none that is new.
@@ -368,7 +369,8 @@ void AxisPipeline::note_condition(TimePoint t) {
 
 State AxisPipeline::present_state() const {
   if (attendance_.pairing() && estimator_.contradicted()) return State::kContradicted;
-  if (!estimator_.calibrated()) return attendance_.pairing() ? State::kCalibrating : State::kWaiting;
+  if (!estimator_.calibrated())
+    return attendance_.pairing() ? State::kCalibrating : State::kWaiting;
   if (attendance_.pairing()) return State::kRunning;
   if (!estimator_.begun()) return State::kWaiting;
   return attendance_.any_in_use() ? State::kDegraded : State::kLost;
@@ -416,8 +418,7 @@ void AxisPipeline::advance(TimePoint now, FrameSink& sink) {
 // --- frames out ----------------------------------------------------------------------------------
 
 // VG_Rate, and VG_Bias where its time has come with it.
-void AxisPipeline::publish(const fusion::VirtualRate& rate, bool valid, TimePoint t,
-                             Duration age) {
+void AxisPipeline::publish(const fusion::VirtualRate& rate, bool valid, TimePoint t, Duration age) {
   RateOutput output{.valid = valid,
                     .rate_dps = rate.rate_dps,
                     .sigma_dps = rate.sigma_dps,
@@ -436,7 +437,7 @@ void AxisPipeline::send_bias() {
   const fusion::Drift drift = present_drift();
   const BiasMode mode = estimator_.bias_mode(attendance_.pairing(), attendance_.any_in_use());
   sender_.send_bias({drift.bias_dps, mode, health()},
-                   {drift.slope_dps_s, drift.bias_sigma_dps, drift.slope_sigma_dps_s});
+                    {drift.slope_dps_s, drift.bias_sigma_dps, drift.slope_sigma_dps_s});
 }
 
 fusion::Drift AxisPipeline::present_drift() const {

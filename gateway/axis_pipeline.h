@@ -160,12 +160,12 @@ class AxisPipeline {
   OutputObserver* output_observer_ = nullptr;
   Status status_;
 
-  TimePoint newest_;       ///< newest instant given to the output
-  TimePoint deadline_{};   ///< nothing is due before; may lie too early, never too late
-  TimePoint reached_{};    ///< newest time that was believed
-  TimePoint suspect_{};    ///< stamp far ahead that nobody has confirmed yet
-  std::array<double, 2> bias_dps_{};    ///< for bias_dps()
-  std::uint64_t bias_windows_ = 0;      ///< when that was asked for last
+  TimePoint newest_;                  ///< newest instant given to the output
+  TimePoint deadline_{};              ///< nothing is due before; may lie too early, never too late
+  TimePoint reached_{};               ///< newest time that was believed
+  TimePoint suspect_{};               ///< stamp far ahead that nobody has confirmed yet
+  std::array<double, 2> bias_dps_{};  ///< for bias_dps()
+  std::uint64_t bias_windows_ = 0;    ///< when that was asked for last
   bool has_cross_ = false;
   double cross_dps_ = 0.0;            ///< what gyro 2 reads of the other axes
   double cross_variance_dps2_ = 0.0;  ///< and how far that may be wrong

@@ -62,8 +62,8 @@ class Estimator {
   /// They cannot: nothing says which one is wrong, so no rate is valid, and nothing is learned.
   [[nodiscard]] bool contradicted() const { return relation_.contradicts(); }
 
-  /// What the platform's other axes show, and what they leave in the gyros' difference, from now on;
-  /// and the true rate at a stop.
+  /// What the platform's other axes show, and what they leave in the gyros' difference, from now
+  /// on; and the true rate at a stop.
   void set_elsewhere(const fusion::Elsewhere& elsewhere) { corrector_->set_elsewhere(elsewhere); }
   void set_cross_variance(double variance_dps2) { corrector_->set_cross_variance(variance_dps2); }
   void set_stop_rate(double rate_dps) { corrector_->set_stop_rate(rate_dps); }

@@ -192,9 +192,9 @@ void take_axis_table(const toml::node& node, TomlReader& unit, TableContext cont
   TomlReader reader(*table, context.file, "[[gyro.axis]]", context.errors);
   const std::string name = reader.required_text("axis", "x");
   if (name.empty()) return;
-  const auto* const found =
-      std::find_if(kAxisNames.begin(), kAxisNames.end(),
-                   [&](char axis) { return name.size() == 1 && name[0] == axis; });
+  const auto* const found = std::find_if(kAxisNames.begin(), kAxisNames.end(), [&](char axis) {
+    return name.size() == 1 && name[0] == axis;
+  });
   if (found == kAxisNames.end()) {
     reader.complain(reader.where("axis"), fmt::format("there is no axis \"{}\"", name),
                     "\"x\", \"y\" or \"z\"");
@@ -231,8 +231,7 @@ struct UnitTable {
 };
 
 const GyroPlan& message_of(UnitTable& unit, const dbc::Signal& main, const Quantity& rate) {
-  if (!unit.message)
-    unit.message = read_message(unit.reader, unit.resolver, unit.name, main, rate);
+  if (!unit.message) unit.message = read_message(unit.reader, unit.resolver, unit.name, main, rate);
   return *unit.message;
 }
 
@@ -270,10 +269,10 @@ std::optional<GyroPlan> read_own_axis(UnitTable& unit, const AxisEntry& entry, s
     signal = resolver.signal_named(*name, "message");
   }
   if (reader.has("rate") && entry.named_above) {
-    reader.complain(reader.where("rate"),
-                    fmt::format("rate and {} both name the signal of axis {}", above,
-                                kAxisNames[axis]),
-                    "keep one of them");
+    reader.complain(
+        reader.where("rate"),
+        fmt::format("rate and {} both name the signal of axis {}", above, kAxisNames[axis]),
+        "keep one of them");
   }
   unit.reader.forgive({above});
   const auto spelling = reader.has("unit") ? reader.text("unit") : unit.unit;
@@ -296,7 +295,8 @@ std::optional<GyroPlan> read_own_axis(UnitTable& unit, const AxisEntry& entry, s
 void check_signals(const std::vector<GyroPlan>& axes, TomlReader& reader) {
   for (std::size_t i = 0; i < axes.size(); ++i) {
     for (std::size_t k = i + 1; k < axes.size(); ++k) {
-      const bool same = axes[i].match == axes[k].match && axes[i].rate.codec == axes[k].rate.codec &&
+      const bool same = axes[i].match == axes[k].match &&
+                        axes[i].rate.codec == axes[k].rate.codec &&
                         axes[i].rate.presence == axes[k].rate.presence;
       if (!same) continue;
       reader.complain(reader.where(),
@@ -311,8 +311,7 @@ void check_signals(const std::vector<GyroPlan>& axes, TomlReader& reader) {
 std::optional<GyroPlan> read_unit(TomlReader& reader, SignalResolver& resolver,
                                   const std::string& name, TableContext context) {
   const AxisEntries entries = entries_of(reader, context);
-  UnitTable unit{reader, resolver, name, reader.text("unit"),
-                 sign_of(reader).value_or(1.0)};
+  UnitTable unit{reader, resolver, name, reader.text("unit"), sign_of(reader).value_or(1.0)};
   const auto max_bias_dps = number_within(reader, "max_bias_dps", kMaxBias_dps, "deg/s");
   const Mount mount = read_mount(reader).value_or(Mount{});
   std::vector<GyroPlan> axes;
@@ -357,8 +356,7 @@ std::optional<GyroPlan> read_gyro(const toml::table& table, std::size_t index,
     reader.complain(reader.where("name"), fmt::format("the name \"{}\" is not printable", name),
                     "letters, digits, blanks: it stands in tables and pictures");
   }
-  SignalResolver resolver(reader, context.cache, context.folder, context.buses,
-                          context.warnings);
+  SignalResolver resolver(reader, context.cache, context.folder, context.buses, context.warnings);
   context.bus_files.insert({resolver.bus(), resolver.dbc_path()});
   auto gyro = is_unit(reader) ? read_unit(reader, resolver, name, context)
                               : read_single(reader, resolver, name);

@@ -105,9 +105,10 @@ std::optional<Mount> checked_matrix(TomlReader& reader, const std::vector<double
   if (det > 0.5 && mount.corrected <= kMountRounding) return mount;
   reader.complain(
       reader.where("mount"),
-      det > 0.5 ? fmt::format("mount is no rotation: the nearest one differs by {:.2g} in an element",
-                              mount.corrected)
-                : fmt::format("mount is no rotation: its determinant is {:.3g}", det),
+      det > 0.5
+          ? fmt::format("mount is no rotation: the nearest one differs by {:.2g} in an element",
+                        mount.corrected)
+          : fmt::format("mount is no rotation: its determinant is {:.3g}", det),
       fmt::format("rows and columns of length 1 at right angles, to {:g}", kMountRounding));
   return std::nullopt;
 }

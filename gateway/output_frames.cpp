@@ -200,10 +200,10 @@ const can::Frame& AxesEncoder::rates(const std::array<const RateOutput*, kAxes>&
     age = std::max(age, output->age);
     instant = output->instant;
   }
-  store_bytes(data + kAxesAge,
-              static_cast<std::uint64_t>(
-                  std::clamp<std::int64_t>((age.count() + 500) / 1000, 0, 65535)),
-              2);
+  store_bytes(
+      data + kAxesAge,
+      static_cast<std::uint64_t>(std::clamp<std::int64_t>((age.count() + 500) / 1000, 0, 65535)),
+      2);
   store_bytes(data + kAxesTime,
               static_cast<std::uint64_t>(std::max<std::int64_t>(to_ns(instant), 0) / 1000), 8);
   protection_.protect({data, kAxesRateBytes});

@@ -173,7 +173,8 @@ void LayoutReader::read_axis() {
     if (name.size() == 1 && name[0] == kAxisNames[axis]) layout_->axis = axis;
   }
   if (layout_->axis || name.empty()) return;
-  reader_.complain(reader_.where("axis"), fmt::format("the units have no axis \"{}\"", name), names);
+  reader_.complain(reader_.where("axis"), fmt::format("the units have no axis \"{}\"", name),
+                   names);
 }
 
 void LayoutReader::take(std::string_view key, const Payload& mask) {

@@ -288,7 +288,8 @@ std::string device_of(const GyroPlan& gyro) {
                                    gyro.rate.name, gyro.sign ? " with a sign signal" : "",
                                    gyro.rate.layout, gyro.rate.scale, gyro.rate.shift);
   if (!gyro.taken_back.empty()) device += ", less model " + gyro.taken_back;
-  if (gyro.mount.turns()) device += fmt::format(", mount {:.6f}", fmt::join(gyro.mount.matrix, " "));
+  if (gyro.mount.turns())
+    device += fmt::format(", mount {:.6f}", fmt::join(gyro.mount.matrix, " "));
   std::string plain;
   for (const char c : device) {
     plain +=
@@ -433,6 +434,10 @@ Expected<fusion::MisalignmentMemory> misalignment_from(const toml::table& root,
 }
 
 Expected<SavedState> axes_from(const toml::table& root, const std::string& where) {
+  Numbers top(root, where, "saved state");
+  for (const char* key : {"format", "axis", "misalignment"})
+    top.pass_over(key);
+  if (const std::optional<Error> error = top.finish()) return tl::unexpected(*error);
   const toml::table* tables = root["axis"].as_table();
   if (tables == nullptr) return fail(where, "holds no [axis]", kRemedy);
   std::vector<SavedState> axes;
@@ -469,10 +474,10 @@ Expected<SavedState> saved_state_from(std::string_view text, const std::string& 
   if (format != nullptr && format->get() == kFormatOfAxes) return axes_from(root, where);
   if (format != nullptr && format->get() == kFormat && root["drift"].is_table())
     return pair_from(root, where);
-  return fail(where,
-              fmt::format("is of another version: only format {} and {} are known", kFormat,
-                          kFormatOfAxes),
-              kRemedy);
+  return fail(
+      where,
+      fmt::format("is of another version: only format {} and {} are known", kFormat, kFormatOfAxes),
+      kRemedy);
 }
 
 }  // namespace vgyro::gateway

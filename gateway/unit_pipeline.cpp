@@ -16,8 +16,12 @@ constexpr double kRadPerDeg = std::numbers::pi / 180.0;
 // What one axis shows of a turn counts for no more than this with the others: a wrong opinion must
 // not last for ever.
 constexpr double kLogTurningMost = 6.0;
+// From this probability on a steady turn about one axis is motion of the platform: nobody stands.
+constexpr double kSurelyTurning = 0.9;
 // The true rate at a stop follows the heading in steps of so much, a ten-thousandth of the Earth's.
 constexpr double kHeadingLeap_s = 1.0;
+// Pairs of different axes that are further apart are of different motion.
+constexpr Duration kApartMost = std::chrono::milliseconds(25);
 constexpr std::array<std::uint8_t, 2> kGyroRoles{kGyro1, kGyro2};
 
 double finite_or_0(double value) {
@@ -47,10 +51,9 @@ void SharedRates::end() {
 
 // Where an axis goes on alone its instants are others than those of the pairs.
 void SharedRates::collect(std::size_t axis, const RateOutput& output) {
-  const bool other_instant =
-      std::any_of(rates_.begin(), rates_.end(), [&](const std::optional<RateOutput>& one) {
-        return one && one->instant != output.instant;
-      });
+  const bool other_instant = std::any_of(
+      rates_.begin(), rates_.end(),
+      [&](const std::optional<RateOutput>& one) { return one && one->instant != output.instant; });
   if (other_instant || rates_[axis]) flush();
   rates_[axis] = output;
   any_ = true;
@@ -106,8 +109,7 @@ UnitPipeline::Unit UnitPipeline::unit_of(std::size_t gyro) const {
   for (std::size_t place = 0; place < axes_.size(); ++place) {
     for (std::size_t other = 0; other < axes_.size(); ++other) {
       const GyroPlan& sensor = plan_.axes[other].gyros[gyro];
-      const double share =
-          plan_.gyros[gyro].mount.at(plan_.axes[place].axis, sensor.sensor_axis);
+      const double share = plan_.gyros[gyro].mount.at(plan_.axes[place].axis, sensor.sensor_axis);
       unit.share[place][other] = sensor.flipped ? -share : share;
       unit.turns = unit.turns || unit.share[place][other] != (place == other ? 1.0 : 0.0);
     }
@@ -244,8 +246,8 @@ void UnitPipeline::note_rates(const Pairs& pairs) {
       continue;
     }
     const std::array<double, 2>& bias_dps = axes_[place]->bias_dps();
-    rate_dps = 0.5 * (pairs[place]->rate_dps[0] - bias_dps[0] + pairs[place]->rate_dps[1] -
-                      bias_dps[1]);
+    rate_dps =
+        0.5 * (pairs[place]->rate_dps[0] - bias_dps[0] + pairs[place]->rate_dps[1] - bias_dps[1]);
   }
 }
 
@@ -259,29 +261,42 @@ void UnitPipeline::note_single(std::size_t gyro, std::size_t place, double rate_
   set_cross(place);
 }
 
+// Of axes in messages of their own the newest pairs are taken for one instant: what the platform
+// does in a millisecond is nothing against what it does in a cell.
 void UnitPipeline::learn_misalignment(const Pairs& pairs) {
+  TimePoint oldest = TimePoint::max();
+  TimePoint newest = TimePoint::min();
+  for (std::size_t place = 0; place < axes_.size(); ++place) {
+    if (pairs[place]) waiting_[place] = pairs[place];
+    if (!waiting_[place]) return;
+    oldest = std::min(oldest, waiting_[place]->t);
+    newest = std::max(newest, waiting_[place]->t);
+  }
+  if (newest - oldest > kApartMost) {
+    misalignment_.break_off();
+    for (auto& pair : waiting_) {
+      if (pair && newest - pair->t > kApartMost) pair.reset();
+    }
+    return;
+  }
   fusion::AxisRates first{};
   fusion::AxisRates second{};
-  const fusion::AlignedPair* any = nullptr;
   for (std::size_t place = 0; place < axes_.size(); ++place) {
-    if (!pairs[place]) {
-      misalignment_.break_off();
-      return;
-    }
-    any = &*pairs[place];
-    first[plan_.axes[place].axis] = any->rate_dps[0];
-    second[plan_.axes[place].axis] = any->rate_dps[1];
+    first[plan_.axes[place].axis] = waiting_[place]->rate_dps[0];
+    second[plan_.axes[place].axis] = waiting_[place]->rate_dps[1];
   }
-  if (!begun_) {
-    begun_ = true;
-    origin_ = any->t;
-    if (saved_) {
-      const double age_s =
-          std::max(to_seconds(axes_[0]->stamp_of(any->t) - *saved_stamp_), 0.0);
-      (void)misalignment_.resume(*saved_, age_s);
-    }
-  }
-  misalignment_.add(to_seconds(any->t - origin_), first, second);
+  waiting_ = {};
+  begin(newest);
+  misalignment_.add(to_seconds(newest - origin_), first, second);
+}
+
+void UnitPipeline::begin(TimePoint t) {
+  if (begun_) return;
+  begun_ = true;
+  origin_ = t;
+  if (!saved_) return;
+  const double age_s = std::max(to_seconds(axes_[0]->stamp_of(t) - saved_stamp_), 0.0);
+  (void)misalignment_.resume(*saved_, age_s);
 }
 
 // --- what the axes tell each other ---------------------------------------------------------------
@@ -299,10 +314,10 @@ void UnitPipeline::share_motion() {
         constexpr double kLeast = 1e-6;
         return std::max(condition.probability[static_cast<std::size_t>(hypothesis)], kLeast);
       };
-      const double log_turning =
-          std::log(of(fusion::Hypothesis::kTurning) / of(fusion::Hypothesis::kStanding));
-      elsewhere.log_turning =
-          std::clamp(log_turning, elsewhere.log_turning, kLogTurningMost);
+      const double turning = of(fusion::Hypothesis::kTurning);
+      elsewhere.moves = elsewhere.moves || turning > kSurelyTurning;
+      elsewhere.log_turning = std::clamp(std::log(turning / of(fusion::Hypothesis::kStanding)),
+                                         elsewhere.log_turning, kLogTurningMost);
     }
     if (elsewhere == told_[place]) continue;
     told_[place] = elsewhere;
@@ -428,8 +443,8 @@ constexpr std::array kWorstFirst{State::kContradicted, State::kLost,     State::
                                  State::kCalibrating,  State::kDegraded, State::kRunning};
 
 std::size_t rank_of(State state) {
-  return static_cast<std::size_t>(
-      std::find(kWorstFirst.begin(), kWorstFirst.end(), state) - kWorstFirst.begin());
+  return static_cast<std::size_t>(std::find(kWorstFirst.begin(), kWorstFirst.end(), state) -
+                                  kWorstFirst.begin());
 }
 
 void add_gyro(const GyroStatus& axis, GyroStatus& unit) {
@@ -471,8 +486,9 @@ void add_axis(const Status& axis, Status& all) {
 }  // namespace
 
 const Status& UnitPipeline::refreshed_status() {
-  status_ = axes_[0]->refreshed_status();
-  for (std::size_t place = 1; place < axes_.size(); ++place)
+  // The rate that stands for all is about the last axis, about which a vehicle turns.
+  status_ = axes_.back()->refreshed_status();
+  for (std::size_t place = 0; place + 1 < axes_.size(); ++place)
     add_axis(axes_[place]->refreshed_status(), status_);
   // The platform's own layouts, each of which one axis sends.
   status_.layouts_out = {};

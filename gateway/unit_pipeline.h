@@ -84,14 +84,16 @@ class UnitPipeline {
 
   [[nodiscard]] Unit unit_of(std::size_t gyro) const;
   [[nodiscard]] bool nothing_due(TimePoint stamp) const;
-  void receive_unit(std::size_t gyro, std::uint8_t role, const std::array<std::uint8_t, kAxes>& roles,
-                    const can::Frame& frame, TimePoint stamp);
+  void receive_unit(std::size_t gyro, std::uint8_t role,
+                    const std::array<std::uint8_t, kAxes>& roles, const can::Frame& frame,
+                    TimePoint stamp);
   /// The rate about an axis of the vehicle; nothing where what is missing matters there.
   [[nodiscard]] std::optional<double> turned(std::size_t gyro, std::size_t place) const;
   void take_pairs();
   void take_round(Pairs& pairs);
   void note_rates(const Pairs& pairs);
   void learn_misalignment(const Pairs& pairs);
+  void begin(TimePoint t);
   void set_cross(std::size_t place);
   void note_single(std::size_t gyro, std::size_t place, double rate_dps);
   void share_motion();
@@ -109,7 +111,8 @@ class UnitPipeline {
   TimePoint origin_;
   bool begun_ = false;
   std::optional<fusion::MisalignmentMemory> saved_;
-  std::optional<TimePoint> saved_stamp_;
+  TimePoint saved_stamp_;
+  Pairs waiting_;  ///< for the pairs of the other axes
 
   std::array<fusion::Elsewhere, kAxes> told_{};
   std::array<std::uint64_t, kAxes> restarts_{};

@@ -30,7 +30,8 @@ std::optional<std::size_t> read_axis(TomlReader& reader, std::string_view key) {
   for (std::size_t i = 0; i < kAxes.size(); ++i) {
     if (*name == kAxes[i]) return i;
   }
-  reader.complain(reader.where(key), fmt::format("there is no axis \"{}\"", *name), "x, y or z");
+  reader.complain(reader.where(key), fmt::format("there is no axis \"{}\"", *name),
+                  "\"x\", \"y\" or \"z\"");
   return std::nullopt;
 }
 
@@ -61,8 +62,8 @@ std::optional<double> read_parameter(TomlReader& reader, const KindInfo& kind,
   return axis ? std::optional(static_cast<double>(*axis)) : std::nullopt;
 }
 
-// The key `axis` is the unit's, unless it is a parameter: of g_sensitivity it is the acceleration's,
-// as long as `from` does not say that.
+// The key `axis` is the unit's, unless it is a parameter: of g_sensitivity it is the
+// acceleration's, as long as `from` does not say that.
 bool has_unit_axis(const TomlReader& reader, const KindInfo& kind) {
   const bool is_parameter =
       std::any_of(kind.parameters.begin(), kind.parameters.end(),
@@ -176,9 +177,10 @@ std::optional<Effect> read_effect(const toml::table& table, const std::string& f
   const bool of_axis = has_unit_axis(reader, *kind);
   if (of_axis) effect.of_axis = read_axis(reader, kAxisKey);
   if (of_axis && acts_on_unit(kind->kind)) {
-    reader.complain(reader.where(kAxisKey),
-                    fmt::format("{} of one axis: it is of a unit, with all of its axes", kind->name),
-                    "leave `axis` out");
+    reader.complain(
+        reader.where(kAxisKey),
+        fmt::format("{} of one axis: it is of a unit, with all of its axes", kind->name),
+        "leave `axis` out");
   }
   for (std::size_t i = 0; i < kind->parameters.size(); ++i) {
     effect.parameters[i] =

@@ -129,8 +129,8 @@ Expected<void> Table::read_header(std::string_view line) {
     order_.push_back(i);
   }
   for (std::size_t i = 0; i < kColumns.size(); ++i) {
-    const bool stands_in = i == kRate && (has(kOtherRates) || has(kOtherRates + 1) ||
-                                          has(kOtherRates + 2));
+    const bool stands_in =
+        i == kRate && (has(kOtherRates) || has(kOtherRates + 1) || has(kOtherRates + 2));
     if ((!kColumns[i].required && i != kRate) || has(i) || stands_in) continue;
     return fail(here(), fmt::format("column {} is missing", kColumns[i].name), kHeaderForm);
   }

@@ -43,8 +43,9 @@ RateTable::RateTable(OutputFile file, const gateway::Plan& plan)
   }
   std::string header = "t_s";
   for (const std::size_t axis : axes_) {
-    header += fmt::format(",rate_{0}_dps,sigma_{0}_dps,valid_{0},state_{0},bias1_{0}_dps,bias2_{0}_dps",
-                          gateway::kAxisNames[axis]);
+    header +=
+        fmt::format(",rate_{0}_dps,sigma_{0}_dps,valid_{0},state_{0},bias1_{0}_dps,bias2_{0}_dps",
+                    gateway::kAxisNames[axis]);
   }
   file_.write(header + ",heading_deg\n");
 }

@@ -503,8 +503,7 @@ Expected<std::optional<gateway::SavedState>> read_state(const std::string& path,
 }
 
 // Nothing where none is wanted.
-Expected<std::optional<RateTable>> open_table(const std::string& path,
-                                              const gateway::Plan& plan) {
+Expected<std::optional<RateTable>> open_table(const std::string& path, const gateway::Plan& plan) {
   if (path.empty()) return std::nullopt;
   auto table = RateTable::open(path, plan);
   if (!table) return tl::unexpected(table.error());

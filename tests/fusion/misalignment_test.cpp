@@ -19,10 +19,10 @@ struct Drive {
   std::array<double, 3> angle_rad{};
   std::array<double, 3> scale{};
   double skew_s = 0.0;
-  double noise_dps = 0.02;       ///< of a sample of each unit
-  double walk_dps_rts = 1e-4;    ///< of each bias
-  double turns_dps = 15.0;       ///< about z
-  double sway_dps = 1.5;         ///< about x and y, at about half a hertz
+  double noise_dps = 0.02;     ///< of a sample of each unit
+  double walk_dps_rts = 1e-4;  ///< of each bias
+  double turns_dps = 15.0;     ///< about z
+  double sway_dps = 1.5;       ///< about x and y, at about half a hertz
   std::uint64_t seed = 1;
 };
 
@@ -73,8 +73,7 @@ TEST(Misalignment, OfHalfADegreeIsFoundToAFiftiethInTenMinutesOfDriving) {
     Misalignment misalignment;
     play(drive, 600.0, misalignment);
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      const double off_deg =
-          (misalignment.angle_rad()[axis] - drive.angle_rad[axis]) / kRadPerDeg;
+      const double off_deg = (misalignment.angle_rad()[axis] - drive.angle_rad[axis]) / kRadPerDeg;
       EXPECT_LT(std::abs(off_deg), 0.02) << axis;
       EXPECT_LT(misalignment.sigma_rad()[axis] / kRadPerDeg, 0.02) << axis;
     }
@@ -185,8 +184,7 @@ TEST(Misalignment, IsLittleMovedByAStepOfABias) {
     misalignment.add(t_s, first, second);
   }
   for (std::size_t axis = 0; axis < 3; ++axis)
-    EXPECT_NEAR(misalignment.angle_rad()[axis], before[axis],
-                4.0 * misalignment.sigma_rad()[axis]);
+    EXPECT_NEAR(misalignment.angle_rad()[axis], before[axis], 4.0 * misalignment.sigma_rad()[axis]);
 }
 
 }  // namespace
