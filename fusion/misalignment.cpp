@@ -39,6 +39,9 @@ constexpr double kNoiseLeast_dps = 1e-4;
 constexpr int kFitted = 5;
 // A segment that contradicts what is known by this much, per state, is believed less.
 constexpr double kContradiction = 4.0;
+// By this much it is of a fault, unless so many in a row say so.
+constexpr double kUnlikely = 50.0;
+constexpr int kUnlikelyMost = 3;
 // Neighbours that are alike by more than this are one value.
 constexpr double kAlikeMost = 0.9;
 
@@ -61,7 +64,14 @@ Misalignment::Misalignment() {
 
 // --- cells ---------------------------------------------------------------------------------------
 
-void Misalignment::add(double t_s, const AxisRates& first_dps, const AxisRates& second_dps) {
+void Misalignment::add(double t_s, const AxisRates& first_dps, const AxisRates& second_dps,
+                       const Both& both) {
+  if (both != both_) {
+    // What came just before an axis was set aside may be of its fault.
+    cells_count_ = 0;
+    break_off();
+  }
+  both_ = both;
   if (begun_ && (t_s - newest_s_ > kHole_s || t_s < newest_s_)) break_off();
   if (!begun_) {
     begun_ = true;
@@ -184,7 +194,7 @@ void Misalignment::close_segment() {
     State right = State::Zero();
     bool any = false;
     for (std::size_t axis = 0; axis < kPlatformAxes; ++axis) {
-      if (present_[axis]) any = add_axis(axis, information, right) || any;
+      if (both_[axis]) any = add_axis(axis, information, right) || any;
     }
     if (any) learn(information, right);
   }
@@ -209,6 +219,8 @@ void Misalignment::learn(Square information, State right) {
   // States that the segment does not move have no row in it.
   expected.diagonal().array() += 1e-12 * (1.0 + expected.trace());
   const double excess = away.dot(expected.ldlt().solve(away)) / kStates;
+  unlikely_ = excess > kUnlikely ? unlikely_ + 1 : 0;
+  if (unlikely_ > 0 && unlikely_ <= kUnlikelyMost) return;
   if (excess > kContradiction) information *= kContradiction / excess;
   const double weight = excess > kContradiction ? kContradiction / excess : 1.0;
   const Square unit = Square::Identity();

@@ -33,11 +33,13 @@ class Misalignment {
 
   Misalignment();
 
-  /// Which axes both units have; of the others nothing is told.
-  void set_present(const std::array<bool, kPlatformAxes>& present) { present_ = present; }
+  /// About which axes both units tell the rate.
+  using Both = std::array<bool, kPlatformAxes>;
 
-  /// A pair of all axes at one instant, as the units read it, biases and all; t_s grows.
-  void add(double t_s, const AxisRates& first_dps, const AxisRates& second_dps);
+  /// One instant, as the units read it, biases and all; t_s grows. About an axis that not both of
+  /// them tell both rates are what is known of it, or 0.
+  void add(double t_s, const AxisRates& first_dps, const AxisRates& second_dps,
+           const Both& both = {true, true, true});
   /// What comes next is not joined to what came before.
   void break_off();
 
@@ -76,10 +78,11 @@ class Misalignment {
   [[nodiscard]] double noise_variance(std::size_t axis) const;
   void learn(Square information, State right);
 
-  std::array<bool, kPlatformAxes> present_{true, true, true};
+  Both both_{true, true, true};  ///< in the present segment
   State mean_ = State::Zero();
   Square covariance_ = Square::Zero();
   std::size_t segments_used_ = 0;
+  int unlikely_ = 0;  ///< segments in a row that contradict all that is known
 
   double cell_from_s_ = 0.0;
   double newest_s_ = 0.0;

@@ -197,6 +197,7 @@ void read_heading(TomlReader& reader, const Plan& plan, CalibrationPlan& calibra
   const auto heading = reader.number("heading_deg");
   if (!heading) return;
   calibration.heading_deg = heading;
+  if (plan.gyros.empty()) return;
   if (plan.output.axes.empty()) {
     reader.complain(reader.where("heading_deg"), "heading_deg is of no use to a single axis",
                     "leave it out: only the Earth's rate about horizontal axes depends on it");
@@ -210,8 +211,14 @@ void read_heading(TomlReader& reader, const Plan& plan, CalibrationPlan& calibra
 }
 
 // The platform's true rate about its axis, or axes, while it rests.
-void read_true_rate(TomlReader& reader, const Plan& platform, CalibrationPlan& plan) {
+void read_true_rate(TomlReader& reader, const toml::table& table, const Plan& platform,
+                    CalibrationPlan& plan) {
   read_axis_rates(reader, platform, plan);
+  // After trouble with the units nobody knows how many axes there are.
+  if (platform.gyros.empty() && table["rate_dps"].is_array()) {
+    reader.forgive({"rate_dps", "latitude_deg", "heading_deg"});
+    return;
+  }
   if (platform.output.axes.empty()) {
     if (const auto rate = reader.number("rate_dps")) {
       plan.rate_dps = *rate;
@@ -241,7 +248,7 @@ void read_calibration(TomlReader& root, Context& context) {
   if (table == nullptr) return;
   TomlReader reader(*table, context.file, "[calibration]", context.errors);
   plan.rest_s = number_within(reader, "rest_s", kRest_s, "s").value_or(plan.rest_s);
-  read_true_rate(reader, context.resolved.plan, plan);
+  read_true_rate(reader, *table, context.resolved.plan, plan);
   const std::string source = reader.text("source").value_or("rest");
   plan.from_reference = source == "reference";
   if (source != "rest" && source != "reference") {

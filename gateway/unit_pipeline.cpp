@@ -28,13 +28,6 @@ double finite_or_0(double value) {
   return std::isfinite(value) ? value : 0.0;
 }
 
-std::array<bool, kAxes> present_in(const Plan& plan) {
-  std::array<bool, kAxes> present{};
-  for (const Plan& pair : plan.axes)
-    present[pair.axis] = true;
-  return present;
-}
-
 }  // namespace
 
 // --- a frame of all rates ------------------------------------------------------------------------
@@ -95,7 +88,6 @@ UnitPipeline::UnitPipeline(const Plan& plan) : plan_(plan), router_(plan_) {
     axes_.push_back(std::make_unique<AxisPipeline>(pair, make_corrector(pair)));
   for (std::size_t gyro = 0; gyro < 2; ++gyro)
     units_[gyro] = unit_of(gyro);
-  misalignment_.set_present(present_in(plan_));
   learns_misalignment_ = plan_.corrector.method == Method::kOptimal;
   if (plan_.output.rate_is_shared && plan_.output.vgyro_frames) {
     shared_.emplace(plan_.output);
@@ -262,13 +254,15 @@ void UnitPipeline::note_single(std::size_t gyro, std::size_t place, double rate_
 }
 
 // Of axes in messages of their own the newest pairs are taken for one instant: what the platform
-// does in a millisecond is nothing against what it does in a cell.
+// does in a millisecond is nothing against what it does in a cell. An axis that goes on with one
+// unit tells nothing itself, and what it is to the others.
 void UnitPipeline::learn_misalignment(const Pairs& pairs) {
   TimePoint oldest = TimePoint::max();
   TimePoint newest = TimePoint::min();
   for (std::size_t place = 0; place < axes_.size(); ++place) {
     if (pairs[place]) waiting_[place] = pairs[place];
-    if (!waiting_[place]) return;
+    if (!waiting_[place] && axes_[place]->pairing()) return;
+    if (!waiting_[place]) continue;
     oldest = std::min(oldest, waiting_[place]->t);
     newest = std::max(newest, waiting_[place]->t);
   }
@@ -281,13 +275,16 @@ void UnitPipeline::learn_misalignment(const Pairs& pairs) {
   }
   fusion::AxisRates first{};
   fusion::AxisRates second{};
+  fusion::Misalignment::Both both{};
   for (std::size_t place = 0; place < axes_.size(); ++place) {
-    first[plan_.axes[place].axis] = waiting_[place]->rate_dps[0];
-    second[plan_.axes[place].axis] = waiting_[place]->rate_dps[1];
+    const std::size_t axis = plan_.axes[place].axis;
+    both[axis] = waiting_[place].has_value();
+    first[axis] = both[axis] ? waiting_[place]->rate_dps[0] : rate_dps_[axis];
+    second[axis] = both[axis] ? waiting_[place]->rate_dps[1] : rate_dps_[axis];
   }
   waiting_ = {};
   begin(newest);
-  misalignment_.add(to_seconds(newest - origin_), first, second);
+  misalignment_.add(to_seconds(newest - origin_), first, second, both);
 }
 
 void UnitPipeline::begin(TimePoint t) {

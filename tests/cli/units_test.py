@@ -197,6 +197,39 @@ class Truth(Units):
             self.assertEqual(states, {"degraded"}, axis)
             self.assertIn("counter_stuck", summary["axes"][i]["gyros"][1]["faults"])
 
+    def test_an_axis_that_never_lived_leaves_the_others_their_tilt(self):
+        drive, a, b = self.drive(seed=13)
+        t, readings = a
+        readings[:, 1] = 0.5
+        rows, summary = self.replay(log_of(frames(t, readings, 0x101), frames(*b, 0x102)))
+        for axis in "xz":
+            relative, _ = self.errors(rows, drive, axis)
+            self.assertGreater(np.mean(relative ** 2), 0.8, axis)
+            self.assertLess(np.mean(relative ** 2), 1.2, axis)
+        # The dead axis is what the other unit says of it.
+        relative, _ = self.errors(rows, drive, "y", 100.0)
+        self.assertLess(np.mean(relative ** 2), 1.2)
+        off = np.abs(np.array(summary["misalignment"]["angle_deg"]) - TILT_DEG)
+        self.assertLess(np.max(off / np.array(summary["misalignment"]["sigma_deg"])), 4.0)
+
+    def test_an_axis_may_come_at_a_rate_of_its_own(self):
+        """Yaw of one unit from another sensor, half as often."""
+        drive, a, b = self.drive(seed=14)
+        t, readings = b
+        lines = []
+        for n, i in enumerate(range(0, len(t), 2)):
+            us = START_US + round(t[i] * 1e6) + 300
+            raw = np.rint(np.radians(readings[i, 2]) * 1e6).astype("<i4").tobytes() + bytes([n % 256, 0, 0, 0])
+            lines.append((us, f"({us // 1_000_000}.{us % 1_000_000:06d}) can0 103#{raw.hex().upper()}\n"))
+        text = config().replace('message = "IMU_B"\nrate_x = "X"\nrate_y = "Y"\nrate_z = "Z"\ncounter = "Counter"\n',
+                                'message = "IMU_B"\nrate_x = "X"\nrate_y = "Y"\ncounter = "Counter"\n'
+                                '[[gyro.axis]]\naxis = "z"\nmessage = "YAW_B"\nrate = "Yaw"\ncounter = "YawCounter"\n')
+        rows, summary = self.replay(log_of(frames(*a, 0x101), frames(*b, 0x102), lines), text)
+        self.judge(rows, drive, axes="xy")
+        self.assertEqual(summary["final_state"], "running")
+        relative, _ = self.errors(rows, drive, "z")
+        self.assertLess(np.mean(relative ** 2), 1.5)
+
     def test_a_unit_that_falls_silent_leaves_the_other(self):
         drive, a, b = self.drive(seed=5)
         t, readings = a

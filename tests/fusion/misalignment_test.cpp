@@ -131,6 +131,29 @@ TEST(Misalignment, IsLearnedOnlyWhereTheMotionShowsIt) {
   EXPECT_GT(misalignment.sigma_rad()[2], 0.5 * Misalignment::kPrior_deg * kRadPerDeg);
 }
 
+// An axis of which only one unit is left is known to the others, whose differences show the tilt.
+TEST(Misalignment, IsLearnedFromTheOtherAxesWhereOneIsOfASingleUnit) {
+  const Drive drive{.angle_rad = {0.008, -0.006, 0.007}};
+  Misalignment misalignment;
+  Random random(3);
+  for (int n = 0; n < 30'000; ++n) {
+    const double t_s = n / kRate_hz;
+    AxisRates first = rate_at(drive, t_s);
+    AxisRates second = second_at(drive, t_s);
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      first[axis] += random.normal(drive.noise_dps);
+      second[axis] += random.normal(drive.noise_dps);
+    }
+    second[1] = first[1];
+    misalignment.add(t_s, first, second, {true, false, true});
+  }
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const double off = misalignment.angle_rad()[axis] - drive.angle_rad[axis];
+    EXPECT_LT(std::abs(off), 4.0 * misalignment.sigma_rad()[axis]) << axis;
+    EXPECT_LT(misalignment.sigma_rad()[axis] / kRadPerDeg, 0.05) << axis;
+  }
+}
+
 TEST(Misalignment, TakesOffWhatUnitTwoReadsTooMuch) {
   const Drive drive{.angle_rad = {0.008, -0.006, 0.007}};
   Misalignment misalignment;
