@@ -38,8 +38,7 @@ void print_e2e(const gateway::E2ePlan& e2e) {
   detail("counter", text);
 }
 
-void print_gyro(const gateway::GyroPlan& gyro) {
-  print_row("gyro " + gyro.name, gyro.bus, gyro.match, gyro.message, gyro.rate);
+void print_rate(const gateway::GyroPlan& gyro) {
   detail("accepted",
          fmt::format("{:g} to {:g} {}{}", gyro.rate.lowest(), gyro.rate.highest(),
                      printable(gyro.rate.unit), gyro.rate.scale < 0 ? ", sign flipped" : ""));
@@ -48,6 +47,10 @@ void print_gyro(const gateway::GyroPlan& gyro) {
                                 gyro.rate.codes.first, gyro.rate.codes.last));
   }
   if (gyro.sign) detail("sign", "from a signal of its own: 1 is negative");
+}
+
+// What a gyro's message tells besides its rate.
+void print_message(const gateway::GyroPlan& gyro) {
   if (gyro.temperature) {
     detail("temperature", fmt::format("{} in {}, {}", gyro.temperature->name,
                                       printable(gyro.temperature->unit), gyro.temperature->layout));
@@ -66,6 +69,71 @@ void print_gyro(const gateway::GyroPlan& gyro) {
   print_e2e(gyro.e2e);
   if (gyro.valid) detail("valid when", gyro.valid->text);
   if (gyro.max_bias_dps) detail("bias", fmt::format("at most {:g} deg/s", *gyro.max_bias_dps));
+}
+
+// How a unit's axes lie in the vehicle, and how far from a rotation that was given.
+void print_mount(const gateway::Mount& mount) {
+  if (!mount.turns() && mount.corrected == 0.0) return;
+  for (std::size_t axis = 0; axis < gateway::kAxes; ++axis) {
+    detail(axis == 0 ? "mount" : "",
+           fmt::format("vehicle's {} = {:+.6f} x {:+.6f} y {:+.6f} z", gateway::kAxisNames[axis],
+                       mount.at(axis, 0), mount.at(axis, 1), mount.at(axis, 2)));
+  }
+  detail("",
+         mount.corrected == 0.0
+             ? std::string("a rotation, exactly")
+             : fmt::format("as given up to {:.2g} from a rotation in an element", mount.corrected));
+}
+
+void print_gyro(const gateway::GyroPlan& gyro) {
+  if (gyro.axes.empty()) {
+    print_row("gyro " + gyro.name, gyro.bus, gyro.match, gyro.message, gyro.rate);
+    print_rate(gyro);
+    print_message(gyro);
+    return;
+  }
+  for (const gateway::GyroPlan& axis : gyro.axes) {
+    print_row(fmt::format("gyro {} {}", gyro.name, gateway::kAxisNames[axis.sensor_axis]), axis.bus,
+              axis.match, axis.message, axis.rate);
+    print_rate(axis);
+    const bool last_of_message = &axis == &gyro.axes.back() || !(axis.match == (&axis)[1].match);
+    if (last_of_message) print_message(axis);
+  }
+  print_mount(gyro.mount);
+}
+
+void print_calibration(const gateway::CalibrationPlan& plan, std::string_view about) {
+  say("  {:<14}", "calibration");
+  if (plan.from_reference) {
+    say("the first {:g} s against [reference]\n", plan.rest_s);
+    return;
+  }
+  const bool waits = plan.when_moving == fusion::WhenMoving::kWait;
+  say("the first {:g} s{}, true rate {}{:g} deg/s", plan.rest_s,
+      waits ? " of rest" : ", taken for rest whatever moves", about, plan.rate_dps);
+  if (plan.doubt_dps > 0.0)
+    say(", the Earth's share unknown: {:.2g} deg/s more in sigma", plan.doubt_dps);
+  say("\n");
+}
+
+void print_output(const gateway::Plan& plan) {
+  const gateway::OutputPlan& output = plan.output;
+  if (!output.vgyro_frames) return;
+  const std::string& bus = plan.buses[output.bus];
+  if (output.axes.empty()) {
+    say("  {:<14}{:<8}VG_Rate {:03X}, VG_Bias {:03X}, VG_Model {:03X}, {}\n", "output", bus,
+        output.rate_id, output.bias_id, output.model_id,
+        output.fd ? "VG_Rate as CAN FD" : "classic CAN");
+  }
+  if (output.rate_is_shared)
+    say("  {:<14}{:<8}VG_Rates {:03X}, all axes, as CAN FD\n", "output", bus, output.rate_id);
+  for (const gateway::Plan& pair : plan.axes) {
+    const std::string rate =
+        output.rate_is_shared ? "" : fmt::format("VG_Rate {:03X}, ", pair.output.rate_id);
+    say("  {:<14}{:<8}{}VG_Bias {:03X}, VG_Model {:03X}, classic CAN\n",
+        fmt::format("output {}", gateway::kAxisNames[pair.axis]), bus, rate, pair.output.bias_id,
+        pair.output.model_id);
+  }
 }
 
 void print_model(const gateway::Plan& plan) {
@@ -152,14 +220,9 @@ void print_plan(const gateway::Plan& plan) {
     print_row("speed", plan.speed->bus, plan.speed->match, plan.speed->message, plan.speed->speed);
     print_e2e(plan.speed->e2e);
   }
-  say("  {:<14}", "calibration");
-  if (plan.calibration.from_reference) {
-    say("the first {:g} s against [reference]\n", plan.calibration.rest_s);
-  } else {
-    const bool waits = plan.calibration.when_moving == fusion::WhenMoving::kWait;
-    say("the first {:g} s{}, true rate {:g} deg/s\n", plan.calibration.rest_s,
-        waits ? " of rest" : ", taken for rest whatever moves", plan.calibration.rate_dps);
-  }
+  if (plan.axes.empty()) print_calibration(plan.calibration, "");
+  for (const gateway::Plan& pair : plan.axes)
+    print_calibration(pair.calibration, fmt::format("about {} ", gateway::kAxisNames[pair.axis]));
   say("  {:<14}{}", "corrector", gateway::to_string(plan.corrector.method));
   if (plan.corrector.method == gateway::Method::kMutual) {
     say(", window {:g} s, drift polynomial of order {}", plan.corrector.window_s,
@@ -169,11 +232,7 @@ void print_plan(const gateway::Plan& plan) {
   }
   say("\n");
   print_model(plan);
-  if (plan.output.vgyro_frames) {
-    say("  {:<14}{:<8}VG_Rate {:03X}, VG_Bias {:03X}, VG_Model {:03X}, {}\n", "output",
-        plan.buses[plan.output.bus], plan.output.rate_id, plan.output.bias_id, plan.output.model_id,
-        plan.output.fd ? "VG_Rate as CAN FD" : "classic CAN");
-  }
+  print_output(plan);
   for (const gateway::OutputLayout& layout : plan.output.layouts)
     print_layout(plan, layout);
 }

@@ -65,4 +65,14 @@ std::optional<Error> RoleFrames::missing_gyro(const std::string& name,
   return std::nullopt;
 }
 
+std::optional<Error> several_axes(const std::string& config, const gateway::Plan& plan,
+                                  const std::string& command) {
+  if (plan.axes.empty()) return std::nullopt;
+  return Error{config,
+               fmt::format("has units of {} axes, and {} looks at one pair of gyros",
+                           plan.axes.size(), command),
+               "a configuration that names one of the axes: rate = \"SIGNAL\" instead of rate_x, "
+               "rate_y, rate_z"};
+}
+
 }  // namespace vgyro::cli

@@ -44,4 +44,9 @@ class RoleFrames {
   std::array<std::uint64_t, 2> frames_{};
 };
 
+/// Of a configuration of whole units for a command that looks at one pair of gyros; nothing of two
+/// single ones. `command`: as it is called.
+std::optional<Error> several_axes(const std::string& config, const gateway::Plan& plan,
+                                  const std::string& command);
+
 }  // namespace vgyro::cli

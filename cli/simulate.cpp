@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <optional>
+#include <span>
 
 #include <fmt/core.h>
 
@@ -35,6 +36,10 @@ constexpr double kAccelerometerOffset = 0.06;
 // What stands on a page of its own goes out with every tenth sample, a little later.
 constexpr std::size_t kPageEvery = 10;
 constexpr double kPageAfter_s = 1e-4;
+// A unit that has several messages sends one after the other.
+constexpr double kMessageAfter_s = 2e-4;
+// Each axis of a unit has random numbers of its own.
+constexpr std::uint64_t kAxisSeed = 0x9E3779B97F4A7C15;
 constexpr double kMicro = 1e6;
 
 enum Part : std::uint8_t { kGyroA = 0, kGyroB = 1, kReference = 2, kAccelerometer = 3 };
@@ -75,9 +80,22 @@ struct SimulatedMessage {
   const FrameMatch* match = nullptr;
   std::vector<Part> parts{};
   const gateway::Quantity* page = nullptr;  ///< set: only this, and what else stands on its page
+  double after_s = 0.0;                     ///< behind the first message of its unit
   std::size_t next = 0;
   double stamp_s = 0.0;
 };
+
+/// A gyro, or one axis of a unit: where its rate stands, and what it reads.
+struct Sensor {
+  const gateway::GyroPlan* plan = nullptr;
+  std::vector<simulation::GyroSample> samples{};
+  std::uint64_t beyond = 0;  ///< readings that the signal cannot carry
+};
+using Sensors = std::array<std::vector<Sensor>, 2>;
+
+std::span<const gateway::GyroPlan> sensors_of(const gateway::GyroPlan& gyro) {
+  return gyro.axes.empty() ? std::span(&gyro, 1) : std::span(gyro.axes);
+}
 
 bool same_message(const FrameMatch& a, const FrameMatch& b) {
   return a.bus == b.bus && a.id == b.id && a.extended == b.extended;
@@ -88,13 +106,20 @@ std::vector<SimulatedMessage> messages_of(const Plan& plan, bool has_acceleratio
   const auto add = [&](const FrameMatch& match, Part part) {
     for (SimulatedMessage& message : messages) {
       if (!same_message(*message.match, match)) continue;
-      message.parts.push_back(part);
+      if (message.parts.back() != part) message.parts.push_back(part);
       return;
     }
-    messages.push_back({.match = &match, .parts = {part}});
+    const auto before = std::count_if(messages.begin(), messages.end(), [&](const auto& message) {
+      return message.parts.front() == part;
+    });
+    messages.push_back({.match = &match,
+                        .parts = {part},
+                        .after_s = static_cast<double>(before) * kMessageAfter_s});
   };
-  add(plan.gyros[0].match, kGyroA);
-  add(plan.gyros[1].match, kGyroB);
+  for (const Part part : {kGyroA, kGyroB}) {
+    for (const gateway::GyroPlan& sensor : sensors_of(plan.gyros[part]))
+      add(sensor.match, part);
+  }
   if (plan.reference) add(plan.reference->match, kReference);
   if (plan.accelerometer && has_acceleration) add(plan.accelerometer->match, kAccelerometer);
   return messages;
@@ -125,7 +150,8 @@ simulation::Settings settings_of(const SimulateOptions& options,
 
 class Recording {
  public:
-  Recording(const Plan& plan, const simulation::Simulator& simulator,
+  /// `simulator` plays what is not of a gyro.
+  Recording(const Plan& plan, const simulation::Simulator& simulator, Sensors sensors,
             std::vector<SimulatedMessage> messages);
 
   /// All frames in the order of their stamps.
@@ -138,9 +164,12 @@ class Recording {
   [[nodiscard]] double stamp_s(Part part, std::size_t n) const;
   [[nodiscard]] bool lost(const SimulatedMessage& message) const;
   [[nodiscard]] can::Frame frame(const SimulatedMessage& message);
-  void put(Part part, std::size_t n, can::Frame& frame);
-  [[nodiscard]] const gateway::E2ePlan& e2e_of(Part part) const;
-  void put_besides(Part part, std::size_t n, can::Frame& frame) const;
+  void put(Part part, const FrameMatch& match, std::size_t n, can::Frame& frame);
+  void put_sensors(Part part, const FrameMatch& match, std::size_t n, can::Frame& frame);
+  [[nodiscard]] const gateway::E2ePlan& e2e_of(Part part, const FrameMatch& match) const;
+  /// The first that stands in this message: it tells what the message tells besides rates.
+  [[nodiscard]] const Sensor& sensor_in(Part part, const FrameMatch& match) const;
+  void put_besides(const Sensor& sensor, std::size_t n, can::Frame& frame) const;
   void put_page(Part part, std::size_t n, const gateway::Quantity& page, can::Frame& frame) const;
   void add_pages(Part part);
   void say_constants() const;
@@ -149,19 +178,18 @@ class Recording {
   const Plan& plan_;
   const simulation::Simulator& simulator_;
   std::vector<SimulatedMessage> messages_;
-  std::array<std::vector<simulation::GyroSample>, 2> gyros_;
+  Sensors sensors_;
   std::vector<simulation::RateSample> reference_;
   std::vector<simulation::AccelerationSample> acceleration_;
-  std::array<std::uint64_t, 2> beyond_{};  ///< readings that the signal cannot carry
   std::uint64_t frames_ = 0;
 };
 
-Recording::Recording(const Plan& plan, const simulation::Simulator& simulator,
+Recording::Recording(const Plan& plan, const simulation::Simulator& simulator, Sensors sensors,
                      std::vector<SimulatedMessage> messages)
     : plan_(plan),
       simulator_(simulator),
       messages_(std::move(messages)),
-      gyros_{simulator.gyro(0), simulator.gyro(1)} {
+      sensors_(std::move(sensors)) {
   for (const SimulatedMessage& message : messages_) {
     for (const Part part : message.parts) {
       if (part == kReference) reference_ = simulator.reference();
@@ -195,18 +223,19 @@ void Recording::add_pages(Part part) {
 std::size_t Recording::count(Part part) const {
   if (part == kReference) return reference_.size();
   if (part == kAccelerometer) return acceleration_.size();
-  return gyros_[part].size();
+  return sensors_[part].front().samples.size();
 }
 
 double Recording::stamp_s(Part part, std::size_t n) const {
   if (part == kReference) return reference_[n].stamp_s;
   if (part == kAccelerometer) return acceleration_[n].stamp_s;
-  return gyros_[part][n].stamp_s;
+  return sensors_[part].front().samples[n].stamp_s;
 }
 
 bool Recording::lost(const SimulatedMessage& message) const {
-  return std::any_of(message.parts.begin(), message.parts.end(),
-                     [&](Part part) { return part <= kGyroB && gyros_[part][message.next].lost; });
+  return std::any_of(message.parts.begin(), message.parts.end(), [&](Part part) {
+    return part <= kGyroB && sensors_[part].front().samples[message.next].lost;
+  });
 }
 
 // From message.next on; false where there is none.
@@ -216,11 +245,12 @@ bool Recording::find_next(SimulatedMessage& message) const {
   while (message.next < count(leader) && lost(message))
     message.next += step;
   if (message.next >= count(leader)) return false;
-  message.stamp_s = stamp_s(leader, message.next) + (message.page != nullptr ? kPageAfter_s : 0.0);
+  message.stamp_s = stamp_s(leader, message.next) + message.after_s +
+                    (message.page != nullptr ? kPageAfter_s : 0.0);
   return true;
 }
 
-void Recording::put(Part part, std::size_t n, can::Frame& frame) {
+void Recording::put(Part part, const FrameMatch& match, std::size_t n, can::Frame& frame) {
   if (part == kReference) {
     gateway::put_quantity(plan_.reference->rate, reference_[n].rate_dps, frame);
     gateway::put_counter(plan_.reference->e2e, n, frame);
@@ -234,23 +264,35 @@ void Recording::put(Part part, std::size_t n, can::Frame& frame) {
     gateway::put_counter(plan_.accelerometer->e2e, n, frame);
     return;
   }
-  const gateway::GyroPlan& gyro = plan_.gyros[part];
-  const simulation::GyroSample& sample = gyros_[part][n];
-  if (std::abs(sample.reading_dps) > gateway::carried_dps(gyro)) ++beyond_[part];
-  gateway::put_gyro(gyro, sample.reading_dps, n, frame);
-  put_besides(part, n, frame);
+  put_sensors(part, match, n, frame);
+}
+
+void Recording::put_sensors(Part part, const FrameMatch& match, std::size_t n, can::Frame& frame) {
+  for (Sensor& sensor : sensors_[part]) {
+    if (!same_message(sensor.plan->match, match)) continue;
+    const double reading_dps = sensor.samples[n].reading_dps;
+    if (std::abs(reading_dps) > gateway::carried_dps(*sensor.plan)) ++sensor.beyond;
+    gateway::put_gyro(*sensor.plan, reading_dps, n, frame);
+  }
+  put_besides(sensor_in(part, match), n, frame);
+}
+
+const Sensor& Recording::sensor_in(Part part, const FrameMatch& match) const {
+  return *std::find_if(sensors_[part].begin(), sensors_[part].end(), [&](const Sensor& sensor) {
+    return same_message(sensor.plan->match, match);
+  });
 }
 
 // Beside a rate that stands on every page those on pages of their own take turns.
-void Recording::put_besides(Part part, std::size_t n, can::Frame& frame) const {
-  const gateway::GyroPlan& gyro = plan_.gyros[part];
+void Recording::put_besides(const Sensor& sensor, std::size_t n, can::Frame& frame) const {
+  const gateway::GyroPlan& gyro = *sensor.plan;
   bool page_is_chosen = false;
   for (std::size_t i = 0; i < kBesides.size(); ++i) {
     const Beside& beside = kBesides[(n + i) % kBesides.size()];
     const auto& quantity = gyro.*beside.quantity;
     if (!quantity || !gateway::carries(gyro, *quantity, frame)) continue;
     if (page_is_chosen && !quantity->presence.holds(frame.payload())) continue;
-    gateway::put_quantity(*quantity, beside.value(simulator_, gyros_[part][n]), frame);
+    gateway::put_quantity(*quantity, beside.value(simulator_, sensor.samples[n]), frame);
     page_is_chosen = page_is_chosen || !quantity->presence.always();
   }
 }
@@ -261,13 +303,14 @@ void Recording::put_page(Part part, std::size_t n, const gateway::Quantity& page
   for (const Beside& beside : kBesides) {
     const auto& quantity = plan_.gyros[part].*beside.quantity;
     if (!quantity || !quantity->presence.holds(frame.payload())) continue;
-    gateway::put_quantity(*quantity, beside.value(simulator_, gyros_[part][n]), frame);
+    gateway::put_quantity(*quantity, beside.value(simulator_, sensors_[part].front().samples[n]),
+                          frame);
   }
 }
 
-const gateway::E2ePlan& Recording::e2e_of(Part part) const {
+const gateway::E2ePlan& Recording::e2e_of(Part part, const FrameMatch& match) const {
   if (part == kReference) return plan_.reference->e2e;
-  return part == kAccelerometer ? plan_.accelerometer->e2e : plan_.gyros[part].e2e;
+  return part == kAccelerometer ? plan_.accelerometer->e2e : sensor_in(part, match).plan->e2e;
 }
 
 can::Frame Recording::frame(const SimulatedMessage& message) {
@@ -276,10 +319,10 @@ can::Frame Recording::frame(const SimulatedMessage& message) {
     put_page(message.parts.front(), message.next, *message.page, frame);
   } else {
     for (const Part part : message.parts)
-      put(part, message.next, frame);
+      put(part, *message.match, message.next, frame);
   }
   for (const Part part : message.parts)
-    gateway::seal(e2e_of(part), frame);
+    gateway::seal(e2e_of(part, *message.match), frame);
   return frame;
 }
 
@@ -314,7 +357,7 @@ void Recording::summarize(const SimulateOptions& options) const {
   tell("{:g} s of {}, {} frames, seed {}\n", simulator_.profile().length_s, options.profile,
        frames_, options.seed);
   for (const Part part : {kGyroA, kGyroB}) {
-    const auto& samples = gyros_[part];
+    const auto& samples = sensors_[part].front().samples;
     const auto lost = std::count_if(samples.begin(), samples.end(),
                                     [](const simulation::GyroSample& s) { return s.lost; });
     tell("  gyro {}: {} samples{}\n", plan_.gyros[part].name, samples.size(),
@@ -349,15 +392,72 @@ void Recording::say_constants() const {
 }
 
 void Recording::warn_of_limits() const {
-  for (const Part part : {kGyroA, kGyroB}) {
-    if (beyond_[part] == 0) continue;
-    warn({"gyro " + plan_.gyros[part].name,
-          fmt::format("{} readings are beyond the {:g} deg/s that its signal {} can carry; they "
-                      "were sent as that",
-                      beyond_[part], gateway::carried_dps(plan_.gyros[part]),
-                      plan_.gyros[part].rate.name),
-          {}});
+  for (const std::vector<Sensor>& sensors : sensors_) {
+    for (const Sensor& sensor : sensors) {
+      if (sensor.beyond == 0) continue;
+      warn({"gyro " + sensor.plan->name,
+            fmt::format("{} readings are beyond the {:g} deg/s that its signal {} can carry; they "
+                        "were sent as that",
+                        sensor.beyond, gateway::carried_dps(*sensor.plan), sensor.plan->rate.name),
+            {}});
+    }
   }
+}
+
+// The motion and the effects of one axis of a unit.
+Expected<simulation::Simulator> axis_simulator(const gateway::GyroPlan& unit, std::size_t gyro,
+                                               std::size_t axis, const model::Model& model,
+                                               const simulation::Profile& profile,
+                                               simulation::Settings settings) {
+  model::Model own{.file = model.file, .effects = {}};
+  std::copy_if(model.effects.begin(), model.effects.end(), std::back_inserter(own.effects),
+               [&](const model::Effect& effect) {
+                 return effect.gyro == gyro && effect.of_axis.value_or(axis) == axis;
+               });
+  std::array<std::array<double, 3>, 3> about{};
+  for (std::size_t sensor = 0; sensor < 3; ++sensor) {
+    for (std::size_t i = 0; i < 3; ++i)
+      about[sensor][i] = unit.mount.at(i, sensor);
+  }
+  settings.seed ^= kAxisSeed * axis;
+  return simulation::Simulator::make(std::move(own), turned(profile, about[axis], about), settings);
+}
+
+Expected<Sensors> simulate_units(const Plan& plan, const model::Model& model,
+                                 const simulation::Profile& profile,
+                                 const simulation::Settings& settings) {
+  Sensors sensors;
+  for (std::size_t gyro = 0; gyro < 2; ++gyro) {
+    for (const gateway::GyroPlan& axis : plan.gyros[gyro].axes) {
+      const auto simulator =
+          axis_simulator(plan.gyros[gyro], gyro, axis.sensor_axis, model, profile, settings);
+      if (!simulator) return tl::unexpected(simulator.error());
+      sensors[gyro].push_back({.plan = &axis, .samples = simulator->gyro(gyro)});
+    }
+  }
+  return sensors;
+}
+
+// Of the motion of single gyros, or of units about all axes that they tell.
+Expected<void> check_motion(const Plan& plan, const simulation::Profile& profile,
+                            const model::Model& model) {
+  if (plan.axes.empty()) {
+    if (!profile.has_rate)
+      return fail(profile.file, "has no column rate_dps", "the rate that both gyros measure");
+    for (const model::Effect& effect : model.effects) {
+      if (!effect.of_axis) continue;
+      return fail(at_line(model.file, effect.line),
+                  "an effect of one axis, and the gyros have one axis each", "leave `axis` out");
+    }
+    return {};
+  }
+  for (const std::size_t axis : plan.output.axes) {
+    if (profile.other_rate_dps[axis]) continue;
+    const char name = gateway::kAxisNames[axis];
+    return fail(profile.file, fmt::format("has no column rate_{}_dps", name),
+                fmt::format("the motion about the vehicle's axis {}", name));
+  }
+  return {};
 }
 
 Expected<void> check_output(const SimulateOptions& options, std::vector<std::string> inputs) {
@@ -375,22 +475,35 @@ int run_simulate(const SimulateOptions& options) {
   if (!loaded) return report(loaded.error());
   const Plan& plan = loaded->plan;
   for (const gateway::GyroPlan& gyro : plan.gyros) {
-    if (const auto good = gateway::check_valid(gyro); !good) return report(good.error());
+    for (const gateway::GyroPlan& sensor : sensors_of(gyro)) {
+      if (const auto good = gateway::check_valid(sensor); !good) return report(good.error());
+    }
   }
   auto model = model::load_model(options.model);
   if (!model) return report(model.error());
   auto profile = simulation::load_profile(options.profile);
   if (!profile) return report(profile.error());
+  if (const auto good = check_motion(plan, *profile, *model); !good) return report(good.error());
   auto messages = messages_of(plan, profile->has_acceleration());
   const simulation::Settings settings = settings_of(options, messages);
+  Expected<Sensors> sensors;
+  if (!plan.axes.empty()) {
+    sensors = simulate_units(plan, *model, *profile, settings);
+    if (!sensors) return report(sensors.error());
+    model->effects.clear();
+  }
   const auto simulator =
       simulation::Simulator::make(*std::move(model), *std::move(profile), settings);
   if (!simulator) return report(simulator.error());
+  if (plan.axes.empty()) {
+    for (std::size_t gyro = 0; gyro < 2; ++gyro)
+      (*sensors)[gyro].push_back({.plan = &plan.gyros[gyro], .samples = simulator->gyro(gyro)});
+  }
   if (const auto good = check_output(options, loaded->files); !good) return report(good.error());
   auto output = OutputFile::open(options.output);
   if (!output) return report(output.error());
 
-  Recording recording(plan, *simulator, std::move(messages));
+  Recording recording(plan, *simulator, *std::move(sensors), std::move(messages));
   recording.write(*output, options.start_s);
   if (const auto closed = output->close(); !closed) return report(closed.error());
   if (!options.quiet) recording.summarize(options);

@@ -127,6 +127,36 @@ int append_gyros(sd_bus_message* reply, const Snapshot& now) {
   return result < 0 ? result : sd_bus_message_close_container(reply);
 }
 
+// Of one axis of a platform of several.
+int append_axis(sd_bus_message* reply, const Snapshot& now, std::size_t place) {
+  const gateway::Status& status = now.axes[place];
+  const std::size_t axis = now.plan->axes[place].axis;
+  Dictionary fields(reply, "{sv}");
+  fields.put("axis", std::string(1, gateway::kAxisNames[axis]));
+  fields.put("state", std::string(to_string(status.state)));
+  fields.put("quality", std::string(to_string(status.quality)));
+  fields.put("rate_dps", status.rate_dps);
+  fields.put("sigma_dps", status.sigma_dps);
+  fields.put("bias_sigma_dps", status.bias_sigma_dps);
+  for (std::size_t k = 0; k < 2; ++k) {
+    const std::string number = std::to_string(k + 1);
+    fields.put(("bias_" + number + "_dps").c_str(), status.gyros[k].bias_dps);
+    fields.put(("health_" + number).c_str(), health_text(status.gyros[k]));
+  }
+  fields.put("misalignment_deg", now.status.misalignment_deg[axis]);
+  fields.put("misalignment_sigma_deg", now.status.misalignment_sigma_deg[axis]);
+  fields.put("stops", status.stops);
+  fields.put("pairs", status.pairs);
+  return fields.close();
+}
+
+int append_axes(sd_bus_message* reply, const Snapshot& now) {
+  int result = sd_bus_message_open_container(reply, 'a', "a{sv}");
+  for (std::size_t place = 0; place < now.axes.size() && result >= 0; ++place)
+    result = append_axis(reply, now, place);
+  return result < 0 ? result : sd_bus_message_close_container(reply);
+}
+
 int append_buses(sd_bus_message* reply, const Snapshot& now) {
   int result = sd_bus_message_open_container(reply, 'a', "a{sv}");
   for (const BusStatus& bus : now.traffic.buses) {
@@ -269,6 +299,7 @@ constexpr Property kProperties[] = {
     {"RestS", [](sd_bus_message* m,
                  const Snapshot& now) { return append_number(m, now.plan->calibration.rest_s); }},
     {"Gyros", append_gyros},
+    {"Axes", append_axes},
     {"Buses", append_buses},
     {"Counters", append_counters},
 };
@@ -299,6 +330,7 @@ const sd_bus_vtable Control::kInterface[] = {
     SD_BUS_PROPERTY("CalibratedS", "d", on_get, 0, SD_BUS_VTABLE_PROPERTY_EMITS_CHANGE),
     SD_BUS_PROPERTY("RestS", "d", on_get, 0, 0),
     SD_BUS_PROPERTY("Gyros", "aa{sv}", on_get, 0, SD_BUS_VTABLE_PROPERTY_EMITS_CHANGE),
+    SD_BUS_PROPERTY("Axes", "aa{sv}", on_get, 0, SD_BUS_VTABLE_PROPERTY_EMITS_CHANGE),
     SD_BUS_PROPERTY("Buses", "aa{sv}", on_get, 0, SD_BUS_VTABLE_PROPERTY_EMITS_INVALIDATION),
     SD_BUS_PROPERTY("Counters", "a{st}", on_get, 0, SD_BUS_VTABLE_PROPERTY_EMITS_INVALIDATION),
     SD_BUS_METHOD("Recalibrate", "", "", on_recalibrate, SD_BUS_VTABLE_UNPRIVILEGED),

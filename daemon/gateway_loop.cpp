@@ -280,6 +280,10 @@ void GatewayLoop::set_alarm() {
 void GatewayLoop::look_at_status() {
   const gateway::Status& status = setup_->pipeline.status();
   setup_->reporter->check_state(status);
+  for (std::size_t place = 0; place < setup_->pipeline.axis_count(); ++place) {
+    const char axis = gateway::kAxisNames[setup_->plan.axes[place].axis];
+    setup_->reporter->check_axis(place, axis, setup_->pipeline.axis_status(place));
+  }
   const std::uint64_t samples = status.gyros[0].samples + status.gyros[1].samples;
   if (std::exchange(samples_, samples) != samples) {
     // No stamp from nowhere may pass for the present.
@@ -471,6 +475,9 @@ const Snapshot& GatewayLoop::snapshot() {
     return snapshot_;
   snapshot_.plan = &setup_->plan;
   snapshot_.status = setup_->pipeline.status();
+  snapshot_.axes.clear();
+  for (std::size_t place = 0; place < setup_->pipeline.axis_count(); ++place)
+    snapshot_.axes.push_back(setup_->pipeline.axis_status(place));
   snapshot_.traffic = traffic();
   snapshot_.uptime_s = to_seconds(clock_.steady() - started_);
   snapshot_.config_refused = reload_refused_;

@@ -215,6 +215,65 @@ void add_gyros(Text& text, const Snapshot& now) {
   });
 }
 
+// Of a platform of several axes what is each one's.
+void add_axes(Text& text, const Snapshot& now) {
+  if (now.axes.empty()) return;
+  const auto each = [&](const auto& add) {
+    for (std::size_t i = 0; i < now.axes.size(); ++i) {
+      const std::string axis(1, gateway::kAxisNames[now.plan->axes[i].axis]);
+      add(Labels{{"axis", axis}}, now.axes[i]);
+    }
+  };
+  using Axis = const gateway::Status&;
+  text.family("vgyro_axis_state", "gauge", "The state of each axis: 1 for the present one.");
+  each([&](Labels labels, Axis axis) {
+    labels.emplace_back("state", "");
+    for (int i = 0; i < gateway::kStateCount; ++i) {
+      labels.back().second = to_string(static_cast<gateway::State>(i));
+      text.sample(labels, axis.state == static_cast<gateway::State>(i));
+    }
+  });
+  text.family("vgyro_axis_rate_degrees_per_second", "gauge",
+              "The virtual rate about it; NaN while invalid.");
+  each([&](const Labels& labels, Axis axis) { text.sample(labels, axis.rate_dps); });
+  text.family("vgyro_axis_rate_sigma_degrees_per_second", "gauge", "Its standard deviation.");
+  each([&](const Labels& labels, Axis axis) { text.sample(labels, axis.sigma_dps); });
+  text.family("vgyro_axis_bias_degrees_per_second", "gauge",
+              "Drift of each unit about it; NaN until calibrated.");
+  each([&](Labels labels, Axis axis) {
+    labels.emplace_back("gyro", "");
+    for (std::size_t k = 0; k < 2; ++k) {
+      labels.back().second = now.plan->gyros[k].name;
+      text.sample(labels, axis.gyros[k].bias_dps);
+    }
+  });
+  text.family("vgyro_axis_faults_total", "counter", "Times that a fault of a unit's axis began.");
+  each([&](Labels labels, Axis axis) {
+    labels.emplace_back("gyro", "");
+    labels.emplace_back("fault", "");
+    for (std::size_t k = 0; k < 2; ++k) {
+      labels[1].second = now.plan->gyros[k].name;
+      for (std::size_t i = 0; i < gateway::kFaultCount; ++i) {
+        labels[2].second = to_string(static_cast<gateway::Fault>(i));
+        text.sample(labels, axis.gyros[k].faults[i].times);
+      }
+    }
+  });
+}
+
+void add_misalignment(Text& text, const Snapshot& now) {
+  if (now.axes.empty()) return;
+  text.family("vgyro_misalignment_degrees", "gauge",
+              "Rotation of the second unit against the first, about each axis.");
+  for (std::size_t i = 0; i < gateway::kAxes; ++i)
+    text.sample({{"axis", std::string_view(&gateway::kAxisNames[i], 1)}},
+                now.status.misalignment_deg[i]);
+  text.family("vgyro_misalignment_sigma_degrees", "gauge", "How well that is known.");
+  for (std::size_t i = 0; i < gateway::kAxes; ++i)
+    text.sample({{"axis", std::string_view(&gateway::kAxisNames[i], 1)}},
+                now.status.misalignment_sigma_deg[i]);
+}
+
 // Few gyros tell it: of the others there is no family of NaN.
 void add_supply(Text& text, const Snapshot& now) {
   const auto& gyros = now.plan->gyros;
@@ -282,6 +341,8 @@ std::string metrics_text(const Snapshot& now) {
   add_layouts(text, now);
   add_gyros(text, now);
   add_supply(text, now);
+  add_axes(text, now);
+  add_misalignment(text, now);
   add_buses(text, now);
   return text.take();
 }

@@ -147,6 +147,28 @@ void Reporter::fault_changed(std::size_t gyro, const gateway::Status& status) {
   }
 }
 
+void Reporter::axis_state_changed(char axis, const gateway::Status& status, AxisTold& told) {
+  const gateway::State before = std::exchange(told.state, status.state);
+  if (!state_lines_.take()) return;
+  log_.tell(Severity::kNotice, {.cause = to_string(status.state)}, "axis {}: {} (was {})", axis,
+            to_string(status.state), to_string(before));
+}
+
+void Reporter::axis_fault_changed(char axis, std::size_t gyro, const gateway::Status& status,
+                                  AxisTold& told) {
+  const auto now = status.gyros[gyro].fault;
+  const auto before = std::exchange(told.faults[gyro], now);
+  if (!health_lines_.take()) return;
+  if (now) {
+    log_.tell(Severity::kWarning, {.gyro = names_[gyro], .cause = to_string(*now)},
+              "axis {} of gyro {} {}", axis, names_[gyro], sentence(*now));
+  } else {
+    log_.tell(Severity::kNotice, {.gyro = names_[gyro], .cause = "well"},
+              "axis {} of gyro {} is {} (was {})", axis, names_[gyro],
+              status.gyros[gyro].heard ? "well again" : "silent", to_string(*before));
+  }
+}
+
 void Reporter::contradiction_changed(const gateway::Status& status) {
   contradiction_ = status.pair.contradiction;
   disagree_ = status.disagree;  // it is of one piece with this

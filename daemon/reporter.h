@@ -15,6 +15,7 @@
 #include "daemon/bus_status.h"
 #include "daemon/line_budget.h"
 #include "daemon/log.h"
+#include "gateway/plan.h"
 #include "gateway/status.h"
 
 namespace vgyro::daemon {
@@ -50,6 +51,16 @@ class Reporter {
     if (status.ambiguous != ambiguous_) ambiguity_changed(status);
   }
 
+  /// Likewise of one axis of a platform of several; `place` is its own from call to call.
+  void check_axis(std::size_t place, char axis, const gateway::Status& status) {
+    AxisTold& told = axes_[place];
+    if (status.state != told.state) axis_state_changed(axis, status, told);
+    for (std::size_t gyro = 0; gyro < 2; ++gyro) {
+      if (status.gyros[gyro].fault != told.faults[gyro])
+        axis_fault_changed(axis, gyro, status, told);
+    }
+  }
+
   /// To be called about once a second: logs troubles that are new, returns the status line.
   std::string second_passed(const gateway::Status& status, const Traffic& traffic);
 
@@ -76,6 +87,15 @@ class Reporter {
     Told foreign;
   };
 
+  /// What has been told of one axis.
+  struct AxisTold {
+    gateway::State state = gateway::State::kWaiting;
+    std::array<std::optional<gateway::Fault>, 2> faults;
+  };
+
+  void axis_state_changed(char axis, const gateway::Status& status, AxisTold& told);
+  void axis_fault_changed(char axis, std::size_t gyro, const gateway::Status& status,
+                          AxisTold& told);
   void state_changed(const gateway::Status& status);
   void fault_changed(std::size_t gyro, const gateway::Status& status);
   void contradiction_changed(const gateway::Status& status);
@@ -104,6 +124,7 @@ class Reporter {
   LineBudget health_lines_;
   std::uint64_t second_ = 0;
   std::array<GyroTold, 2> gyros_;
+  std::array<AxisTold, gateway::kAxes> axes_;
   Told clock_steps_, rates_out_of_range_, layouts_out_of_range_, reference_rejected_,
       accelerometer_rejected_, speed_rejected_, windows_skipped_, restarts_, estimate_restarts_;
   Told stale_, overflow_, failed_;

@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include "daemon/reporter.h"
 #include "gateway/plan.h"
@@ -15,8 +16,9 @@ namespace vgyro::daemon {
 struct Snapshot {
   const gateway::Plan* plan = nullptr;  ///< lives as long as the snapshot is the newest
   gateway::Status status;
-  std::array<double, 2> bias_sigma_dps{};     ///< of each gyro; NaN where it is not known
-  std::array<double, 2> slope_dps_s{};        ///< of its bias; likewise
+  std::vector<gateway::Status> axes;       ///< of a platform of several, in the order of Plan::axes
+  std::array<double, 2> bias_sigma_dps{};  ///< of each gyro; NaN where it is not known
+  std::array<double, 2> slope_dps_s{};     ///< of its bias; likewise
   std::array<double, 2> slope_sigma_dps_s{};  ///< likewise
   Traffic traffic;
   double uptime_s = 0.0;

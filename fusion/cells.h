@@ -33,6 +33,7 @@ struct CellBlock {
   double to_s = 0.0;
   std::size_t count = 0;
   std::array<Cell, kCellsMax> cells;
+  double cross_variance = 0.0;  ///< mean of Corrector::set_cross_variance(), (deg/s)²
 
   [[nodiscard]] double length_s() const { return to_s - from_s; }
   [[nodiscard]] double mean_dps(std::size_t gyro) const {

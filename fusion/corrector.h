@@ -59,9 +59,19 @@ enum class Hypothesis : std::uint8_t {
 };
 inline constexpr std::size_t kHypotheses = 9;
 
+/// What the platform's other axes show.
+struct Elsewhere {
+  bool moves = false;        ///< about one of them it moves, so it does not stand
+  double log_turning = 0.0;  ///< log of how much likelier they make a steady turn than a stop
+
+  friend bool operator==(const Elsewhere&, const Elsewhere&) = default;
+};
+
 /// What the method does at present, for people and for VG_Bias.
 struct Condition {
   bool stopped = false;         ///< standing still: the common drift is being learned
+  bool moves = false;           ///< about this axis, as far as it sees itself
+  bool steady = false;          ///< in a steady stretch: probability says what it is
   bool ambiguous = false;       ///< two readings of the data are likely, and far apart
   std::array<bool, 2> blind{};  ///< this gyro feels no rotation, as it seems
   std::array<double, kHypotheses> probability{};
@@ -103,6 +113,14 @@ class Corrector {
   virtual void set_resolution(std::size_t /*gyro*/, double /*step_dps*/) {}
   /// Variance of the specific force's magnitude from now on, g²; NaN where it is not known.
   virtual void set_vibration(double /*variance_g2*/) {}
+
+  /// What the platform's other axes show from now on.
+  virtual void set_elsewhere(const Elsewhere& /*elsewhere*/) {}
+  /// The variance that the gyros' difference has because they are not quite parallel and the
+  /// platform turns about other axes, from now on, (deg/s)².
+  virtual void set_cross_variance(double /*variance_dps2*/) {}
+  /// The true rate at a stop from now on, where there is one at all.
+  virtual void set_stop_rate(double /*rate_dps*/) {}
 
   /// What of the rate is either gyro's: they add up to 1.
   [[nodiscard]] virtual std::array<double, 2> shares() const { return {0.5, 0.5}; }

@@ -78,6 +78,10 @@ constexpr double kContradiction = 9.0;
 // … and by this many standard deviations of the bias difference one gyro may have stepped.
 constexpr double kStepSigma = 5.0;
 
+// What other axes leave in a rate that is less than so many of its standard deviations may be all
+// there is of it.
+constexpr double kTilted = 5.0;
+
 // From here on a gyro counts as blind; below the other probability nothing is said of it.
 constexpr double kBlind = 0.5;
 constexpr double kBlindMin = 1e-3;
@@ -204,6 +208,15 @@ class OptimalCorrector final : public Corrector {
     noise_.set_resolution(gyro, step_dps);
   }
   void set_vibration(double variance_g2) override { vibration_g2_ = variance_g2; }
+  void set_elsewhere(const Elsewhere& elsewhere) override { elsewhere_ = elsewhere; }
+  void set_cross_variance(double variance_dps2) override {
+    cross_variance_ = variance_dps2;
+    cross_sum_ += variance_dps2;
+    ++cross_count_;
+  }
+  void set_stop_rate(double rate_dps) override {
+    if (settings_.stop_rate_dps) settings_.stop_rate_dps = rate_dps;
+  }
 
   [[nodiscard]] std::array<double, 2> shares() const override { return weight_; }
   [[nodiscard]] Drift drift(double t_s) const override {
@@ -230,6 +243,8 @@ class OptimalCorrector final : public Corrector {
     double to_s = 0.0;
     double covered_s = 0.0;  ///< of a steady one
     double sway_s = 0.0;     ///< Σ of its variance · seconds
+    double cross_s = 0.0;    ///< Σ of what other axes may leave in the difference · seconds
+    double cross_covered_s = 0.0;
     std::array<double, 2> excess_s{};
     std::array<double, 2> temperature_c_s{};
     double temperature_s = 0.0;
@@ -241,9 +256,11 @@ class OptimalCorrector final : public Corrector {
   void run(double t_s);
 
   // Blocks.
-  [[gnu::noinline]] void close_block(const CellBlock& block);
+  [[gnu::noinline]] void close_block(const CellBlock& complete);
   bool is_spiked(const CellBlock& block);
   void judge_coherence(const CellBlock& block);
+  [[nodiscard]] double take_cross_variance();
+  [[nodiscard]] double window_cross_variance() const;
   [[nodiscard]] Present trusted(Present present) const;
   void learn_from(const CellBlock& block, bool steady);
   bool has_jumped(const CellBlock& block);
@@ -317,6 +334,11 @@ class OptimalCorrector final : public Corrector {
   std::array<double, 2> temperature_c_{kNone, kNone};
   std::array<double, 2> applied_temperature_c_{kNone, kNone};
   double vibration_g2_ = kNone;
+  Elsewhere elsewhere_;
+  double log_turning_elsewhere_ = 0.0;  ///< as far as this steady run has been told
+  double cross_variance_ = 0.0;         ///< at present
+  double cross_sum_ = 0.0;              ///< since the last block
+  std::uint64_t cross_count_ = 0;
   double still_vibration_g2_ = kNone;  ///< at stops
 
   Window window_;
@@ -520,10 +542,12 @@ VirtualRate OptimalCorrector::update(const RatePair& pair) {
   fast_difference_ += kFastGain * (first - second - fast_difference_);
   const double contradiction = fast_difference_ * fast_difference_;
   const double allowed =
-      squared(kFastSigma) * (fast_noise_ + kFastNoise * rate_density(rate) / interval);
+      squared(kFastSigma) *
+      (fast_noise_ + kFastNoise * rate_density(rate) / interval + cross_variance_);
   // A single value may be no measurement at all.
-  const double sudden = squared(first - second) -
-                        squared(kSuddenSigma) * (noise_1 - 2.0 * noise_12 + noise_2 + fast_noise_);
+  const double sudden =
+      squared(first - second) -
+      squared(kSuddenSigma) * (noise_1 - 2.0 * noise_12 + noise_2 + fast_noise_ + cross_variance_);
   variance += blame_ * std::max({contradiction - allowed, sudden, 0.0});
   const VirtualRate out{rate, std::sqrt(variance), {first, second}};
   if (blind_[0] + blind_[1] < kBlindMin) return out;
@@ -643,6 +667,12 @@ void OptimalCorrector::judge_coherence(const CellBlock& block) {
   }
   // Raw means: what is learned meanwhile must not look like motion.
   const std::array<double, 2> mean{block.mean_dps(0) * gain_[0], block.mean_dps(1) * gain_[1]};
+  // Gyros that are not parallel need not feel alike what is about other axes.
+  const double fastest = std::max(std::abs(mean[0]), std::abs(mean[1]));
+  if (squared(kTilted) * block.cross_variance > squared(fastest)) {
+    coherence_.break_off();
+    return;
+  }
   // A time skew shows where the rate's own slope changes within the block.
   double bend = 0.0;
   for (std::size_t i = 1; i < block.count; ++i) {
@@ -667,10 +697,21 @@ bool OptimalCorrector::is_spiked(const CellBlock& block) {
   return ++spiked_blocks_ <= kSpikedBlocks;
 }
 
+double OptimalCorrector::take_cross_variance() {
+  const double mean =
+      cross_count_ > 0 ? cross_sum_ / static_cast<double>(cross_count_) : cross_variance_;
+  cross_sum_ = 0.0;
+  cross_count_ = 0;
+  return mean;
+}
+
 // A block is used when the next one has been judged: motion begins before it is seen.
-void OptimalCorrector::close_block(const CellBlock& block) {
+void OptimalCorrector::close_block(const CellBlock& complete) {
   ++edition_;
-  if (is_spiked(block)) return;
+  const double cross_variance = take_cross_variance();
+  if (is_spiked(complete)) return;
+  CellBlock block = complete;
+  block.cross_variance = cross_variance;
   judge_coherence(block);
   const Present present = trusted(block.present);
   if (block.present == Present::kBoth && present != Present::kBoth && !blind_before_)
@@ -684,7 +725,8 @@ void OptimalCorrector::close_block(const CellBlock& block) {
   }
   apply_temperature();
   auto steadiness = StopDetector::Steadiness::kMoving;
-  if (settings_.stop_rate_dps) steadiness = detector_.judge(level_of(block), wheels_);
+  if (settings_.stop_rate_dps)
+    steadiness = detector_.judge(level_of(block), wheels_, elsewhere_.moves);
   const bool steady = steadiness == StopDetector::Steadiness::kSteady;
   // All held blocks but the last belong to a run that has just become sure, or to none.
   const bool waits = steadiness == StopDetector::Steadiness::kUnsure && held_count_ < kHeldMax;
@@ -768,7 +810,8 @@ bool OptimalCorrector::has_jumped(const CellBlock& block) {
                     2.0 * late_s * apart.dot(estimate_.slope_with_bias * apart) +
                     late_s * late_s * apart.dot(estimate_.slope_covariance * apart) +
                     of_difference(noise_.density()) / length + rate_density(rate) / length +
-                    noise_.rounding_variance(0) + noise_.rounding_variance(1);
+                    noise_.rounding_variance(0) + noise_.rounding_variance(1) +
+                    block.cross_variance;
   const double skew_s = std::abs(estimate_.mean(kSkew)) +
                         std::sqrt(estimate_.covariance(kSkew, kSkew)) + kSkewTolerance_s;
   variance += squared(std::min(skew_s, kTurnTolerance_s) * slope);
@@ -842,6 +885,12 @@ void OptimalCorrector::open_window(const CellBlock& block, Kind kind, Present pr
   for (std::size_t gyro = 0; gyro < 2; ++gyro)
     window_.temperature_c_s[gyro] += temperature_c_[gyro] * block.length_s();
   window_.temperature_s += block.length_s();
+  window_.cross_s += block.cross_variance * block.length_s();
+  window_.cross_covered_s += block.length_s();
+}
+
+double OptimalCorrector::window_cross_variance() const {
+  return window_.cross_covered_s > 0.0 ? window_.cross_s / window_.cross_covered_s : 0.0;
 }
 
 void OptimalCorrector::add_difference(const CellBlock& block, Present present) {
@@ -908,6 +957,10 @@ void OptimalCorrector::learn_difference(double length_s) {
     ++windows_.skipped;
     return;
   }
+  // The rows are of unit noise; what comes of another axis is the same in all of the window, and
+  // may go with this axis's own rate.
+  const double information = squared(measurement.rows(0, kBias1));
+  measurement.noise.diagonal().array() += information * window_cross_variance();
   const Contradiction found = contradiction(measurement, length_s);
   DriftMeasurement doubted = measurement;
   if (found.per_row > kContradiction) doubted.noise *= found.per_row / kContradiction;
@@ -954,7 +1007,7 @@ DriftMeasurement OptimalCorrector::turning_measurement() const {
   measurement.values(0) = (window_.excess_s[0] - window_.excess_s[1]) / length;
   measurement.noise(0, 0) =
       (of_difference(noise_.density()) + rate_density(0, rate) + rate_density(1, rate)) / length +
-      noise_.rounding_variance(0) + noise_.rounding_variance(1);
+      noise_.rounding_variance(0) + noise_.rounding_variance(1) + window_cross_variance();
   return measurement;
 }
 
@@ -982,6 +1035,10 @@ SteadyWindow OptimalCorrector::steady_window() {
   steady.log_turning = run_ == Run::kMoving
                            ? detector_.log_turning(wheels_) + log_turning_by_vibration()
                            : detector_.log_turning_gain(wheels_, steady.length_s);
+  // Of what the other axes show this run hears each part once.
+  if (run_ == Run::kMoving) log_turning_elsewhere_ = 0.0;
+  steady.log_turning += elsewhere_.log_turning - log_turning_elsewhere_;
+  log_turning_elsewhere_ = elsewhere_.log_turning;
   return steady;
 }
 
@@ -1144,6 +1201,8 @@ Condition OptimalCorrector::condition() const {
   now.noisy = {noise_.noisy(0), noise_.noisy(1)};
   now.blind = {blind_[0] >= kBlind, blind_[1] >= kBlind};
   now.stopped = run_ == Run::kStop;
+  now.steady = run_ != Run::kMoving;
+  now.moves = detector_.moves();
   if (readings_.empty()) return now;
   auto& probability = now.probability;
   probability[index_of(Hypothesis::kStanding)] = readings_.standing();

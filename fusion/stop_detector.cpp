@@ -73,7 +73,8 @@ void StopDetector::note_motion(double level_dps, double length_s, bool rolls) {
   moved_on_ = moved_on_ || rolls || turned_deg_ > kTurned_deg || moving_s_ > kMovedOn_s;
 }
 
-StopDetector::Steadiness StopDetector::judge(const BlockLevel& block, Wheels wheels) {
+StopDetector::Steadiness StopDetector::judge(const BlockLevel& block, Wheels wheels,
+                                             bool moves_elsewhere) {
   double level = 0.0;
   for (std::size_t gyro = 0; gyro < 2; ++gyro)
     level += block.weight[gyro] * (block.excess_dps[gyro] - block.bias_dps[gyro]);
@@ -84,7 +85,9 @@ StopDetector::Steadiness StopDetector::judge(const BlockLevel& block, Wheels whe
     wheels_distrusted_ = true;
   }
   const bool on_wheels = wheels == Wheels::kStanding && !wheels_distrusted_;
-  const bool moves = wheels == Wheels::kRolling || !steady(block, on_wheels);
+  const bool rolling = wheels == Wheels::kRolling;
+  moves_ = !rolling && !steady(block, on_wheels);
+  const bool moves = rolling || moves_ || moves_elsewhere;
   if (moves) end_run();
   const bool rolls = moves && wheels == Wheels::kRolling;
   if (run_s_ < kRun_s) note_motion(level, block.length_s, rolls);

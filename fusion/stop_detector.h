@@ -40,7 +40,10 @@ class StopDetector {
     kSteady
   };
 
-  Steadiness judge(const BlockLevel& block, Wheels wheels);
+  /// `moves_elsewhere`: about another axis the platform moves.
+  Steadiness judge(const BlockLevel& block, Wheels wheels, bool moves_elsewhere = false);
+  /// Whatever other axes and wheels say, this axis moved in the last block.
+  [[nodiscard]] bool moves() const { return moves_; }
   void reset() { end_run(); }
 
   /// The last block began a run of steady ones.
@@ -68,6 +71,7 @@ class StopDetector {
   void note_motion(double level_dps, double length_s, bool rolls);
 
   bool wheels_distrusted_ = false;
+  bool moves_ = false;
   double sway_variance_ = 0.0;
   double run_s_ = 0.0;
   int run_blocks_ = 0;

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <numbers>
 #include <set>
+#include <span>
 
 #include <fmt/core.h>
 
@@ -13,7 +14,9 @@
 #include "base/spelling.h"
 #include "base/toml_reader.h"
 #include "fusion/polynomial.h"
+#include "gateway/axes_plan.h"
 #include "gateway/e2e_config.h"
+#include "gateway/gyro_config.h"
 #include "gateway/input_conflicts.h"
 #include "gateway/model_plan.h"
 #include "gateway/output_layout_config.h"
@@ -24,8 +27,6 @@ namespace vgyro::gateway {
 
 namespace {
 
-// IERS: the Earth turns 7.292115e-5 rad/s against the stars.
-constexpr double kEarthRate_dps = 7.292115e-5 * 180.0 / std::numbers::pi;
 // A configuration takes some kB; what is so much larger is another file.
 constexpr std::size_t kConfigBytesMax = std::size_t{1} << 20U;
 
@@ -38,135 +39,32 @@ struct Context {
   std::set<BusFile> bus_files = {};
 };
 
-struct Limits {
-  double low = 0.0;
-  double high = 0.0;
-  bool above_low = false;  ///< the lower one itself is too little
-};
+TableContext tables_of(Context& context) {
+  return {context.file,
+          context.folder,
+          context.cache,
+          context.resolved.plan.buses,
+          context.bus_files,
+          context.errors,
+          context.resolved.warnings};
+}
 
 // A bias from less than a second is an accident of the noise; after a day nobody waits any more.
 constexpr Limits kRest_s{1.0, 86'400.0};
 // A window needs several samples of each gyro; over an hour every drift has turned.
 constexpr Limits kWindow_s{0.1, 3'600.0};
-// Gyros that read more than this at rest are broken rather than biased.
-constexpr Limits kMaxBias_dps{0.0, 100.0, true};
 
-// A number inside limits; nothing after a complaint, or where the key is not there.
-std::optional<double> number_within(TomlReader& reader, std::string_view key, const Limits& limits,
-                                    std::string_view unit) {
-  const auto value = reader.number(key);
-  if (!value) return std::nullopt;
-  const bool enough = limits.above_low ? *value > limits.low : *value >= limits.low;
-  if (enough && *value <= limits.high) return value;
-  reader.complain(reader.where(key), fmt::format("{} is {:g} {}", key, *value, unit),
-                  limits.above_low
-                      ? fmt::format("above {:g} and up to {:g}", limits.low, limits.high)
-                      : fmt::format("{:g} to {:g}", limits.low, limits.high));
-  return std::nullopt;
-}
-
-void read_sign(TomlReader& reader, Quantity& rate) {
-  const auto sign = reader.integer("sign");
-  if (!sign) return;
-  if (*sign != 1 && *sign != -1) {
-    reader.complain(reader.where("sign"), fmt::format("sign is {}", *sign),
-                    "1, or -1 to flip the axis");
-    return;
-  }
-  rate.scale *= static_cast<double>(*sign);
-}
-
-void read_source_address(TomlReader& reader, const dbc::Message& message, FrameMatch& match) {
-  const auto address = reader.integer("source_address");
-  if (!address) return;
-  if (!message.is_j1939 || *address < 0 || *address > std::int64_t{kSourceMask}) {
-    reader.complain(reader.where("source_address"),
-                    "source_address is 0 to 255, for a J1939 message",
-                    "a message is J1939 when its DBC attribute VFrameFormat is J1939PG");
-    return;
-  }
-  match.id = (match.id & ~kSourceMask) | static_cast<std::uint32_t>(*address);
-  match.mask |= kSourceMask;
-  match.others.clear();
-}
-
-// Rates about other axes of the unit, in its own message.
-constexpr std::array<const char*, 3> kOtherAxisKeys{"rate_x", "rate_y", "rate_z"};
-using OtherAxisSignals = std::array<const dbc::Signal*, kOtherAxisKeys.size()>;
-
-OtherAxisSignals other_axis_signals(SignalResolver& resolver) {
-  OtherAxisSignals signals{};
-  for (std::size_t axis = 0; axis < signals.size(); ++axis)
-    signals[axis] = resolver.signal(kOtherAxisKeys[axis], false);
-  return signals;
-}
-
-void read_other_axes(SignalResolver& resolver, const OtherAxisSignals& signals, GyroPlan& gyro) {
-  for (std::size_t axis = 0; axis < signals.size(); ++axis) {
-    if (signals[axis] == nullptr) continue;
-    gyro.*kOtherAxes[axis] =
-        resolver.quantity(*signals[axis], kOtherAxisKeys[axis], Dimension::kRate);
-  }
-}
-
-std::optional<GyroPlan> read_gyro(const toml::table& table, std::size_t index, Context& context) {
-  TomlReader reader(table, context.file, "[[gyro]]", context.errors);
-  const std::size_t errors_before = context.errors.size();
-  const std::string name = reader.text("name").value_or(index == 0 ? "a" : "b");
-  if (printable(name) != name) {
-    reader.complain(reader.where("name"), fmt::format("the name \"{}\" is not printable", name),
-                    "letters, digits, blanks: it stands in tables and pictures");
-  }
-  SignalResolver resolver(reader, context.cache, context.folder, context.resolved.plan.buses,
-                          context.resolved.warnings);
-  context.bus_files.insert({resolver.bus(), resolver.dbc_path()});
-  const dbc::Signal* rate_signal = resolver.signal("rate", true);
-  const dbc::Signal* sign_signal = resolver.signal("sign_signal", false);
-  const dbc::Signal* temperature_signal = resolver.signal("temperature", false);
-  const dbc::Signal* supply_signal = resolver.signal("supply_voltage", false);
-  const OtherAxisSignals other_axes = other_axis_signals(resolver);
-  const auto unit = reader.text("unit");
-  std::optional<GyroPlan> gyro;
-  std::optional<Quantity> rate;
-  if (rate_signal != nullptr)
-    rate = resolver.quantity(*rate_signal, "rate", Dimension::kRate, unit);
-  if (rate) {
-    gyro.emplace(GyroPlan{.name = name,
-                          .bus = resolver.bus(),
-                          .message = resolver.message().name,
-                          .match = resolver.match(),
-                          .rate = *rate,
-                          .sign = {},
-                          .temperature = {},
-                          .e2e = {},
-                          .valid = {},
-                          .saturation_dps = {}});
-    read_sign(reader, gyro->rate);
-    read_source_address(reader, resolver.message(), gyro->match);
-    gyro->e2e = read_e2e(reader, resolver, *rate_signal);
-    if (const auto valid = read_condition(reader, resolver, *rate_signal))
-      gyro->valid = valid->condition;
-    gyro->max_bias_dps = number_within(reader, "max_bias_dps", kMaxBias_dps, "deg/s");
-    if (sign_signal != nullptr && resolver.shares_page("sign_signal", *sign_signal, *rate_signal)) {
-      gyro->sign = resolver.codec(*sign_signal);
+// The message of `a` that `b` reads as well; null: there is none.
+const GyroPlan* sharing_frames(const GyroPlan& a, const GyroPlan& b) {
+  const auto messages_of = [](const GyroPlan& gyro) {
+    return gyro.axes.empty() ? std::span(&gyro, 1) : std::span(gyro.axes);
+  };
+  for (const GyroPlan& one : messages_of(a)) {
+    for (const GyroPlan& other : messages_of(b)) {
+      if (may_share_frames(one.match, other.match)) return &one;
     }
-    if (temperature_signal != nullptr) {
-      gyro->temperature =
-          resolver.quantity(*temperature_signal, "temperature", Dimension::kTemperature);
-    }
-    if (supply_signal != nullptr) {
-      gyro->supply_voltage =
-          resolver.quantity(*supply_signal, "supply_voltage", Dimension::kVoltage);
-    }
-    read_other_axes(resolver, other_axes, *gyro);
-  } else {
-    // Ask for the rest, so that a good key is not called unknown on top of the real trouble.
-    reader.forgive({"sign", "source_address", "valid", "max_bias_dps"});
-    forgive_e2e(reader);
   }
-  reader.finish();
-  if (context.errors.size() > errors_before) return std::nullopt;
-  return gyro;
+  return nullptr;
 }
 
 void read_gyros(TomlReader& root, Context& context) {
@@ -185,18 +83,19 @@ void read_gyros(TomlReader& root, Context& context) {
       root.complain(root.where("gyro"), "gyro must be written as [[gyro]] tables");
       return;
     }
-    if (auto gyro = read_gyro(*table, i, context)) gyros.push_back(std::move(*gyro));
+    if (auto gyro = read_gyro(*table, i, tables_of(context))) gyros.push_back(std::move(*gyro));
   }
   if (gyros.size() != 2) return;
-  if (may_share_frames(gyros[0].match, gyros[1].match)) {
+  if (const GyroPlan* shared = sharing_frames(gyros[0], gyros[1])) {
     root.complain(root.where("gyro"),
-                  fmt::format("both gyros are read from the same frame: {} on {}", gyros[0].message,
-                              gyros[0].bus),
+                  fmt::format("both gyros are read from the same frame: {} on {}", shared->message,
+                              shared->bus),
                   "two different gyros are needed; J1939 gyros of one PGN are told apart by "
                   "source_address = N");
     return;
   }
   context.resolved.plan.gyros.assign(gyros.begin(), gyros.end());
+  find_axes(root, context.resolved.plan);
 }
 
 template <class Read>
@@ -276,28 +175,80 @@ void read_when_moving(TomlReader& reader, CalibrationPlan& plan) {
                   suggest_name(word, {"wait", "accept"}));
 }
 
+// Of a platform of several axes: a number for each.
+void read_axis_rates(TomlReader& reader, const Plan& plan, CalibrationPlan& calibration) {
+  const std::size_t axes = plan.output.axes.size();
+  if (axes == 0 || !reader.has("rate_dps")) return;
+  const std::string shape = fmt::format("a list of {} numbers, one for each axis", axes);
+  const toml::array* list = reader.array("rate_dps", shape);
+  if (list == nullptr) return;
+  for (const toml::node& node : *list) {
+    const auto rate = node.is_number() ? node.value<double>() : std::nullopt;
+    if (rate && std::abs(*rate) < 1e5) calibration.axis_rate_dps.push_back(*rate);
+  }
+  if (calibration.axis_rate_dps.size() == axes && list->size() == axes) return;
+  calibration.axis_rate_dps.assign(axes, 0.0);
+  reader.complain(reader.where("rate_dps"), "rate_dps is not " + shape,
+                  "the platform's true rate about each axis while calibrating, in deg/s");
+}
+
+// The Earth's rate about the vehicle's horizontal axes is told by where it heads.
+void read_heading(TomlReader& reader, const Plan& plan, CalibrationPlan& calibration) {
+  const auto heading = reader.number("heading_deg");
+  if (!heading) return;
+  calibration.heading_deg = heading;
+  if (plan.gyros.empty()) return;
+  if (plan.output.axes.empty()) {
+    reader.complain(reader.where("heading_deg"), "heading_deg is of no use to a single axis",
+                    "leave it out: only the Earth's rate about horizontal axes depends on it");
+  } else if (!(std::abs(*heading) <= 360.0)) {
+    reader.complain(reader.where("heading_deg"), fmt::format("heading_deg is {:g}", *heading),
+                    "0 to 360, clockwise from north: where x points while calibrating");
+  } else if (!reader.has("latitude_deg")) {
+    reader.complain(reader.where("heading_deg"), "heading_deg stands without latitude_deg",
+                    "latitude_deg beside it");
+  }
+}
+
+// The platform's true rate about its axis, or axes, while it rests.
+void read_true_rate(TomlReader& reader, const toml::table& table, const Plan& platform,
+                    CalibrationPlan& plan) {
+  read_axis_rates(reader, platform, plan);
+  // After trouble with the units nobody knows how many axes there are.
+  if (platform.gyros.empty() && table["rate_dps"].is_array()) {
+    reader.forgive({"rate_dps", "latitude_deg", "heading_deg"});
+    return;
+  }
+  if (platform.output.axes.empty()) {
+    if (const auto rate = reader.number("rate_dps")) {
+      plan.rate_dps = *rate;
+      if (!(std::abs(*rate) < 1e5)) {
+        reader.complain(reader.where("rate_dps"), fmt::format("rate_dps is {:g}", *rate),
+                        "the platform's true rate while calibrating, in deg/s");
+      }
+    }
+  }
+  plan.latitude_deg = reader.number("latitude_deg");
+  read_heading(reader, platform, plan);
+  if (!plan.latitude_deg) return;
+  if (reader.has("rate_dps")) {
+    reader.complain(reader.where("latitude_deg"),
+                    "rate_dps and latitude_deg both say the true rate", "keep one of them");
+  }
+  if (!(std::abs(*plan.latitude_deg) <= 90.0)) {
+    reader.complain(reader.where("latitude_deg"),
+                    fmt::format("latitude_deg is {:g}", *plan.latitude_deg), "-90 to 90");
+  }
+  plan.rate_dps = kEarthRate_dps * std::sin(*plan.latitude_deg * std::numbers::pi / 180.0);
+}
+
 void read_calibration(TomlReader& root, Context& context) {
   CalibrationPlan& plan = context.resolved.plan.calibration;
   const toml::table* table = root.table("calibration");
   if (table == nullptr) return;
   TomlReader reader(*table, context.file, "[calibration]", context.errors);
   plan.rest_s = number_within(reader, "rest_s", kRest_s, "s").value_or(plan.rest_s);
-  const auto rate = reader.number("rate_dps");
-  const auto latitude = reader.number("latitude_deg");
-  if (rate && latitude) {
-    reader.complain(reader.where("latitude_deg"),
-                    "rate_dps and latitude_deg both say the true rate", "keep one of them");
-  }
-  if (latitude && !(std::abs(*latitude) <= 90.0)) {
-    reader.complain(reader.where("latitude_deg"), fmt::format("latitude_deg is {:g}", *latitude),
-                    "-90 to 90");
-  }
-  if (rate && !(std::abs(*rate) < 1e5)) {
-    reader.complain(reader.where("rate_dps"), fmt::format("rate_dps is {:g}", *rate),
-                    "the platform's true rate while calibrating, in deg/s");
-  }
-  if (rate) plan.rate_dps = *rate;
-  if (latitude) plan.rate_dps = kEarthRate_dps * std::sin(*latitude * std::numbers::pi / 180.0);
+  read_true_rate(reader, *table, context.resolved.plan, plan);
   const std::string source = reader.text("source").value_or("rest");
   plan.from_reference = source == "reference";
   if (source != "rest" && source != "reference") {
@@ -306,8 +257,14 @@ void read_calibration(TomlReader& root, Context& context) {
   }
   // The reference tells the rate while calibrating; what it will be at a stop it does not tell.
   plan.stop_rate_dps = plan.rate_dps;
-  if (plan.from_reference && !rate && !latitude) plan.stop_rate_dps = std::nullopt;
+  const bool is_told = reader.has("rate_dps") || reader.has("latitude_deg");
+  if (plan.from_reference && !is_told) plan.stop_rate_dps = std::nullopt;
   read_when_moving(reader, plan);
+  if (plan.from_reference && !context.resolved.plan.output.axes.empty()) {
+    reader.complain(reader.where("source"),
+                    "a reference about one axis cannot calibrate a platform of several",
+                    "source = \"rest\"");
+  }
   if (plan.from_reference && !root.has("reference")) {
     reader.complain(reader.where("source"), "source = \"reference\" needs a [reference] table");
   }
@@ -368,6 +325,10 @@ void apply_knowledge(Context& context) {
     plan.corrector.gyros[gyro].max_bias_dps = plan.gyros[gyro].max_bias_dps;
     plan.corrector.gyros[gyro].learns_temperature = plan.gyros[gyro].temperature.has_value();
   }
+  if (!plan.output.axes.empty()) {
+    build_axes(plan, context.errors);
+    return;
+  }
   if (plan.model) apply_model(model::Model(*plan.model), plan, context.errors);
 }
 
@@ -399,6 +360,7 @@ void read_output(TomlReader& root, Context& context) {
   plan.output.bias_id = read_output_id(reader, "bias_id", plan.output.bias_id);
   plan.output.model_id = read_output_id(reader, "model_id", plan.output.model_id);
   plan.output.fd = reader.boolean("fd").value_or(false);
+  plan.output.rate_is_shared = plan.output.fd && !plan.output.axes.empty();
   plan.output.vgyro_frames = reader.boolean("vgyro_frames").value_or(true);
   if (bus.empty()) {
     reader.forgive({"layout"});

@@ -85,6 +85,12 @@ void Estimator::calibrate_with(const fusion::AlignedPair& pair, double true_rate
   moved_in_calibration_ = calibrator_.result().in_motion;
 }
 
+void Estimator::restart_calibration() {
+  if (calibrated_) return;
+  calibrator_.reject();
+  corrector_->restart_calibration();
+}
+
 // Only where the calibration waits for rest can it begin again: motion would give the same result
 // once more, and a reference knows better.
 bool Estimator::result_can_be() const {

@@ -62,6 +62,15 @@ class Estimator {
   /// They cannot: nothing says which one is wrong, so no rate is valid, and nothing is learned.
   [[nodiscard]] bool contradicted() const { return relation_.contradicts(); }
 
+  /// What the platform's other axes show, and what they leave in the gyros' difference, from now
+  /// on; and the true rate at a stop.
+  void set_elsewhere(const fusion::Elsewhere& elsewhere) { corrector_->set_elsewhere(elsewhere); }
+  void set_cross_variance(double variance_dps2) { corrector_->set_cross_variance(variance_dps2); }
+  void set_stop_rate(double rate_dps) { corrector_->set_stop_rate(rate_dps); }
+  /// The platform moved about another axis: what was gathered of this one was no rest.
+  [[gnu::cold, gnu::noinline]] void restart_calibration();
+  [[nodiscard]] std::uint64_t calibration_restarts() const { return calibrator_.restarts(); }
+
   /// A pair before calibrated().
   [[gnu::noinline]] void calibrate(const fusion::AlignedPair& pair);
   /// A reference rate, which may complete the calibration.
@@ -82,6 +91,8 @@ class Estimator {
   [[nodiscard]] bool disagree(bool both_in_use) const {
     return (both_in_use && condition_.disagree) || contradicted();
   }
+  /// Windows learned from so far.
+  [[nodiscard]] std::uint64_t windows() const { return corrector_->windows().completed; }
   [[nodiscard]] Quality quality(bool both_in_use) const;
   [[nodiscard]] BiasMode bias_mode(bool both_in_use, bool any_in_use) const;
 

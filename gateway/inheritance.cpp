@@ -1,5 +1,6 @@
 #include "gateway/inheritance.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <utility>
@@ -35,7 +36,22 @@ bool agree(const fusion::DriftMemory& before, const fusion::DriftMemory& now, do
   return true;
 }
 
+bool contradict(const SavedState& before, const SavedState& now, const Plan& plan);
+
+// An axis that is not what it was is a platform that turned.
+bool axes_contradict(const SavedState& before, const SavedState& now, const Plan& plan) {
+  for (const Plan& pair : plan.axes) {
+    const auto of_axis = [&](const SavedState& state) { return state.axis == pair.axis; };
+    const auto old = std::find_if(before.axes.begin(), before.axes.end(), of_axis);
+    const auto own = std::find_if(now.axes.begin(), now.axes.end(), of_axis);
+    if (old == before.axes.end() || own == now.axes.end()) continue;
+    if (contradict(*old, *own, pair)) return true;
+  }
+  return false;
+}
+
 bool contradict(const SavedState& before, const SavedState& now, const Plan& plan) {
+  if (!plan.axes.empty()) return axes_contradict(before, now, plan);
   if (before.devices != now.devices) return false;  // biases of others
   const std::optional<fusion::DriftMemory> old = aged(before, now, plan);
   if (!old) return false;

@@ -22,8 +22,12 @@ struct Input {
 
 std::vector<Input> inputs_of(const Plan& plan) {
   std::vector<Input> inputs;
-  for (const GyroPlan& gyro : plan.gyros)
-    inputs.push_back({"gyro " + gyro.name, "gyro", gyro.message, gyro.match, &gyro.rate});
+  for (const GyroPlan& gyro : plan.gyros) {
+    if (gyro.axes.empty())
+      inputs.push_back({"gyro " + gyro.name, "gyro", gyro.message, gyro.match, &gyro.rate});
+    for (const GyroPlan& axis : gyro.axes)
+      inputs.push_back({"gyro " + gyro.name, "gyro", axis.message, axis.match, &axis.rate});
+  }
   if (const auto& it = plan.reference)
     inputs.push_back({"reference", "reference", it->message, it->match, &it->rate});
   if (const auto& it = plan.accelerometer)
@@ -62,11 +66,11 @@ bool may_share_frames(const FrameMatch& a, const FrameMatch& b) {
 void check_apart(TomlReader& root, const Plan& plan) {
   const std::vector<Input> inputs = inputs_of(plan);
   for (std::size_t i = 0; i < inputs.size(); ++i) {
-    // The two gyros among themselves were looked at before.
-    for (std::size_t k = std::max<std::size_t>(i + 1, 2); k < inputs.size(); ++k) {
+    for (std::size_t k = i + 1; k < inputs.size(); ++k) {
       const Input& a = inputs[i];
       const Input& b = inputs[k];
-      if (!confused(a, b)) continue;
+      // The gyros among themselves were looked at before.
+      if (b.key == "gyro" || !confused(a, b)) continue;
       root.complain(root.where(b.key),
                     fmt::format("{} ({}) and {} ({}) cannot be told apart: a frame of one of them "
                                 "on {} is taken for both",
@@ -80,7 +84,7 @@ void check_apart(TomlReader& root, const Plan& plan) {
 namespace {
 
 struct Own {
-  std::string_view message;
+  std::string message;
   FrameId id;
   std::string remedy;
 };
@@ -88,13 +92,26 @@ struct Own {
 std::vector<Own> own_frames(const Plan& plan, const std::string& bus) {
   const OutputPlan& output = plan.output;
   std::vector<Own> own;
-  const auto add = [&](std::string_view message, std::string_view key, std::uint32_t id) {
+  const auto add = [&](const std::string& message, std::string_view key, std::uint32_t id) {
     own.push_back({message, {id, false}, fmt::format("[output] {} = another identifier", key)});
   };
-  if (output.vgyro_frames && plan.buses[output.bus] == bus) {
+  if (output.vgyro_frames && plan.buses[output.bus] == bus && output.axes.empty()) {
     add("VG_Rate", "rate_id", output.rate_id);
     add("VG_Bias", "bias_id", output.bias_id);
     add("VG_Model", "model_id", output.model_id);
+  }
+  if (output.vgyro_frames && plan.buses[output.bus] == bus) {
+    for (const std::size_t axis : output.axes) {
+      const auto step = static_cast<std::uint32_t>(axis) * kAxisIdStep;
+      const char upper = static_cast<char>(kAxisNames[axis] - 'x' + 'X');
+      if (output.rate_is_shared && axis == output.axes.front()) {
+        add("VG_Rates", "rate_id", output.rate_id);
+      } else if (!output.rate_is_shared) {
+        add(fmt::format("VG_Rate_{}", upper), "rate_id", output.rate_id + step);
+      }
+      add(fmt::format("VG_Bias_{}", upper), "bias_id", output.bias_id + step);
+      add(fmt::format("VG_Model_{}", upper), "model_id", output.model_id + step);
+    }
   }
   for (const OutputLayout& layout : output.layouts) {
     if (plan.buses[layout.bus] != bus) continue;

@@ -157,6 +157,10 @@ void apply_model(const model::Model& model, Plan& plan, std::vector<Error>& erro
   std::array<double, 2> flicker_dps{};
   for (const model::Effect& effect : model.effects) {
     const std::string place = at_line(model.file, effect.line);
+    if (effect.of_axis && plan.output.axes.empty()) {
+      errors.push_back({place, "an effect of one axis, and the gyros have one axis each",
+                        "leave `axis` out, or rate_x, rate_y, rate_z in the [[gyro]] tables"});
+    }
     check_inputs(effect, plan, place, errors);
     add_noise(effect, plan.corrector.gyros[effect.gyro]);
     add_lag_doubt(effect, plan.corrector.gyros[effect.gyro]);

@@ -152,4 +152,62 @@ const can::Frame& OutputEncoder::model(const ModelOutput& output) {
   return model_;
 }
 
+// --- all axes ------------------------------------------------------------------------------------
+
+namespace {
+
+constexpr std::size_t kAxesRateBytes = 48;
+constexpr std::size_t kAxesState = 3;    ///< of each axis a byte: state, validity, quality
+constexpr std::size_t kAxesHealth = 6;   ///< of each axis a byte
+constexpr std::size_t kAxesAge = 9;      ///< two bytes
+constexpr std::size_t kAxesTime = 12;    ///< eight
+constexpr std::size_t kAxesRates = 20;   ///< of each axis four
+constexpr std::size_t kAxesSigmas = 32;  ///< of each axis four
+
+void store_bytes(std::uint8_t* to, std::uint64_t value, std::size_t bytes) {
+  for (std::size_t i = 0; i < bytes; ++i)
+    to[i] = static_cast<std::uint8_t>(value >> (8U * i));
+}
+
+}  // namespace
+
+AxesEncoder::AxesEncoder(const OutputPlan& plan)
+    : frame_(frame_of(plan.rate_id, kAxesRateBytes, can::kFd | can::kBitRateSwitch)),
+      protection_(static_cast<std::uint16_t>(plan.rate_id)) {}
+
+void AxesEncoder::count_on_from(const AxesEncoder& before) {
+  if (frame_.id == before.frame_.id) protection_ = before.protection_;
+}
+
+const can::Frame& AxesEncoder::rates(const std::array<const RateOutput*, kAxes>& axes) {
+  std::uint8_t* data = frame_.data.data();
+  std::fill_n(data, kAxesRateBytes, std::uint8_t{0});
+  Duration age{0};
+  TimePoint instant;
+  for (std::size_t axis = 0; axis < kAxes; ++axis) {
+    const RateOutput* output = axes[axis];
+    const bool valid = output != nullptr && output->valid &&
+                       std::abs(output->rate_dps) <= 2147483647.0 / kFdRatePerDps;
+    store_bytes(data + kAxesRates + 4 * axis,
+                valid ? signed_field(output->rate_dps * kFdRatePerDps, 32) : 0x80000000U, 4);
+    store_bytes(data + kAxesSigmas + 4 * axis,
+                valid ? sigma_field(output->sigma_dps * kFdSigmaPerDps, 32) : ~0U, 4);
+    if (output == nullptr) continue;
+    const auto quality = static_cast<unsigned>(valid ? output->quality : Quality::kUnusable);
+    data[kAxesState + axis] = static_cast<std::uint8_t>(static_cast<unsigned>(output->state) |
+                                                        (valid ? 8U : 0U) | quality << 4U);
+    data[kAxesHealth + axis] = output->health;
+    age = std::max(age, output->age);
+    instant = output->instant;
+  }
+  store_bytes(
+      data + kAxesAge,
+      static_cast<std::uint64_t>(std::clamp<std::int64_t>((age.count() + 500) / 1000, 0, 65535)),
+      2);
+  store_bytes(data + kAxesTime,
+              static_cast<std::uint64_t>(std::max<std::int64_t>(to_ns(instant), 0) / 1000), 8);
+  protection_.protect({data, kAxesRateBytes});
+  return frame_;
+}
+
 }  // namespace vgyro::gateway

@@ -87,4 +87,20 @@ class OutputEncoder {
   dbc::E2eProfile11C model_protection_;
 };
 
+/// VG_Rates: the rates of all axes of a platform in one FD frame.
+class AxesEncoder {
+ public:
+  explicit AxesEncoder(const OutputPlan& plan);
+
+  /// Where the identifier is the same the counter goes on where the other's stands.
+  void count_on_from(const AxesEncoder& before);
+
+  /// About x, y and z, of one instant; null: there is none. Precondition: one is there.
+  const can::Frame& rates(const std::array<const RateOutput*, kAxes>& axes);
+
+ private:
+  can::Frame frame_;
+  dbc::E2eProfile5 protection_;
+};
+
 }  // namespace vgyro::gateway

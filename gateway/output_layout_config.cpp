@@ -83,8 +83,9 @@ class LayoutReader {
       : reader_(table, context.file, "[[output.layout]]", context.errors),
         context_(context),
         resolver_(reader_, context.cache, context.folder, plan.buses, context.warnings,
-                  plan.buses[plan.output.bus]),
-        method_(plan.corrector.method) {}
+                  {.bus = plan.buses[plan.output.bus]}),
+        method_(plan.corrector.method),
+        axes_(plan.output.axes) {}
 
   std::optional<OutputLayout> read();
 
@@ -100,6 +101,7 @@ class LayoutReader {
   void read_id();
   void read_source_address();
   void read_every();
+  void read_axis();
   void take(std::string_view key, const Payload& mask);
   bool on_page(std::string_view key, const dbc::Signal& signal);
   void fill_rest();
@@ -115,6 +117,7 @@ class LayoutReader {
   LayoutContext context_;
   SignalResolver resolver_;
   Method method_;
+  const std::vector<std::size_t>& axes_;  ///< of the platform; empty: a single one
   bool fd_ = false;
   dbc::CodeRules rules_ = dbc::CodeRules::kNone;
   const dbc::Signal* rate_ = nullptr;
@@ -140,16 +143,38 @@ std::optional<OutputLayout> LayoutReader::read() {
     read_valid();
     read_protection();
     read_every();
+    read_axis();
     fill_rest();
     warn_of_rate();
   } else {
     reader_.forgive({"unit", "sign", "rate_not_available", "id", "source_address", "valid",
-                     "invalid", "every_ms", "fd", "fill"});
+                     "invalid", "every_ms", "fd", "fill", "axis"});
     forgive_e2e(reader_);
   }
   reader_.finish();
   if (context_.errors.size() > errors_before) return std::nullopt;
   return layout_;
+}
+
+// Of a platform of several axes a layout carries one of them.
+void LayoutReader::read_axis() {
+  if (axes_.empty()) {
+    if (!reader_.has("axis")) return;
+    reader_.forgive({"axis"});
+    reader_.complain(reader_.where("axis"), "axis is of a platform of several axes",
+                     "leave it out, or rate_x, rate_y, rate_z in the [[gyro]] tables");
+    return;
+  }
+  std::string names;
+  for (const std::size_t axis : axes_)
+    names += fmt::format("{}\"{}\"", names.empty() ? "" : ", ", kAxisNames[axis]);
+  const std::string name = reader_.required_text("axis", "z");
+  for (const std::size_t axis : axes_) {
+    if (name.size() == 1 && name[0] == kAxisNames[axis]) layout_->axis = axis;
+  }
+  if (layout_->axis || name.empty()) return;
+  reader_.complain(reader_.where("axis"), fmt::format("the units have no axis \"{}\"", name),
+                   names);
 }
 
 void LayoutReader::take(std::string_view key, const Payload& mask) {

@@ -17,7 +17,7 @@
 #include "base/time.h"
 #include "can/frame.h"
 #include "gateway/frame_sink.h"
-#include "gateway/output_frames.h"
+#include "gateway/observers.h"
 #include "gateway/plan.h"
 #include "gateway/saved_state.h"
 #include "gateway/status.h"
@@ -28,29 +28,13 @@ class Corrector;
 
 namespace vgyro::gateway {
 
-/// For those who draw or add up: every virtual rate with what it was made of, before it becomes a
-/// frame, also where it is beyond what the frame can carry. NaN stands for a missing gyro, and for
-/// a rate that is not known yet.
-class RateObserver {
- public:
-  virtual ~RateObserver() = default;
-  virtual void on_rate(TimePoint t, const std::array<double, 2>& raw_dps, double virtual_dps) = 0;
-  /// What the corrector thinks of its data, at every rate once it is calibrated; before on_rate().
-  virtual void on_condition(TimePoint /*t*/, const fusion::Condition& /*condition*/) {}
-};
-
-/// For those who write down what goes out: every VG_Rate as it was sent.
-class OutputObserver {
- public:
-  virtual ~OutputObserver() = default;
-  /// `bias_dps` as VG_Bias would say it at this moment; NaN where it is not known.
-  virtual void on_output(const RateOutput& output, const std::array<double, 2>& bias_dps) = 0;
-};
+class AxisPipeline;
+class UnitPipeline;
 
 class Pipeline {
  public:
   explicit Pipeline(const Plan& plan);
-  /// With a corrector of the caller's instead of the plan's.
+  /// With a corrector of the caller's instead of the plan's. Precondition: two single gyros.
   Pipeline(const Plan& plan, std::unique_ptr<fusion::Corrector> corrector);
   Pipeline(Pipeline&&) noexcept;
   Pipeline& operator=(Pipeline&&) noexcept;
@@ -68,6 +52,10 @@ class Pipeline {
   [[nodiscard]] TimePoint next_deadline() const;
 
   [[nodiscard]] const Status& status() const;
+  /// Of a platform of several axes how many there are, in the order of Plan::axes, and what the
+  /// pipeline knows of each; of two single gyros there are none.
+  [[nodiscard]] std::size_t axis_count() const;
+  [[nodiscard]] const Status& axis_status(std::size_t place) const;
 
   /// How often there was something to say so far, whether or not a frame went out for it. No state
   /// changes without.
@@ -91,13 +79,13 @@ class Pipeline {
   /// which is at its end then. The frames' counters go on as with count_on_from().
   void take_over(Pipeline&& before);
 
-  /// Null to take it off again.
-  void observe(RateObserver* observer);
-  void observe_output(OutputObserver* observer);
+  /// Null to take it off again. Of a platform of several axes of the one in this `place`.
+  void observe(RateObserver* observer, std::size_t place = 0);
+  void observe_output(OutputObserver* observer, std::size_t place = 0);
 
  private:
-  struct Impl;
-  std::unique_ptr<Impl> impl_;
+  std::unique_ptr<AxisPipeline> single_;  ///< of two single gyros …
+  std::unique_ptr<UnitPipeline> units_;   ///< … or of two units; the other is null
 };
 
 }  // namespace vgyro::gateway

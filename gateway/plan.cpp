@@ -27,7 +27,15 @@ double Quantity::sendable_highest() const {
 }
 
 std::vector<FrameMatch> Plan::inputs() const {
-  std::vector<FrameMatch> matches{gyros[0].match, gyros[1].match};
+  std::vector<FrameMatch> matches;
+  const auto add = [&](const FrameMatch& match) {
+    if (std::find(matches.begin(), matches.end(), match) == matches.end()) matches.push_back(match);
+  };
+  for (const GyroPlan& gyro : gyros) {
+    if (gyro.axes.empty()) matches.push_back(gyro.match);
+    for (const GyroPlan& one : gyro.axes)
+      add(one.match);
+  }
   if (reference) matches.push_back(reference->match);
   if (accelerometer) matches.push_back(accelerometer->match);
   if (speed) matches.push_back(speed->match);
@@ -41,8 +49,15 @@ std::string to_string(const FrameId& id) {
 std::vector<FrameId> output_ids(const OutputPlan& plan, can::BusIndex bus) {
   std::vector<FrameId> ids;
   if (plan.vgyro_frames && plan.bus == bus) {
-    for (const std::uint32_t id : {plan.rate_id, plan.bias_id, plan.model_id})
-      ids.push_back({id, false});
+    const std::vector<std::size_t> axes =
+        plan.axes.empty() ? std::vector<std::size_t>{0} : plan.axes;
+    for (const std::size_t axis : axes) {
+      const auto step = static_cast<std::uint32_t>(axis) * kAxisIdStep;
+      const bool has_rate = !plan.rate_is_shared || axis == axes.front();
+      if (has_rate) ids.push_back({plan.rate_id + (plan.rate_is_shared ? 0 : step), false});
+      ids.push_back({plan.bias_id + step, false});
+      ids.push_back({plan.model_id + step, false});
+    }
   }
   for (const OutputLayout& layout : plan.layouts) {
     if (layout.bus == bus) ids.push_back({layout.id, layout.extended});

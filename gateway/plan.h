@@ -114,6 +114,23 @@ struct E2ePlan {
   friend bool operator==(const E2ePlan&, const E2ePlan&) = default;
 };
 
+/// The vehicle's axes: x forward, y to the left, z up. A sensor numbers its own likewise.
+inline constexpr std::size_t kAxes = 3;
+inline constexpr std::array<char, kAxes> kAxisNames{'x', 'y', 'z'};
+
+/// Row by row: the rate about the vehicle's axis i is the sum of matrix[3·i + s] times the rate
+/// about the sensor's axis s. A rotation, to the rounding of a double.
+struct Mount {
+  std::array<double, kAxes * kAxes> matrix{1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0};
+  double corrected = 0.0;  ///< by how much an element was off, as configured, to be a rotation
+
+  [[nodiscard]] double at(std::size_t axis, std::size_t sensor_axis) const {
+    return matrix[kAxes * axis + sensor_axis];
+  }
+  [[nodiscard]] bool turns() const { return matrix != Mount{}.matrix; }
+  friend bool operator==(const Mount&, const Mount&) = default;
+};
+
 struct GyroPlan {
   std::string name;
   std::string bus;
@@ -132,6 +149,11 @@ struct GyroPlan {
   double dead_band_dps = 0.0;                 ///< likewise: it reads 0 below; 0: it has none
   std::optional<double> max_bias_dps = {};    ///< no bias of this gyro is larger
   std::string taken_back = {};                ///< digest of what is taken back; empty: nothing
+  /// Of a whole unit: its sensor's axes, each as a gyro; what stands above is the first one's.
+  std::vector<GyroPlan> axes = {};
+  std::size_t sensor_axis = 0;  ///< of one of these: which it is
+  bool flipped = false;         ///< of the pair about an axis: `rate` is against the sensor's sign
+  Mount mount = {};             ///< of the unit in the vehicle
 
   friend bool operator==(const GyroPlan&, const GyroPlan&) = default;
 };
@@ -176,6 +198,12 @@ struct CalibrationPlan {
   double rate_dps = 0.0;        ///< true rate along the axis while calibrating at rest
   bool from_reference = false;  ///< calibrate against [reference] instead
   std::optional<double> stop_rate_dps = 0.0;  ///< true rate at a stop, where it is known
+  double doubt_dps = 0.0;  ///< 1σ of rate_dps that stays in every rate: the Earth's, of a heading
+                           ///< that nobody told
+  /// As configured, for all axes of a platform: [calibration] rate_dps, latitude_deg, heading_deg.
+  std::vector<double> axis_rate_dps = {};
+  std::optional<double> latitude_deg = {};
+  std::optional<double> heading_deg = {};
   fusion::WhenMoving when_moving = fusion::WhenMoving::kWait;
 
   friend bool operator==(const CalibrationPlan&, const CalibrationPlan&) = default;
@@ -244,6 +272,7 @@ struct OutputLayout {
   E2ePlan e2e = {};
   std::optional<Duration> every = {};  ///< at most one frame in this time; nothing: with every rate
   std::vector<RestingSignal> resting = {};
+  std::optional<std::size_t> axis = {};  ///< of a platform of several: whose rate it carries
 
   /// Can its frames say that there is no valid rate? Where they cannot, none is sent then.
   [[nodiscard]] bool can_say_invalid() const { return valid || rate.has_code; }
@@ -259,7 +288,14 @@ struct OutputPlan {
   bool fd = false;
   bool vgyro_frames = true;  ///< VG_Rate, VG_Bias and VG_Model
   std::vector<OutputLayout> layouts = {};
+  /// Of a platform of several axes: which; the identifiers are axis 0's, another's are kAxisIdStep
+  /// higher for each. Empty: a single one.
+  std::vector<std::size_t> axes = {};
+  bool rate_is_shared = false;  ///< one FD frame carries the rates of all axes
 };
+
+/// From the identifiers of one axis to those of the next: VG_Rate, VG_Bias, VG_Model.
+inline constexpr std::uint32_t kAxisIdStep = 3;
 
 /// Who sends what: an identifier on a bus.
 struct FrameId {
@@ -285,6 +321,10 @@ struct Plan {
   CorrectorPlan corrector;
   std::optional<model::Model> model;  ///< effects that are known and taken back
   OutputPlan output;
+  /// Of a platform of several axes: for each the plan of the pair of gyros about it, in the order
+  /// x, y, z; what the axes share stands in all of them. Empty: two single gyros.
+  std::vector<Plan> axes = {};
+  std::size_t axis = 0;  ///< of one of these: which of the vehicle's axes it is
 
   /// Every frame that the pipeline wants to receive: the kernel filters.
   [[nodiscard]] std::vector<FrameMatch> inputs() const;

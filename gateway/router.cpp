@@ -3,8 +3,12 @@
 namespace vgyro::gateway {
 
 Router::Router(const Plan& plan) : standard_(plan.buses.size()) {
-  add(plan.gyros[0].match, kGyro1);
-  add(plan.gyros[1].match, kGyro2);
+  for (std::size_t gyro = 0; gyro < 2; ++gyro) {
+    const std::uint8_t role = gyro == 0 ? kGyro1 : kGyro2;
+    if (plan.gyros[gyro].axes.empty()) add(plan.gyros[gyro].match, role);
+    for (const GyroPlan& axis : plan.gyros[gyro].axes)
+      add(axis.match, role);
+  }
   if (plan.reference) add(plan.reference->match, kReference);
   if (plan.accelerometer) add(plan.accelerometer->match, kAccelerometer);
   if (plan.speed) add(plan.speed->match, kSpeed);

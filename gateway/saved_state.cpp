@@ -9,6 +9,7 @@
 #include <vector>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "base/toml_reader.h"
 #include "gateway/status.h"
@@ -18,6 +19,8 @@ namespace vgyro::gateway {
 namespace {
 
 constexpr std::int64_t kFormat = 1;
+// Of a platform of several axes: what format 1 holds stands in [axis.x] … instead.
+constexpr std::int64_t kFormatOfAxes = 2;
 constexpr const char* kRemedy = "the gateway calibrates anew; nothing has to be done";
 
 // The text ends with this and eight digits, so that whatever is cut off takes the checksum along.
@@ -285,6 +288,8 @@ std::string device_of(const GyroPlan& gyro) {
                                    gyro.rate.name, gyro.sign ? " with a sign signal" : "",
                                    gyro.rate.layout, gyro.rate.scale, gyro.rate.shift);
   if (!gyro.taken_back.empty()) device += ", less model " + gyro.taken_back;
+  if (gyro.mount.turns())
+    device += fmt::format(", mount {:.6f}", fmt::join(gyro.mount.matrix, " "));
   std::string plain;
   for (const char c : device) {
     plain +=
@@ -294,6 +299,24 @@ std::string device_of(const GyroPlan& gyro) {
 }
 
 Expected<void> check_devices(const SavedState& state, const Plan& plan) {
+  if (!state.axes.empty() && plan.axes.empty())
+    return fail({}, "is of units of several axes, but the gyros of the configuration have one",
+                kRemedy);
+  if (state.axes.empty() && !plan.axes.empty())
+    return fail({}, "is of two single gyros, but the configuration has units of several axes",
+                kRemedy);
+  for (const SavedState& one : state.axes) {
+    const auto pair = std::find_if(plan.axes.begin(), plan.axes.end(),
+                                   [&](const Plan& each) { return each.axis == one.axis; });
+    if (pair == plan.axes.end()) {
+      return fail({},
+                  fmt::format("is of an axis {} that the configuration does not have",
+                              kAxisNames[one.axis]),
+                  kRemedy);
+    }
+    if (auto same = check_devices(one, *pair); !same) return same;
+  }
+  if (!state.axes.empty()) return {};
   for (std::size_t gyro = 0; gyro < 2; ++gyro) {
     const std::string device = device_of(plan.gyros[gyro]);
     if (state.devices[gyro] == device) continue;
@@ -312,46 +335,70 @@ Expected<void> check_devices(const SavedState& state, const Plan& plan) {
   return {};
 }
 
-std::string to_text(const SavedState& state) {
-  const fusion::DriftMemory& drift = state.drift;
-  std::string text = fmt::format(
-      "# Biases of two gyros, kept by vgyrod so that a restart need not calibrate again.\n"
-      "# Without this file the gateway calibrates anew. A file changed by hand is refused.\n"
-      "format = {}\nrate_stamp_ns = {}\nrest_rate_dps = {}\n",
-      kFormat, to_ns(state.rate_stamp), shortest(state.rest_rate_dps));
+namespace {
+
+constexpr const char* kHead =
+    "# Biases of two gyros, kept by vgyrod so that a restart need not calibrate again.\n"
+    "# Without this file the gateway calibrates anew. A file changed by hand is refused.\n";
+
+std::string pair_text(const SavedState& state) {
+  std::string text = fmt::format("rate_stamp_ns = {}\nrest_rate_dps = {}\n",
+                                 to_ns(state.rate_stamp), shortest(state.rest_rate_dps));
   for (std::size_t gyro = 0; gyro < 2; ++gyro) {
     text += fmt::format("device_{} = {}\n", gyro + 1, quoted(state.devices[gyro]));
     if (state.temperature_c[gyro]) {
       text += fmt::format("{} = {}\n", temperature_key(gyro), shortest(*state.temperature_c[gyro]));
     }
   }
-  text += contradiction(state.pair);
-  text += fmt::format(
-      "\n[drift]  # covariances: of gyro 1, of both, of gyro 2\n"
-      "bias_dps = {}\nbias_covariance = {}\nwhite_density = {}\nsample_variance = {}\n"
-      "walk_ratio_per_s = {}\nwalk_weight = {}\n"
-      "scale_difference = {}\nscale_difference_sigma = {}\nskew_s = {}\nskew_sigma_s = {}\n",
-      listed(drift.bias_dps), listed(drift.bias_covariance), listed(drift.white_density),
-      listed(drift.sample_variance), listed(fusion::kWalkRatios_per_s), listed(drift.walk_weight),
-      shortest(drift.scale_difference), shortest(drift.scale_difference_sigma),
-      shortest(drift.skew_s), shortest(drift.skew_sigma_s));
-  text += kinds_and_slopes(drift);
+  return text + contradiction(state.pair);
+}
+
+std::string drift_text(const fusion::DriftMemory& drift, std::string_view table) {
+  return fmt::format(
+             "\n[{}]  # covariances: of gyro 1, of both, of gyro 2\n"
+             "bias_dps = {}\nbias_covariance = {}\nwhite_density = {}\nsample_variance = {}\n"
+             "walk_ratio_per_s = {}\nwalk_weight = {}\n"
+             "scale_difference = {}\nscale_difference_sigma = {}\nskew_s = {}\nskew_sigma_s = {}\n",
+             table, listed(drift.bias_dps), listed(drift.bias_covariance),
+             listed(drift.white_density), listed(drift.sample_variance),
+             listed(fusion::kWalkRatios_per_s), listed(drift.walk_weight),
+             shortest(drift.scale_difference), shortest(drift.scale_difference_sigma),
+             shortest(drift.skew_s), shortest(drift.skew_sigma_s)) +
+         kinds_and_slopes(drift);
+}
+
+std::string axes_text(const SavedState& state) {
+  std::string text = fmt::format("{}format = {}\n", kHead, kFormatOfAxes);
+  if (state.misalignment) {
+    text += fmt::format(
+        "\n[misalignment]  # from unit 1 to unit 2; covariances xx, xy, xz, yy, yz, zz\n"
+        "angle_rad = {}\ncovariance = {}\n",
+        listed(state.misalignment->angle_rad), listed(state.misalignment->covariance));
+  }
+  for (const SavedState& one : state.axes) {
+    const char axis = kAxisNames[one.axis];
+    text += fmt::format("\n[axis.{}]\n{}", axis, pair_text(one));
+    text += drift_text(one.drift, fmt::format("axis.{}.drift", axis));
+  }
+  return text;
+}
+
+}  // namespace
+
+std::string to_text(const SavedState& state) {
+  std::string text = axes_text(state);
+  if (state.axes.empty()) {
+    text = fmt::format("{}format = {}\n{}", kHead, kFormat, pair_text(state));
+    text += drift_text(state.drift, "drift");
+  }
   return text + seal(text);
 }
 
-Expected<SavedState> saved_state_from(std::string_view text, const std::string& where) {
-  const Expected<std::string_view> content = unsealed(text, where);
-  if (!content) return tl::unexpected(content.error());
-  const Expected<toml::table> parsed = parse_toml(*content, where, kRemedy);
-  if (!parsed) return tl::unexpected(parsed.error());
-  const toml::table& root = *parsed;
+namespace {
+
+Expected<SavedState> pair_from(const toml::table& root, const std::string& where) {
   const toml::table* drift = root["drift"].as_table();
-  // Not by value<>(): the library casts a number with a fraction before it looks whether that fits.
-  const toml::value<std::int64_t>* format = root["format"].as_integer();
-  if (drift == nullptr || format == nullptr || format->get() != kFormat) {
-    return fail(where, fmt::format("is of another version: only format {} is known", kFormat),
-                kRemedy);
-  }
+  if (drift == nullptr) return fail(where, "holds no [drift]", kRemedy);
   SavedState state;
   Numbers top(root, where, "saved state");
   top.pass_over("format");
@@ -370,6 +417,67 @@ Expected<SavedState> saved_state_from(std::string_view text, const std::string& 
   state.drift = drift_from(table);
   if (const std::optional<Error> error = table.finish()) return tl::unexpected(*error);
   return state;
+}
+
+// Units that face each other are no small rotation.
+constexpr double kAngleMax_rad = 3.2;
+
+Expected<fusion::MisalignmentMemory> misalignment_from(const toml::table& root,
+                                                       const std::string& where) {
+  Numbers table(root, where, "[misalignment]");
+  fusion::MisalignmentMemory memory;
+  memory.angle_rad = table.numbers<3>("angle_rad", -kAngleMax_rad, kAngleMax_rad);
+  memory.covariance =
+      table.numbers<6>("covariance", -kAngleMax_rad * kAngleMax_rad, kAngleMax_rad * kAngleMax_rad);
+  if (const std::optional<Error> error = table.finish()) return tl::unexpected(*error);
+  return memory;
+}
+
+Expected<SavedState> axes_from(const toml::table& root, const std::string& where) {
+  Numbers top(root, where, "saved state");
+  for (const char* key : {"format", "axis", "misalignment"})
+    top.pass_over(key);
+  if (const std::optional<Error> error = top.finish()) return tl::unexpected(*error);
+  const toml::table* tables = root["axis"].as_table();
+  if (tables == nullptr) return fail(where, "holds no [axis]", kRemedy);
+  std::vector<SavedState> axes;
+  for (std::size_t axis = 0; axis < kAxes; ++axis) {
+    const toml::table* table = (*tables)[std::string_view(&kAxisNames[axis], 1)].as_table();
+    if (table == nullptr) continue;
+    auto one = pair_from(*table, where);
+    if (!one) return one;
+    one->axis = axis;
+    axes.push_back(std::move(*one));
+  }
+  if (axes.empty() || axes.size() != tables->size())
+    return fail(where, "holds no axes, or unknown ones", kRemedy);
+  SavedState state = axes.front();
+  state.axes = std::move(axes);
+  if (const toml::table* table = root["misalignment"].as_table()) {
+    const auto misalignment = misalignment_from(*table, where);
+    if (!misalignment) return tl::unexpected(misalignment.error());
+    state.misalignment = *misalignment;
+  }
+  return state;
+}
+
+}  // namespace
+
+Expected<SavedState> saved_state_from(std::string_view text, const std::string& where) {
+  const Expected<std::string_view> content = unsealed(text, where);
+  if (!content) return tl::unexpected(content.error());
+  const Expected<toml::table> parsed = parse_toml(*content, where, kRemedy);
+  if (!parsed) return tl::unexpected(parsed.error());
+  const toml::table& root = *parsed;
+  // Not by value<>(): the library casts a number with a fraction before it looks whether that fits.
+  const toml::value<std::int64_t>* format = root["format"].as_integer();
+  if (format != nullptr && format->get() == kFormatOfAxes) return axes_from(root, where);
+  if (format != nullptr && format->get() == kFormat && root["drift"].is_table())
+    return pair_from(root, where);
+  return fail(
+      where,
+      fmt::format("is of another version: only format {} and {} are known", kFormat, kFormatOfAxes),
+      kRemedy);
 }
 
 }  // namespace vgyro::gateway

@@ -9,10 +9,12 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "base/error.h"
 #include "base/time.h"
 #include "fusion/drift_memory.h"
+#include "fusion/misalignment.h"
 #include "fusion/pair_relation.h"
 #include "gateway/plan.h"
 
@@ -28,6 +30,10 @@ struct SavedState {
   std::array<std::string, 2> devices;                  ///< device_of() the gyros
   double rest_rate_dps = 0.0;                          ///< what the biases were learned against
   fusion::PairVerdict pair;  ///< a contradiction, which only motion can take back
+  /// Of a platform of several axes: a state of each that has one; what stands above is the first's.
+  std::vector<SavedState> axes = {};
+  std::size_t axis = 0;  ///< of one of these: which
+  std::optional<fusion::MisalignmentMemory> misalignment = {};
 };
 
 /// What must be the same for the biases of a gyro to mean the same: bus, identifier, signal, scale,

@@ -47,7 +47,11 @@ bool Sender::send_rate(const RateOutput& output) {
   sigma_dps_ = valid ? output.sigma_dps : kNone;
   quality_ = valid ? output.quality : Quality::kUnusable;
   // The encoder, too, makes one that it cannot carry invalid.
-  if (vgyro_frames_) sink_->put(encoder_.rate(output), stamp_);
+  if (vgyro_frames_ && collector_ != nullptr) {
+    collector_->collect(axis_, output);
+  } else if (vgyro_frames_) {
+    sink_->put(encoder_.rate(output), stamp_);
+  }
   if (!layouts_.empty()) send_layouts(output);
   return valid;
 }

@@ -19,6 +19,13 @@
 
 namespace vgyro::gateway {
 
+/// Takes the rates of several senders that share a frame.
+class RateCollector {
+ public:
+  virtual ~RateCollector() = default;
+  virtual void collect(std::size_t axis, const RateOutput& output) = 0;
+};
+
 class Sender {
  public:
   static constexpr Duration kBiasPeriod = std::chrono::milliseconds(100);
@@ -42,6 +49,13 @@ class Sender {
     Sender& sender_;
   };
 
+  /// From now on rates of this axis go out in a frame of several, made elsewhere; its identifier is
+  /// none of ours.
+  void share_rates(RateCollector* collector, std::size_t axis) {
+    collector_ = collector;
+    axis_ = axis;
+  }
+
   /// Precondition of both: a Turn. A rate that the frame cannot carry goes out as invalid: false
   /// then, and where it was not valid before.
   bool send_rate(const RateOutput& output);
@@ -64,6 +78,8 @@ class Sender {
 
   /// How often there was something to say, whether or not a frame went out for it.
   [[nodiscard]] std::uint64_t spoken() const { return rates_ + bias_times_; }
+  /// The last VG_Rate's; NaN when that was invalid.
+  [[nodiscard]] double rate_dps() const { return rate_dps_; }
 
   /// The books, and what the last rate said.
   void tell(Status& status) const;
@@ -78,6 +94,8 @@ class Sender {
   can::BusIndex bus_;
   bool vgyro_frames_;
   FrameSink* sink_ = nullptr;
+  RateCollector* collector_ = nullptr;
+  std::size_t axis_ = 0;
   TimePoint stamp_;
   TimePoint next_bias_;  ///< the next point of the grid, or 0: at once
   std::uint64_t rates_ = 0;

@@ -98,15 +98,28 @@ std::vector<std::string> DatabaseCache::paths() const {
   return paths;
 }
 
+namespace {
+
+// Of a key that may be missing where there is a default.
+std::string text_or(TomlReader& reader, std::string_view key, const std::string& fallback,
+                    std::string_view example) {
+  if (fallback.empty() || reader.has(key)) return reader.required_text(key, example);
+  reader.forgive({key});
+  return fallback;
+}
+
+}  // namespace
+
 SignalResolver::SignalResolver(TomlReader& reader, DatabaseCache& cache,
                                const std::string& config_folder, std::vector<std::string>& buses,
-                               std::vector<Error>& warnings, const std::string& default_bus)
+                               std::vector<Error>& warnings, const SignalDefaults& defaults)
     : reader_(reader), warnings_(warnings) {
-  const bool is_default = !default_bus.empty() && !reader.has("bus");
-  bus_ = is_default ? default_bus : required_bus(reader);
+  const bool is_default = !defaults.bus.empty() && !reader.has("bus");
+  bus_ = is_default ? defaults.bus : required_bus(reader);
   if (is_default) reader.forgive({"bus"});
-  const std::string dbc = reader.required_text("dbc", "bench.dbc");
-  const std::string message = reader.required_text("message", "GYRO_A");
+  const std::string dbc = text_or(reader, "dbc", defaults.dbc, "bench.dbc");
+  const std::string message = text_or(reader, "message", defaults.message, "GYRO_A");
+  named_ = {bus_, dbc, message};
   const auto codes = read_code_rules();
   if (bus_.empty() || dbc.empty() || message.empty()) return;
   bus_index_ = bus_index(buses, bus_);

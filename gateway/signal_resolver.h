@@ -32,14 +32,20 @@ class DatabaseCache {
   std::vector<Error>& warnings_;
 };
 
+/// What is meant where a table has no such key; an empty one must be there.
+struct SignalDefaults {
+  std::string bus = {};
+  std::string dbc = {};
+  std::string message = {};
+};
+
 /// One message of one table of the configuration.
 class SignalResolver {
  public:
-  /// Reads the keys bus, dbc, message, codes of the table. With a `default_bus` the first may be
-  /// missing.
+  /// Reads the keys bus, dbc, message, codes of the table.
   SignalResolver(TomlReader& reader, DatabaseCache& cache, const std::string& config_folder,
                  std::vector<std::string>& buses, std::vector<Error>& warnings,
-                 const std::string& default_bus = {});
+                 const SignalDefaults& defaults = {});
 
   [[nodiscard]] bool usable() const { return message_ != nullptr; }
   [[nodiscard]] const std::string& bus() const { return bus_; }
@@ -48,6 +54,8 @@ class SignalResolver {
   /// Whose codes the message has, by its DBC file or the configuration.
   [[nodiscard]] dbc::CodeRules rules() const { return rules_; }
   [[nodiscard]] const std::string& dbc_path() const { return dbc_path_; }
+  /// For a table that need not say them again.
+  [[nodiscard]] const SignalDefaults& named() const { return named_; }
 
   /// The signal that `key` names; null after a complaint, or when the key is not there.
   const dbc::Signal* signal(std::string_view key, bool required);
@@ -72,6 +80,7 @@ class SignalResolver {
 
   TomlReader& reader_;
   std::vector<Error>& warnings_;
+  SignalDefaults named_;  ///< as configured
   std::string bus_;
   can::BusIndex bus_index_ = 0;
   std::string dbc_path_;

@@ -173,6 +173,11 @@ struct Status {
   std::array<double, fusion::kHypotheses> probability{};
   std::uint64_t estimate_restarts = 0;  ///< times that the estimate was lost and began anew
 
+  /// Of a platform of several axes: the rotation between its units, and what has told it.
+  std::uint64_t misalignment_segments = 0;
+  std::array<double, 3> misalignment_deg{};
+  std::array<double, 3> misalignment_sigma_deg{};
+
   /// Of all layouts.
   [[nodiscard]] LayoutCounts layouts_total() const;
 };

@@ -360,8 +360,14 @@ double lag_sigma_s(const Effect& effect) {
   return lag_s(effect) * effect.sigma[0] / effect.parameters[0];
 }
 
+bool acts_on_unit(Kind kind) {
+  return info(kind).nature == Nature::kLag || kind == Kind::kDroppedFrames ||
+         kind == Kind::kClockSkew || kind == Kind::kTimestampJitter;
+}
+
 std::string parameters_text(const Effect& effect) {
   std::string text;
+  if (effect.of_axis) text = fmt::format("of {}: ", "xyz"[*effect.of_axis]);
   const std::span<const Parameter> parameters = info(effect.kind).parameters;
   for (std::size_t i = 0; i < parameters.size(); ++i) {
     if (i > 0) text += ", ";

@@ -104,6 +104,9 @@ double slope(const Effect& effect, double rate_dps, const Surroundings& surround
 /// What the kinds of Nature::kClip make of a reading.
 double clipped_dps(const Effect& effect, double reading_dps);
 
+/// Lags, and what happens to frames and stamps: of a unit of several axes it is of all of them.
+bool acts_on_unit(Kind kind);
+
 /// Of Nature::kLag: 1σ of lag_s(), from the effect's σ.
 double lag_sigma_s(const Effect& effect);
 

@@ -64,8 +64,10 @@ std::string table_text(const Effect& effect, std::string_view newline) {
   const KindInfo& kind = info(effect.kind);
   std::string text = fmt::format("[[effect]]{0}gyro = {1}{0}kind = \"{2}\"{0}", newline,
                                  effect.gyro + 1, kind.name);
+  if (effect.of_axis)
+    text += fmt::format("{} = \"{}\"{}", kAxisKey, "xyz"[*effect.of_axis], newline);
   for (std::size_t i = 0; i < kind.parameters.size(); ++i) {
-    text += fmt::format("{} = {}{}", kind.parameters[i].name,
+    text += fmt::format("{} = {}{}", key_of(kind.parameters[i], effect.of_axis.has_value()),
                         value_text(kind.parameters[i], effect.parameters[i]), newline);
   }
   if (const std::string sigma = sigma_text(effect); !sigma.empty()) {
@@ -83,7 +85,7 @@ Expected<Model> read(std::string_view text) {
 
 bool same(const Effect& a, const Effect& b) {
   return a.gyro == b.gyro && a.kind == b.kind && a.parameters == b.parameters &&
-         a.sigma == b.sigma && a.ambiguous == b.ambiguous;
+         a.sigma == b.sigma && a.ambiguous == b.ambiguous && a.of_axis == b.of_axis;
 }
 
 // `text` must hold these effects, whatever else it holds.

@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <optional>
 
 namespace vgyro::model {
 
@@ -65,6 +66,8 @@ struct Effect {
   unsigned line = 0;       ///< of its table in the model file; 0 when it comes from elsewhere
   Parameters sigma{};      ///< 1σ of each parameter; 0: nothing is said of its doubt
   bool ambiguous = false;  ///< another reading is as good: the whole effect may not be this gyro's
+  /// Of a unit of several axes: of this one of its sensor's (0 … 2); nothing: of each of them.
+  std::optional<std::size_t> of_axis = {};
 
   friend bool operator==(const Effect&, const Effect&) = default;
 };

@@ -1,5 +1,6 @@
 #include "model/file.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <optional>
@@ -21,14 +22,16 @@ constexpr std::size_t kFileBytesMax = std::size_t{1} << 20U;
 constexpr std::int64_t kFormat = 1;
 constexpr std::array<std::string_view, 3> kAxes{"x", "y", "z"};
 
-std::optional<double> read_axis(TomlReader& reader, const Parameter& parameter) {
-  const auto name = reader.text(parameter.name);
+constexpr std::string_view kFromKey = "from";
+
+std::optional<std::size_t> read_axis(TomlReader& reader, std::string_view key) {
+  const auto name = reader.text(key);
   if (!name) return std::nullopt;
   for (std::size_t i = 0; i < kAxes.size(); ++i) {
-    if (*name == kAxes[i]) return static_cast<double>(i);
+    if (*name == kAxes[i]) return i;
   }
-  reader.complain(reader.where(parameter.name), fmt::format("there is no axis \"{}\"", *name),
-                  parameter.limits());
+  reader.complain(reader.where(key), fmt::format("there is no axis \"{}\"", *name),
+                  "\"x\", \"y\" or \"z\"");
   return std::nullopt;
 }
 
@@ -42,7 +45,11 @@ std::optional<double> read_number(TomlReader& reader, const Parameter& parameter
 
 // A missing one after a complaint of its own.
 std::optional<double> read_parameter(TomlReader& reader, const KindInfo& kind,
-                                     const Parameter& parameter) {
+                                     const Parameter& parameter, bool has_unit_axis) {
+  if (parameter.form == Parameter::Form::kAxis && has_unit_axis) {
+    const auto axis = read_axis(reader, key_of(parameter, true));
+    return axis ? std::optional(static_cast<double>(*axis)) : std::nullopt;
+  }
   if (!reader.has(parameter.name)) {
     reader.forgive({parameter.name});
     if (parameter.preset) return parameter.preset;
@@ -50,8 +57,18 @@ std::optional<double> read_parameter(TomlReader& reader, const KindInfo& kind,
                     parameter.limits());
     return std::nullopt;
   }
-  return parameter.form == Parameter::Form::kAxis ? read_axis(reader, parameter)
-                                                  : read_number(reader, parameter);
+  if (parameter.form != Parameter::Form::kAxis) return read_number(reader, parameter);
+  const auto axis = read_axis(reader, parameter.name);
+  return axis ? std::optional(static_cast<double>(*axis)) : std::nullopt;
+}
+
+// The key `axis` is the unit's, unless it is a parameter: of g_sensitivity it is the
+// acceleration's, as long as `from` does not say that.
+bool has_unit_axis(const TomlReader& reader, const KindInfo& kind) {
+  const bool is_parameter =
+      std::any_of(kind.parameters.begin(), kind.parameters.end(),
+                  [](const Parameter& parameter) { return parameter.name == kAxisKey; });
+  return reader.has(kAxisKey) && (!is_parameter || reader.has(kFromKey));
 }
 
 // Two values within the limits are no further apart.
@@ -157,8 +174,17 @@ std::optional<Effect> read_effect(const toml::table& table, const std::string& f
   Effect effect{.gyro = gyro.value_or(0),
                 .kind = kind->kind,
                 .line = static_cast<unsigned>(table.source().begin.line)};
+  const bool of_axis = has_unit_axis(reader, *kind);
+  if (of_axis) effect.of_axis = read_axis(reader, kAxisKey);
+  if (of_axis && acts_on_unit(kind->kind)) {
+    reader.complain(
+        reader.where(kAxisKey),
+        fmt::format("{} of one axis: it is of a unit, with all of its axes", kind->name),
+        "leave `axis` out");
+  }
   for (std::size_t i = 0; i < kind->parameters.size(); ++i) {
-    effect.parameters[i] = read_parameter(reader, *kind, kind->parameters[i]).value_or(0.0);
+    effect.parameters[i] =
+        read_parameter(reader, *kind, kind->parameters[i], of_axis).value_or(0.0);
   }
   read_sigma(table, reader, file, errors, effect);
   effect.ambiguous = reader.boolean("ambiguous").value_or(false);
@@ -178,10 +204,15 @@ void read_format(TomlReader& root, const std::string& file) {
 }
 
 void check_count(TomlReader& root, Kind kind, std::size_t most, const Model& model) {
-  for (std::size_t gyro = 0; gyro < 2; ++gyro) {
+  for (std::size_t place = 0; place < 2 * kAxes.size(); ++place) {
+    const std::size_t gyro = place / kAxes.size();
+    const std::size_t axis = place % kAxes.size();
     std::size_t count = 0;
     for (const Effect& effect : model.effects) {
-      if (effect.gyro != gyro || effect.kind != kind || ++count != most + 1) continue;
+      // What is of all axes is told of with the first.
+      const bool of_axis = effect.of_axis.value_or(axis) == axis;
+      if (effect.gyro != gyro || effect.kind != kind || !of_axis || ++count != most + 1) continue;
+      if (!effect.of_axis && axis > 0) continue;
       root.complain(at_line(model.file, effect.line),
                     fmt::format("gyro {} has more than {} effects of kind {}", gyro + 1, most,
                                 info(kind).name));
@@ -208,6 +239,10 @@ void check_flicker(TomlReader& root, const Model& model) {
 }
 
 }  // namespace
+
+std::string_view key_of(const Parameter& parameter, bool has_unit_axis) {
+  return has_unit_axis && parameter.name == kAxisKey ? kFromKey : parameter.name;
+}
 
 ModelResult parse_model(std::string_view text, const std::string& file) {
   const auto parsed = parse_toml(text, file, "strings stand in quotes, effects in [[effect]]");

@@ -181,6 +181,33 @@ void Curve::add_piece(std::size_t i, std::span<const double> values,
   integrals_.push_back(integrals_.back() + length * evaluate_integral(piece.used(), 0.5));
 }
 
+// A sum of polynomials of the same piece is one, and so it is as exact as its parts.
+Curve Curve::mixed(const Curve& like, std::span<const std::pair<double, const Curve*>> parts) {
+  Curve sum;
+  sum.times_s_ = like.times_s_;
+  sum.begins_.push_back(0);
+  sum.integrals_.push_back(0.0);
+  for (const auto& [share, part] : parts) {
+    assert(part->times_s_ == like.times_s_);
+    sum.first_ += share * part->first_;
+    sum.last_ += share * part->last_;
+  }
+  for (std::size_t i = 0; i + 1 < sum.times_s_.size(); ++i) {
+    Polynomial piece{.c = {}, .size = 1};
+    for (const auto& [share, part] : parts) {
+      const std::size_t begin = part->begins_[i];
+      piece.size = std::max(piece.size, part->begins_[i + 1] - begin);
+      for (std::size_t k = 0; begin + k < part->begins_[i + 1]; ++k)
+        piece.c[k] += share * part->coefficients_[begin + k];
+    }
+    sum.coefficients_.insert(sum.coefficients_.end(), piece.used().begin(), piece.used().end());
+    sum.begins_.push_back(sum.coefficients_.size());
+    const double length = sum.times_s_[i + 1] - sum.times_s_[i];
+    sum.integrals_.push_back(sum.integrals_.back() + length * evaluate_integral(piece.used(), 0.5));
+  }
+  return sum;
+}
+
 // Precondition: first point <= t <= last point, and there are two.
 Curve::Place Curve::find(double t_s) const {
   const auto after = std::upper_bound(times_s_.begin() + 1, times_s_.end() - 1, t_s);

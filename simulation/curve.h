@@ -10,6 +10,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <utility>
 #include <vector>
 
 namespace vgyro::simulation {
@@ -24,6 +25,10 @@ class Curve {
   /// values as times, at least one, finite, times growing.
   Curve(std::span<const double> times_s, std::span<const double> values,
         std::size_t piece_points = kPointsMax);
+
+  /// The sum of `part.first` times `part.second`, at the points of `like`. Precondition: all have
+  /// the same points.
+  static Curve mixed(const Curve& like, std::span<const std::pair<double, const Curve*>> parts);
 
   [[nodiscard]] double value(double t_s) const;
   [[nodiscard]] double slope(double t_s) const;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <utility>
 #include <vector>
 
 #include <fmt/core.h>
@@ -27,7 +28,7 @@ constexpr std::size_t kAcceleration = 3;
 constexpr std::size_t kSupply = 6;
 constexpr std::size_t kOtherRates = 7;
 constexpr std::array<Column, 10> kColumns{{{"t_s", -1e9, 1e9, true},
-                                           {"rate_dps", -1e5, 1e5, true},
+                                           {"rate_dps", -1e5, 1e5, false},
                                            {"temperature_c", -273.15, 1000.0, false},
                                            {"acc_x_g", -1000.0, 1000.0, false},
                                            {"acc_y_g", -1000.0, 1000.0, false},
@@ -128,7 +129,9 @@ Expected<void> Table::read_header(std::string_view line) {
     order_.push_back(i);
   }
   for (std::size_t i = 0; i < kColumns.size(); ++i) {
-    if (!kColumns[i].required || has(i)) continue;
+    const bool stands_in =
+        i == kRate && (has(kOtherRates) || has(kOtherRates + 1) || has(kOtherRates + 2));
+    if ((!kColumns[i].required && i != kRate) || has(i) || stands_in) continue;
     return fail(here(), fmt::format("column {} is missing", kColumns[i].name), kHeaderForm);
   }
   return {};
@@ -198,9 +201,14 @@ Expected<Profile> parse_profile(std::string_view text, const std::string& file) 
   const double begin_s = times_s.front();
   for (double& t_s : times_s)
     t_s -= begin_s;
+  const std::vector<double> still(times_s.size(), 0.0);
+  const std::size_t upright = kOtherRates + 2;
+  const std::vector<double>& rate_dps =
+      table.has(kRate) ? table.column(kRate) : (table.has(upright) ? table.column(upright) : still);
   Profile profile{.file = file,
                   .length_s = times_s.back(),
-                  .rate_dps = Curve(times_s, table.column(kRate)),
+                  .has_rate = table.has(kRate),
+                  .rate_dps = Curve(times_s, rate_dps),
                   .temperature_c = {},
                   .acceleration_g = {},
                   .supply_v = {},
@@ -217,6 +225,23 @@ Expected<Profile> parse_profile(std::string_view text, const std::string& file) 
   }
   if (table.has(kSupply)) profile.supply_v = Curve(times_s, table.column(kSupply), kSlowPoints);
   return profile;
+}
+
+Profile turned(const Profile& profile, const std::array<double, 3>& rate,
+               const std::array<std::array<double, 3>, 3>& others) {
+  const auto mixed = [&](const std::array<double, 3>& share) {
+    std::vector<std::pair<double, const Curve*>> parts;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const auto& curve = profile.other_rate_dps[axis];
+      if (curve && share[axis] != 0.0) parts.emplace_back(share[axis], &*curve);
+    }
+    return Curve::mixed(profile.rate_dps, parts);
+  };
+  Profile own = profile;
+  own.rate_dps = mixed(rate);
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    own.other_rate_dps[axis] = mixed(others[axis]);
+  return own;
 }
 
 Expected<Profile> load_profile(const std::string& path) {

@@ -21,7 +21,8 @@ inline constexpr std::size_t kProfileRowsMax = 2'000'000;
 struct Profile {
   std::string file;
   double length_s = 0.0;
-  Curve rate_dps;
+  bool has_rate = true;  ///< the column rate_dps is there
+  Curve rate_dps;        ///< where the profile has no column rate_dps: about z
   std::optional<Curve> temperature_c;
   std::array<std::optional<Curve>, 3> acceleration_g;
   std::optional<Curve> supply_v;
@@ -29,6 +30,12 @@ struct Profile {
 
   [[nodiscard]] bool has_acceleration() const;
 };
+
+/// The motion as a gyro about one axis of a turned sensor feels it. `rate` is, of the rates about
+/// the vehicle's x, y and z, what makes up its own; `others` likewise of the three axes of its
+/// unit. An axis that the profile does not have is 0.
+Profile turned(const Profile& profile, const std::array<double, 3>& rate,
+               const std::array<std::array<double, 3>, 3>& others);
 
 Expected<Profile> load_profile(const std::string& path);
 /// `file` names the text in complaints.

@@ -16,6 +16,7 @@
 #include "cli/output/overwrite.h"
 #include "cli/output/terminal.h"
 #include "cli/pair_recording.h"
+#include "cli/role_frames.h"
 #include "gateway/config.h"
 
 namespace vgyro::cli {
@@ -48,6 +49,8 @@ Expected<AllanReport> judge(const AllanOptions& options, const gateway::Plan& pl
 int run_allan(const AllanOptions& options) {
   const auto loaded = gateway::load_config(options.config);
   if (!loaded) return report(loaded.error());
+  if (const auto units = several_axes(options.config, loaded->plan, "allan"); units)
+    return report(*units);
   for (const Error& warning : loaded->warnings)
     warn(warning);
   if (!options.plot.empty()) {

@@ -5,6 +5,7 @@
 #include "cli/output/errors.h"
 #include "cli/output/overwrite.h"
 #include "cli/recording.h"
+#include "cli/role_frames.h"
 #include "gateway/config.h"
 
 namespace vgyro::cli {
@@ -15,6 +16,8 @@ tl::expected<GapInputs, std::vector<Error>> load_gap_inputs(
     const std::vector<std::string>& outputs) {
   auto loaded = gateway::load_config(config, {.model = model});
   if (!loaded) return tl::unexpected(loaded.error());
+  if (const auto units = several_axes(config, loaded->plan, doing); units)
+    return tl::unexpected(std::vector<Error>{*units});
   for (const Error& warning : loaded->warnings)
     warn(warning);
   std::vector<std::string> read = loaded->files;

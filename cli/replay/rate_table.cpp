@@ -35,14 +35,73 @@ struct Line {
 
 }  // namespace
 
-RateTable::RateTable(OutputFile file) : file_(std::move(file)) {
-  file_.write(kHeader);
+RateTable::RateTable(OutputFile file, const gateway::Plan& plan)
+    : file_(std::move(file)), axes_(plan.output.axes) {
+  if (axes_.empty()) {
+    file_.write(kHeader);
+    return;
+  }
+  std::string header = "t_s";
+  for (const std::size_t axis : axes_) {
+    header +=
+        fmt::format(",rate_{0}_dps,sigma_{0}_dps,valid_{0},state_{0},bias1_{0}_dps,bias2_{0}_dps",
+                    gateway::kAxisNames[axis]);
+  }
+  file_.write(header + ",heading_deg\n");
 }
 
-Expected<RateTable> RateTable::open(const std::string& path) {
+Expected<RateTable> RateTable::open(const std::string& path, const gateway::Plan& plan) {
   auto file = OutputFile::open(path);
   if (!file) return tl::unexpected(file.error());
-  return RateTable(std::move(*file));
+  return RateTable(std::move(*file), plan);
+}
+
+Expected<void> RateTable::close() {
+  if (any_) write_line();
+  return file_.close();
+}
+
+// Where an axis goes on with one unit its instants are others than those of the pairs.
+void RateTable::gather(std::size_t place, const gateway::RateOutput& output,
+                       const std::array<double, 2>& bias_dps) {
+  const bool other_instant =
+      std::any_of(entries_.begin(), entries_.end(), [&](const std::optional<Entry>& entry) {
+        return entry && entry->output.instant != output.instant;
+      });
+  if (other_instant || entries_[place]) write_line();
+  entries_[place] = {output, bias_dps};
+  any_ = true;
+}
+
+void RateTable::write_line() {
+  // Of each axis four numbers, a state and a flag, and two more numbers in all.
+  constexpr std::size_t kLineBytesMax = 640;
+  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+  char* const begin = file_.room(kLineBytesMax);
+  Line line{begin};
+  TimePoint instant;
+  for (const std::optional<Entry>& entry : entries_)
+    instant = entry ? entry->output.instant : instant;
+  line.seconds(instant);
+  double heading_deg = kNone;
+  for (std::size_t place = 0; place < axes_.size(); ++place) {
+    const std::optional<Entry>& entry = entries_[place];
+    const bool valid = entry && entry->output.valid;
+    line.number(valid ? entry->output.rate_dps : kNone, kRateDigits);
+    line.number(valid ? entry->output.sigma_dps : kNone, kRateDigits);
+    line.put(valid ? ",1," : ",0,");
+    if (entry) line.put(to_string(entry->output.state));
+    for (std::size_t gyro = 0; gyro < 2; ++gyro)
+      line.number(entry ? entry->bias_dps[gyro] : kNone, kRateDigits);
+    if (axes_[place] != 2 || !valid) continue;
+    turn(instant, entry->output.rate_dps);
+    heading_deg = heading_deg_;
+  }
+  line.number(heading_deg, kHeadingDigits);
+  *line.at++ = '\n';
+  file_.commit(static_cast<std::size_t>(line.at - begin));
+  entries_ = {};
+  any_ = false;
 }
 
 void RateTable::turn(TimePoint instant, double rate_dps) {

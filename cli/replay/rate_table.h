@@ -6,6 +6,7 @@
 #include <array>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "base/error.h"
 #include "base/time.h"
@@ -17,14 +18,38 @@ namespace vgyro::cli {
 class RateTable final : public gateway::OutputObserver {
  public:
   /// "-" is standard output.
-  static Expected<RateTable> open(const std::string& path);
+  static Expected<RateTable> open(const std::string& path, const gateway::Plan& plan);
 
   void on_output(const gateway::RateOutput& output, const std::array<double, 2>& bias_dps) override;
+  /// Of a platform of several axes: who takes the rates of the one in this place. A line holds all
+  /// axes of an instant, and the heading about z.
+  [[nodiscard]] gateway::OutputObserver* column(std::size_t place) {
+    columns_[place].table = this;
+    columns_[place].place = place;
+    return &columns_[place];
+  }
   /// The error names the file and the reason.
-  Expected<void> close() { return file_.close(); }
+  Expected<void> close();
 
  private:
-  explicit RateTable(OutputFile file);
+  struct Column final : gateway::OutputObserver {
+    void on_output(const gateway::RateOutput& output,
+                   const std::array<double, 2>& bias_dps) override {
+      table->gather(place, output, bias_dps);
+    }
+    RateTable* table = nullptr;
+    std::size_t place = 0;
+  };
+  /// One axis of a line.
+  struct Entry {
+    gateway::RateOutput output;
+    std::array<double, 2> bias_dps{};
+  };
+
+  RateTable(OutputFile file, const gateway::Plan& plan);
+  void gather(std::size_t place, const gateway::RateOutput& output,
+              const std::array<double, 2>& bias_dps);
+  void write_line();
   /// Adds the turn since the last valid rate. Between two instants, and across a hole, the rate is
   /// taken to change evenly.
   void turn(TimePoint instant, double rate_dps);
@@ -36,6 +61,11 @@ class RateTable final : public gateway::OutputObserver {
   };
   std::optional<Rate> last_;  ///< the last valid one
   double heading_deg_ = 0.0;
+
+  std::vector<std::size_t> axes_;  ///< of the platform; empty: a single one
+  std::array<Column, gateway::kAxes> columns_;
+  std::array<std::optional<Entry>, gateway::kAxes> entries_;
+  bool any_ = false;
 };
 
 }  // namespace vgyro::cli

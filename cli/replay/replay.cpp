@@ -103,6 +103,21 @@ class Totals final : public gateway::RateObserver {
   TimePoint last_;
 };
 
+/// Of one axis of several.
+class AxisTotals final : public gateway::RateObserver {
+ public:
+  explicit AxisTotals(AxisSummary& summary) : summary_(&summary) {}
+  void on_rate(TimePoint /*t*/, const std::array<double, 2>& /*raw_dps*/,
+               double virtual_dps) override {
+    if (std::isnan(virtual_dps)) return;
+    summary_->rate_sum_dps += virtual_dps;
+    ++summary_->rates;
+  }
+
+ private:
+  AxisSummary* summary_;
+};
+
 // Interface names of the log → indices of the plan, through the user's --map.
 class BusMap {
  public:
@@ -164,11 +179,16 @@ class Replay {
         pipeline_(plan),
         sink_(output, plan),
         totals_(summary_, options.plot.empty() ? nullptr : &plot_) {
-    pipeline_.observe(&totals_);
+    if (pipeline_.axis_count() == 0) pipeline_.observe(&totals_);
+    observe_axes(plan);
   }
 
   /// Before the first log.
-  void write_table(RateTable& table) { pipeline_.observe_output(&table); }
+  void write_table(RateTable& table) {
+    if (pipeline_.axis_count() == 0) pipeline_.observe_output(&table);
+    for (std::size_t place = 0; place < pipeline_.axis_count(); ++place)
+      pipeline_.observe_output(table.column(place), place);
+  }
   /// Before the first log.
   Expected<void> take_up(const gateway::SavedState& state) { return pipeline_.resume(state); }
 
@@ -188,6 +208,8 @@ class Replay {
 
   ReplaySummary& finish() {
     summary_.status = pipeline_.status();
+    for (std::size_t place = 0; place < pipeline_.axis_count(); ++place)
+      summary_.axes[place].status = pipeline_.axis_status(place);
     summary_.frames_out = sink_.frames;
     summary_.slope_dps_s.fill(std::numeric_limits<double>::quiet_NaN());
     summary_.slope_sigma_dps_s = summary_.slope_dps_s;
@@ -203,6 +225,19 @@ class Replay {
   const ReplayPlot& plot() const { return plot_; }
 
  private:
+  // A picture is of the last of the axes, about which a vehicle turns.
+  void observe_axes(const gateway::Plan& plan) {
+    const std::size_t count = pipeline_.axis_count();
+    summary_.axes.resize(count);
+    for (std::size_t place = 0; place < count; ++place) {
+      summary_.axes[place].name = gateway::kAxisNames[plan.axes[place].axis];
+      axis_totals_.emplace_back(summary_.axes[place]);
+    }
+    for (std::size_t place = 0; place < count; ++place)
+      pipeline_.observe(&axis_totals_[place], place);
+    if (count > 0 && is_drawn_) pipeline_.observe(&totals_, count - 1);
+  }
+
   void run_records(const std::string& name, canlog::LogReader& reader) {
     LogProgress progress("replay " + name, reader);
     std::array<canlog::LogRecord, kRecordsAtOnce> room;
@@ -235,7 +270,9 @@ class Replay {
     const gateway::Status& status = pipeline_.status();
     if (status.biases_out == biases_seen_) return;
     biases_seen_ = status.biases_out;
-    plot_.add_bias(stamp, {status.gyros[0].bias_dps, status.gyros[1].bias_dps});
+    const std::size_t axes = pipeline_.axis_count();
+    const gateway::Status& drawn = axes == 0 ? status : pipeline_.axis_status(axes - 1);
+    plot_.add_bias(stamp, {drawn.gyros[0].bias_dps, drawn.gyros[1].bias_dps});
   }
 
   const ReplayOptions& options_;
@@ -247,6 +284,7 @@ class Replay {
   ReplaySummary summary_;
   ReplayPlot plot_;
   Totals totals_;
+  std::vector<AxisTotals> axis_totals_;
   bool first_ = true;
   TimePoint last_;
   std::uint64_t frames_seen_ = 0;
@@ -465,9 +503,9 @@ Expected<std::optional<gateway::SavedState>> read_state(const std::string& path,
 }
 
 // Nothing where none is wanted.
-Expected<std::optional<RateTable>> open_table(const std::string& path) {
+Expected<std::optional<RateTable>> open_table(const std::string& path, const gateway::Plan& plan) {
   if (path.empty()) return std::nullopt;
-  auto table = RateTable::open(path);
+  auto table = RateTable::open(path, plan);
   if (!table) return tl::unexpected(table.error());
   return std::move(*table);
 }
@@ -495,7 +533,7 @@ int run_replay(const ReplayOptions& options) {
   if (!logs) return report(logs.error());
   auto output = OutputFile::open(options.output);
   if (!output) return report(output.error());
-  auto table = open_table(options.csv);
+  auto table = open_table(options.csv, plan);
   if (!table) return report(table.error());
 
   // What is read from a pipe ends with its writer.

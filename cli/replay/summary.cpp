@@ -146,6 +146,9 @@ const gateway::GyroPlan* gyro_of(const gateway::Plan& plan, const std::string& i
                                  const IdCounts::Row& row) {
   for (const gateway::GyroPlan& gyro : plan.gyros) {
     if (gyro.bus == interface && gyro.match.carries(row.id, row.extended)) return &gyro;
+    for (const gateway::GyroPlan& axis : gyro.axes) {
+      if (axis.bus == interface && axis.match.carries(row.id, row.extended)) return &gyro;
+    }
   }
   return nullptr;
 }
@@ -164,6 +167,44 @@ Json layouts_json(const gateway::Status& status, const gateway::Plan& plan) {
                        {"withheld", counts.withheld}});
   }
   return layouts;
+}
+
+Json axis_gyro_json(const gateway::GyroStatus& gyro) {
+  return {{"samples", gyro.samples},
+          {"rejected", rejected_json(gyro)},
+          {"faults", faults_json(gyro)},
+          {"bias_dps", number(gyro.bias_dps)}};
+}
+
+// Of a platform of several axes what is each one's.
+Json axes_json(const ReplaySummary& summary) {
+  Json axes = Json::array();
+  for (const AxisSummary& axis : summary.axes) {
+    const gateway::Status& status = axis.status;
+    axes.push_back(
+        {{"axis", std::string(1, axis.name)},
+         {"final_state", to_string(status.state)},
+         {"pairs", status.pairs},
+         {"rates", status.rates_out},
+         {"rates_valid", status.rates_out_valid},
+         {"mean_rate_dps", number(mean_of(axis.rate_sum_dps, axis.rates))},
+         {"gyros", {axis_gyro_json(status.gyros[0]), axis_gyro_json(status.gyros[1])}},
+         {"windows", {{"completed", status.windows}, {"skipped", status.windows_skipped}}},
+         {"stops",
+          {{"learned", status.stops},
+           {"refused", status.stops_refused},
+           {"open", status.stops_open}}},
+         {"disagreements", status.disagreements},
+         {"hypotheses", hypotheses_json(status)},
+         {"pair", pair_json(status)}});
+  }
+  return axes;
+}
+
+Json misalignment_json(const gateway::Status& status) {
+  return {{"angle_deg", status.misalignment_deg},
+          {"sigma_deg", status.misalignment_sigma_deg},
+          {"segments", status.misalignment_segments}};
 }
 
 }  // namespace
@@ -270,6 +311,10 @@ Json to_json(const ReplaySummary& summary, const gateway::Plan& plan) {
         {"mean_rate_dps", number(mean_of(summary.rate_sum_dps, summary.rates))}}},
       {"final_state", to_string(status.state)}};
   if (!plan.output.layouts.empty()) all["out"]["layouts"] = layouts_json(status, plan);
+  if (!summary.axes.empty()) {
+    all["axes"] = axes_json(summary);
+    all["misalignment"] = misalignment_json(status);
+  }
   return all;
 }
 
@@ -394,6 +439,33 @@ void put_virtual_gyro(fmt::memory_buffer& text, const ReplaySummary& summary) {
   put_plain_mean(text, summary);
 }
 
+// One line for each axis, and what is between the units.
+void put_axes(fmt::memory_buffer& text, const ReplaySummary& summary, const gateway::Plan& plan) {
+  auto to = std::back_inserter(text);
+  for (const AxisSummary& axis : summary.axes) {
+    const gateway::Status& status = axis.status;
+    fmt::format_to(to, "\naxis {}        {}, {} pairs, {} valid rates", axis.name,
+                   to_string(status.state), status.pairs, status.rates_out_valid);
+    if (axis.rates > 0)
+      fmt::format_to(to, ", mean {:+.6f} deg/s", mean_of(axis.rate_sum_dps, axis.rates));
+    for (std::size_t i = 0; i < 2; ++i) {
+      if (!std::isfinite(status.gyros[i].bias_dps)) continue;
+      fmt::format_to(to, ", drift of {} {:+.6f}", plan.gyros[i].name, status.gyros[i].bias_dps);
+    }
+    fmt::format_to(to, ", {} stops", status.stops);
+    for (std::size_t i = 0; i < 2; ++i)
+      put_faults(text, status.gyros[i], summary.first_s);
+  }
+  const gateway::Status& status = summary.status;
+  if (summary.axes.empty() || status.misalignment_segments == 0) return;
+  fmt::format_to(to, "\nmisalignment  of {} against {}:", plan.gyros[1].name, plan.gyros[0].name);
+  for (std::size_t axis = 0; axis < gateway::kAxes; ++axis) {
+    fmt::format_to(to, "{} {:+.4f} ± {:.4f} deg about {}", axis == 0 ? "" : ",",
+                   status.misalignment_deg[axis], status.misalignment_sigma_deg[axis],
+                   gateway::kAxisNames[axis]);
+  }
+}
+
 void put_layouts(fmt::memory_buffer& text, const gateway::Status& status,
                  const gateway::Plan& plan) {
   auto to = std::back_inserter(text);
@@ -437,6 +509,7 @@ std::string to_text(const ReplaySummary& summary, const gateway::Plan& plan) {
     put_gyro(text, summary, plan, i);
   put_other_inputs(text, summary.status, plan);
   put_virtual_gyro(text, summary);
+  put_axes(text, summary, plan);
   put_layouts(text, summary.status, plan);
   put_method(text, summary, plan);
   fmt::format_to(std::back_inserter(text), "\nended in state {}\n",

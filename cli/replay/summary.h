@@ -64,6 +64,14 @@ struct Gap {
   double length_s = 0.0;
 };
 
+/// One axis of a platform of several.
+struct AxisSummary {
+  char name = 'x';
+  gateway::Status status;
+  double rate_sum_dps = 0.0;  ///< over the valid virtual rates
+  std::uint64_t rates = 0;
+};
+
 struct ReplaySummary {
   std::vector<LogSummary> logs;
   std::vector<std::string> interfaces;
@@ -79,6 +87,7 @@ struct ReplaySummary {
   std::array<double, 2> raw_sum_dps{};  ///< over the same instants, where the gyro took part
   std::array<std::uint64_t, 2> raws{};
   std::uint64_t gaps = 0;         ///< between successive virtual rates, longer than kGap_s
+  std::vector<AxisSummary> axes;  ///< empty: two single gyros
   std::vector<Gap> longest_gaps;  ///< at most kGapsShown, longest first
   static constexpr double kGap_s = 0.5;
   static constexpr std::size_t kGapsShown = 5;

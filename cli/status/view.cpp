@@ -162,6 +162,38 @@ std::string gyros_table(const Json& status, const Paint& paint) {
   return table(rows, paint);
 }
 
+/// Of a platform of several axes; empty of two single gyros.
+std::string axes_table(const Json& status, const Paint& paint) {
+  const Json axes = at(status, "axes");
+  if (!axes.is_array() || axes.empty()) return {};
+  std::vector<std::vector<Cell>> rows{
+      header({"axis", "state", "rate, deg/s", "bias 1, deg/h", "bias 2, deg/h", "health 1",
+              "health 2", "tilt of 2, deg"})};
+  for (const Json& axis : axes) {
+    const std::string state = text_of(axis, "state");
+    const auto health = [&](const char* key) {
+      const std::string text = text_of(axis, key);
+      return Cell{text, text == "ok" ? Mood::kGood : Mood::kBad};
+    };
+    const auto bias = [&](const char* key) {
+      return Cell{number_text(number_of(axis, key) * kDegPerHour, "{:+.2f}"), Mood::kPlain, true};
+    };
+    rows.push_back({{text_of(axis, "axis")},
+                    {state, mood_of_state(state)},
+                    {with_sigma(number_of(axis, "rate_dps"), number_of(axis, "sigma_dps"),
+                                "{:+.5f}", "{:.5f}"),
+                     Mood::kPlain, true},
+                    bias("bias_1_dps"),
+                    bias("bias_2_dps"),
+                    health("health_1"),
+                    health("health_2"),
+                    {with_sigma(number_of(axis, "misalignment_deg"),
+                                number_of(axis, "misalignment_sigma_deg"), "{:+.3f}", "{:.3f}"),
+                     Mood::kPlain, true}});
+  }
+  return table(rows, paint) + '\n';
+}
+
 std::string buses_table(const Json& status, const Paint& paint) {
   std::vector<std::vector<Cell>> rows{
       header({"bus", "link", "controller", "received", "lost", "downs", "errors"})};
@@ -356,7 +388,8 @@ std::string status_table(const Json& status, const ViewOptions& options) {
   const Paint paint(options.colour);
   const Json counters = at(status, "counters");
   std::string text = head(status, options, paint);
-  text += '\n' + gyros_table(status, paint) + '\n' + buses_table(status, paint) + '\n';
+  text += '\n' + axes_table(status, paint) + gyros_table(status, paint) + '\n' +
+          buses_table(status, paint) + '\n';
   text += fmt::format(
       "sent {} frames, {} valid rates of {}; dropped: stale {}, overflow {}, refused {}\n",
       count_of(counters, "frames_sent"), count_of(counters, "rates_valid"),

@@ -643,7 +643,7 @@ bus = "can1"
             self.assertIn(part, said)
 
     def test_saved_state_that_cannot_be_used(self):
-        whole = b"format = 2\n"
+        whole = b"format = 3\n"
         whole += b'\n[checksum]\ncrc32 = "%08x"\n' % zlib.crc32(whole)
         for text, said in (None, "cannot be read"), (b"format = 1\n", "is damaged"), (whole, "only format 1"):
             if text is not None:

@@ -129,7 +129,7 @@ class OnTheBus(Bench):
         self.assertEqual(listed.returncode, 0, listed.stderr)
         members = {line.split()[0]: line.split()[1:3] for line in listed.stdout.splitlines() if line.startswith(".")}
         expected = {".Recalibrate": ["method", "-"], ".SaveState": ["method", "-"], ".Counters": ["property", "a{st}"],
-                    ".Gyros": ["property", "aa{sv}"], ".Buses": ["property", "aa{sv}"]}
+                    ".Gyros": ["property", "aa{sv}"], ".Axes": ["property", "aa{sv}"], ".Buses": ["property", "aa{sv}"]}
         expected |= {f".{name}": ["property", "s"] for name in ("Version", "Method", "State", "Quality", "Restored", "Contradiction",
                                                                 "ContradictionText")}
         expected |= {f".{name}": ["property", "b"] for name in ("Valid", "Disagree", "Ambiguous", "RatesTooFarApart",

@@ -197,12 +197,63 @@ struct Forgery {
   const char* said;  ///< in the message
 };
 
+SavedState state_of_axes() {
+  SavedState state = plain_state();
+  SavedState x = state;
+  SavedState z = state;
+  z.axis = 2;
+  z.drift.bias_dps = {0.25, -0.125};
+  state.axes = {x, z};
+  state.misalignment = {.angle_rad = {0.005, -0.004, 0.003},
+                        .covariance = {1e-8, 1e-9, -1e-9, 2e-8, 3e-9, 4e-8}};
+  return state;
+}
+
+// Of a platform of several axes every number comes back as it was.
+TEST(SavedState, OfSeveralAxesComesBack) {
+  const SavedState state = state_of_axes();
+  const std::string text = to_text(state);
+  const auto read = saved_state_from(text, kWhere);
+  ASSERT_TRUE(read) << read.error().message();
+  ASSERT_EQ(read->axes.size(), 2U);
+  EXPECT_EQ(read->axes[1].axis, 2U);
+  EXPECT_EQ(read->axes[1].drift.bias_dps, state.axes[1].drift.bias_dps);
+  EXPECT_EQ(read->misalignment->angle_rad, state.misalignment->angle_rad);
+  EXPECT_EQ(read->misalignment->covariance, state.misalignment->covariance);
+  EXPECT_EQ(to_text(*read), text);
+}
+
+TEST(SavedState, OfSeveralAxesThatCannotBeIsRefused) {
+  const std::string content = content_of(to_text(state_of_axes()));
+  ASSERT_TRUE(saved_state_from(sealed(content), kWhere));
+  const Forgery forgeries[] = {
+      {"[axis.z]", "[axis.w]", "rate_stamp_ns is missing"},
+      {"[axis.z.drift]", "[axis.z.other]", "holds no [drift]"},
+      {"[misalignment]", "[tilt]", "unknown key"},
+      {"angle_rad = [0.005", "angle_rad = [nan", "angle_rad holds nan"},
+      {"angle_rad = [0.005, ", "angle_rad = [", "no list of 3"},
+      {"covariance = [1e-08", "covariance = [1e300", "covariance holds"},
+  };
+  for (const Forgery& forgery : forgeries) {
+    SCOPED_TRACE(forgery.to);
+    std::string forged = content;
+    const std::size_t at = forged.find(forgery.from);
+    ASSERT_NE(at, std::string::npos);
+    forged.replace(at, std::string(forgery.from).size(), forgery.to);
+    const auto read = saved_state_from(sealed(forged), kWhere);
+    ASSERT_FALSE(read);
+    EXPECT_NE(read.error().message().find(forgery.said), std::string::npos)
+        << read.error().message();
+  }
+}
+
 // With a right checksum, so that nothing but the check of the content stands in the way.
 TEST(SavedState, WhatCannotBeIsRefusedBehindARightChecksum) {
   const std::string content = content_of(to_text(plain_state()));
   ASSERT_TRUE(saved_state_from(sealed(content), kWhere));
   const Forgery forgeries[] = {
-      {"format = 1", "format = 2", "format 1"},
+      {"format = 1", "format = 3", "format 1"},
+      {"format = 1", "format = 2", "unknown key"},
       {"format = 1", "format = \"1\"", "format 1"},
       {"format = 1", "format = 5e19", "format 1"},
       {"format = 1", "format = nan", "format 1"},

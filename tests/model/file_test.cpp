@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "model/catalogue.h"
+#include "model/edit.h"
 
 namespace vgyro::model {
 namespace {
@@ -62,6 +63,59 @@ coefficient_dps_k = 1
   EXPECT_DOUBLE_EQ(temperature.parameters[1], 25.0) << "reference_c is 25 unless it is given";
 }
 
+// Of whole units: `axis` is the unit's; what g_sensitivity depends on is then called `from`.
+TEST(ModelFile, SaysOfWhichAxisOfAUnitAnEffectIs) {
+  const std::string text = R"(format = 1
+
+[[effect]]
+gyro = 1
+kind = "bias"
+axis = "y"
+value_dps = 0.5
+
+[[effect]]
+gyro = 2
+kind = "g_sensitivity"
+axis = "x"
+from = "z"
+coefficient_dps_g = 0.25
+
+[[effect]]
+gyro = 2
+kind = "cross_axis"
+axis = "z"
+from = "x"
+coefficient = 0.125
+
+[[effect]]
+gyro = 1
+kind = "g_sensitivity"
+axis = "z"
+coefficient_dps_g = 0.5
+)";
+  const ModelResult result = parse_model(text, "m.toml");
+  ASSERT_TRUE(result) << result.error().front().message();
+  ASSERT_EQ(result->effects.size(), 4U);
+  EXPECT_EQ(result->effects[0].of_axis, 1U);
+  EXPECT_EQ(result->effects[1].of_axis, 0U);
+  EXPECT_EQ(result->effects[1].parameters[0], 2.0);
+  EXPECT_EQ(result->effects[2].of_axis, 2U);
+  EXPECT_EQ(result->effects[2].parameters[0], 0.0);
+  EXPECT_EQ(result->effects[3].of_axis, std::nullopt) << "the acceleration's, as it always was";
+  EXPECT_EQ(result->effects[3].parameters[0], 2.0);
+  EXPECT_EQ(to_toml(*result).substr(to_toml(*result).find('\n')), text.substr(text.find('\n')));
+}
+
+TEST(ModelFile, CountsDriftsOfEachAxis) {
+  std::string text = "format = 1\n";
+  for (const char* axis : {"x", "x", "x", "y", "y", "y"})
+    text += std::string("[[effect]]\ngyro = 1\nkind = \"gauss_markov\"\naxis = \"") + axis +
+            "\"\nsigma_dps = 0.1\ntau_s = 100\n";
+  EXPECT_TRUE(parse_model(text, "m.toml"));
+  text += "[[effect]]\ngyro = 1\nkind = \"gauss_markov\"\nsigma_dps = 0.1\ntau_s = 100\n";
+  EXPECT_EQ(complaints_of(text).size(), 1U);
+}
+
 TEST(ModelFile, MayHoldNoEffect) {
   const ModelResult result = parse_model("format = 1\n", "m.toml");
   ASSERT_TRUE(result);
@@ -73,6 +127,8 @@ TEST(ModelFile, NamesLineCauseAndRemedyOfEveryMistake) {
       {effect("gyro = 1\nkind = \"scale_facter\"\nerror = 1e-4\n"),
        "m.toml:5: ", "did you mean \"scale_factor\"?"},
       {effect("gyro = 1\nkind = \"hum\"\n"), "m.toml:5: ", "vgyro model list"},
+      {effect("gyro = 1\nkind = \"delay\"\nseconds = 0.1\naxis = \"x\"\n"),
+       "m.toml:7: ", "leave `axis` out"},
       {effect("gyro = 1\nkind = \"bias\"\nvalue_dsp = 1e-4\n"),
        "m.toml:3: ", "bias needs value_dps"},
       {effect("gyro = 1\nkind = \"warm_up\"\namplitude_dps = 1\ntau_s = 0\n"),

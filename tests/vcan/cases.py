@@ -4,8 +4,10 @@ play), says what the guest has to do, and judges the result."""
 import dataclasses
 import json
 import lzma
+import math
 import os
 import re
+import struct
 import subprocess
 import sys
 import tomllib
@@ -1027,6 +1029,93 @@ class CommandCase:
         return found.group(0)
 
 
+UNITS_DBC = """\
+VERSION ""
+
+BU_: RIG
+
+BO_ 257 IMU_A: 8 RIG
+ SG_ X : 0|16@1- (0.005,0) [-160|160] "deg/s" RIG
+ SG_ Y : 16|16@1- (0.005,0) [-160|160] "deg/s" RIG
+ SG_ Z : 32|16@1- (0.005,0) [-160|160] "deg/s" RIG
+ SG_ Counter : 48|8@1+ (1,0) [0|255] "" RIG
+
+BO_ 258 IMU_B: 8 RIG
+ SG_ X : 0|16@1- (0.005,0) [-160|160] "deg/s" RIG
+ SG_ Y : 16|16@1- (0.005,0) [-160|160] "deg/s" RIG
+ SG_ Z : 32|16@1- (0.005,0) [-160|160] "deg/s" RIG
+ SG_ Counter : 48|8@1+ (1,0) [0|255] "" RIG
+"""
+
+UNITS_CONFIG = "".join(f"""\
+[[gyro]]
+name = "{name}"
+bus = "can{bus}"
+dbc = "units.dbc"
+message = "{message}"
+rate_x = "X"
+rate_y = "Y"
+rate_z = "Z"
+counter = "Counter"
+{mount}
+""" for bus, name, message, mount in ((0, "left", "IMU_A", ""), (1, "right", "IMU_B", "mount = [0, 0, 90]"))) + """\
+[calibration]
+rest_s = 2
+rate_dps = [0.0, 0.0, 0.0]
+
+[output]
+bus = "can0"
+"""
+
+
+class UnitsCase:
+    """Two whole units on two buses, one of them turned by 90 deg: at rest, then turning about all axes."""
+
+    name = "units"
+    says = "two units of three axes, one turned by 90 deg"
+    still_s, run_s, rate_hz, noise_dps = 3.0, 5.0, 100.0, 0.03
+    ids = tuple(range(0x610, 0x619))
+
+    def truth(self, since_s):
+        t = since_s - self.still_s
+        return [0.0] * 3 if t < 0.0 else [a * math.sin(w * t) ** 2 for a, w in ((3.0, 2.0), (-4.0, 1.5), (20.0, 1.0))]
+
+    def prepare(self, folder):
+        random = np.random.default_rng(29)
+        (folder / "units.dbc").write_text(UNITS_DBC, encoding="utf-8")
+        (folder / "vgyro.toml").write_text(UNITS_CONFIG, encoding="utf-8")
+        lines = []
+        for n in range(round((self.still_s + self.run_s) * self.rate_hz)):
+            for bus, can_id, bias, late_s in ((0, 0x101, 0.4, 0.0), (1, 0x102, -0.3, 0.004)):
+                since_s = n / self.rate_hz + late_s
+                x, y, z = self.truth(since_s)
+                sensed = (x, y, z) if bus == 0 else (y, -x, z)
+                raw = [round((rate + bias + random.normal(0.0, self.noise_dps)) / 0.005) for rate in sensed]
+                us = 1_700_000_000_000_000 + round(since_s * 1e6)
+                data = struct.pack("<hhhBB", *raw, n % 256, 0).hex().upper()
+                lines.append((us, f"({us // 1_000_000}.{us % 1_000_000:06}) can{bus} {can_id:03X}#{data}\n"))
+        (folder / "played.log").write_text("".join(text for _, text in sorted(lines)), encoding="ascii")
+        return {"links": [{"name": "can0"}, {"name": "can1"}], "steps": [["play", str(folder / "played.log")]],
+                "command": [str(BIN / "vgyrod"), "--config", str(folder / "vgyro.toml")]}
+
+    def judge(self, folder, result):
+        run = read_run(folder, result, self.ids)
+        check_service(run)
+        check_played(run)
+        replayed = run.replay()
+        oracle = verdicts.Oracle(SOURCE / "dbc/vgyro_axes.dbc")
+        said = []
+        for axis, rate_id in enumerate(self.ids[::3]):
+            verdicts.check_same_rates(run.of(rate_id), [line for line in replayed if int(line.name, 16) == rate_id])
+            valid = [signals["VG_Rate"] for signals in (oracle.decode(line) for line in run.of(rate_id)) if signals["VG_Valid"] == 1.0]
+            require(len(valid) > 400, f"{len(valid)} valid rates about {'xyz'[axis]}")
+            said.append(f"{len(valid)} about {'xyz'[axis]}")
+        for can_id in self.ids:
+            verdicts.check_protection(run.of(can_id), can_id)
+        require("axis z: running" in run.said, f"the journal names no axis:\n{run.said}")
+        return f"valid rates {', '.join(said)}, as in the replay, {describe(run)}"
+
+
 class CarCase:
     """Recorded traffic of a car: one gyro among many identifiers, the other and the reference on a bus
     of their own. At real time."""
@@ -1099,6 +1188,7 @@ def all_cases(recordings):
         RestartCase(),
         InheritedCase(),
         ForeignLayoutsCase(),
+        UnitsCase(),
         IdleCase(),
         CommandCase("no_can_interface", "an interface that is none of CAN: exit 1 and what to do",
                     [vgyrod, "--config", "{folder}/vgyro.toml"], 1,

@@ -1,0 +1,98 @@
+#pragma once
+
+// The small rotation θ between two units of gyros: unit 2 reads Ω + Ω × θ. Learned from the
+// difference of the units while they turn, together with what else turning shows in it: a scale
+// factor difference of each axis and a time skew. Cells of a tenth of a second make segments of
+// some seconds; within a segment biases are constants and drop out. Each segment tells its own
+// noise. docs/optimal.md derives it. Rates in deg/s, θ in rad; nothing is allocated, and a platform
+// of two axes has a third that does not turn.
+
+#include <array>
+#include <cstddef>
+
+#include <Eigen/Core>
+
+namespace vgyro::fusion {
+
+inline constexpr std::size_t kPlatformAxes = 3;
+
+/// About x, y, z.
+using AxisRates = std::array<double, kPlatformAxes>;
+
+struct MisalignmentMemory {
+  std::array<double, 3> angle_rad{};
+  std::array<double, 6> covariance{};  ///< xx, xy, xz, yy, yz, zz, rad²
+};
+
+class Misalignment {
+ public:
+  /// What is not known of two units whose mounts are given.
+  static constexpr double kPrior_deg = 1.0;
+  static constexpr double kCell_s = 0.1;
+  static constexpr std::size_t kSegmentCells = 50;
+
+  Misalignment();
+
+  /// About which axes both units tell the rate.
+  using Both = std::array<bool, kPlatformAxes>;
+
+  /// One instant, as the units read it, biases and all; t_s grows. About an axis that not both of
+  /// them tell both rates are what is known of it, or 0.
+  void add(double t_s, const AxisRates& first_dps, const AxisRates& second_dps,
+           const Both& both = {true, true, true});
+  /// What comes next is not joined to what came before.
+  void break_off();
+
+  /// What unit 2 reads too much about `axis` while the platform turns at `rate_dps` …
+  [[nodiscard]] double cross_dps(std::size_t axis, const AxisRates& rate_dps) const;
+  /// … and the variance that is left of it, (deg/s)².
+  [[nodiscard]] double cross_variance(std::size_t axis, const AxisRates& rate_dps) const;
+
+  [[nodiscard]] std::array<double, 3> angle_rad() const;
+  [[nodiscard]] std::array<double, 3> sigma_rad() const;
+  /// Segments that have told something.
+  [[nodiscard]] std::size_t segments() const { return segments_used_; }
+
+  [[nodiscard]] MisalignmentMemory memory() const;
+  /// False where it cannot be right; then nothing has changed.
+  bool resume(const MisalignmentMemory& memory, double age_s);
+
+ private:
+  /// θx, θy, θz; scale factor differences of x, y, z; skew in seconds.
+  static constexpr int kStates = 7;
+  using State = Eigen::Matrix<double, kStates, 1>;
+  using Square = Eigen::Matrix<double, kStates, kStates>;
+
+  struct Cell {
+    AxisRates rate_dps{};        ///< mean of both units
+    AxisRates difference_dps{};  ///< unit 2 less unit 1
+  };
+
+  void close_cell();
+  void close_segment();
+  void grow(double length_s);
+  /// Row of `axis` in a cell.
+  [[nodiscard]] State regressor(std::size_t axis, std::size_t cell) const;
+  /// False where it tells nothing.
+  bool add_axis(std::size_t axis, Square& information, State& right) const;
+  [[nodiscard]] double noise_variance(std::size_t axis) const;
+  void learn(Square information, State right);
+
+  Both both_{true, true, true};  ///< in the present segment
+  State mean_ = State::Zero();
+  Square covariance_ = Square::Zero();
+  std::size_t segments_used_ = 0;
+  int unlikely_ = 0;  ///< segments in a row that contradict all that is known
+
+  double cell_from_s_ = 0.0;
+  double newest_s_ = 0.0;
+  double learned_until_s_ = 0.0;
+  double count_ = 0.0;
+  AxisRates first_sum_{};
+  AxisRates second_sum_{};
+  std::array<Cell, kSegmentCells> cells_;
+  std::size_t cells_count_ = 0;
+  bool begun_ = false;
+};
+
+}  // namespace vgyro::fusion

@@ -1,0 +1,30 @@
+#pragma once
+
+// From two whole units to a pair of gyros about each axis of the vehicle: which sensor axis tells
+// which, what the mounts leave out, identifiers, true rates at rest and the model's effects of each
+// pair. Fills Plan::axes.
+
+#include <vector>
+
+#include "base/error.h"
+#include "base/toml_reader.h"
+#include "gateway/plan.h"
+
+namespace vgyro::gateway {
+
+/// A sensor axis with less than this share in a vehicle's axis is not missed there: 1.1 deg.
+inline constexpr double kShareMissed = 0.02;
+
+/// Sets OutputPlan::axes: those that both units tell; complains where they tell different ones.
+/// Precondition: both gyros are resolved. Of single gyros there are none.
+void find_axes(TomlReader& root, Plan& plan);
+
+/// The true rate of each axis while the platform rests: of the latitude and, about x and y, of the
+/// heading; `rate_dps` of the configuration goes before. What nobody told is in
+/// CalibrationPlan::doubt_dps. Precondition: all of the configuration is read.
+void build_axes(Plan& plan, std::vector<Error>& errors);
+
+/// IERS: the Earth turns 7.292115e-5 rad/s against the stars.
+extern const double kEarthRate_dps;
+
+}  // namespace vgyro::gateway

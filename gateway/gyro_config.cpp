@@ -1,0 +1,373 @@
+#include "gateway/gyro_config.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include <fmt/core.h>
+
+#include "base/printable.h"
+#include "base/spelling.h"
+#include "gateway/e2e_config.h"
+#include "gateway/mount.h"
+#include "gateway/valid_config.h"
+
+namespace vgyro::gateway {
+
+namespace {
+
+// Gyros that read more than this at rest are broken rather than biased.
+constexpr Limits kMaxBias_dps{0.0, 100.0, true};
+
+}  // namespace
+
+std::optional<double> number_within(TomlReader& reader, std::string_view key, const Limits& limits,
+                                    std::string_view unit) {
+  const auto value = reader.number(key);
+  if (!value) return std::nullopt;
+  const bool enough = limits.above_low ? *value > limits.low : *value >= limits.low;
+  if (enough && *value <= limits.high) return value;
+  reader.complain(reader.where(key), fmt::format("{} is {:g} {}", key, *value, unit),
+                  limits.above_low
+                      ? fmt::format("above {:g} and up to {:g}", limits.low, limits.high)
+                      : fmt::format("{:g} to {:g}", limits.low, limits.high));
+  return std::nullopt;
+}
+
+namespace {
+
+/// 1 or -1; nothing where the key is not there, or after a complaint.
+std::optional<double> sign_of(TomlReader& reader) {
+  const auto sign = reader.integer("sign");
+  if (!sign) return std::nullopt;
+  if (*sign == 1 || *sign == -1) return static_cast<double>(*sign);
+  reader.complain(reader.where("sign"), fmt::format("sign is {}", *sign),
+                  "1, or -1 to flip the axis");
+  return std::nullopt;
+}
+
+}  // namespace
+
+void read_sign(TomlReader& reader, Quantity& rate) {
+  if (const auto sign = sign_of(reader)) rate.scale *= *sign;
+}
+
+void read_source_address(TomlReader& reader, const dbc::Message& message, FrameMatch& match) {
+  const auto address = reader.integer("source_address");
+  if (!address) return;
+  if (!message.is_j1939 || *address < 0 || *address > std::int64_t{kSourceMask}) {
+    reader.complain(reader.where("source_address"),
+                    "source_address is 0 to 255, for a J1939 message",
+                    "a message is J1939 when its DBC attribute VFrameFormat is J1939PG");
+    return;
+  }
+  match.id = (match.id & ~kSourceMask) | static_cast<std::uint32_t>(*address);
+  match.mask |= kSourceMask;
+  match.others.clear();
+}
+
+namespace {
+
+// Rates about other axes of the unit, in its own message.
+constexpr std::array<const char*, 3> kOtherAxisKeys{"rate_x", "rate_y", "rate_z"};
+using OtherAxisSignals = std::array<const dbc::Signal*, kOtherAxisKeys.size()>;
+
+OtherAxisSignals other_axis_signals(SignalResolver& resolver) {
+  OtherAxisSignals signals{};
+  for (std::size_t axis = 0; axis < signals.size(); ++axis)
+    signals[axis] = resolver.signal(kOtherAxisKeys[axis], false);
+  return signals;
+}
+
+void read_other_axes(SignalResolver& resolver, const OtherAxisSignals& signals, GyroPlan& gyro) {
+  for (std::size_t axis = 0; axis < signals.size(); ++axis) {
+    if (signals[axis] == nullptr) continue;
+    gyro.*kOtherAxes[axis] =
+        resolver.quantity(*signals[axis], kOtherAxisKeys[axis], Dimension::kRate);
+  }
+}
+
+std::optional<GyroPlan> read_single(TomlReader& reader, SignalResolver& resolver,
+                                    const std::string& name) {
+  const dbc::Signal* rate_signal = resolver.signal("rate", true);
+  const dbc::Signal* sign_signal = resolver.signal("sign_signal", false);
+  const dbc::Signal* temperature_signal = resolver.signal("temperature", false);
+  const dbc::Signal* supply_signal = resolver.signal("supply_voltage", false);
+  const OtherAxisSignals other_axes = other_axis_signals(resolver);
+  const auto unit = reader.text("unit");
+  std::optional<GyroPlan> gyro;
+  std::optional<Quantity> rate;
+  if (rate_signal != nullptr)
+    rate = resolver.quantity(*rate_signal, "rate", Dimension::kRate, unit);
+  if (rate) {
+    gyro.emplace(GyroPlan{.name = name,
+                          .bus = resolver.bus(),
+                          .message = resolver.message().name,
+                          .match = resolver.match(),
+                          .rate = *rate,
+                          .sign = {},
+                          .temperature = {},
+                          .e2e = {},
+                          .valid = {},
+                          .saturation_dps = {}});
+    read_sign(reader, gyro->rate);
+    read_source_address(reader, resolver.message(), gyro->match);
+    gyro->e2e = read_e2e(reader, resolver, *rate_signal);
+    if (const auto valid = read_condition(reader, resolver, *rate_signal))
+      gyro->valid = valid->condition;
+    gyro->max_bias_dps = number_within(reader, "max_bias_dps", kMaxBias_dps, "deg/s");
+    if (sign_signal != nullptr && resolver.shares_page("sign_signal", *sign_signal, *rate_signal)) {
+      gyro->sign = resolver.codec(*sign_signal);
+    }
+    if (temperature_signal != nullptr) {
+      gyro->temperature =
+          resolver.quantity(*temperature_signal, "temperature", Dimension::kTemperature);
+    }
+    if (supply_signal != nullptr) {
+      gyro->supply_voltage =
+          resolver.quantity(*supply_signal, "supply_voltage", Dimension::kVoltage);
+    }
+    read_other_axes(resolver, other_axes, *gyro);
+  } else {
+    // Ask for the rest, so that a good key is not called unknown on top of the real trouble.
+    reader.forgive({"sign", "source_address", "valid", "max_bias_dps"});
+    forgive_e2e(reader);
+  }
+  return gyro;
+}
+
+// --- a whole unit --------------------------------------------------------------------------------
+
+bool is_unit(const TomlReader& reader) {
+  return !reader.has("rate") &&
+         (reader.has("axis") || std::any_of(kOtherAxisKeys.begin(), kOtherAxisKeys.end(),
+                                            [&](const char* key) { return reader.has(key); }));
+}
+
+// What a table says of the message that it reads, as far as a single gyro's table says it too.
+// `main` is a signal of it.
+GyroPlan read_message(TomlReader& reader, SignalResolver& resolver, const std::string& name,
+                      const dbc::Signal& main, const Quantity& rate) {
+  GyroPlan gyro{.name = name,
+                .bus = resolver.bus(),
+                .message = resolver.message().name,
+                .match = resolver.match(),
+                .rate = rate,
+                .sign = {},
+                .temperature = {},
+                .e2e = {},
+                .valid = {},
+                .saturation_dps = {}};
+  read_source_address(reader, resolver.message(), gyro.match);
+  gyro.e2e = read_e2e(reader, resolver, main);
+  if (const auto valid = read_condition(reader, resolver, main)) gyro.valid = valid->condition;
+  const dbc::Signal* temperature = resolver.signal("temperature", false);
+  if (temperature != nullptr)
+    gyro.temperature = resolver.quantity(*temperature, "temperature", Dimension::kTemperature);
+  const dbc::Signal* supply = resolver.signal("supply_voltage", false);
+  if (supply != nullptr)
+    gyro.supply_voltage = resolver.quantity(*supply, "supply_voltage", Dimension::kVoltage);
+  return gyro;
+}
+
+void forgive_message(TomlReader& reader) {
+  reader.forgive({"source_address", "valid", "temperature", "supply_voltage"});
+  forgive_e2e(reader);
+}
+
+/// One axis on its way into the plan.
+struct AxisEntry {
+  const toml::table* own = nullptr;  ///< its [[gyro.axis]], where it has one
+  bool named_above = false;          ///< rate_x … stands in [[gyro]]
+};
+using AxisEntries = std::array<AxisEntry, kAxes>;
+
+void take_axis_table(const toml::node& node, TomlReader& unit, TableContext context,
+                     AxisEntries& entries) {
+  const toml::table* table = node.as_table();
+  if (table == nullptr) {
+    unit.complain(unit.where("axis"), "axis must be written as [[gyro.axis]] tables");
+    return;
+  }
+  TomlReader reader(*table, context.file, "[[gyro.axis]]", context.errors);
+  const std::string name = reader.required_text("axis", "x");
+  if (name.empty()) return;
+  const auto* const found = std::find_if(kAxisNames.begin(), kAxisNames.end(), [&](char axis) {
+    return name.size() == 1 && name[0] == axis;
+  });
+  if (found == kAxisNames.end()) {
+    reader.complain(reader.where("axis"), fmt::format("there is no axis \"{}\"", name),
+                    "\"x\", \"y\" or \"z\"");
+    return;
+  }
+  AxisEntry& entry = entries[static_cast<std::size_t>(found - kAxisNames.begin())];
+  if (entry.own != nullptr) {
+    reader.complain(reader.where("axis"), fmt::format("axis {} is there twice", name),
+                    "one [[gyro.axis]] for each axis");
+    return;
+  }
+  entry.own = table;
+}
+
+AxisEntries entries_of(TomlReader& reader, TableContext context) {
+  AxisEntries entries;
+  for (std::size_t axis = 0; axis < kAxes; ++axis)
+    entries[axis].named_above = reader.has(kOtherAxisKeys[axis]);
+  const toml::array* tables = reader.array("axis", "a list of tables: [[gyro.axis]]");
+  if (tables == nullptr) return entries;
+  for (const toml::node& node : *tables)
+    take_axis_table(node, reader, context, entries);
+  return entries;
+}
+
+/// What all axes of a unit have from its own table.
+struct UnitTable {
+  TomlReader& reader;
+  SignalResolver& resolver;
+  const std::string& name;
+  std::optional<std::string> unit;
+  double sign = 1.0;
+  std::optional<GyroPlan> message = {};  ///< what the unit's own message tells besides rates
+};
+
+const GyroPlan& message_of(UnitTable& unit, const dbc::Signal& main, const Quantity& rate) {
+  if (!unit.message) unit.message = read_message(unit.reader, unit.resolver, unit.name, main, rate);
+  return *unit.message;
+}
+
+GyroPlan finished_axis(GyroPlan gyro, const Quantity& rate, double sign, std::size_t axis) {
+  gyro.rate = rate;
+  gyro.rate.scale *= sign;
+  gyro.rate.shift *= sign;
+  gyro.sensor_axis = axis;
+  return gyro;
+}
+
+std::optional<GyroPlan> read_plain_axis(UnitTable& unit, std::size_t axis) {
+  const char* key = kOtherAxisKeys[axis];
+  const dbc::Signal* signal = unit.resolver.signal(key, false);
+  if (signal == nullptr) return std::nullopt;
+  const auto rate = unit.resolver.quantity(*signal, key, Dimension::kRate, unit.unit);
+  if (!rate) return std::nullopt;
+  return finished_axis(message_of(unit, *signal, *rate), *rate, unit.sign, axis);
+}
+
+// An axis with a table of its own, which may have a message of its own.
+std::optional<GyroPlan> read_own_axis(UnitTable& unit, const AxisEntry& entry, std::size_t axis,
+                                      TableContext context) {
+  TomlReader reader(*entry.own, context.file, "[[gyro.axis]]", context.errors);
+  reader.forgive({"axis"});
+  const bool own_message = reader.has("message") || reader.has("bus") || reader.has("dbc");
+  SignalResolver resolver(reader, context.cache, context.folder, context.buses, context.warnings,
+                          unit.resolver.named());
+  context.bus_files.insert({resolver.bus(), resolver.dbc_path()});
+  const char* above = kOtherAxisKeys[axis];
+  const dbc::Signal* signal = nullptr;
+  if (reader.has("rate") || !entry.named_above) {
+    signal = resolver.signal("rate", true);
+  } else if (const auto name = unit.reader.text(above); name && resolver.usable()) {
+    signal = resolver.signal_named(*name, "message");
+  }
+  if (reader.has("rate") && entry.named_above) {
+    reader.complain(
+        reader.where("rate"),
+        fmt::format("rate and {} both name the signal of axis {}", above, kAxisNames[axis]),
+        "keep one of them");
+  }
+  unit.reader.forgive({above});
+  const auto spelling = reader.has("unit") ? reader.text("unit") : unit.unit;
+  const double sign = sign_of(reader).value_or(unit.sign);
+  std::optional<Quantity> rate;
+  if (signal != nullptr) rate = resolver.quantity(*signal, "rate", Dimension::kRate, spelling);
+  std::optional<GyroPlan> gyro;
+  if (rate) {
+    gyro = finished_axis(own_message ? read_message(reader, resolver, unit.name, *signal, *rate)
+                                     : message_of(unit, *signal, *rate),
+                         *rate, sign, axis);
+  } else if (own_message) {
+    forgive_message(reader);
+  }
+  reader.finish();
+  return gyro;
+}
+
+// One signal about two axes is a mistake in either name.
+void check_signals(const std::vector<GyroPlan>& axes, TomlReader& reader) {
+  for (std::size_t i = 0; i < axes.size(); ++i) {
+    for (std::size_t k = i + 1; k < axes.size(); ++k) {
+      const bool same = axes[i].match == axes[k].match &&
+                        axes[i].rate.codec == axes[k].rate.codec &&
+                        axes[i].rate.presence == axes[k].rate.presence;
+      if (!same) continue;
+      reader.complain(reader.where(),
+                      fmt::format("axes {} and {} are read from the same signal: {} of {}",
+                                  kAxisNames[axes[i].sensor_axis], kAxisNames[axes[k].sensor_axis],
+                                  axes[i].rate.name, axes[i].message),
+                      "a signal for each axis");
+    }
+  }
+}
+
+std::optional<GyroPlan> read_unit(TomlReader& reader, SignalResolver& resolver,
+                                  const std::string& name, TableContext context) {
+  const AxisEntries entries = entries_of(reader, context);
+  UnitTable unit{reader, resolver, name, reader.text("unit"), sign_of(reader).value_or(1.0)};
+  const auto max_bias_dps = number_within(reader, "max_bias_dps", kMaxBias_dps, "deg/s");
+  const Mount mount = read_mount(reader).value_or(Mount{});
+  std::vector<GyroPlan> axes;
+  for (std::size_t axis = 0; axis < kAxes; ++axis) {
+    const AxisEntry& entry = entries[axis];
+    std::optional<GyroPlan> one;
+    if (entry.own != nullptr) {
+      one = read_own_axis(unit, entry, axis, context);
+    } else if (entry.named_above) {
+      one = read_plain_axis(unit, axis);
+    }
+    if (one) axes.push_back(std::move(*one));
+  }
+  if (!unit.message) forgive_message(reader);
+  const auto wanted = std::count_if(entries.begin(), entries.end(), [](const AxisEntry& entry) {
+    return entry.own != nullptr || entry.named_above;
+  });
+  if (wanted < 2) {
+    reader.complain(reader.where(),
+                    "a unit of one axis: rate_x, rate_y, rate_z are two or three of them",
+                    "rate = \"SIGNAL\" where the gyro has one axis only");
+  }
+  check_signals(axes, reader);
+  if (axes.empty()) return std::nullopt;
+  GyroPlan gyro = axes.front();
+  gyro.max_bias_dps = max_bias_dps;
+  gyro.mount = mount;
+  for (GyroPlan& axis : axes)
+    axis.max_bias_dps = max_bias_dps;
+  gyro.axes = std::move(axes);
+  return gyro;
+}
+
+}  // namespace
+
+std::optional<GyroPlan> read_gyro(const toml::table& table, std::size_t index,
+                                  TableContext context) {
+  TomlReader reader(table, context.file, "[[gyro]]", context.errors);
+  const std::size_t errors_before = context.errors.size();
+  const std::string name = reader.text("name").value_or(index == 0 ? "a" : "b");
+  if (printable(name) != name) {
+    reader.complain(reader.where("name"), fmt::format("the name \"{}\" is not printable", name),
+                    "letters, digits, blanks: it stands in tables and pictures");
+  }
+  SignalResolver resolver(reader, context.cache, context.folder, context.buses, context.warnings);
+  context.bus_files.insert({resolver.bus(), resolver.dbc_path()});
+  auto gyro = is_unit(reader) ? read_unit(reader, resolver, name, context)
+                              : read_single(reader, resolver, name);
+  if (!is_unit(reader) && reader.has("mount")) {
+    reader.forgive({"mount"});
+    reader.complain(reader.where("mount"), "mount is of a gyro with one axis",
+                    "rate_x, rate_y, rate_z instead of rate; one axis is turned by sign = -1");
+  }
+  reader.finish();
+  if (context.errors.size() > errors_before) return std::nullopt;
+  return gyro;
+}
+
+}  // namespace vgyro::gateway

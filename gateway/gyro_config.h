@@ -1,0 +1,50 @@
+#pragma once
+
+// The [[gyro]] tables: a single gyro, or a whole unit of two or three axes. Complaints carry file
+// and line, as gateway/config.
+
+#include <optional>
+#include <set>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "base/error.h"
+#include "base/toml_reader.h"
+#include "gateway/input_conflicts.h"
+#include "gateway/plan.h"
+#include "gateway/signal_resolver.h"
+
+namespace vgyro::gateway {
+
+/// What the tables of a configuration share.
+struct TableContext {
+  const std::string& file;    ///< the configuration's own path
+  const std::string& folder;  ///< DBC paths are relative to it
+  DatabaseCache& cache;
+  std::vector<std::string>& buses;
+  std::set<BusFile>& bus_files;
+  std::vector<Error>& errors;
+  std::vector<Error>& warnings;
+};
+
+/// One [[gyro]] table; nothing after a complaint. Of a unit GyroPlan::axes are filled.
+std::optional<GyroPlan> read_gyro(const toml::table& table, std::size_t index,
+                                  TableContext context);
+
+struct Limits {
+  double low = 0.0;
+  double high = 0.0;
+  bool above_low = false;  ///< the lower one itself is too little
+};
+
+/// A number inside limits; nothing after a complaint, or where the key is not there.
+std::optional<double> number_within(TomlReader& reader, std::string_view key, const Limits& limits,
+                                    std::string_view unit);
+
+/// The key `sign` of any table that reads a rate.
+void read_sign(TomlReader& reader, Quantity& rate);
+/// The key `source_address` of any table that reads a message.
+void read_source_address(TomlReader& reader, const dbc::Message& message, FrameMatch& match);
+
+}  // namespace vgyro::gateway

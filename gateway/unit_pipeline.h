@@ -1,0 +1,125 @@
+#pragma once
+
+// Two whole units: an AxisPipeline for each axis of the vehicle, fed from the units' frames, and
+// what needs all axes together: mounts, the small rotation between the units, stops that are stops
+// of all axes, and a frame that carries all rates. Opens nothing, reads no clock, allocates nothing
+// once it is constructed.
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "base/error.h"
+#include "base/time.h"
+#include "can/frame.h"
+#include "fusion/misalignment.h"
+#include "gateway/axis_pipeline.h"
+#include "gateway/frame_sink.h"
+#include "gateway/output_frames.h"
+#include "gateway/plan.h"
+#include "gateway/router.h"
+#include "gateway/saved_state.h"
+#include "gateway/status.h"
+
+namespace vgyro::gateway {
+
+/// One FD frame of all axes: gathers the rates of one instant, and knows when they are all there.
+class SharedRates final : public RateCollector {
+ public:
+  explicit SharedRates(const OutputPlan& plan) : encoder_(plan) {}
+
+  void begin(FrameSink& sink, TimePoint stamp);
+  /// Sends what is gathered.
+  void flush();
+  void end();
+  void collect(std::size_t axis, const RateOutput& output) override;
+  void count_on_from(const SharedRates& before) { encoder_.count_on_from(before.encoder_); }
+
+ private:
+  AxesEncoder encoder_;
+  FrameSink* sink_ = nullptr;
+  TimePoint stamp_;
+  std::array<std::optional<RateOutput>, kAxes> rates_;
+  bool any_ = false;
+};
+
+class UnitPipeline {
+ public:
+  /// Precondition: plan.axes.
+  explicit UnitPipeline(const Plan& plan);
+
+  // As of Pipeline.
+
+  void receive(can::BusIndex bus, const can::Frame& frame, TimePoint stamp, FrameSink& sink);
+  void advance(TimePoint now, FrameSink& sink);
+  [[nodiscard]] TimePoint next_deadline() const;
+  /// Of the platform: sums and worsts of its axes.
+  const Status& refreshed_status();
+  [[nodiscard]] std::size_t axis_count() const { return axes_.size(); }
+  const Status& axis_status(std::size_t place) { return axes_[place]->refreshed_status(); }
+  [[nodiscard]] std::uint64_t spoken() const;
+  [[nodiscard]] std::optional<SavedState> memory() const;
+  Expected<void> resume(const SavedState& state);
+  void count_on_from(const UnitPipeline& before);
+  void change_output(const Plan& plan);
+  void observe(std::size_t place, RateObserver* observer) { axes_[place]->observe(observer); }
+  void observe_output(std::size_t place, OutputObserver* observer) {
+    axes_[place]->observe_output(observer);
+  }
+  [[nodiscard]] const Plan& plan() const { return plan_; }
+
+ private:
+  using Pairs = std::array<std::optional<fusion::AlignedPair>, kAxes>;
+  /// What a unit's sensor reads, and how it turns into the vehicle's axes. Both in the order of
+  /// `axes_`: a pair's own sensor axis stands in its place.
+  struct Unit {
+    std::array<std::array<double, kAxes>, kAxes> share{};
+    bool turns = false;
+    std::array<double, kAxes> reading_dps{};
+    std::array<bool, kAxes> known{};
+  };
+  class Turn;
+
+  [[nodiscard]] Unit unit_of(std::size_t gyro) const;
+  [[nodiscard]] bool nothing_due(TimePoint stamp) const;
+  void receive_unit(std::size_t gyro, std::uint8_t role,
+                    const std::array<std::uint8_t, kAxes>& roles, const can::Frame& frame,
+                    TimePoint stamp);
+  /// The rate about an axis of the vehicle; nothing where what is missing matters there.
+  [[nodiscard]] std::optional<double> turned(std::size_t gyro, std::size_t place) const;
+  void take_pairs();
+  void take_round(Pairs& pairs);
+  void note_rates(const Pairs& pairs);
+  void learn_misalignment(const Pairs& pairs);
+  void begin(TimePoint t);
+  void set_cross(std::size_t place);
+  void note_single(std::size_t gyro, std::size_t place, double rate_dps);
+  void share_motion();
+  void share_restarts();
+  void follow_heading(TimePoint t);
+
+  Plan plan_;
+  Router router_;
+  std::vector<std::unique_ptr<AxisPipeline>> axes_;
+  std::array<Unit, 2> units_;
+  std::optional<SharedRates> shared_;
+  fusion::Misalignment misalignment_;
+  bool learns_misalignment_ = false;
+  fusion::AxisRates rate_dps_{};  ///< about x, y, z: the newest of the platform, biases taken off
+  TimePoint origin_;
+  bool begun_ = false;
+  std::optional<fusion::MisalignmentMemory> saved_;
+  TimePoint saved_stamp_;
+  Pairs waiting_;  ///< for the pairs of the other axes
+
+  std::array<fusion::Elsewhere, kAxes> told_{};
+  std::array<std::uint64_t, kAxes> restarts_{};
+  double heading_rad_ = 0.0;  ///< clockwise from north
+  TimePoint heading_at_;
+  bool heading_known_ = false;
+  Status status_;
+};
+
+}  // namespace vgyro::gateway

@@ -1,0 +1,296 @@
+#include <array>
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <numbers>
+#include <random>
+
+#include <gtest/gtest.h>
+
+#include "gateway/config.h"
+#include "gateway/input_frames.h"
+#include "gateway/pipeline.h"
+#include "gateway/saved_state.h"
+#include "tests/gateway/counting_new.h"
+
+namespace vgyro::gateway {
+namespace {
+
+constexpr double kRadPerDeg = std::numbers::pi / 180.0;
+constexpr Duration kInterval = std::chrono::milliseconds(20);
+constexpr TimePoint kStart = time_from_ns(1'700'000'000'000'000'000);
+
+constexpr const char* kUnits = R"(VERSION ""
+
+BU_: RIG
+
+BO_ 257 IMU_A: 16 RIG
+ SG_ X : 0|32@1- (1E-006,0) [-2000|2000] "deg/s" RIG
+ SG_ Y : 32|32@1- (1E-006,0) [-2000|2000] "deg/s" RIG
+ SG_ Z : 64|32@1- (1E-006,0) [-2000|2000] "deg/s" RIG
+ SG_ Counter : 96|8@1+ (1,0) [0|255] "" RIG
+
+BO_ 258 IMU_B: 16 RIG
+ SG_ X : 0|32@1- (1E-006,0) [-2000|2000] "deg/s" RIG
+ SG_ Y : 32|32@1- (1E-006,0) [-2000|2000] "deg/s" RIG
+ SG_ Z : 64|32@1- (1E-006,0) [-2000|2000] "deg/s" RIG
+ SG_ Counter : 96|8@1+ (1,0) [0|255] "" RIG
+)";
+
+std::string gyro_text(const char* name, const char* message) {
+  return std::string("[[gyro]]\nname = \"") + name +
+         "\"\nbus = \"can0\"\ndbc = \"units.dbc\"\nmessage = \"" + message +
+         "\"\nrate_x = \"X\"\nrate_y = \"Y\"\nrate_z = \"Z\"\ncounter = \"Counter\"\n";
+}
+
+/// A configuration of its own folder, read as users' are.
+Plan plan_of(const std::string& output = "") {
+  std::string folder = std::filesystem::temp_directory_path() / "vgyro-units-XXXXXX";
+  if (::mkdtemp(folder.data()) == nullptr) std::abort();
+  std::ofstream(folder + "/units.dbc") << kUnits;
+  std::ofstream(folder + "/vgyro.toml")
+      << gyro_text("left", "IMU_A") << gyro_text("right", "IMU_B")
+      << "[calibration]\nrest_s = 20\nrate_dps = [0.0, 0.0, 0.0]\n[output]\nbus = \"can0\"\n"
+      << output;
+  auto loaded = load_config(folder + "/vgyro.toml");
+  std::filesystem::remove_all(folder);
+  if (!loaded) throw std::runtime_error(loaded.error().front().message());
+  return std::move(loaded->plan);
+}
+
+using Rates = std::array<double, 3>;
+
+/// How the platform moves; unit 2 is tilted against unit 1.
+struct World {
+  Rates (*rate)(double t_s);
+  Rates angle_rad{};
+  double noise_dps = 0.02;
+  Rates first_bias{0.1, -0.2, 0.3};
+  Rates second_bias{-0.3, 0.15, 0.05};
+};
+
+Rates drives(double t_s) {
+  if (t_s < 25.0) return {};
+  const double ramp = std::min((t_s - 25.0) / 2.0, 1.0);
+  const double gate = ramp * ramp * (3.0 - 2.0 * ramp);
+  return {gate * 1.5 * std::sin(2.9 * t_s), gate * 1.3 * std::sin(2.3 * t_s),
+          gate * 25.0 * std::sin(0.33 * t_s) * std::sin(0.05 * t_s)};
+}
+
+class Bus final : public FrameSink {
+ public:
+  void put(const can::Frame& frame, TimePoint /*stamp*/) override {
+    ++frames;
+    if (frame.id == 0x610) ++rates;
+  }
+  std::size_t frames = 0;
+  std::size_t rates = 0;
+};
+
+/// Takes every rate about one axis.
+class Judge final : public OutputObserver {
+ public:
+  Judge(const World& world, std::size_t axis) : world_(world), axis_(axis) {}
+  void on_output(const RateOutput& output, const std::array<double, 2>& bias_dps) override {
+    if (!output.valid) return;
+    const double t_s = to_seconds(output.instant - kStart);
+    const double off = output.rate_dps - world_.rate(t_s)[axis_];
+    heading_deg += off * to_seconds(kInterval);
+    squares += std::pow(off / output.sigma_dps, 2);
+    ++count;
+    bias = bias_dps;
+  }
+  [[nodiscard]] double normalised() const { return squares / count; }
+  double heading_deg = 0.0;
+  double squares = 0.0;
+  double count = 0.0;
+  std::array<double, 2> bias{};
+
+ private:
+  const World& world_;
+  std::size_t axis_;
+};
+
+void put_unit(const Plan& plan, std::size_t unit, const Rates& reading, int n, can::Frame& frame) {
+  for (const GyroPlan& axis : plan.gyros[unit].axes)
+    put_gyro(axis, reading[axis.sensor_axis], static_cast<std::uint64_t>(n), frame);
+}
+
+/// Frames of both units from `from_s` to `to_s`.
+void play(const World& world, const Plan& plan, double from_s, double to_s, Pipeline& pipeline,
+          FrameSink& sink, std::uint64_t seed = 7) {
+  std::mt19937_64 engine(seed);
+  std::normal_distribution<double> noise(0.0, world.noise_dps);
+  std::array<can::Frame, 2> frames{empty_frame(plan.gyros[0].match),
+                                   empty_frame(plan.gyros[1].match)};
+  const auto first = static_cast<int>(from_s / to_seconds(kInterval));
+  const auto last = static_cast<int>(to_s / to_seconds(kInterval));
+  for (int n = first; n < last; ++n) {
+    for (std::size_t unit = 0; unit < 2; ++unit) {
+      const TimePoint t = kStart + n * kInterval + (unit == 0 ? Duration{0} : kInterval / 3);
+      const Rates w = world.rate(to_seconds(t - kStart));
+      Rates reading = w;
+      const Rates& a = world.angle_rad;
+      const Rates& bias = unit == 0 ? world.first_bias : world.second_bias;
+      if (unit == 1) {
+        reading[0] += w[1] * a[2] - w[2] * a[1];
+        reading[1] += w[2] * a[0] - w[0] * a[2];
+        reading[2] += w[0] * a[1] - w[1] * a[0];
+      }
+      for (std::size_t i = 0; i < 3; ++i)
+        reading[i] += bias[i] + noise(engine);
+      put_unit(plan, unit, reading, n, frames[unit]);
+      pipeline.receive(0, frames[unit], t, sink);
+    }
+  }
+}
+
+TEST(UnitPipeline, HasAnAxisForEachAndNamesIt) {
+  const Plan plan = plan_of();
+  ASSERT_EQ(plan.axes.size(), 3U);
+  const Pipeline pipeline(plan);
+  EXPECT_EQ(pipeline.axis_count(), 3U);
+  const std::vector<FrameId> ids = output_ids(plan.output, 0);
+  ASSERT_EQ(ids.size(), 9U);
+  for (std::size_t i = 0; i < ids.size(); ++i)
+    EXPECT_EQ(ids[i].id, 0x610U + i);
+  EXPECT_EQ(output_ids(plan_of("fd = true\n").output, 0).size(), 7U);
+}
+
+TEST(UnitPipeline, AllocatesNothingOnTheFramePath) {
+  for (const char* output : {"", "fd = true\n"}) {
+    SCOPED_TRACE(output);
+    const Plan plan = plan_of(output);
+    const World world{.rate = drives, .angle_rad = {0.005, -0.004, 0.003}};
+    Pipeline pipeline(plan);
+    Bus bus;
+    std::mt19937_64 engine(1);
+    play(world, plan, 0.0, 1.0, pipeline, bus);
+    const std::size_t before = allocations_so_far();
+    play(world, plan, 1.0, 90.0, pipeline, bus);
+    // The generator's own frames and distribution take none either.
+    EXPECT_EQ(allocations_so_far() - before, 0U);
+    EXPECT_GT(bus.frames, 9'000U);
+    EXPECT_GT(pipeline.status().misalignment_segments, 5U);
+  }
+}
+
+// The tilt is known again at the start of a second drive, and its heading error gone.
+TEST(UnitPipeline, KeepsTheTiltForASecondDrive) {
+  const Plan plan = plan_of();
+  const World world{.rate = drives,
+                    .angle_rad = {0.3 * kRadPerDeg, -0.32 * kRadPerDeg, 0.24 * kRadPerDeg}};
+  Pipeline first(plan);
+  Bus bus;
+  play(world, plan, 0.0, 600.0, first, bus);
+  const auto memory = first.memory();
+  ASSERT_TRUE(memory);
+  ASSERT_EQ(memory->axes.size(), 3U);
+  ASSERT_TRUE(memory->misalignment);
+  const std::string text = to_text(*memory);
+  EXPECT_LT(text.size(), kSavedStateBytesMax);
+  const auto read = saved_state_from(text, "state");
+  ASSERT_TRUE(read) << read.error().message();
+  EXPECT_EQ(to_text(*read), text);
+
+  Pipeline second(plan);
+  ASSERT_TRUE(second.resume(*read));
+  Judge judge(world, 0);
+  second.observe_output(&judge, 0);
+  play(world, plan, 620.0, 740.0, second, bus, 8);
+  const Status& status = second.status();
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    EXPECT_NEAR(status.misalignment_deg[axis], world.angle_rad[axis] / kRadPerDeg, 0.02) << axis;
+    EXPECT_LT(status.misalignment_sigma_deg[axis], 0.02) << axis;
+  }
+  EXPECT_EQ(status.state, State::kRunning);
+  EXPECT_GT(judge.count, 5'000.0);
+  EXPECT_GT(judge.normalised(), 0.8);
+  EXPECT_LT(judge.normalised(), 1.2);
+  // By the biases' own doubt alone: 120 s times 1e-3 deg/s or so.
+  EXPECT_LT(std::abs(judge.heading_deg), 4.0 * 120.0 * status.bias_sigma_dps + 0.02);
+}
+
+TEST(UnitPipeline, TakesUpNoStateOfOthers) {
+  const Plan plan = plan_of();
+  const World world{.rate = drives};
+  Pipeline first(plan);
+  Bus bus;
+  play(world, plan, 0.0, 60.0, first, bus);
+  auto state = *first.memory();
+  Pipeline second(plan);
+  SavedState single = state;
+  single.axes.clear();
+  EXPECT_FALSE(second.resume(single));
+  SavedState other = state;
+  other.axes[1].devices[0] = "another";
+  EXPECT_FALSE(second.resume(other));
+  EXPECT_TRUE(second.resume(state));
+}
+
+// A ferry that turns slowly and is tilted a little: its steady turn shows about z, and what of it
+// is about x must not be learned there as drift.
+Rates ferry(double t_s) {
+  if (t_s < 60.0) return {};
+  return {0.002, 0.0, 2.0};
+}
+
+TEST(UnitPipeline, LearnsNoDriftOfASteadyTurnThatAnotherAxisTells) {
+  const Plan plan = plan_of();
+  const World world{.rate = ferry, .noise_dps = 0.01};
+  Pipeline pipeline(plan);
+  Bus bus;
+  Judge judge(world, 0);
+  pipeline.observe_output(&judge, 0);
+  play(world, plan, 0.0, 400.0, pipeline, bus);
+  EXPECT_NEAR(judge.bias[0], world.first_bias[0], 0.001);
+  EXPECT_NEAR(judge.bias[1], world.second_bias[0], 0.001);
+  EXPECT_LT(judge.normalised(), 1.2);
+  const auto& probability = pipeline.axis_status(2).probability;
+  EXPECT_GT(probability[static_cast<std::size_t>(fusion::Hypothesis::kTurning)], 0.9);
+}
+
+// Motion about one axis is motion of the platform: no axis calibrates meanwhile.
+Rates turns_early(double t_s) {
+  if (t_s < 10.0 || t_s > 30.0) return {};
+  return {0.0, 0.0, 10.0 * std::sin(std::numbers::pi * (t_s - 10.0) / 20.0)};
+}
+
+TEST(UnitPipeline, BeginsTheCalibrationOfAllAxesAgainWhereOneMoves) {
+  const Plan plan = plan_of();
+  const World world{.rate = turns_early};
+  Pipeline pipeline(plan);
+  Bus bus;
+  play(world, plan, 0.0, 29.0, pipeline, bus);
+  for (std::size_t place = 0; place < 3; ++place)
+    EXPECT_EQ(pipeline.axis_status(place).state, State::kCalibrating) << place;
+  play(world, plan, 29.0, 60.0, pipeline, bus);
+  for (std::size_t place = 0; place < 3; ++place) {
+    EXPECT_EQ(pipeline.axis_status(place).state, State::kRunning) << place;
+    EXPECT_GT(pipeline.axis_status(place).calibration_restarts, 0U) << place;
+  }
+}
+
+TEST(UnitPipeline, GoesOnUnderAnotherOutput) {
+  const World world{.rate = drives};
+  const Plan plan = plan_of();
+  const Plan fd = plan_of("fd = true\n");
+  ASSERT_TRUE(same_but_output(plan, plan));
+  Pipeline first(plan);
+  Bus bus;
+  play(world, plan, 0.0, 40.0, first, bus);
+  Plan moved = plan;
+  moved.output = fd.output;
+  for (std::size_t place = 0; place < 3; ++place)
+    moved.axes[place].output = fd.axes[place].output;
+  Pipeline second(moved);
+  second.take_over(std::move(first));
+  Bus after;
+  play(world, plan, 40.0, 50.0, second, after);
+  EXPECT_NEAR(static_cast<double>(after.rates), 500.0, 2.0);
+  EXPECT_EQ(second.status().state, State::kRunning);
+}
+
+}  // namespace
+}  // namespace vgyro::gateway
