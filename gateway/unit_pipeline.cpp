@@ -68,13 +68,11 @@ void SharedRates::flush() {
 class UnitPipeline::Turn {
  public:
   Turn(UnitPipeline& units, FrameSink& sink, TimePoint stamp) : units_(units) {
-    if (units.shared_) units.shared_->begin(sink, stamp);
+    units.begin_output(sink, stamp);
     for (std::size_t place = 0; place < units.axes_.size(); ++place)
       turns_[place].emplace(units.axes_[place]->sender(), sink, stamp);
   }
-  ~Turn() {
-    if (units_.shared_) units_.shared_->end();
-  }
+  ~Turn() { units_.end_output(); }
   Turn(const Turn&) = delete;
   Turn& operator=(const Turn&) = delete;
 
@@ -83,17 +81,39 @@ class UnitPipeline::Turn {
   std::array<std::optional<AxisPipeline::Turn>, kAxes> turns_;
 };
 
-UnitPipeline::UnitPipeline(const Plan& plan) : plan_(plan), router_(plan_) {
+UnitPipeline::UnitPipeline(const Plan& plan) : plan_(plan), router_(plan_), layouts_(plan_.output) {
   for (const Plan& pair : plan_.axes)
     axes_.push_back(std::make_unique<AxisPipeline>(pair, make_corrector(pair)));
   for (std::size_t gyro = 0; gyro < 2; ++gyro)
     units_[gyro] = unit_of(gyro);
   learns_misalignment_ = plan_.corrector.method == Method::kOptimal;
-  if (plan_.output.rate_is_shared && plan_.output.vgyro_frames) {
-    shared_.emplace(plan_.output);
-    for (const auto& axis : axes_)
-      axis->sender().share_rates(&*shared_, axis->plan().axis);
+  if (plan_.output.rate_is_shared && plan_.output.vgyro_frames) shared_.emplace(plan_.output);
+  share_output();
+}
+
+void UnitPipeline::share_output() {
+  for (const auto& axis : axes_) {
+    axis->sender().share_rates(shared_ ? &*shared_ : nullptr, axis->plan().axis);
+    axis->sender().share_layouts(layouts_.empty() ? nullptr : &layouts_, axis->plan().axis);
   }
+}
+
+void UnitPipeline::begin_output(FrameSink& sink, TimePoint stamp) {
+  sink_ = &sink;
+  stamp_ = stamp;
+  if (shared_) shared_->begin(sink, stamp);
+}
+
+void UnitPipeline::end_output() {
+  if (shared_) shared_->end();
+  layouts_.settle(stamp_, *sink_);
+  sink_ = nullptr;
+}
+
+// The rates of one instant are all there.
+void UnitPipeline::settle_output() {
+  if (shared_) shared_->flush();
+  layouts_.settle(stamp_, *sink_);
 }
 
 UnitPipeline::Unit UnitPipeline::unit_of(std::size_t gyro) const {
@@ -217,7 +237,7 @@ void UnitPipeline::take_round(Pairs& pairs) {
     axes_[place]->take_pair(*pairs[place]);
     t = pairs[place]->t;
   }
-  if (shared_) shared_->flush();
+  settle_output();
   share_motion();
   follow_heading(t);
 }
@@ -360,10 +380,10 @@ void UnitPipeline::follow_heading(TimePoint t) {
 // --- time ----------------------------------------------------------------------------------------
 
 void UnitPipeline::advance(TimePoint now, FrameSink& sink) {
-  if (shared_) shared_->begin(sink, now);
+  begin_output(sink, now);
   for (const auto& axis : axes_)
     axis->advance(now, sink);
-  if (shared_) shared_->end();
+  end_output();
 }
 
 TimePoint UnitPipeline::next_deadline() const {
@@ -417,6 +437,7 @@ void UnitPipeline::count_on_from(const UnitPipeline& before) {
     }
   }
   if (shared_ && before.shared_) shared_->count_on_from(*before.shared_);
+  layouts_.count_on_from(before.layouts_);
 }
 
 void UnitPipeline::change_output(const Plan& plan) {
@@ -427,8 +448,8 @@ void UnitPipeline::change_output(const Plan& plan) {
   if (plan_.output.rate_is_shared && plan_.output.vgyro_frames) shared.emplace(plan_.output);
   if (shared && shared_) shared->count_on_from(*shared_);
   shared_ = shared;
-  for (const auto& axis : axes_)
-    axis->sender().share_rates(shared_ ? &*shared_ : nullptr, axis->plan().axis);
+  layouts_.change_plan(plan_.output);
+  share_output();
 }
 
 // --- the whole platform --------------------------------------------------------------------------
@@ -487,15 +508,7 @@ const Status& UnitPipeline::refreshed_status() {
   status_ = axes_.back()->refreshed_status();
   for (std::size_t place = 0; place + 1 < axes_.size(); ++place)
     add_axis(axes_[place]->refreshed_status(), status_);
-  // The platform's own layouts, each of which one axis sends.
-  status_.layouts_out = {};
-  std::array<std::size_t, kAxes> sent{};
-  for (std::size_t i = 0; i < plan_.output.layouts.size(); ++i) {
-    for (std::size_t place = 0; place < axes_.size(); ++place) {
-      if (plan_.output.layouts[i].axis != plan_.axes[place].axis) continue;
-      status_.layouts_out[i] = axes_[place]->status().layouts_out[sent[place]++];
-    }
-  }
+  layouts_.tell(status_);
   status_.misalignment_segments = misalignment_.segments();
   for (std::size_t axis = 0; axis < kAxes; ++axis) {
     status_.misalignment_deg[axis] = misalignment_.angle_rad()[axis] / kRadPerDeg;

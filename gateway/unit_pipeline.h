@@ -18,6 +18,7 @@
 #include "gateway/axis_pipeline.h"
 #include "gateway/frame_sink.h"
 #include "gateway/output_frames.h"
+#include "gateway/output_layout.h"
 #include "gateway/plan.h"
 #include "gateway/router.h"
 #include "gateway/saved_state.h"
@@ -82,6 +83,11 @@ class UnitPipeline {
   };
   class Turn;
 
+  /// Between the two, what concerns all axes goes to this sink.
+  void begin_output(FrameSink& sink, TimePoint stamp);
+  void end_output();
+  void share_output();
+  void settle_output();
   [[nodiscard]] Unit unit_of(std::size_t gyro) const;
   [[nodiscard]] bool nothing_due(TimePoint stamp) const;
   void receive_unit(std::size_t gyro, std::uint8_t role,
@@ -105,6 +111,9 @@ class UnitPipeline {
   std::vector<std::unique_ptr<AxisPipeline>> axes_;
   std::array<Unit, 2> units_;
   std::optional<SharedRates> shared_;
+  LayoutSet layouts_;
+  FrameSink* sink_ = nullptr;
+  TimePoint stamp_;
   fusion::Misalignment misalignment_;
   bool learns_misalignment_ = false;
   fusion::AxisRates rate_dps_{};  ///< about x, y, z: the newest of the platform, biases taken off

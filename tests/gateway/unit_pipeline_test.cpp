@@ -36,7 +36,18 @@ BO_ 258 IMU_B: 16 RIG
  SG_ Y : 32|32@1- (1E-006,0) [-2000|2000] "deg/s" RIG
  SG_ Z : 64|32@1- (1E-006,0) [-2000|2000] "deg/s" RIG
  SG_ Counter : 96|8@1+ (1,0) [0|255] "" RIG
+
+BO_ 259 WHOLE: 8 RIG
+ SG_ X : 0|16@1- (0.01,0) [-300|300] "deg/s" RIG
+ SG_ Y : 16|16@1- (0.01,0) [-300|300] "deg/s" RIG
+ SG_ Z : 32|16@1- (0.01,0) [-300|300] "deg/s" RIG
+ SG_ Alive : 48|8@1+ (1,0) [0|255] "" RIG
 )";
+
+constexpr const char* kWhole =
+    "[[output.layout]]\ndbc = \"units.dbc\"\nmessage = \"WHOLE\"\nrate_not_available = -32768\n"
+    "counter = \"Alive\"\n";
+constexpr const char* kAllRates = "rate_x = \"X\"\nrate_y = \"Y\"\nrate_z = \"Z\"\n";
 
 std::string gyro_text(const char* name, const char* message) {
   return std::string("[[gyro]]\nname = \"") + name +
@@ -83,9 +94,11 @@ class Bus final : public FrameSink {
   void put(const can::Frame& frame, TimePoint /*stamp*/) override {
     ++frames;
     if (frame.id == 0x610) ++rates;
+    if (frame.id == 259) last_of_layout = frame;
   }
   std::size_t frames = 0;
   std::size_t rates = 0;
+  can::Frame last_of_layout{};
 };
 
 /// Takes every rate about one axis.
@@ -159,7 +172,8 @@ TEST(UnitPipeline, HasAnAxisForEachAndNamesIt) {
 }
 
 TEST(UnitPipeline, AllocatesNothingOnTheFramePath) {
-  for (const char* output : {"", "fd = true\n"}) {
+  const std::string layout = std::string(kWhole) + kAllRates;
+  for (const std::string& output : {std::string(), std::string("fd = true\n"), layout}) {
     SCOPED_TRACE(output);
     const Plan plan = plan_of(output);
     const World world{.rate = drives, .angle_rad = {0.005, -0.004, 0.003}};
@@ -290,6 +304,33 @@ TEST(UnitPipeline, GoesOnUnderAnotherOutput) {
   play(world, plan, 40.0, 50.0, second, after);
   EXPECT_NEAR(static_cast<double>(after.rates), 500.0, 2.0);
   EXPECT_EQ(second.status().state, State::kRunning);
+}
+
+// A layout that carried one axis and carries all from then on is the same stream: its counter and
+// its books go on.
+TEST(UnitPipeline, GoesOnCountingWhereALayoutGetsMoreAxes) {
+  const World world{.rate = drives};
+  const Plan plan = plan_of(std::string(kWhole) + "rate_z = \"Z\"\n");
+  const Plan moved = plan_of(std::string(kWhole) + kAllRates);
+  Pipeline first(plan);
+  Bus bus;
+  play(world, plan, 0.0, 40.0, first, bus);
+  const std::uint64_t before = first.status().layouts_out[0].frames;
+  EXPECT_NEAR(static_cast<double>(before), 2000.0, 12.0);
+  EXPECT_EQ(bus.last_of_layout.data[6], (before - 1) % 256);
+  Pipeline second(moved);
+  second.take_over(std::move(first));
+  play(world, moved, 40.0, 50.0, second, bus);
+  const LayoutCounts counts = second.status().layouts_out[0];
+  EXPECT_NEAR(static_cast<double>(counts.frames - before), 500.0, 1.0);
+  EXPECT_EQ(bus.last_of_layout.data[6], (counts.frames - 1) % 256);
+  // All but those of the calibration, which takes 20 s.
+  EXPECT_NEAR(static_cast<double>(counts.frames - counts.valid), 1000.0, 12.0);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const auto raw = static_cast<std::int16_t>(bus.last_of_layout.data[2 * axis] |
+                                               bus.last_of_layout.data[2 * axis + 1] << 8U);
+    EXPECT_NEAR(raw * 0.01, second.axis_status(axis).rate_dps, 0.005 + 1e-9) << axis;
+  }
 }
 
 }  // namespace
