@@ -49,7 +49,9 @@ AxisPipeline::AxisPipeline(const Plan& the_plan, std::unique_ptr<fusion::Correct
       attendance_(plan_, aligner_, guard_),
       estimator_(plan_, std::move(corrector)),
       sender_(plan_.output),
-      newest_(kNever) {
+      newest_(kNever),
+      bias_sigma_dps_(kNone),
+      earth_doubt_dps_(plan_.calibration.doubt_dps) {
   if (plan_.reference) reference_input_.emplace(reference_intake(*plan_.reference));
   for (GyroStatus& gyro : status_.gyros)
     gyro.last_rate_dps = kNone;
@@ -356,7 +358,7 @@ void AxisPipeline::add_cross_doubt(fusion::VirtualRate& rate) const {
   const double share = estimator_.shares()[1];
   rate.sigma_dps =
       std::sqrt(rate.sigma_dps * rate.sigma_dps + share * share * cross_variance_dps2_ +
-                plan_.calibration.doubt_dps * plan_.calibration.doubt_dps);
+                earth_doubt_dps_ * earth_doubt_dps_);
 }
 
 // The corrector's opinion of both; of one gyro alone it has none that is new.
@@ -457,7 +459,9 @@ const std::array<double, 2>& AxisPipeline::bias_dps() {
   const std::uint64_t windows = estimator_.windows();
   if (windows == bias_windows_ && windows > 0) return bias_dps_;
   bias_windows_ = windows;
-  bias_dps_ = estimator_.drift(newest_).bias_dps;
+  const fusion::Drift drift = estimator_.drift(newest_);
+  bias_dps_ = drift.bias_dps;
+  bias_sigma_dps_ = drift.bias_sigma_dps;
   for (double& bias_dps : bias_dps_)
     bias_dps = std::isfinite(bias_dps) ? bias_dps : 0.0;
   return bias_dps_;

@@ -99,6 +99,15 @@ class AxisPipeline {
   [[nodiscard]] const Estimator& estimator() const { return estimator_; }
   /// The newest virtual rate; NaN where that is not valid.
   [[nodiscard]] double rate_dps() const { return sender_.rate_dps(); }
+  /// 1σ of what the Earth's rate may have been instead while the biases were learned.
+  void set_earth_doubt(double doubt_dps) { earth_doubt_dps_ = doubt_dps; }
+  [[nodiscard]] double earth_doubt_dps() const { return earth_doubt_dps_; }
+  /// Its σ, and that of the bias in it as of the last window; NaN where none is stated.
+  [[nodiscard]] double sigma_dps() const { return sender_.sigma_dps(); }
+  [[nodiscard]] double bias_sigma_dps() {
+    (void)bias_dps();
+    return bias_sigma_dps_;
+  }
   /// Of both gyros, as of the last window; 0 before there are any.
   [[nodiscard]] const std::array<double, 2>& bias_dps();
   /// A time of the pairs on the clock of the frames.
@@ -165,10 +174,12 @@ class AxisPipeline {
   TimePoint reached_{};               ///< newest time that was believed
   TimePoint suspect_{};               ///< stamp far ahead that nobody has confirmed yet
   std::array<double, 2> bias_dps_{};  ///< for bias_dps()
+  double bias_sigma_dps_;             ///< likewise
   std::uint64_t bias_windows_ = 0;    ///< when that was asked for last
   bool has_cross_ = false;
   double cross_dps_ = 0.0;            ///< what gyro 2 reads of the other axes
   double cross_variance_dps2_ = 0.0;  ///< and how far that may be wrong
+  double earth_doubt_dps_;            ///< for add_cross_doubt()
 };
 
 }  // namespace vgyro::gateway

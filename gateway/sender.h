@@ -85,6 +85,9 @@ class Sender {
   /// The last VG_Rate's; NaN when that was invalid.
   [[nodiscard]] double rate_dps() const { return rate_dps_; }
 
+  /// Its σ; likewise, or where none is stated.
+  [[nodiscard]] double sigma_dps() const { return sigma_dps_; }
+
   /// The books, and what the last rate said.
   void tell(Status& status) const;
 

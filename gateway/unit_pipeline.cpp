@@ -18,8 +18,6 @@ constexpr double kRadPerDeg = std::numbers::pi / 180.0;
 constexpr double kLogTurningMost = 6.0;
 // From this probability on a steady turn about one axis is motion of the platform: nobody stands.
 constexpr double kSurelyTurning = 0.9;
-// The true rate at a stop follows the heading in steps of so much, a ten-thousandth of the Earth's.
-constexpr double kHeadingLeap_s = 1.0;
 // Pairs of different axes that are further apart are of different motion.
 constexpr Duration kApartMost = std::chrono::milliseconds(25);
 constexpr std::array<std::uint8_t, 2> kGyroRoles{kGyro1, kGyro2};
@@ -81,7 +79,8 @@ class UnitPipeline::Turn {
   std::array<std::optional<AxisPipeline::Turn>, kAxes> turns_;
 };
 
-UnitPipeline::UnitPipeline(const Plan& plan) : plan_(plan), router_(plan_), layouts_(plan_.output) {
+UnitPipeline::UnitPipeline(const Plan& plan)
+    : plan_(plan), router_(plan_), layouts_(plan_.output), heading_(plan_.calibration) {
   for (const Plan& pair : plan_.axes)
     axes_.push_back(std::make_unique<AxisPipeline>(pair, make_corrector(pair)));
   for (std::size_t gyro = 0; gyro < 2; ++gyro)
@@ -183,6 +182,7 @@ void UnitPipeline::receive_unit(std::size_t gyro, std::uint8_t role,
     if (!heard[place] || axes_[place]->pairing()) continue;
     note_single(gyro, place, rate_dps[place]);
     axes_[place]->speak_alone(gyro, readings[place].t, rate_dps[place]);
+    follow_heading(readings[place].t);
   }
 }
 
@@ -311,9 +311,16 @@ void UnitPipeline::begin(TimePoint t) {
   if (begun_) return;
   begun_ = true;
   origin_ = t;
-  if (!saved_) return;
-  const double age_s = std::max(to_seconds(axes_[0]->stamp_of(t) - saved_stamp_), 0.0);
-  (void)misalignment_.resume(*saved_, age_s);
+  if (!resumed_) return;
+  heading_.age(age_s(t));
+  if (saved_) (void)misalignment_.resume(*saved_, age_s(t));
+}
+
+// As of an axis: a clock that stands before the state tells nothing.
+double UnitPipeline::age_s(TimePoint t) const {
+  const TimePoint stamp = axes_[0]->stamp_of(t);
+  if (stamp < saved_stamp_) return Estimator::kUnknownAge_s;
+  return to_seconds(stamp - saved_stamp_);
 }
 
 // --- what the axes tell each other ---------------------------------------------------------------
@@ -358,22 +365,39 @@ void UnitPipeline::share_restarts() {
 
 // The Earth's rate about the vehicle's horizontal axes turns with its heading.
 void UnitPipeline::follow_heading(TimePoint t) {
-  const CalibrationPlan& calibration = plan_.calibration;
-  if (!calibration.heading_deg || !calibration.latitude_deg) return;
-  if (!heading_known_) {
-    heading_known_ = true;
-    heading_rad_ = *calibration.heading_deg * kRadPerDeg;
-    heading_at_ = t;
-  }
-  const double since_s = to_seconds(t - heading_at_);
-  heading_at_ = std::max(heading_at_, t);
-  if (since_s <= 0.0 || since_s > kHeadingLeap_s) return;
-  // Compasses count clockwise, gyros the other way.
-  heading_rad_ -= rate_dps_[2] * kRadPerDeg * since_s;
-  const double north_dps = kEarthRate_dps * std::cos(*calibration.latitude_deg * kRadPerDeg);
+  if (!heading_.is_told()) return;
+  begin(t);
+  const bool rests = std::none_of(axes_.begin(), axes_.end(),
+                                  [](const auto& axis) { return axis->estimator().calibrated(); });
+  heading_.follow(t, turn_about_z(), rests);
+  share_heading();
+}
+
+std::optional<Heading::Turn> UnitPipeline::turn_about_z() {
+  AxisPipeline& axis = *axes_.back();
+  const State state = axis.status().state;
+  const bool speaks = state == State::kRunning || state == State::kDegraded;
+  if (axis.plan().axis != 2 || !speaks || !std::isfinite(axis.rate_dps())) return std::nullopt;
+  return Heading::Turn{.rate_dps = axis.rate_dps(),
+                       .sigma_dps = finite_or_0(axis.sigma_dps()),
+                       .bias_sigma_dps = finite_or_0(axis.bias_sigma_dps())};
+}
+
+// What is learned at a stop, or in a calibration, is as wrong as what is expected of the Earth
+// then.
+void UnitPipeline::share_heading() {
   for (const auto& axis : axes_) {
-    if (axis->plan().axis == 0) axis->estimator().set_stop_rate(north_dps * std::cos(heading_rad_));
-    if (axis->plan().axis == 1) axis->estimator().set_stop_rate(north_dps * std::sin(heading_rad_));
+    const std::size_t about = axis->plan().axis;
+    if (about == 2) continue;
+    Estimator& estimator = axis->estimator();
+    const double rate_dps = heading_.earth_rate_dps(about);
+    const double doubt_dps = heading_.earth_doubt_dps(about);
+    estimator.set_stop_rate(rate_dps);
+    if (!estimator.calibrated()) {
+      axis->set_earth_doubt(std::hypot(doubt_dps, rate_dps - axis->plan().calibration.rate_dps));
+    } else if (estimator.condition().stopped) {
+      axis->set_earth_doubt(doubt_dps);
+    }
   }
 }
 
@@ -408,13 +432,22 @@ std::optional<SavedState> UnitPipeline::memory() const {
     auto state = axis->memory();
     if (!state) continue;
     state->axis = axis->plan().axis;
+    state->earth_doubt_dps = axis->earth_doubt_dps();
     axes.push_back(std::move(*state));
   }
   if (axes.empty()) return std::nullopt;
   SavedState all = axes.front();
   all.axes = std::move(axes);
   if (learns_misalignment_) all.misalignment = begun_ || !saved_ ? misalignment_.memory() : *saved_;
+  all.heading = heading_.memory();
   return all;
+}
+
+// An older state does not say where the vehicle pointed when it learned.
+double UnitPipeline::doubt_of(const SavedState& state, const Plan& pair) const {
+  if (state.earth_doubt_dps) return std::max(*state.earth_doubt_dps, pair.calibration.doubt_dps);
+  const bool turns = heading_.is_told() && pair.axis != 2;
+  return turns ? heading_.north_dps() / std::numbers::sqrt2 : pair.calibration.doubt_dps;
 }
 
 Expected<void> UnitPipeline::resume(const SavedState& state) {
@@ -423,8 +456,11 @@ Expected<void> UnitPipeline::resume(const SavedState& state) {
     for (const auto& axis : axes_) {
       if (axis->plan().axis != one.axis) continue;
       if (auto taken = axis->resume(one); !taken) return taken;
+      axis->set_earth_doubt(doubt_of(one, axis->plan()));
     }
   }
+  resumed_ = true;
+  heading_.resume(state.heading);
   saved_ = state.misalignment;
   saved_stamp_ = state.rate_stamp;
   return {};

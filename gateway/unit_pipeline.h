@@ -17,6 +17,7 @@
 #include "fusion/misalignment.h"
 #include "gateway/axis_pipeline.h"
 #include "gateway/frame_sink.h"
+#include "gateway/heading.h"
 #include "gateway/output_frames.h"
 #include "gateway/output_layout.h"
 #include "gateway/plan.h"
@@ -100,11 +101,15 @@ class UnitPipeline {
   void note_rates(const Pairs& pairs);
   void learn_misalignment(const Pairs& pairs);
   void begin(TimePoint t);
+  [[nodiscard]] double age_s(TimePoint t) const;
+  [[nodiscard]] double doubt_of(const SavedState& state, const Plan& pair) const;
   void set_cross(std::size_t place);
   void note_single(std::size_t gyro, std::size_t place, double rate_dps);
   void share_motion();
   void share_restarts();
   void follow_heading(TimePoint t);
+  [[nodiscard]] std::optional<Heading::Turn> turn_about_z();
+  void share_heading();
 
   Plan plan_;
   Router router_;
@@ -121,13 +126,12 @@ class UnitPipeline {
   bool begun_ = false;
   std::optional<fusion::MisalignmentMemory> saved_;
   TimePoint saved_stamp_;
+  bool resumed_ = false;
   Pairs waiting_;  ///< for the pairs of the other axes
 
   std::array<fusion::Elsewhere, kAxes> told_{};
   std::array<std::uint64_t, kAxes> restarts_{};
-  double heading_rad_ = 0.0;  ///< clockwise from north
-  TimePoint heading_at_;
-  bool heading_known_ = false;
+  Heading heading_;
   Status status_;
 };
 

@@ -9,6 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "gateway/config.h"
+#include "gateway/heading.h"
 #include "gateway/input_frames.h"
 #include "gateway/pipeline.h"
 #include "gateway/saved_state.h"
@@ -56,13 +57,14 @@ std::string gyro_text(const char* name, const char* message) {
 }
 
 /// A configuration of its own folder, read as users' are.
-Plan plan_of(const std::string& output = "") {
+Plan plan_of(const std::string& output = "",
+             const std::string& calibration = "rate_dps = [0.0, 0.0, 0.0]") {
   std::string folder = std::filesystem::temp_directory_path() / "vgyro-units-XXXXXX";
   if (::mkdtemp(folder.data()) == nullptr) std::abort();
   std::ofstream(folder + "/units.dbc") << kUnits;
   std::ofstream(folder + "/vgyro.toml")
-      << gyro_text("left", "IMU_A") << gyro_text("right", "IMU_B")
-      << "[calibration]\nrest_s = 20\nrate_dps = [0.0, 0.0, 0.0]\n[output]\nbus = \"can0\"\n"
+      << gyro_text("left", "IMU_A") << gyro_text("right", "IMU_B") << "[calibration]\nrest_s = 20\n"
+      << calibration << "\n[output]\nbus = \"can0\"\n"
       << output;
   auto loaded = load_config(folder + "/vgyro.toml");
   std::filesystem::remove_all(folder);
@@ -331,6 +333,164 @@ TEST(UnitPipeline, GoesOnCountingWhereALayoutGetsMoreAxes) {
                                                bus.last_of_layout.data[2 * axis + 1] << 8U);
     EXPECT_NEAR(raw * 0.01, second.axis_status(axis).rate_dps, 0.005 + 1e-9) << axis;
   }
+}
+
+// --- the heading ---------------------------------------------------------------------------------
+
+constexpr double kLatitude_deg = 50.0;
+constexpr const char* kNorthwards = "latitude_deg = 50.0\nheading_deg = 0.0";
+// IERS: 7.292115e-5 rad/s.
+constexpr double kEarth_dps = 7.292115e-5 / kRadPerDeg;
+
+double north_dps() {
+  return kEarth_dps * std::cos(kLatitude_deg * kRadPerDeg);
+}
+
+/// What the Earth adds where x points so, clockwise from north.
+Rates on_earth(double heading_deg, double about_z_dps) {
+  return {north_dps() * std::cos(heading_deg * kRadPerDeg),
+          north_dps() * std::sin(heading_deg * kRadPerDeg),
+          kEarth_dps * std::sin(kLatitude_deg * kRadPerDeg) + about_z_dps};
+}
+
+/// Northwards at rest, then about to the south within ten seconds, and at rest again; an hour later
+/// somebody has turned the platform to the east.
+Rates goes_south(double t_s) {
+  if (t_s < 30.0) return on_earth(0.0, 0.0);
+  if (t_s < 40.0) return on_earth(18.0 * (t_s - 30.0), -18.0);
+  return t_s < 3600.0 ? on_earth(180.0, 0.0) : on_earth(90.0, 0.0);
+}
+
+constexpr World kOnEarth{.rate = goes_south, .noise_dps = 0.002};
+
+/// Biases of both units about x that a stop has left, less those that they have; the second unit
+/// is judged by its own.
+double off_after(const Pipeline& pipeline) {
+  const Status& x = pipeline.axis_status(0);
+  EXPECT_GT(x.stops, 0U);
+  return 0.5 * (x.gyros[0].bias_dps - kOnEarth.first_bias[0] + x.gyros[1].bias_dps -
+                kOnEarth.second_bias[0]);
+}
+
+TEST(UnitHeading, TurnsTheEarthAtAStop) {
+  const Plan plan = plan_of("", kNorthwards);
+  Pipeline pipeline(plan);
+  Bus bus;
+  play(kOnEarth, plan, 0.0, 160.0, pipeline, bus);
+  // Learned with the Earth as it was to the north it would be off by twice its rate.
+  EXPECT_LT(std::abs(off_after(pipeline)), 0.3 * north_dps());
+  EXPECT_LT(pipeline.axis_status(0).sigma_dps, 0.5 * north_dps() + kOnEarth.noise_dps);
+}
+
+// A reload, or a service that is started again at once: the heading is what it was.
+TEST(UnitHeading, IsKeptThroughAShortRestart) {
+  const Plan plan = plan_of("", kNorthwards);
+  Pipeline first(plan);
+  Bus bus;
+  play(kOnEarth, plan, 0.0, 42.0, first, bus);
+  const auto read = saved_state_from(to_text(*first.memory()), "state");
+  ASSERT_TRUE(read) << read.error().message();
+  ASSERT_TRUE(read->heading);
+  EXPECT_NEAR(std::abs(read->heading->heading_rad), std::numbers::pi, 0.03);
+  EXPECT_LT(read->heading->sigma_rad, 0.1);
+  Pipeline second(plan);
+  ASSERT_TRUE(second.resume(*read));
+  play(kOnEarth, plan, 42.2, 160.0, second, bus, 8);
+  EXPECT_LT(std::abs(off_after(second)), 0.3 * north_dps());
+}
+
+// After an hour nobody knows where it points: what a stop teaches then may be wrong by the Earth's
+// rate, and σ says so; before that stop it is as good as it was.
+TEST(UnitHeading, IsInSigmaAfterALongRestart) {
+  const Plan plan = plan_of("", kNorthwards);
+  Pipeline first(plan);
+  Bus bus;
+  play(kOnEarth, plan, 0.0, 100.0, first, bus);
+  const SavedState state = *first.memory();
+  for (const bool older : {false, true}) {
+    SCOPED_TRACE(older ? "of an older release" : "of this one");
+    SavedState kept = state;
+    if (older) {
+      kept.heading.reset();
+      for (SavedState& axis : kept.axes)
+        axis.earth_doubt_dps.reset();
+    }
+    Pipeline second(plan);
+    ASSERT_TRUE(second.resume(kept));
+    Judge judge(kOnEarth, 0);
+    second.observe_output(&judge, 0);
+    play(kOnEarth, plan, 3700.0, 3703.0, second, bus, 8);
+    const double doubt_dps = north_dps() / std::numbers::sqrt2;
+    const double white_dps = 0.5 * kOnEarth.noise_dps * kOnEarth.noise_dps;
+    const auto sigma = [&] { return second.axis_status(0).sigma_dps; };
+    if (older) {
+      EXPECT_GT(sigma(), 0.99 * doubt_dps);
+    }
+    play(kOnEarth, plan, 3703.0, 3860.0, second, bus, 9);
+    EXPECT_GT(sigma(), 0.99 * doubt_dps);
+    EXPECT_LT(sigma(), 1.2 * std::sqrt(doubt_dps * doubt_dps + white_dps));
+    EXPECT_LT(std::abs(off_after(second)), 3.0 * doubt_dps);
+    // What a third run takes up is as doubtful.
+    const auto memory = second.memory();
+    ASSERT_TRUE(memory);
+    EXPECT_GT(memory->axes[0].earth_doubt_dps.value_or(0.0), 0.99 * doubt_dps);
+    EXPECT_EQ(memory->axes[2].earth_doubt_dps.value_or(1.0), 0.0) << "z needs no heading";
+  }
+}
+
+// The law against throws of a dice: mean and spread of the Earth's rate over headings that may be.
+TEST(UnitHeading, HasTheMeanAndSpreadOfItsDoubt) {
+  constexpr std::uint64_t kSeed = 3;
+  std::mt19937_64 engine(kSeed);
+  CalibrationPlan calibration;
+  calibration.latitude_deg = kLatitude_deg;
+  calibration.heading_deg = 0.0;
+  for (const double sigma_rad : {0.0, 0.2, 1.0, Heading::kSigmaMost_rad}) {
+    for (const double heading_rad : {0.0, 0.7, -2.5}) {
+      Heading heading(calibration);
+      heading.resume(HeadingMemory{.heading_rad = heading_rad, .sigma_rad = sigma_rad});
+      std::normal_distribution<double> may_be(heading_rad, std::max(sigma_rad, 1e-12));
+      constexpr int kThrows = 200'000;
+      std::array<double, 2> sum{};
+      std::array<double, 2> squares{};
+      for (int i = 0; i < kThrows; ++i) {
+        const double one = may_be(engine);
+        const std::array<double, 2> rate_dps{north_dps() * std::cos(one),
+                                             north_dps() * std::sin(one)};
+        for (std::size_t axis = 0; axis < 2; ++axis) {
+          sum[axis] += rate_dps[axis];
+          squares[axis] += rate_dps[axis] * rate_dps[axis];
+        }
+      }
+      for (std::size_t axis = 0; axis < 2; ++axis) {
+        const double mean = sum[axis] / kThrows;
+        const double spread = std::sqrt(std::max(squares[axis] / kThrows - mean * mean, 0.0));
+        const double off = 5.0 * north_dps() / std::sqrt(kThrows);
+        EXPECT_NEAR(heading.earth_rate_dps(axis), mean, off) << sigma_rad << ' ' << heading_rad;
+        EXPECT_NEAR(heading.earth_doubt_dps(axis), spread, off) << sigma_rad << ' ' << heading_rad;
+      }
+    }
+  }
+}
+
+TEST(UnitHeading, IsLostWhileNobodyTellsTheTurns) {
+  CalibrationPlan calibration;
+  calibration.latitude_deg = kLatitude_deg;
+  calibration.heading_deg = 0.0;
+  Heading heading(calibration);
+  const Heading::Turn turn{.rate_dps = 9.0, .sigma_dps = 0.01, .bias_sigma_dps = 1e-4};
+  TimePoint t = kStart;
+  for (int i = 0; i < 500; ++i, t += kInterval)
+    heading.follow(t, std::nullopt, true);
+  EXPECT_EQ(heading.earth_doubt_dps(0), 0.0) << "at rest it does not turn";
+  for (int i = 0; i < 500; ++i, t += kInterval)
+    heading.follow(t, turn, false);
+  // To the left by 90 deg is to the west.
+  EXPECT_NEAR(heading.earth_rate_dps(1), -north_dps(), 1e-3 * north_dps());
+  EXPECT_LT(heading.earth_doubt_dps(0), 0.01 * north_dps());
+  heading.follow(t + std::chrono::minutes(2), turn, false);
+  EXPECT_NEAR(heading.earth_rate_dps(1), 0.0, 1e-3 * north_dps());
+  EXPECT_NEAR(heading.earth_doubt_dps(0), north_dps() / std::numbers::sqrt2, 1e-3 * north_dps());
 }
 
 }  // namespace
