@@ -126,10 +126,11 @@ bool AxisPipeline::offer(std::size_t gyro, const Reading& reading, double rate_d
   return true;
 }
 
-// Whatever is wrong with the other axis is wrong with this one as far as anybody can tell.
-void AxisPipeline::go_without(std::size_t gyro, TimePoint t) {
-  attendance_.judge_refused(gyro, t, Reject::kFlaggedInvalid);
-  refuse(gyro, Reject::kFlaggedInvalid, t);
+// Nothing is wrong with the sensor's own axis here, and others may need it.
+void AxisPipeline::go_without(std::size_t gyro, TimePoint t, bool other_is_sick) {
+  ++status_.gyros[gyro].rejected[static_cast<std::size_t>(Reject::kOtherAxis)];
+  if (attendance_.go_without(gyro, other_is_sick)) carry_on_without(gyro, t);
+  if (t >= deadline_) do_what_is_due(t);
 }
 
 // A frame without a sample. One that is sick tells of its gyro where its stamp can be believed;

@@ -80,8 +80,9 @@ class AxisPipeline {
   };
   /// False where the frame gives none; that is dealt with then.
   bool admit(std::size_t gyro, const can::Frame& frame, TimePoint stamp, Reading& reading);
-  /// Of an axis that cannot be told, because another axis of its unit is set aside.
-  void go_without(std::size_t gyro, TimePoint t);
+  /// Of an axis that cannot be told, because another one of its unit is not: for that is sick, or
+  /// what it said last is too old.
+  void go_without(std::size_t gyro, TimePoint t, bool other_is_sick);
   /// The reading, turned into the vehicle's axes. False where it comes too late to be used.
   bool offer(std::size_t gyro, const Reading& reading, double rate_dps);
   /// The next pair; to be followed by take_pair().
@@ -115,6 +116,12 @@ class AxisPipeline {
   [[nodiscard]] const Status& status() const { return status_; }
   [[nodiscard]] bool in_use(std::size_t gyro) const { return attendance_.in_use(gyro); }
   [[nodiscard]] bool pairing() const { return attendance_.pairing(); }
+  /// Its own sensor axis may not be used for now.
+  [[nodiscard]] bool set_aside(std::size_t gyro) const { return attendance_.set_aside(gyro); }
+  /// Between its samples; 0 while nobody knows.
+  [[nodiscard]] Duration interval(std::size_t gyro) const {
+    return aligner_.chosen() ? attendance_.usual_interval(gyro) : Duration::zero();
+  }
 
  private:
   /// Code of its own for each gyro, to which the places of all that belongs to it are constants,

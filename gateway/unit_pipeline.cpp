@@ -122,6 +122,7 @@ UnitPipeline::Unit UnitPipeline::unit_of(std::size_t gyro) const {
       const GyroPlan& sensor = plan_.axes[other].gyros[gyro];
       const double share = plan_.gyros[gyro].mount.at(plan_.axes[place].axis, sensor.sensor_axis);
       unit.share[place][other] = sensor.flipped ? -share : share;
+      unit.together[place][other] = sensor.match == plan_.axes[place].gyros[gyro].match;
       unit.turns = unit.turns || unit.share[place][other] != (place == other ? 1.0 : 0.0);
     }
   }
@@ -162,17 +163,19 @@ void UnitPipeline::receive_unit(std::size_t gyro, std::uint8_t role,
   for (std::size_t place = 0; place < axes_.size(); ++place) {
     if ((roles[place] & role) == 0) continue;
     heard[place] = axes_[place]->admit(gyro, frame, stamp, readings[place]);
-    unit.known[place] = heard[place];
-    if (heard[place]) unit.reading_dps[place] = readings[place].rate_dps;
+    if (!heard[place]) continue;
+    unit.reading_dps[place] = readings[place].rate_dps;
+    unit.read_at[place] = stamp;
   }
   std::array<double, kAxes> rate_dps{};
   for (std::size_t place = 0; place < axes_.size(); ++place) {
     if (!heard[place]) continue;
-    const std::optional<double> rate =
-        unit.turns ? turned(gyro, place) : std::optional(readings[place].rate_dps);
-    if (!rate) axes_[place]->go_without(gyro, readings[place].t);
-    heard[place] = rate && axes_[place]->offer(gyro, readings[place], *rate);
-    rate_dps[place] = rate.value_or(0.0);
+    rate_dps[place] = readings[place].rate_dps;
+    const Worth worth = unit.turns ? turn(gyro, place, stamp, rate_dps[place]) : Worth::kNew;
+    if (worth != Worth::kNew)
+      axes_[place]->go_without(gyro, readings[place].t, worth == Worth::kSick);
+    heard[place] =
+        worth == Worth::kNew && axes_[place]->offer(gyro, readings[place], rate_dps[place]);
   }
   for (std::size_t place = 0; place < axes_.size(); ++place) {
     if (heard[place]) axes_[place]->arrive(gyro, readings[place].t);
@@ -186,22 +189,36 @@ void UnitPipeline::receive_unit(std::size_t gyro, std::uint8_t role,
   }
 }
 
-// In place of a sensor axis that is set aside, and has little to say here, stands what is known of
-// the vehicle's rate about it.
-std::optional<double> UnitPipeline::turned(std::size_t gyro, std::size_t place) const {
+UnitPipeline::Worth UnitPipeline::worth(std::size_t gyro, std::size_t place, std::size_t other,
+                                        TimePoint stamp) const {
   const Unit& unit = units_[gyro];
-  double rate_dps = 0.0;
+  if (axes_[other]->set_aside(gyro)) return Worth::kSick;
+  const Duration age = span(unit.read_at[other], stamp);
+  if (unit.together[place][other]) return age == Duration::zero() ? Worth::kNew : Worth::kOld;
+  const Duration interval = axes_[other]->interval(gyro);
+  const Duration most = interval > Duration::zero() ? interval + interval / 2 : kApartMost;
+  return age <= most && age >= -most ? Worth::kNew : Worth::kOld;
+}
+
+// In place of a sensor axis that has little to say here, and nothing new, stands what is known of
+// the vehicle's rate about it.
+UnitPipeline::Worth UnitPipeline::turn(std::size_t gyro, std::size_t place, TimePoint stamp,
+                                       double& rate_dps) const {
+  const Unit& unit = units_[gyro];
+  Worth all = Worth::kNew;
+  rate_dps = 0.0;
   for (std::size_t other = 0; other < axes_.size(); ++other) {
     const double share = unit.share[place][other];
-    if (unit.known[other]) {
+    const Worth one = share == 0.0 ? Worth::kNew : worth(gyro, place, other, stamp);
+    if (one == Worth::kNew) {
       rate_dps += share * unit.reading_dps[other];
     } else if (std::abs(share) > kShareMissed) {
-      return std::nullopt;
+      all = std::max(all, one);
     } else {
       rate_dps += share * rate_dps_[plan_.axes[other].axis];
     }
   }
-  return rate_dps;
+  return all;
 }
 
 // --- rates ---------------------------------------------------------------------------------------

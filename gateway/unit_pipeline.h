@@ -79,9 +79,13 @@ class UnitPipeline {
   struct Unit {
     std::array<std::array<double, kAxes>, kAxes> share{};
     bool turns = false;
+    /// Both axes stand in one message.
+    std::array<std::array<bool, kAxes>, kAxes> together{};
     std::array<double, kAxes> reading_dps{};
-    std::array<bool, kAxes> known{};
+    std::array<TimePoint, kAxes> read_at{};  ///< stamp of the reading
   };
+  /// What a reading is worth to another axis.
+  enum class Worth : std::uint8_t { kNew, kOld, kSick };
   class Turn;
 
   /// Between the two, what concerns all axes goes to this sink.
@@ -94,8 +98,10 @@ class UnitPipeline {
   void receive_unit(std::size_t gyro, std::uint8_t role,
                     const std::array<std::uint8_t, kAxes>& roles, const can::Frame& frame,
                     TimePoint stamp);
-  /// The rate about an axis of the vehicle; nothing where what is missing matters there.
-  [[nodiscard]] std::optional<double> turned(std::size_t gyro, std::size_t place) const;
+  [[nodiscard]] Worth worth(std::size_t gyro, std::size_t place, std::size_t other,
+                            TimePoint stamp) const;
+  /// The rate about an axis of the vehicle. Where what is missing matters there: kOld or kSick.
+  Worth turn(std::size_t gyro, std::size_t place, TimePoint stamp, double& rate_dps) const;
   void take_pairs();
   void take_round(Pairs& pairs);
   void note_rates(const Pairs& pairs);

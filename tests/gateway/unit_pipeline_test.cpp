@@ -3,9 +3,11 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <numbers>
 #include <random>
 
+#include <fmt/core.h>
 #include <gtest/gtest.h>
 
 #include "gateway/config.h"
@@ -14,6 +16,7 @@
 #include "gateway/pipeline.h"
 #include "gateway/saved_state.h"
 #include "tests/gateway/counting_new.h"
+#include "tests/gateway/rig.h"
 
 namespace vgyro::gateway {
 namespace {
@@ -333,6 +336,273 @@ TEST(UnitPipeline, GoesOnCountingWhereALayoutGetsMoreAxes) {
                                                bus.last_of_layout.data[2 * axis + 1] << 8U);
     EXPECT_NEAR(raw * 0.01, second.axis_status(axis).rate_dps, 0.005 + 1e-9) << axis;
   }
+}
+
+// --- what is wrong with a frame, and with an axis
+// -------------------------------------------------
+
+/// Units whose axes have messages of their own, 0x11n and 0x12n, each with counter and check value.
+std::string own_messages_dbc() {
+  std::string text = "VERSION \"\"\n\nBU_: RIG\n";
+  for (int unit = 1; unit <= 2; ++unit) {
+    for (int axis = 0; axis < 3; ++axis) {
+      text += fmt::format(
+          "\nBO_ {} UNIT{}_{}: 8 RIG\n SG_ Rate : 0|32@1- (1E-006,0) [-2000|2000] \"deg/s\" RIG\n"
+          " SG_ Counter : 32|4@1+ (1,0) [0|15] \"\" RIG\n SG_ Crc : 56|8@1+ (1,0) [0|255] \"\" "
+          "RIG\n",
+          0x100 + 0x10 * unit + axis, unit, "XYZ"[axis]);
+    }
+  }
+  return text;
+}
+
+Plan own_messages(const std::string& second_mount = "") {
+  std::string text;
+  for (int unit = 1; unit <= 2; ++unit) {
+    text += fmt::format(
+        "[[gyro]]\nname = \"{0}\"\nbus = \"can0\"\ndbc = \"units.dbc\"\n"
+        "message = \"UNIT{0}_X\"\n{1}\n",
+        unit, unit == 2 ? second_mount : "");
+    for (const char axis : {'x', 'y', 'z'}) {
+      text += fmt::format(
+          "[[gyro.axis]]\naxis = \"{}\"\nmessage = \"UNIT{}_{}\"\nrate = \"Rate\"\n"
+          "counter = \"Counter\"\ncrc = \"Crc\"\ne2e = \"crc8_j1850\"\n",
+          axis, unit, static_cast<char>(axis - 'x' + 'X'));
+    }
+  }
+  text += "[calibration]\nrest_s = 20\nrate_dps = [0.0, 0.0, 0.0]\n[output]\nbus = \"can0\"\n";
+  std::string folder = std::filesystem::temp_directory_path() / "vgyro-units-XXXXXX";
+  if (::mkdtemp(folder.data()) == nullptr) std::abort();
+  std::ofstream(folder + "/units.dbc") << own_messages_dbc();
+  std::ofstream(folder + "/vgyro.toml") << text;
+  auto loaded = load_config(folder + "/vgyro.toml");
+  std::filesystem::remove_all(folder);
+  if (!loaded) throw std::runtime_error(loaded.error().front().message());
+  return std::move(loaded->plan);
+}
+
+/// What becomes of a frame of unit 0 or 1 about a sensor's axis; false: it is lost.
+using Spoil =
+    std::function<bool(std::size_t unit, std::size_t axis, double t_s, can::Frame& frame)>;
+
+/// Each axis in a message of its own, 1 ms after each other; unit 2 is mounted as its plan says.
+void play_apart(const World& world, const Plan& plan, double from_s, double to_s,
+                Pipeline& pipeline, FrameSink& sink, const Spoil& spoil, std::uint64_t seed = 7) {
+  std::mt19937_64 engine(seed);
+  std::normal_distribution<double> noise(0.0, world.noise_dps);
+  const auto first = static_cast<int>(from_s / to_seconds(kInterval));
+  const auto last = static_cast<int>(to_s / to_seconds(kInterval));
+  for (int n = first; n < last; ++n) {
+    for (std::size_t unit = 0; unit < 2; ++unit) {
+      for (const GyroPlan& axis : plan.gyros[unit].axes) {
+        const auto late = std::chrono::milliseconds(static_cast<int>(axis.sensor_axis + 5 * unit));
+        const TimePoint t = kStart + n * kInterval + late;
+        const double t_s = to_seconds(t - kStart);
+        const Rates w = world.rate(t_s);
+        double reading = noise(engine);
+        reading += (unit == 0 ? world.first_bias : world.second_bias)[axis.sensor_axis];
+        // The sensor feels the vehicle's rate turned back.
+        for (std::size_t i = 0; i < 3; ++i)
+          reading += plan.gyros[unit].mount.at(i, axis.sensor_axis) * w[i];
+        can::Frame frame = empty_frame(axis.match);
+        put_gyro(axis, reading, static_cast<std::uint64_t>(n), frame);
+        seal(axis.e2e, frame);
+        if (spoil(unit, axis.sensor_axis, t_s, frame)) pipeline.receive(0, frame, t, sink);
+      }
+    }
+  }
+}
+
+/// The state about each axis, and whether a rate is ever further off than σ allows.
+struct Outcome {
+  std::array<State, 3> during{};
+  std::array<State, 3> after{};
+  std::array<double, 3> normalised{};
+};
+
+constexpr double kSpoiltFrom_s = 90.0;
+constexpr double kSpoiltTo_s = 120.0;
+
+Outcome outcome_of(const Plan& plan, Pipeline& pipeline, const Spoil& spoil) {
+  static const World world{.rate = drives};
+  Bus bus;
+  std::array<Judge, 3> judges{Judge(world, 0), Judge(world, 1), Judge(world, 2)};
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    pipeline.observe_output(&judges[axis], axis);
+  const Spoil meanwhile = [&](std::size_t unit, std::size_t axis, double t_s, can::Frame& frame) {
+    return t_s < kSpoiltFrom_s || t_s >= kSpoiltTo_s || spoil(unit, axis, t_s, frame);
+  };
+  Outcome outcome;
+  play_apart(world, plan, 0.0, kSpoiltTo_s - 1.0, pipeline, bus, meanwhile);
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    outcome.during[axis] = pipeline.axis_status(axis).state;
+  play_apart(world, plan, kSpoiltTo_s - 1.0, kSpoiltTo_s + 20.0, pipeline, bus, meanwhile, 8);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    outcome.after[axis] = pipeline.axis_status(axis).state;
+    outcome.normalised[axis] = judges[axis].normalised();
+    EXPECT_GT(judges[axis].count, 5'000.0) << axis;
+  }
+  return outcome;
+}
+
+constexpr std::array kAllRunning{State::kRunning, State::kRunning, State::kRunning};
+
+std::uint64_t refused(Pipeline& pipeline, std::size_t axis, std::size_t gyro, Reject cause) {
+  return pipeline.axis_status(axis).gyros[gyro].rejected[static_cast<std::size_t>(cause)];
+}
+
+// What is wrong with a frame is wrong with all that stands in it: with three axes in one message
+// the unit is set aside, …
+TEST(UnitFaults, AFaultOfTheFrameIsOfAllAxesInIt) {
+  const Plan plan = plan_of();
+  const World world{.rate = drives};
+  Pipeline pipeline(plan);
+  Bus bus;
+  play(world, plan, 0.0, 60.0, pipeline, bus);
+  std::mt19937_64 engine(5);
+  std::normal_distribution<double> noise(0.0, world.noise_dps);
+  can::Frame frozen = empty_frame(plan.gyros[1].match);
+  put_unit(plan, 1, {1.0, 1.0, 1.0}, 3000 % 256, frozen);
+  can::Frame good = empty_frame(plan.gyros[0].match);
+  for (int n = 3000; n < 3050; ++n) {
+    put_unit(plan, 0, {0.1 + noise(engine), -0.2 + noise(engine), 0.3 + noise(engine)}, n, good);
+    pipeline.receive(0, good, kStart + n * kInterval, bus);
+    pipeline.receive(0, frozen, kStart + n * kInterval + kInterval / 3, bus);
+  }
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    EXPECT_EQ(pipeline.axis_status(axis).state, State::kDegraded) << axis;
+    EXPECT_EQ(pipeline.axis_status(axis).gyros[1].fault, Fault::kCounterStuck) << axis;
+    EXPECT_EQ(refused(pipeline, axis, 1, Reject::kCounterRepeated), 49U) << axis;
+  }
+}
+
+// … and of axes in messages of their own the one whose message it is.
+TEST(UnitFaults, AFaultOfAnAxisOwnFrameLeavesTheOtherAxes) {
+  struct Case {
+    const char* name;
+    Reject cause;
+    Spoil spoil;
+  };
+  const Plan plan = own_messages();
+  const auto of_z = [](std::size_t unit, std::size_t axis) { return unit == 1 && axis == 2; };
+  const std::array cases{Case{"check value", Reject::kCrcWrong,
+                              [&](std::size_t unit, std::size_t axis, double, can::Frame& frame) {
+                                if (of_z(unit, axis)) frame.data[7] ^= 0x5A;
+                                return true;
+                              }},
+                         Case{"counter", Reject::kCounterRepeated,
+                              [&](std::size_t unit, std::size_t axis, double, can::Frame& frame) {
+                                if (!of_z(unit, axis)) return true;
+                                frame.data[4] = 3;
+                                seal(plan.gyros[1].axes[2].e2e, frame);
+                                return true;
+                              }},
+                         Case{"length", Reject::kTruncated,
+                              [&](std::size_t unit, std::size_t axis, double, can::Frame& frame) {
+                                if (of_z(unit, axis)) frame.length = 3;
+                                return true;
+                              }}};
+  for (const Case& one : cases) {
+    SCOPED_TRACE(one.name);
+    Pipeline pipeline(plan);
+    const Outcome outcome = outcome_of(plan, pipeline, one.spoil);
+    EXPECT_EQ(outcome.during, (std::array{State::kRunning, State::kRunning, State::kDegraded}));
+    EXPECT_EQ(outcome.after, kAllRunning);
+    EXPECT_GT(refused(pipeline, 2, 1, one.cause), 1'000U);
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      EXPECT_LT(outcome.normalised[axis], 1.3) << axis;
+      if (axis < 2) {
+        EXPECT_EQ(rig::rejected_total(pipeline.axis_status(axis).gyros[1]), 0U) << axis;
+      }
+    }
+  }
+}
+
+// A clip is the sensor axis's own, whatever message it stands in.
+TEST(UnitFaults, AClippedAxisIsSetAsideAlone) {
+  const Plan plan = own_messages();
+  Pipeline pipeline(plan);
+  const GyroPlan& z = plan.gyros[1].axes[2];
+  int n = 0;
+  const Outcome outcome = outcome_of(
+      plan, pipeline, [&](std::size_t unit, std::size_t axis, double, can::Frame& frame) {
+        if (unit != 1 || axis != 2) return true;
+        put_gyro(z, 2000.0, static_cast<std::uint64_t>(n++), frame);
+        seal(z.e2e, frame);
+        return true;
+      });
+  EXPECT_EQ(outcome.during, (std::array{State::kRunning, State::kRunning, State::kDegraded}));
+  EXPECT_EQ(outcome.after, kAllRunning);
+  EXPECT_GT(
+      pipeline.axis_status(2).gyros[1].faults[static_cast<std::size_t>(Fault::kSaturated)].times,
+      0U);
+  EXPECT_LT(outcome.normalised[2], 1.3);
+}
+
+// A mount mixes y and z. A reading of z that is no longer new must not stand for one, or the rate
+// about y would be wrong by a third of what the platform turns.
+TEST(UnitFaults, AMountMixesNoReadingThatIsOld) {
+  const Plan plan = own_messages("mount = [20, 0, 0]");
+  struct Case {
+    const char* name;
+    Spoil spoil;
+  };
+  const std::array cases{
+      Case{"silent", [](std::size_t unit, std::size_t axis, double,
+                        can::Frame&) { return unit != 1 || axis != 2; }},
+      Case{"check value", [](std::size_t unit, std::size_t axis, double, can::Frame& frame) {
+             if (unit == 1 && axis == 2) frame.data[7] ^= 0x5A;
+             return true;
+           }}};
+  for (const Case& one : cases) {
+    SCOPED_TRACE(one.name);
+    Pipeline pipeline(plan);
+    const Outcome outcome = outcome_of(plan, pipeline, one.spoil);
+    // About x the unit still tells all; about y and z it does not.
+    EXPECT_EQ(outcome.during, (std::array{State::kRunning, State::kDegraded, State::kDegraded}));
+    EXPECT_EQ(outcome.after, kAllRunning);
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      EXPECT_LT(outcome.normalised[axis], 1.5) << axis;
+  }
+}
+
+// An axis that was sick and is well again must not find the ones that went without it sick.
+TEST(UnitFaults, AMixedUnitComesBackWhole) {
+  const Plan plan = own_messages("mount = [20, 0, 0]");
+  Pipeline pipeline(plan);
+  const GyroPlan& y = plan.gyros[1].axes[1];
+  int n = 0;
+  const Outcome outcome = outcome_of(
+      plan, pipeline, [&](std::size_t unit, std::size_t axis, double, can::Frame& frame) {
+        if (unit != 1 || axis != 1) return true;
+        put_gyro(y, 0.5, static_cast<std::uint64_t>(n++), frame);
+        seal(y.e2e, frame);
+        return true;
+      });
+  EXPECT_EQ(outcome.during, (std::array{State::kRunning, State::kDegraded, State::kDegraded}));
+  EXPECT_EQ(outcome.after, kAllRunning);
+  const Status& z = pipeline.axis_status(2);
+  EXPECT_EQ(z.gyros[1].faults[static_cast<std::size_t>(Fault::kStuck)].times, 0U);
+  EXPECT_GT(refused(pipeline, 2, 1, Reject::kOtherAxis), 1'000U);
+}
+
+// One frame that is lost is a hole, and no sickness of anybody.
+TEST(UnitFaults, ALostFrameOfAMixedAxisSetsNobodyAside) {
+  const Plan plan = own_messages("mount = [20, 0, 0]");
+  Pipeline pipeline(plan);
+  int n = 0;
+  const Outcome outcome = outcome_of(
+      plan, pipeline, [&](std::size_t unit, std::size_t axis, double, can::Frame& frame) {
+        if (unit == 1 && axis == 2 && ++n % 100 == 0) frame.data[7] ^= 0x5A;
+        return true;
+      });
+  EXPECT_EQ(outcome.during, kAllRunning);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    for (const FaultRecord& record : pipeline.axis_status(axis).gyros[1].faults)
+      EXPECT_EQ(record.times, 0U) << axis;
+    EXPECT_LT(outcome.normalised[axis], 1.3) << axis;
+  }
+  EXPECT_GT(refused(pipeline, 2, 1, Reject::kCrcWrong), 10U);
 }
 
 // --- the heading ---------------------------------------------------------------------------------
