@@ -120,7 +120,7 @@ class AxisPipeline {
   [[nodiscard]] bool set_aside(std::size_t gyro) const { return attendance_.set_aside(gyro); }
   /// Between its samples; 0 while nobody knows.
   [[nodiscard]] Duration interval(std::size_t gyro) const {
-    return aligner_.chosen() ? attendance_.usual_interval(gyro) : Duration::zero();
+    return aligner_.chosen() ? attendance_.usual_interval(gyro) : guard_.interval(gyro);
   }
 
  private:

@@ -385,18 +385,26 @@ Plan own_messages(const std::string& second_mount = "") {
 using Spoil =
     std::function<bool(std::size_t unit, std::size_t axis, double t_s, can::Frame& frame)>;
 
-/// Each axis in a message of its own, 1 ms after each other; unit 2 is mounted as its plan says.
+/// How often a unit speaks, and how far apart the messages of its axes are.
+struct Pace {
+  Duration interval = kInterval;
+  std::chrono::milliseconds apart{1};
+};
+
+/// Each axis in a message of its own; unit 2 is mounted as its plan says.
 void play_apart(const World& world, const Plan& plan, double from_s, double to_s,
-                Pipeline& pipeline, FrameSink& sink, const Spoil& spoil, std::uint64_t seed = 7) {
+                Pipeline& pipeline, FrameSink& sink, const Spoil& spoil, std::uint64_t seed = 7,
+                const Pace& pace = {}) {
   std::mt19937_64 engine(seed);
   std::normal_distribution<double> noise(0.0, world.noise_dps);
-  const auto first = static_cast<int>(from_s / to_seconds(kInterval));
-  const auto last = static_cast<int>(to_s / to_seconds(kInterval));
+  const auto first = static_cast<int>(from_s / to_seconds(pace.interval));
+  const auto last = static_cast<int>(to_s / to_seconds(pace.interval));
   for (int n = first; n < last; ++n) {
     for (std::size_t unit = 0; unit < 2; ++unit) {
       for (const GyroPlan& axis : plan.gyros[unit].axes) {
-        const auto late = std::chrono::milliseconds(static_cast<int>(axis.sensor_axis + 5 * unit));
-        const TimePoint t = kStart + n * kInterval + late;
+        const Duration late = pace.apart * static_cast<int>(axis.sensor_axis) +
+                              pace.interval / 4 * static_cast<int>(unit);
+        const TimePoint t = kStart + n * pace.interval + late;
         const double t_s = to_seconds(t - kStart);
         const Rates w = world.rate(t_s);
         double reading = noise(engine);
@@ -584,6 +592,21 @@ TEST(UnitFaults, AMixedUnitComesBackWhole) {
   const Status& z = pipeline.axis_status(2);
   EXPECT_EQ(z.gyros[1].faults[static_cast<std::size_t>(Fault::kStuck)].times, 0U);
   EXPECT_GT(refused(pipeline, 2, 1, Reject::kOtherAxis), 1'000U);
+}
+
+// At ten samples a second, of which each axis's come a third of the time after another's.
+TEST(UnitFaults, SlowAxesInMessagesOfTheirOwnComeIntoUse) {
+  const Plan plan = own_messages("mount = [20, 0, 0]");
+  const World world{.rate = [](double) { return Rates{}; }};
+  Pipeline pipeline(plan);
+  Bus bus;
+  play_apart(world, plan, 0.0, 40.0, pipeline, bus,
+             [](std::size_t, std::size_t, double, can::Frame&) { return true; }, 7,
+             {.interval = std::chrono::milliseconds(100), .apart = std::chrono::milliseconds(33)});
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    EXPECT_EQ(pipeline.axis_status(axis).state, State::kRunning) << axis;
+    EXPECT_LT(refused(pipeline, axis, 1, Reject::kOtherAxis), 3U) << axis;
+  }
 }
 
 // One frame that is lost is a hole, and no sickness of anybody.
