@@ -99,6 +99,17 @@ class Drive:
         return t, self.rate(t) @ np.asarray(turn).T + np.asarray(bias_dps) + walk + noise
 
 
+SBG = f"""\
+[[output.layout]]
+dbc = "{SOURCE}/dbc/profiles/sbg_ellipse.dbc"
+message = "SBG_ImuGyro"
+rate_x = "RateX"
+rate_y = "RateY"
+rate_z = "RateZ"
+sign_y = -1
+sign_z = -1
+rate_not_available = -32768
+"""
 BIAS_A, BIAS_B = (0.1, -0.2, 0.3), (-0.07, 0.15, -0.25)
 TILT_DEG = np.array([0.3, -0.32, 0.24])  # half a degree in all
 
@@ -329,6 +340,31 @@ class Frames(Units):
         layout = '[[output.layout]]\ndbc = "units.dbc"\nmessage = "YAW_B"\nrate = "Yaw"\naxis = "z"\nrate_not_available = -2147483648\n'
         rows, summary = self.replay(log_of(frames(*a, 0x101), frames(*b, 0x102)), config(output=layout))
         self.assertEqual(summary["out"]["layouts"][0]["valid"], sum(row["valid_z"] == "1" for row in rows))
+
+    def test_a_layout_carries_all_axes(self):
+        """In SBG's frame, of which y points to the right and z down."""
+        _, a, b = self.drive(seconds=90.0, seed=15)
+        rows, summary = self.replay(log_of(frames(*a, 0x101), frames(*b, 0x102)), config(output=SBG))
+        self.assertEqual(self.judge_layout(rows), len(rows))
+        valid = sum(all(row[f"valid_{axis}"] == "1" for axis in AXES) for row in rows)
+        self.assertEqual(summary["out"]["layouts"][0], {"bus": "can0", "id": 290, "message": "SBG_ImuGyro", "frames": len(rows),
+                                                        "valid": valid, "out_of_range": 0, "withheld": 0})
+        checked = self.good("check", "u.toml").stdout.decode()
+        for said in ("SBG_ImuGyro.RateX", "y: RateY", "z: RateZ, bit 32, 16 bits", "sign flipped"):
+            self.assertIn(said, checked)
+
+    def judge_layout(self, rows):
+        """Each frame is the table's line, or says "not available"; how many there are."""
+        lines = [line.split() for line in self.read("out.log").splitlines() if " 122#" in line]
+        table = {axis: [float(row[f"rate_{axis}_dps"]) if row[f"valid_{axis}"] == "1" else None for row in rows] for axis in AXES}
+        for i, line in enumerate(lines):
+            raw = np.frombuffer(bytes.fromhex(line[2].split("#")[1]), "<i2")
+            for axis, value, sign in zip(AXES, raw, (1, -1, -1)):
+                wanted = table[axis][i]
+                self.assertEqual(value == -32768, wanted is None, line)
+                if wanted is not None:
+                    self.assertAlmostEqual(sign * np.degrees(value * 1e-3), wanted, delta=np.degrees(0.5e-3) + 1e-6)
+        return len(lines)
 
     def test_two_simulated_units_are_replayed_to_the_truth(self):
         drive = Drive(240.0, 12)
