@@ -8,7 +8,7 @@ import unittest
 
 import numpy as np
 
-from units_test import AXES, BIAS_A, BIAS_B, TILTED, Drive, Units, config, frames, gyro, log_of
+from units_test import DBC, AXES, BIAS_A, BIAS_B, TILTED, Drive, Units, config, frames, gyro, log_of
 
 # One unit upside down, and a quarter turn besides: exchanged and flipped axes at once.
 MOUNT = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
@@ -152,6 +152,116 @@ class Gap(Axes):
         first = [(self.folder / "found" / name).read_bytes() for name in ("gap.json", "model.toml", "report.html")]
         self.gap("--axis", "x")
         self.assertEqual(first, [(self.folder / "found" / name).read_bytes() for name in ("gap.json", "model.toml", "report.html")])
+
+
+TRUTH_DBC = DBC + """
+BO_ 260 TABLE: 16 RIG
+ SG_ TableX : 0|32@1- (1E-006,0) [-2000|2000] "deg/s" RIG
+ SG_ TableY : 32|32@1- (1E-006,0) [-2000|2000] "deg/s" RIG
+ SG_ TableZ : 64|32@1- (1E-006,0) [-2000|2000] "deg/s" RIG
+"""
+TABLE = '[reference]\nbus = "can0"\ndbc = "truth.dbc"\nmessage = "TABLE"\n'
+TABLE_OF_AXES = TABLE + 'rate_x = "TableX"\nrate_y = "TableY"\nrate_z = "TableZ"\n'
+
+
+class Reference(Axes):
+    def setUp(self):
+        super().setUp()
+        self.write("truth.dbc", TRUTH_DBC)
+
+    def with_table(self, seconds, seed):
+        """A drive of two units, one tilted, and a table that tells the truth 100 times a second."""
+        print(f"seed {seed}")
+        drive = Drive(seconds, seed)
+        t = np.arange(0.0017, seconds, 0.01)
+        self.write("in.log", log_of(frames(*drive.unit(0.0, np.eye(3), BIAS_A), 0x101), frames(*drive.unit(0.0043, TILTED, BIAS_B), 0x102),
+                                    frames(t, drive.rate(t), 0x104)))
+        self.write("u.toml", config() + TABLE_OF_AXES)
+        self.write("m.toml", MODEL + biases(1, BIAS_A) + biases(2, BIAS_B))
+        return drive
+
+    def test_with_a_reference_of_all_axes_it_is_told_which_unit_is_tilted(self):
+        self.with_table(300.0, 11)
+        found = self.gap()
+        for axis in found["axes"]:
+            self.assertTrue(axis["recording"]["with_reference"], axis["axis"])
+        named = {(one["axis"], one["parameters"]["from"]): one for one in found["effects"] if is_tilt(one)}
+        for pair in (("x", "z"), ("y", "z")):
+            one = named[pair]
+            self.assertTrue(one["applied"])
+            self.assertEqual(one["ambiguous_with"], [])
+            truth = TILTED[AXES.index(pair[0]), AXES.index(pair[1])]
+            self.assertLess(abs(one["parameters"]["coefficient"] - truth) / one["sigma"]["coefficient"], 4.0, one)
+
+    def test_a_reference_of_one_rate_is_about_z(self):
+        self.with_table(100.0, 12)
+        self.write("u.toml", config() + TABLE + 'rate = "TableZ"\n')
+        told = [axis["recording"]["with_reference"] for axis in self.compare()["axes"]]
+        self.assertEqual(told, [False, False, True])
+
+    def test_it_calibrates_a_platform_that_moves(self):
+        drive = self.with_table(260.0, 13)
+        # Begun amid the first drive: nothing rests there.
+        lines = self.read("in.log").splitlines(keepends=True)
+        moving = [line for line in lines if float(line[1:line.index(")")]) > 1_700_000_065]
+        rows, summary = self.replay("".join(moving), config(calibration='source = "reference"') + TABLE_OF_AXES)
+        self.assertEqual(summary["final_state"], "running")
+        for axis in AXES:
+            relative, _ = self.errors(rows, drive, axis)
+            self.assertGreater(len(relative), 5000)
+            self.assertLess(np.mean(relative ** 2), 1.3, axis)
+            self.assertLess(np.max(np.abs(relative)), 6.0, axis)
+
+    def test_it_must_tell_every_axis_to_calibrate(self):
+        self.write("u.toml", config(calibration='source = "reference"') + TABLE + 'rate_x = "TableX"\nrate_z = "TableZ"\n')
+        said = self.bad("check", "u.toml")
+        self.assertIn("the reference does not tell the rate about y", said)
+        self.assertIn("rate_x, rate_y, rate_z in [reference]", said)
+
+    def test_beside_gyros_of_one_axis_it_tells_one_rate(self):
+        single = config(calibration="").replace('rate_x = "X"\nrate_y = "Y"\nrate_z = "Z"\n', 'rate = "Z"\n')
+        self.write("u.toml", single + TABLE_OF_AXES)
+        said = self.bad("check", "u.toml")
+        self.assertIn("are of a reference of whole units", said)
+        self.assertNotIn("unknown key", said)
+
+    def test_the_simulated_reference_tells_the_motion_of_the_profile(self):
+        self.write("u.toml", config() + TABLE_OF_AXES)
+        self.write("none.toml", "format = 1\n")
+        t = np.arange(0.0, 20.0, 0.05)
+        motion = np.stack([3 * np.sin(0.7 * t), 2 * np.cos(0.9 * t), 20 * np.sin(0.5 * t)], axis=1)
+        rows = "\n".join(",".join(f"{value:.9f}" for value in row) for row in np.column_stack([t, motion]))
+        self.write("p.csv", "t_s,rate_x_dps,rate_y_dps,rate_z_dps\n" + rows + "\n")
+        self.good("simulate", "--config", "u.toml", "--model", "none.toml", "--profile", "p.csv", "-q", "-o", "sim.log")
+        done = self.good("decode", "--dbc", "truth.dbc", "sim.log")
+        table = [line for line in map(json.loads, done.stdout.decode().splitlines()) if line["message"] == "TABLE"]
+        self.assertGreater(len(table), 3900)
+        for line in table:
+            t_s = line["t"] - 1_700_000_000
+            truth = (3 * np.sin(0.7 * t_s), 2 * np.cos(0.9 * t_s), 20 * np.sin(0.5 * t_s))
+            for axis, rate_dps in zip("XYZ", truth):
+                self.assertAlmostEqual(line["signals"][f"Table{axis}"]["value"], rate_dps, delta=2e-4)
+        said = self.good("check", "u.toml").stdout.decode()
+        for axis in "XYZ":
+            self.assertIn(f"Table{axis}", said)
+
+
+class Picture(Axes):
+    def test_every_axis_has_a_picture_of_its_own(self):
+        self.record(200.0, 14, TILTED)
+        self.good("replay", "--config", "u.toml", "-q", "-o", "out.log", "--plot", "drift.svg", "in.log")
+        self.assertFalse((self.folder / "drift.svg").exists())
+        pictures = [self.read(f"drift-{axis}.svg") for axis in AXES]
+        for axis, picture in zip(AXES, pictures):
+            self.assertIn(f"in.log about {axis}: optimal", picture)
+            self.assertIn("virtual gyro", picture)
+        self.assertEqual(len(set(pictures)), 3)
+
+    def test_a_picture_never_writes_over_what_is_read(self):
+        self.record(60.0, 15)
+        (self.folder / "in-y.svg").symlink_to("in.log")
+        said = self.bad("replay", "--config", "u.toml", "-q", "-o", "out.log", "--plot", "in.svg", "in.log")
+        self.assertIn("in-y.svg", said)
 
 
 class Allan(Axes):
