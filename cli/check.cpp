@@ -211,13 +211,22 @@ void print_layout(const gateway::Plan& plan, const gateway::OutputLayout& layout
     detail("fixed", fmt::format("{}: {}", signal.name, signal.says));
 }
 
+std::vector<gateway::Quantity> rates_of(const gateway::ReferencePlan& reference) {
+  std::vector<gateway::Quantity> rates;
+  for (const auto& axis : reference.axes) {
+    if (axis) rates.push_back(*axis);
+  }
+  return rates.empty() ? std::vector{reference.rate} : rates;
+}
+
 void print_plan(const gateway::Plan& plan) {
   say("  {:<14}{:<8}{:<10}{:<25} {:<7} {}\n", "", "bus", "id", "signal", "unit", "bits");
   for (const gateway::GyroPlan& gyro : plan.gyros)
     print_gyro(gyro);
   if (plan.reference) {
-    print_row("reference", plan.reference->bus, plan.reference->match, plan.reference->message,
-              plan.reference->rate);
+    for (const gateway::Quantity& rate : rates_of(*plan.reference))
+      print_row("reference", plan.reference->bus, plan.reference->match, plan.reference->message,
+                rate);
     print_e2e(plan.reference->e2e);
   }
   if (plan.accelerometer) {

@@ -177,18 +177,27 @@ class Recorder {
 
 }  // namespace
 
-Expected<gap::Recording> read_recording(const std::string& log, const gateway::Plan& plan,
-                                        const std::string& doing) {
-  RoleFrames frames(plan);
-  Recorder recorder(plan);
+Expected<std::vector<gap::Recording>> read_recordings(const std::string& log,
+                                                      std::span<const gateway::Plan> plans,
+                                                      const std::string& doing) {
+  RoleFrames frames(plans);
+  std::vector<Recorder> recorders;
+  recorders.reserve(plans.size());
+  for (const gateway::Plan& plan : plans)
+    recorders.emplace_back(plan);
   const auto done = frames.read(
-      {log}, doing,
-      [&](std::uint8_t roles, const canlog::LogRecord& record) { recorder.take(roles, record); });
+      {log}, doing, [&](std::size_t pair, std::uint8_t roles, const canlog::LogRecord& record) {
+        recorders[pair].take(roles, record);
+      });
   if (!done) return tl::unexpected(done.error());
-  if (const auto missing = frames.missing_gyro(log, recorder.used())) {
-    return tl::unexpected(*missing);
+  std::vector<gap::Recording> recordings;
+  for (std::size_t pair = 0; pair < plans.size(); ++pair) {
+    if (const auto missing = frames.missing_gyro(log, pair, recorders[pair].used())) {
+      return tl::unexpected(*missing);
+    }
+    recordings.push_back(recorders[pair].finish());
   }
-  return recorder.finish();
+  return recordings;
 }
 
 }  // namespace vgyro::cli

@@ -122,6 +122,21 @@ void set_true_rate(const CalibrationPlan& configured, std::size_t place, std::si
     calibration.doubt_dps = known ? 0.0 : north_dps / std::sqrt(2.0);
   }
   calibration.stop_rate_dps = calibration.rate_dps;
+  // What the reference tells while calibrating nobody tells at a stop.
+  const bool is_told = !configured.axis_rate_dps.empty() || configured.latitude_deg;
+  if (!configured.from_reference || is_told) return;
+  calibration.stop_rate_dps = std::nullopt;
+  calibration.doubt_dps = 0.0;
+}
+
+// Of the reference what it tells about this axis, if it does.
+void set_reference(std::size_t axis, Plan& pair) {
+  if (!pair.reference) return;
+  if (const auto rate = pair.reference->axes[axis]) {
+    pair.reference->rate = *rate;
+  } else {
+    pair.reference.reset();
+  }
 }
 
 void set_output(const OutputPlan& configured, std::size_t axis, OutputPlan& output) {
@@ -152,6 +167,7 @@ Plan plan_about(const Plan& platform, std::size_t place,
   for (std::size_t gyro = 0; gyro < 2; ++gyro)
     pair.gyros[gyro] = gyro_about(platform.gyros[gyro], axis, sensors[gyro][axis]);
   set_true_rate(platform.calibration, place, axis, pair.calibration);
+  set_reference(axis, pair);
   set_output(platform.output, axis, pair.output);
   set_noise(pair);
   if (!platform.model) return pair;

@@ -34,9 +34,6 @@ std::optional<double> number_within(TomlReader& reader, std::string_view key, co
   return std::nullopt;
 }
 
-namespace {
-
-/// 1 or -1; nothing where the key is not there, or after a complaint.
 std::optional<double> sign_of(TomlReader& reader) {
   const auto sign = reader.integer("sign");
   if (!sign) return std::nullopt;
@@ -44,12 +41,6 @@ std::optional<double> sign_of(TomlReader& reader) {
   reader.complain(reader.where("sign"), fmt::format("sign is {}", *sign),
                   "1, or -1 to flip the axis");
   return std::nullopt;
-}
-
-}  // namespace
-
-void read_sign(TomlReader& reader, Quantity& rate) {
-  if (const auto sign = sign_of(reader)) rate.scale *= *sign;
 }
 
 void read_source_address(TomlReader& reader, const dbc::Message& message, FrameMatch& match) {
@@ -110,7 +101,7 @@ std::optional<GyroPlan> read_single(TomlReader& reader, SignalResolver& resolver
                           .e2e = {},
                           .valid = {},
                           .saturation_dps = {}});
-    read_sign(reader, gyro->rate);
+    gyro->rate.scale *= sign_of(reader).value_or(1.0);
     read_source_address(reader, resolver.message(), gyro->match);
     gyro->e2e = read_e2e(reader, resolver, *rate_signal);
     if (const auto valid = read_condition(reader, resolver, *rate_signal))

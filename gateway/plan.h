@@ -167,8 +167,10 @@ struct ReferencePlan {
   std::string bus;
   std::string message;
   FrameMatch match;
-  Quantity rate;
+  Quantity rate;  ///< of a platform of several axes: the last of those below
   E2ePlan e2e = {};
+  /// Of a platform of several axes: the rates about the vehicle's that it tells.
+  std::array<std::optional<Quantity>, kAxes> axes = {};
 
   friend bool operator==(const ReferencePlan&, const ReferencePlan&) = default;
 };

@@ -434,13 +434,6 @@ class BadInput(Units):
         self.refused(config(calibration="rate_dps = [0.1]"), "rate_dps is not a list of 3 numbers")
         self.refused(config(calibration="heading_deg = 12"), "heading_deg stands without latitude_deg")
 
-    def test_commands_that_look_at_one_pair(self):
-        self.write("u.toml", config())
-        self.write("one.log", "")
-        self.write("m.toml", "format = 1\n")
-        for command in (("allan", "one.log"), ("compare", "--model", "m.toml", "--measured", "one.log"), ("gap", "--measured", "one.log", "--out", "found")):
-            self.assertIn("has units of 3 axes", self.bad(command[0], "--config", "u.toml", *command[1:]))
-
     def test_axes_of_the_model_file(self):
         self.write("u.toml", config())
         self.write("m.toml", 'format = 1\n[[effect]]\ngyro = 1\nkind = "delay"\naxis = "x"\nseconds = 0.01\n')
