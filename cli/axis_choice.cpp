@@ -7,6 +7,8 @@
 
 #include <fmt/format.h>
 
+#include "gateway/axes_plan.h"
+
 namespace vgyro::cli {
 
 namespace {
@@ -34,9 +36,8 @@ std::optional<Error> tilted_unit(const std::string& config, const gateway::Plan&
 }
 
 void name_other_axes(const gateway::GyroPlan& unit, gateway::GyroPlan& gyro) {
-  for (const gateway::GyroPlan& other : unit.axes) {
-    if (other.sensor_axis == gyro.sensor_axis || other.match != gyro.match) continue;
-    gyro.*gateway::kOtherAxes[other.sensor_axis] = other.rate;
+  for (std::size_t from = 0; from < gateway::kAxes; ++from) {
+    if (from != gyro.sensor_axis) gateway::name_other_axis(unit, from, gyro);
   }
 }
 

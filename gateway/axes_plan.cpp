@@ -2,21 +2,17 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <numeric>
 #include <string>
 
 #include <fmt/core.h>
 
+#include "base/angle.h"
 #include "gateway/model_plan.h"
 
 namespace vgyro::gateway {
 
-const double kEarthRate_dps = 7.292115e-5 * 180.0 / std::numbers::pi;
-
 namespace {
-
-constexpr double kRadPerDeg = std::numbers::pi / 180.0;
 
 const GyroPlan* sensor_axis(const GyroPlan& unit, std::size_t axis) {
   const auto found = std::find_if(unit.axes.begin(), unit.axes.end(),
@@ -97,10 +93,8 @@ model::Model effects_about(const model::Model& model, const Plan& pair) {
 void read_other_axes(const model::Model& model, const Plan& platform, Plan& pair) {
   for (const model::Effect& effect : model.effects) {
     if (!depends_on_other_axes(effect)) continue;
-    const auto from = static_cast<std::size_t>(effect.parameters[0]);
-    GyroPlan& gyro = pair.gyros[effect.gyro];
-    const GyroPlan* other = sensor_axis(platform.gyros[effect.gyro], from);
-    if (other != nullptr && other->match == gyro.match) gyro.*kOtherAxes[from] = other->rate;
+    name_other_axis(platform.gyros[effect.gyro], static_cast<std::size_t>(effect.parameters[0]),
+                    pair.gyros[effect.gyro]);
   }
 }
 
@@ -191,6 +185,11 @@ void drop_repeated(std::vector<Error>& errors) {
 }
 
 }  // namespace
+
+void name_other_axis(const GyroPlan& unit, std::size_t from, GyroPlan& gyro) {
+  const GyroPlan* other = sensor_axis(unit, from);
+  if (other != nullptr && other->match == gyro.match) gyro.*kOtherAxes[from] = other->rate;
+}
 
 void find_axes(TomlReader& root, Plan& plan) {
   const std::array<bool, 2> is_unit{!plan.gyros[0].axes.empty(), !plan.gyros[1].axes.empty()};

@@ -411,10 +411,7 @@ void read_output(TomlReader& root, Context& context) {
   if (bus.empty()) {
     reader.forgive({"layout"});
   } else {
-    read_output_layouts(
-        reader,
-        {context.file, context.folder, context.cache, context.errors, context.resolved.warnings},
-        plan);
+    read_output_layouts(reader, tables_of(context), plan);
   }
   check_output_ids(reader, plan);
   const bool failed = !context.errors.empty();

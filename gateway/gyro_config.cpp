@@ -34,11 +34,11 @@ std::optional<double> number_within(TomlReader& reader, std::string_view key, co
   return std::nullopt;
 }
 
-std::optional<double> sign_of(TomlReader& reader) {
-  const auto sign = reader.integer("sign");
+std::optional<double> sign_of(TomlReader& reader, std::string_view key) {
+  const auto sign = reader.integer(key);
   if (!sign) return std::nullopt;
   if (*sign == 1 || *sign == -1) return static_cast<double>(*sign);
-  reader.complain(reader.where("sign"), fmt::format("sign is {}", *sign),
+  reader.complain(reader.where(key), fmt::format("{} is {}", key, *sign),
                   "1, or -1 to flip the axis");
   return std::nullopt;
 }

@@ -4,13 +4,13 @@
 #include <cmath>
 #include <numbers>
 
+#include "base/angle.h"
 #include "gateway/axes_plan.h"
 
 namespace vgyro::gateway {
 
 namespace {
 
-constexpr double kRadPerDeg = std::numbers::pi / 180.0;
 // Further apart, rates do not tell what lies between them.
 constexpr double kLeap_s = 1.0;
 // 1σ of how a vehicle turns while nobody looks: a slow bend of a road.

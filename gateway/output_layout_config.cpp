@@ -106,7 +106,7 @@ std::string ending_of(std::size_t axis) {
 /// One table.
 class LayoutReader {
  public:
-  LayoutReader(const toml::table& table, LayoutContext context, Plan& plan)
+  LayoutReader(const toml::table& table, TableContext context, Plan& plan)
       : reader_(table, context.file, "[[output.layout]]", context.errors),
         context_(context),
         resolver_(reader_, context.cache, context.folder, plan.buses, context.warnings,
@@ -124,7 +124,6 @@ class LayoutReader {
   void begin_layout(const Quantity& quantity);
   void read_rate(const RateEntry& entry);
   void read_entry(const RateEntry& entry, LayoutRate& one);
-  double sign_of(const std::string& key);
   void read_sign(const RateEntry& entry, LayoutRate& one);
   void read_sigma(const RateEntry& entry, LayoutRate& one);
   std::optional<OutputFlag> read_valid(const std::string& key, const std::string& invalid);
@@ -149,7 +148,7 @@ class LayoutReader {
   }
 
   TomlReader reader_;
-  LayoutContext context_;
+  TableContext context_;
   SignalResolver resolver_;
   Method method_;
   const std::vector<std::size_t>& axes_;  ///< of the platform; empty: a single one
@@ -181,7 +180,7 @@ std::optional<OutputLayout> LayoutReader::read() {
   if (layout_ && context_.errors.size() == errors_before) {
     read_id();
     read_source_address();
-    sign_ = sign_of("sign");
+    sign_ = sign_of(reader_).value_or(1.0);
     for (std::size_t i = 0; i < entries_.size(); ++i)
       read_entry(entries_[i], layout_->rates[i]);
     layout_->valid = read_valid("valid", "invalid");
@@ -335,15 +334,6 @@ void LayoutReader::begin_layout(const Quantity& quantity) {
   add(taken_, mask_of(quantity.presence));
 }
 
-double LayoutReader::sign_of(const std::string& key) {
-  const auto sign = reader_.integer(key);
-  if (sign && *sign != 1 && *sign != -1) {
-    reader_.complain(reader_.where(key), fmt::format("{} is {}", key, *sign),
-                     "1, or -1 to flip the axis");
-  }
-  return static_cast<double>(sign.value_or(1));
-}
-
 void LayoutReader::read_entry(const RateEntry& entry, LayoutRate& one) {
   read_sign(entry, one);
   if (entry.sigma_signal != nullptr) read_sigma(entry, one);
@@ -352,7 +342,7 @@ void LayoutReader::read_entry(const RateEntry& entry, LayoutRate& one) {
 }
 
 void LayoutReader::read_sign(const RateEntry& entry, LayoutRate& one) {
-  if (by_axes_) one.rate.scale *= sign_of(entry.sign);
+  if (by_axes_) one.rate.scale *= sign_of(reader_, entry.sign).value_or(1.0);
   one.rate.scale *= sign_;
   const dbc::Signal* signal = entry.sign_signal_found;
   if (signal == nullptr || !on_page(entry.sign_signal, *signal)) return;
@@ -683,7 +673,7 @@ std::string id_text(const FrameId& id) {
 
 }  // namespace
 
-void read_output_layouts(TomlReader& output, LayoutContext context, Plan& plan) {
+void read_output_layouts(TomlReader& output, TableContext context, Plan& plan) {
   const toml::array* tables = output.array("layout", "a list of tables: [[output.layout]]");
   if (tables == nullptr) return;
   if (tables->size() > kOutputLayoutsMost) {

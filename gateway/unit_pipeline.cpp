@@ -6,20 +6,20 @@
 #include <numbers>
 #include <utility>
 
+#include "base/angle.h"
 #include "gateway/axes_plan.h"
 
 namespace vgyro::gateway {
 
 namespace {
 
-constexpr double kRadPerDeg = std::numbers::pi / 180.0;
 // What one axis shows of a turn counts for no more than this with the others: a wrong opinion must
 // not last for ever.
 constexpr double kLogTurningMost = 6.0;
 // From this probability on a steady turn about one axis is motion of the platform: nobody stands.
 constexpr double kSurelyTurning = 0.9;
 // Pairs of different axes that are further apart are of different motion.
-constexpr Duration kApartMost = std::chrono::milliseconds(25);
+constexpr Duration kApartMost = LayoutSet::kApartMost;
 constexpr std::array<std::uint8_t, 2> kGyroRoles{kGyro1, kGyro2};
 
 double finite_or_0(double value) {

@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
-#include <numbers>
 #include <span>
 
 #include <fmt/core.h>
 
+#include "base/angle.h"
 #include "model/catalogue.h"
 #include "model/equation.h"
 #include "model/temperature_past.h"
@@ -22,7 +22,6 @@ namespace {
 using model::Effect;
 using model::Kind;
 
-constexpr double kRadPerDeg = std::numbers::pi / 180.0;
 constexpr double kVibrationWindow_s = 1.0;
 // A bus keeps the order of a sender's frames; a log tells them apart by a microsecond.
 constexpr double kStampStep_s = 1e-6;

@@ -126,6 +126,22 @@ def frames(t, readings, identifier, counter=None):
     return lines
 
 
+def yaw_frames(t, yaw_dps):
+    """(time, line) of each sample of unit B's yaw in a message of its own, 0.3 ms behind the others."""
+    lines = []
+    for i, t_s in enumerate(t):
+        us = START_US + round(t_s * 1e6) + 300
+        raw = np.rint(np.radians(yaw_dps[i]) * 1e6).astype("<i4").tobytes() + bytes([i % 256, 0, 0, 0])
+        lines.append((us, f"({us // 1_000_000}.{us % 1_000_000:06d}) can0 103#{raw.hex().upper()}\n"))
+    return lines
+
+
+def config_of_own_yaw(more=""):
+    return config().replace('message = "IMU_B"\nrate_x = "X"\nrate_y = "Y"\nrate_z = "Z"\ncounter = "Counter"\n',
+                            'message = "IMU_B"\nrate_x = "X"\nrate_y = "Y"\ncounter = "Counter"\n'
+                            f'[[gyro.axis]]\naxis = "z"\nmessage = "YAW_B"\nrate = "Yaw"\n{more}counter = "YawCounter"\n')
+
+
 def log_of(*streams):
     return "".join(line for _, line in sorted(line for stream in streams for line in stream))
 
@@ -227,14 +243,8 @@ class Truth(Units):
         """Yaw of one unit from another sensor, half as often."""
         drive, a, b = self.drive(seed=14)
         t, readings = b
-        lines = []
-        for n, i in enumerate(range(0, len(t), 2)):
-            us = START_US + round(t[i] * 1e6) + 300
-            raw = np.rint(np.radians(readings[i, 2]) * 1e6).astype("<i4").tobytes() + bytes([n % 256, 0, 0, 0])
-            lines.append((us, f"({us // 1_000_000}.{us % 1_000_000:06d}) can0 103#{raw.hex().upper()}\n"))
-        text = config().replace('message = "IMU_B"\nrate_x = "X"\nrate_y = "Y"\nrate_z = "Z"\ncounter = "Counter"\n',
-                                'message = "IMU_B"\nrate_x = "X"\nrate_y = "Y"\ncounter = "Counter"\n'
-                                '[[gyro.axis]]\naxis = "z"\nmessage = "YAW_B"\nrate = "Yaw"\ncounter = "YawCounter"\n')
+        lines = yaw_frames(t[::2], readings[::2, 2])
+        text = config_of_own_yaw()
         rows, summary = self.replay(log_of(frames(*a, 0x101), frames(*b, 0x102), lines), text)
         self.judge(rows, drive, axes="xy")
         self.assertEqual(summary["final_state"], "running")
@@ -262,14 +272,8 @@ class Truth(Units):
     def test_an_axis_may_have_a_message_sign_and_unit_of_its_own(self):
         drive, a, b = self.drive(seed=7)
         t, readings = b
-        lines = []
-        for i, t_s in enumerate(t):
-            us = START_US + round(t_s * 1e6) + 300
-            raw = np.rint(-np.radians(readings[i, 2]) * 1e6).astype("<i4").tobytes() + bytes([i % 256, 0, 0, 0])
-            lines.append((us, f"({us // 1_000_000}.{us % 1_000_000:06d}) can0 103#{raw.hex().upper()}\n"))
-        text = config().replace('message = "IMU_B"\nrate_x = "X"\nrate_y = "Y"\nrate_z = "Z"\ncounter = "Counter"\n',
-                                'message = "IMU_B"\nrate_x = "X"\nrate_y = "Y"\ncounter = "Counter"\n'
-                                '[[gyro.axis]]\naxis = "z"\nmessage = "YAW_B"\nrate = "Yaw"\nsign = -1\ncounter = "YawCounter"\n')
+        lines = yaw_frames(t, -readings[:, 2])
+        text = config_of_own_yaw("sign = -1\n")
         rows, summary = self.replay(log_of(frames(*a, 0x101), frames(*b, 0x102), lines), text)
         # Lines of axes whose messages differ stand at instants of their own.
         self.judge(rows, drive, axes="xy")
