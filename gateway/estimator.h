@@ -69,6 +69,16 @@ class Estimator {
   void set_stop_rate(double rate_dps) { corrector_->set_stop_rate(rate_dps); }
   /// The platform moved about another axis: what was gathered of this one was no rest.
   [[gnu::cold, gnu::noinline]] void restart_calibration();
+  /// Likewise, and about that axis it had rested for long enough: this one's calibration ends too,
+  /// or begins again where it has too little yet.
+  [[gnu::cold, gnu::noinline]] void end_calibration(TimePoint t, TimePoint still_until);
+  /// Motion has ended the calibration before its time: until when the platform rested.
+  [[nodiscard]] const std::optional<TimePoint>& calibration_cut_at() const { return cut_at_; }
+  /// Motion in the calibration that was accepted is one of the platform.
+  [[nodiscard]] bool moved_in_calibration() const {
+    return moved_in_calibration_ || (!calibrated_ && calibrator_.moved());
+  }
+  void note_motion_in_calibration();
   [[nodiscard]] std::uint64_t calibration_restarts() const { return calibrator_.restarts(); }
 
   /// A pair before calibrated().
@@ -109,6 +119,7 @@ class Estimator {
   void calibrate_with_reference();
   void read_condition();
   void calibrate_with(const fusion::AlignedPair& pair, double true_rate_dps);
+  void take_result();
   [[nodiscard]] bool result_can_be() const;
   [[nodiscard]] double seconds(TimePoint t) const { return to_seconds(t - origin_); }
 
@@ -123,6 +134,7 @@ class Estimator {
   bool begun_ = false;
   bool calibrated_;
   bool moved_in_calibration_ = false;  ///< and that was accepted
+  std::optional<TimePoint> cut_at_;
 
   std::optional<SavedState> saved_;  ///< to be taken up by the first pair
   Restored restored_ = Restored::kNothing;

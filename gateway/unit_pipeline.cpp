@@ -255,6 +255,7 @@ void UnitPipeline::take_round(Pairs& pairs) {
     t = pairs[place]->t;
   }
   settle_output();
+  share_calibrations(t);
   share_motion();
   follow_heading(t);
 }
@@ -364,6 +365,25 @@ void UnitPipeline::share_motion() {
     told_[place] = elsewhere;
     axes_[place]->estimator().set_elsewhere(elsewhere);
   }
+}
+
+// A stop that ends for one axis ends for all: whoever has rested for long enough is calibrated as
+// well, whoever has not begins again. Motion that is accepted is motion of all.
+void UnitPipeline::share_calibrations(TimePoint t) {
+  bool moved = false;
+  std::optional<TimePoint> still_until;
+  bool all_calibrated = true;
+  for (const auto& axis : axes_) {
+    moved = moved || axis->estimator().moved_in_calibration();
+    if (!still_until) still_until = axis->estimator().calibration_cut_at();
+    all_calibrated = all_calibrated && axis->estimator().calibrated();
+  }
+  if (all_calibrated) return;
+  for (const auto& axis : axes_) {
+    if (still_until && !cut_short_) axis->end_calibration(t, *still_until);
+    if (moved) axis->estimator().note_motion_in_calibration();
+  }
+  cut_short_ = still_until.has_value();
 }
 
 void UnitPipeline::share_restarts() {
