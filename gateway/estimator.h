@@ -95,6 +95,10 @@ class Estimator {
   [[nodiscard]] std::array<double, 2> shares() const { return corrector_->shares(); }
   /// What the corrector thinks of its data, as of the newest rate.
   [[nodiscard]] const fusion::Condition& condition() const { return condition_; }
+  /// Grows when that, or whether it is calibrated, says something new.
+  [[nodiscard]] std::uint64_t condition_edition() const {
+    return 2 * condition_edition_ + (calibrated_ ? 1 : 0);
+  }
   /// What is known of the drifts at `t`. Precondition: knows_gyros().
   [[nodiscard]] fusion::Drift drift(TimePoint t) const { return corrector_->drift(seconds(t)); }
   /// Do the gyros contradict each other, at present or altogether?

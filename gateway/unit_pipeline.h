@@ -137,6 +137,7 @@ class UnitPipeline {
   Pairs waiting_;  ///< for the pairs of the other axes
 
   std::array<fusion::Elsewhere, kAxes> told_{};
+  std::array<std::uint64_t, kAxes> told_of_{};  ///< editions of the conditions that made it
   std::array<std::uint64_t, kAxes> restarts_{};
   bool cut_short_ = false;  ///< the calibrations of all axes, by the motion that one of them saw
   Heading heading_;

@@ -275,6 +275,27 @@ TEST(UnitPipeline, AllocatesNothingOnTheFramePath) {
   }
 }
 
+// Nor with what follows the heading, mixes axes in messages of their own, and meets faults.
+TEST(UnitPipeline, AllocatesNothingThroughFaultsOfAMixedUnit) {
+  const World world{.rate = drives};
+  Plan plan = own_messages("mount = [20, 0, 0]");
+  plan.calibration.latitude_deg = 50.0;
+  plan.calibration.heading_deg = 0.0;
+  Pipeline pipeline(plan);
+  Bus bus;
+  const Spoil spoil = [](std::size_t unit, std::size_t axis, double t_s, can::Frame& frame) {
+    if (unit == 1 && axis == 2 && t_s > 50.0 && t_s < 60.0) frame.data[7] ^= 0x5A;
+    return unit != 0 || t_s < 65.0 || t_s > 75.0;
+  };
+  play_apart(world, plan, 0.0, 1.0, pipeline, bus, spoil);
+  const std::size_t before = allocations_so_far();
+  play_apart(world, plan, 1.0, 90.0, pipeline, bus, spoil);
+  EXPECT_EQ(allocations_so_far() - before, 0U);
+  EXPECT_EQ(pipeline.status().state, State::kRunning);
+  EXPECT_GT(pipeline.axis_status(1).gyros[1].rejected[static_cast<std::size_t>(Reject::kOtherAxis)],
+            400U);
+}
+
 // The tilt is known again at the start of a second drive, and its heading error gone.
 TEST(UnitPipeline, KeepsTheTiltForASecondDrive) {
   const Plan plan = plan_of();
