@@ -139,7 +139,7 @@ void read_accelerometer(TomlReader& reader, SignalResolver& resolver, Plan& plan
       axes.push_back(*axis);
     last = signal;
   }
-  if (axes.size() != 3) {
+  if (axes.size() != 3 || last == nullptr) {
     reader.forgive({"source_address"});
     forgive_e2e(reader);
     return;
