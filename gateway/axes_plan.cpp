@@ -196,10 +196,11 @@ void find_axes(TomlReader& root, Plan& plan) {
   if (!is_unit[0] && !is_unit[1]) return;
   if (is_unit[0] != is_unit[1]) {
     const std::size_t unit = is_unit[0] ? 0 : 1;
-    root.complain(root.where("gyro"),
-                  fmt::format("gyro {} has {} axes, and gyro {} has one", plan.gyros[unit].name,
-                              plan.gyros[unit].axes.size(), plan.gyros[1 - unit].name),
-                  "rate_x, rate_y, rate_z in both [[gyro]] tables, or rate in both");
+    root.complain(
+        root.where("gyro"),
+        fmt::format("gyro {} has {} axes, and gyro {} has one", plan.gyros[unit].name,
+                    plan.gyros[unit].axes.size(), plan.gyros[1 - unit].name),
+        "rate_x, rate_y, rate_z instead of rate in both [[gyro]] tables, or rate in both");
     return;
   }
   std::array<std::vector<std::size_t>, 2> axes{axes_of(plan.gyros[0]), axes_of(plan.gyros[1])};

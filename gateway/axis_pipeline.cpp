@@ -291,6 +291,12 @@ void AxisPipeline::take_pair(const fusion::AlignedPair& pair) {
   if (!too_late) publish(rate, valid, pair.t, age);
 }
 
+void AxisPipeline::end_calibration(TimePoint t, TimePoint still_until) {
+  if (estimator_.calibrated() || !estimator_.begun()) return;
+  estimator_.end_calibration(t, still_until);
+  if (estimator_.calibrated()) enter_state();
+}
+
 void AxisPipeline::take_single(std::size_t gyro, TimePoint t, double rate_dps, Duration age) {
   if (t <= newest_) return;
   newest_ = t;

@@ -88,6 +88,8 @@ class AxisPipeline {
   /// The next pair; to be followed by take_pair().
   bool pop(fusion::AlignedPair& pair) { return aligner_.pop(pair); }
   void take_pair(const fusion::AlignedPair& pair);
+  /// Another axis's calibration was ended by motion at `t`.
+  void end_calibration(TimePoint t, TimePoint still_until);
   /// A reading that was offered is heard: first what is due, then …
   void arrive(std::size_t gyro, TimePoint t);
   /// … the pairs that came of it, and this, where none does because the other gyro is not there.

@@ -73,7 +73,10 @@ void read_gyros(TomlReader& root, Context& context) {
   const std::size_t count = tables == nullptr ? 0 : tables->size();
   if (count != 2) {
     root.complain(count == 0 ? context.file : root.where("gyro"),
-                  fmt::format("there are {} [[gyro]] tables", count), "exactly two are needed");
+                  fmt::format("there are {} [[gyro]] tables", count),
+                  count < 2 ? "exactly two are needed"
+                            : "exactly two are needed; several axes of one unit stand in its own "
+                              "table: rate_x, rate_y, rate_z");
     return;
   }
   std::vector<GyroPlan> gyros;
@@ -172,7 +175,7 @@ void read_accelerometer(TomlReader& reader, SignalResolver& resolver, Plan& plan
       axes.push_back(*axis);
     last = signal;
   }
-  if (axes.size() != 3) {
+  if (axes.size() != 3 || last == nullptr) {
     reader.forgive({"source_address"});
     forgive_e2e(reader);
     return;
@@ -251,7 +254,10 @@ void read_true_rate(TomlReader& reader, const toml::table& table, const Plan& pl
                     CalibrationPlan& plan) {
   read_axis_rates(reader, platform, plan);
   // After trouble with the units nobody knows how many axes there are.
-  if (platform.gyros.empty() && table["rate_dps"].is_array()) {
+  const bool any_unit = std::any_of(platform.gyros.begin(), platform.gyros.end(),
+                                    [](const GyroPlan& gyro) { return !gyro.axes.empty(); });
+  const bool troubled = platform.gyros.empty() || (any_unit && platform.output.axes.empty());
+  if (troubled && table["rate_dps"].is_array()) {
     reader.forgive({"rate_dps", "latitude_deg", "heading_deg"});
     return;
   }

@@ -299,12 +299,14 @@ std::string device_of(const GyroPlan& gyro) {
 }
 
 Expected<void> check_devices(const SavedState& state, const Plan& plan) {
-  if (!state.axes.empty() && plan.axes.empty())
+  if (!state.axes.empty() && plan.axes.empty()) {
     return fail({}, "is of units of several axes, but the gyros of the configuration have one",
                 kRemedy);
-  if (state.axes.empty() && !plan.axes.empty())
+  }
+  if (state.axes.empty() && !plan.axes.empty()) {
     return fail({}, "is of two single gyros, but the configuration has units of several axes",
                 kRemedy);
+  }
   for (const SavedState& one : state.axes) {
     const auto pair = std::find_if(plan.axes.begin(), plan.axes.end(),
                                    [&](const Plan& each) { return each.axis == one.axis; });

@@ -255,6 +255,7 @@ void UnitPipeline::take_round(Pairs& pairs) {
     t = pairs[place]->t;
   }
   settle_output();
+  share_calibrations(t);
   share_motion();
   follow_heading(t);
 }
@@ -344,6 +345,12 @@ double UnitPipeline::age_s(TimePoint t) const {
 
 // A stop is a stop of all axes, and a turn about one of them is one of the platform.
 void UnitPipeline::share_motion() {
+  std::array<std::uint64_t, kAxes> editions{};
+  for (std::size_t place = 0; place < axes_.size(); ++place)
+    editions[place] = axes_[place]->estimator().condition_edition();
+  // They say the same for some hundred pairs.
+  if (editions == told_of_) return;
+  told_of_ = editions;
   for (std::size_t place = 0; place < axes_.size(); ++place) {
     fusion::Elsewhere elsewhere;
     for (std::size_t other = 0; other < axes_.size(); ++other) {
@@ -364,6 +371,25 @@ void UnitPipeline::share_motion() {
     told_[place] = elsewhere;
     axes_[place]->estimator().set_elsewhere(elsewhere);
   }
+}
+
+// A stop that ends for one axis ends for all: whoever has rested for long enough is calibrated as
+// well, whoever has not begins again. Motion that is accepted is motion of all.
+void UnitPipeline::share_calibrations(TimePoint t) {
+  bool moved = false;
+  std::optional<TimePoint> still_until;
+  bool all_calibrated = true;
+  for (const auto& axis : axes_) {
+    moved = moved || axis->estimator().moved_in_calibration();
+    if (!still_until) still_until = axis->estimator().calibration_cut_at();
+    all_calibrated = all_calibrated && axis->estimator().calibrated();
+  }
+  if (all_calibrated) return;
+  for (const auto& axis : axes_) {
+    if (still_until && !cut_short_) axis->end_calibration(t, *still_until);
+    if (moved) axis->estimator().note_motion_in_calibration();
+  }
+  cut_short_ = still_until.has_value();
 }
 
 void UnitPipeline::share_restarts() {

@@ -112,6 +112,7 @@ class UnitPipeline {
   void set_cross(std::size_t place);
   void note_single(std::size_t gyro, std::size_t place, double rate_dps);
   void share_motion();
+  void share_calibrations(TimePoint t);
   void share_restarts();
   void follow_heading(TimePoint t);
   [[nodiscard]] std::optional<Heading::Turn> turn_about_z();
@@ -136,7 +137,9 @@ class UnitPipeline {
   Pairs waiting_;  ///< for the pairs of the other axes
 
   std::array<fusion::Elsewhere, kAxes> told_{};
+  std::array<std::uint64_t, kAxes> told_of_{};  ///< editions of the conditions that made it
   std::array<std::uint64_t, kAxes> restarts_{};
+  bool cut_short_ = false;  ///< the calibrations of all axes, by the motion that one of them saw
   Heading heading_;
   Status status_;
 };

@@ -413,6 +413,7 @@ class BadInput(Units):
 
     def test_a_mount_that_is_no_rotation(self):
         self.refused(config(more_a="mount = [1, 0.2, 0, 0, 1, 0, 0, 0, 1]"), "mount is no rotation", "right angles")
+        self.refused(config(more_a="mount = [0.7, 0, 0, 0, 0.7, 0, 0, 0, 0.7]"), "mount is no rotation: the nearest one differs by 0.3 in an element")
         self.refused(config(more_a="mount = [0, 0, 0, 0, 0, 0, 0, 0, 0]"), "mount is no rotation: its determinant is 0")
         self.refused(config(more_a="mount = [1, 2]"), "neither three numbers nor nine")
         self.refused(config(more_a="mount = [0, 0, 900]"), "an angle of 900 deg", "-360 to 360")
@@ -426,6 +427,60 @@ class BadInput(Units):
     def test_one_axis_and_three(self):
         single = '[[gyro]]\nname = "right"\nbus = "can0"\ndbc = "units.dbc"\nmessage = "IMU_B"\nrate = "Z"\n'
         self.refused(config().replace(gyro("right", "IMU_B"), single), "gyro left has 3 axes, and gyro right has one", "in both [[gyro]] tables")
+
+    def test_one_axis_and_three_are_one_complaint(self):
+        single = '[[gyro]]\nname = "right"\nbus = "can0"\ndbc = "units.dbc"\nmessage = "IMU_B"\nrate = "Z"\n'
+        self.write("u.toml", config().replace(gyro("right", "IMU_B"), single))
+        message = self.bad("check", "u.toml")
+        self.assertNotIn("rate_dps", message)
+        self.assertEqual(message.count("error:"), 1, message)
+
+    def test_more_than_two_units(self):
+        self.refused(config() + gyro("third", "IMU_B"), "there are 3 [[gyro]] tables", "exactly two are needed", "in its own table: rate_x, rate_y, rate_z")
+        axes = "".join(f'[[gyro]]\nname = "{unit}{axis}"\nbus = "can0"\ndbc = "units.dbc"\nmessage = "IMU_{unit}"\nrate = "{axis}"\n'
+                       for unit in "AB" for axis in "XYZ")
+        self.refused(axes + '[output]\nbus = "can0"\n', "there are 6 [[gyro]] tables", "several axes of one unit stand in its own table")
+
+    def test_two_units_of_one_message(self):
+        self.refused(config().replace("IMU_B", "IMU_A"), "both gyros are read from the same frame: IMU_A on can0", "two different gyros are needed")
+        text = config().replace('message = "IMU_B"\nrate_x = "X"\nrate_y = "Y"\nrate_z = "Z"\ncounter = "Counter"\n',
+                                'message = "IMU_B"\nrate_x = "X"\nrate_y = "Y"\ncounter = "Counter"\n'
+                                '[[gyro.axis]]\naxis = "z"\nmessage = "IMU_A"\nrate = "Z"\n')
+        self.refused(text, "both gyros are read from the same frame: IMU_A on can0")
+
+    def test_a_mount_that_mixes_axes_of_two_messages_is_warned_of(self):
+        """Their rates may differ, which no file says."""
+        def unit(mount):
+            return config().replace('message = "IMU_B"\nrate_x = "X"\nrate_y = "Y"\nrate_z = "Z"\ncounter = "Counter"\n',
+                                    f'message = "IMU_B"\nrate_x = "X"\nrate_y = "Y"\ncounter = "Counter"\nmount = {mount}\n'
+                                    '[[gyro.axis]]\naxis = "z"\nmessage = "YAW_B"\nrate = "Yaw"\ncounter = "YawCounter"\n')
+        self.write("u.toml", unit("[20, 0, 0]"))
+        said = self.good("check", "u.toml").stderr.decode()
+        self.assertRegex(said, r"u\.toml:19: mount mixes Y of IMU_B and Yaw of YAW_B about the vehicle's y")
+        self.assertIn("only swaps axes and signs", said)
+        self.write("u.toml", unit("[180, 0, 90]"))
+        self.assertNotIn("mount mixes", self.good("check", "u.toml").stderr.decode())
+
+    def test_axes_at_different_rates_under_a_mount_are_right_within_sigma(self):
+        """Yaw of one unit comes half as often, and the mount mixes it with pitch."""
+        drive, a, b = self.drive(seconds=240.0, seed=16, turn=rotation(np.radians([20, 0, 0])).T)
+        t, readings = b
+        readings = readings.copy()
+        lines = []
+        for n, i in enumerate(range(0, len(t), 2)):
+            us = START_US + round(t[i] * 1e6) + 300
+            raw = np.rint(np.radians(readings[i, 2]) * 1e6).astype("<i4").tobytes() + bytes([n % 256, 0, 0, 0])
+            lines.append((us, f"({us // 1_000_000}.{us % 1_000_000:06d}) can0 103#{raw.hex().upper()}\n"))
+        text = config().replace('message = "IMU_B"\nrate_x = "X"\nrate_y = "Y"\nrate_z = "Z"\ncounter = "Counter"\n',
+                                'message = "IMU_B"\nrate_x = "X"\nrate_y = "Y"\ncounter = "Counter"\nmount = [20, 0, 0]\n'
+                                '[[gyro.axis]]\naxis = "z"\nmessage = "YAW_B"\nrate = "Yaw"\ncounter = "YawCounter"\n')
+        rows, summary = self.replay(log_of(frames(*a, 0x101), frames(*b, 0x102), lines), text)
+        for axis in AXES:
+            relative, _ = self.errors(rows, drive, axis)
+            self.assertGreater(len(relative), 5000, axis)
+            self.assertLess(np.mean(relative ** 2), 1.5, axis)
+            self.assertLess(np.max(np.abs(relative)), 7.0, axis)
+        self.assertEqual(summary["final_state"], "running")
 
     def test_a_unit_of_one_axis(self):
         self.refused(config().replace('rate_x = "X"\nrate_y = "Y"\n', ""), "a unit of one axis", 'rate = "SIGNAL"')

@@ -164,6 +164,86 @@ void play(const World& world, const Plan& plan, double from_s, double to_s, Pipe
   }
 }
 
+/// Units whose axes have messages of their own, 0x11n and 0x12n, each with counter and check value.
+std::string own_messages_dbc() {
+  std::string text = "VERSION \"\"\n\nBU_: RIG\n";
+  for (int unit = 1; unit <= 2; ++unit) {
+    for (int axis = 0; axis < 3; ++axis) {
+      text += fmt::format(
+          "\nBO_ {} UNIT{}_{}: 8 RIG\n SG_ Rate : 0|32@1- (1E-006,0) [-2000|2000] \"deg/s\" RIG\n"
+          " SG_ Counter : 32|4@1+ (1,0) [0|15] \"\" RIG\n SG_ Crc : 56|8@1+ (1,0) [0|255] \"\" "
+          "RIG\n",
+          0x100 + 0x10 * unit + axis, unit, "XYZ"[axis]);
+    }
+  }
+  return text;
+}
+
+Plan own_messages(const std::string& second_mount = "") {
+  std::string text;
+  for (int unit = 1; unit <= 2; ++unit) {
+    text += fmt::format(
+        "[[gyro]]\nname = \"{0}\"\nbus = \"can0\"\ndbc = \"units.dbc\"\n"
+        "message = \"UNIT{0}_X\"\n{1}\n",
+        unit, unit == 2 ? second_mount : "");
+    for (const char axis : {'x', 'y', 'z'}) {
+      text += fmt::format(
+          "[[gyro.axis]]\naxis = \"{}\"\nmessage = \"UNIT{}_{}\"\nrate = \"Rate\"\n"
+          "counter = \"Counter\"\ncrc = \"Crc\"\ne2e = \"crc8_j1850\"\n",
+          axis, unit, static_cast<char>(axis - 'x' + 'X'));
+    }
+  }
+  text += "[calibration]\nrest_s = 20\nrate_dps = [0.0, 0.0, 0.0]\n[output]\nbus = \"can0\"\n";
+  std::string folder = std::filesystem::temp_directory_path() / "vgyro-units-XXXXXX";
+  if (::mkdtemp(folder.data()) == nullptr) std::abort();
+  std::ofstream(folder + "/units.dbc") << own_messages_dbc();
+  std::ofstream(folder + "/vgyro.toml") << text;
+  auto loaded = load_config(folder + "/vgyro.toml");
+  std::filesystem::remove_all(folder);
+  if (!loaded) throw std::runtime_error(loaded.error().front().message());
+  return std::move(loaded->plan);
+}
+
+/// What becomes of a frame of unit 0 or 1 about a sensor's axis; false: it is lost.
+using Spoil =
+    std::function<bool(std::size_t unit, std::size_t axis, double t_s, can::Frame& frame)>;
+
+/// How often a unit speaks, and how far apart the messages of its axes are.
+struct Pace {
+  Duration interval = kInterval;
+  std::chrono::milliseconds apart{1};
+};
+
+/// Each axis in a message of its own; unit 2 is mounted as its plan says.
+void play_apart(const World& world, const Plan& plan, double from_s, double to_s,
+                Pipeline& pipeline, FrameSink& sink, const Spoil& spoil, std::uint64_t seed = 7,
+                const Pace& pace = {}) {
+  std::mt19937_64 engine(seed);
+  std::normal_distribution<double> noise(0.0, world.noise_dps);
+  const auto first = static_cast<int>(from_s / to_seconds(pace.interval));
+  const auto last = static_cast<int>(to_s / to_seconds(pace.interval));
+  for (int n = first; n < last; ++n) {
+    for (std::size_t unit = 0; unit < 2; ++unit) {
+      for (const GyroPlan& axis : plan.gyros[unit].axes) {
+        const Duration late = pace.apart * static_cast<int>(axis.sensor_axis) +
+                              pace.interval / 4 * static_cast<int>(unit);
+        const TimePoint t = kStart + n * pace.interval + late;
+        const double t_s = to_seconds(t - kStart);
+        const Rates w = world.rate(t_s);
+        double reading = noise(engine);
+        reading += (unit == 0 ? world.first_bias : world.second_bias)[axis.sensor_axis];
+        // The sensor feels the vehicle's rate turned back.
+        for (std::size_t i = 0; i < 3; ++i)
+          reading += plan.gyros[unit].mount.at(i, axis.sensor_axis) * w[i];
+        can::Frame frame = empty_frame(axis.match);
+        put_gyro(axis, reading, static_cast<std::uint64_t>(n), frame);
+        seal(axis.e2e, frame);
+        if (spoil(unit, axis.sensor_axis, t_s, frame)) pipeline.receive(0, frame, t, sink);
+      }
+    }
+  }
+}
+
 TEST(UnitPipeline, HasAnAxisForEachAndNamesIt) {
   const Plan plan = plan_of();
   ASSERT_EQ(plan.axes.size(), 3U);
@@ -193,6 +273,27 @@ TEST(UnitPipeline, AllocatesNothingOnTheFramePath) {
     EXPECT_GT(bus.frames, 9'000U);
     EXPECT_GT(pipeline.status().misalignment_segments, 5U);
   }
+}
+
+// Nor with what follows the heading, mixes axes in messages of their own, and meets faults.
+TEST(UnitPipeline, AllocatesNothingThroughFaultsOfAMixedUnit) {
+  const World world{.rate = drives};
+  Plan plan = own_messages("mount = [20, 0, 0]");
+  plan.calibration.latitude_deg = 50.0;
+  plan.calibration.heading_deg = 0.0;
+  Pipeline pipeline(plan);
+  Bus bus;
+  const Spoil spoil = [](std::size_t unit, std::size_t axis, double t_s, can::Frame& frame) {
+    if (unit == 1 && axis == 2 && t_s > 50.0 && t_s < 60.0) frame.data[7] ^= 0x5A;
+    return unit != 0 || t_s < 65.0 || t_s > 75.0;
+  };
+  play_apart(world, plan, 0.0, 1.0, pipeline, bus, spoil);
+  const std::size_t before = allocations_so_far();
+  play_apart(world, plan, 1.0, 90.0, pipeline, bus, spoil);
+  EXPECT_EQ(allocations_so_far() - before, 0U);
+  EXPECT_EQ(pipeline.status().state, State::kRunning);
+  EXPECT_GT(pipeline.axis_status(1).gyros[1].rejected[static_cast<std::size_t>(Reject::kOtherAxis)],
+            400U);
 }
 
 // The tilt is known again at the start of a second drive, and its heading error gone.
@@ -291,6 +392,66 @@ TEST(UnitPipeline, BeginsTheCalibrationOfAllAxesAgainWhereOneMoves) {
   }
 }
 
+// Soon after eighteen of twenty seconds it turns about z, slowly and a little tilted: x sees
+// less of it than a calibration calls motion.
+Rates sets_off(double t_s) {
+  if (t_s < 18.3) return {};
+  return {0.03, -0.03, 3.0};
+}
+
+// A stop that is over is over for all axes: they are calibrated with what they rested, and none
+// learns the rest of the turn as its drift.
+TEST(UnitPipeline, EndsTheCalibrationOfAllAxesWhereOneMovesAtTheEnd) {
+  const Plan plan = plan_of();
+  const World world{.rate = sets_off, .noise_dps = 0.002};
+  Pipeline pipeline(plan);
+  Bus bus;
+  play(world, plan, 0.0, 20.5, pipeline, bus);
+  for (std::size_t place = 0; place < 3; ++place) {
+    const Status& status = pipeline.axis_status(place);
+    EXPECT_EQ(status.state, State::kRunning) << place;
+    EXPECT_EQ(status.calibration_restarts, 0U) << place;
+    for (std::size_t gyro = 0; gyro < 2; ++gyro) {
+      const double bias = (gyro == 0 ? world.first_bias : world.second_bias)[place];
+      // Of 900 samples; with what is left of its time it would be off by 0.0025.
+      EXPECT_NEAR(status.gyros[gyro].bias_dps, bias, 6.0 * 0.002 / std::sqrt(900.0)) << place;
+    }
+  }
+}
+
+// An axis that has too little of the stop, because its message came later, waits for the next one.
+TEST(UnitPipeline, BeginsAgainWhereAnAxisHasTooLittleOfTheStop) {
+  const Plan plan = own_messages();
+  const World world{.rate =
+                        [](double t_s) {
+                          return t_s < 19.0 || t_s > 30.0 ? Rates{} : Rates{0.0, 0.0, 3.0};
+                        },
+                    .noise_dps = 0.002};
+  Pipeline pipeline(plan);
+  Bus bus;
+  const Spoil late = [](std::size_t, std::size_t axis, double t_s, can::Frame&) {
+    return axis != 0 || t_s > 8.0;
+  };
+  play_apart(world, plan, 0.0, 29.0, pipeline, bus, late);
+  EXPECT_EQ(pipeline.axis_status(0).state, State::kCalibrating);
+  EXPECT_GT(pipeline.axis_status(0).calibration_restarts, 0U);
+  EXPECT_EQ(pipeline.axis_status(2).state, State::kRunning);
+  EXPECT_EQ(pipeline.axis_status(2).calibration_restarts, 0U);
+  play_apart(world, plan, 29.0, 60.0, pipeline, bus, late, 8);
+  EXPECT_EQ(pipeline.axis_status(0).state, State::kRunning);
+}
+
+// Where motion is accepted, an axis that does not feel it is as uncertain.
+TEST(UnitPipeline, AcceptedMotionIsMotionOfAllAxes) {
+  const Plan plan = plan_of("", "rate_dps = [0.0, 0.0, 0.0]\nwhen_moving = \"accept\"");
+  const World world{.rate = turns_early};
+  Pipeline pipeline(plan);
+  Bus bus;
+  play(world, plan, 0.0, 25.0, pipeline, bus);
+  for (std::size_t place = 0; place < 3; ++place)
+    EXPECT_TRUE(pipeline.axis_status(place).moved_in_calibration) << place;
+}
+
 TEST(UnitPipeline, GoesOnUnderAnotherOutput) {
   const World world{.rate = drives};
   const Plan plan = plan_of();
@@ -340,86 +501,6 @@ TEST(UnitPipeline, GoesOnCountingWhereALayoutGetsMoreAxes) {
 
 // --- what is wrong with a frame, and with an axis
 // -------------------------------------------------
-
-/// Units whose axes have messages of their own, 0x11n and 0x12n, each with counter and check value.
-std::string own_messages_dbc() {
-  std::string text = "VERSION \"\"\n\nBU_: RIG\n";
-  for (int unit = 1; unit <= 2; ++unit) {
-    for (int axis = 0; axis < 3; ++axis) {
-      text += fmt::format(
-          "\nBO_ {} UNIT{}_{}: 8 RIG\n SG_ Rate : 0|32@1- (1E-006,0) [-2000|2000] \"deg/s\" RIG\n"
-          " SG_ Counter : 32|4@1+ (1,0) [0|15] \"\" RIG\n SG_ Crc : 56|8@1+ (1,0) [0|255] \"\" "
-          "RIG\n",
-          0x100 + 0x10 * unit + axis, unit, "XYZ"[axis]);
-    }
-  }
-  return text;
-}
-
-Plan own_messages(const std::string& second_mount = "") {
-  std::string text;
-  for (int unit = 1; unit <= 2; ++unit) {
-    text += fmt::format(
-        "[[gyro]]\nname = \"{0}\"\nbus = \"can0\"\ndbc = \"units.dbc\"\n"
-        "message = \"UNIT{0}_X\"\n{1}\n",
-        unit, unit == 2 ? second_mount : "");
-    for (const char axis : {'x', 'y', 'z'}) {
-      text += fmt::format(
-          "[[gyro.axis]]\naxis = \"{}\"\nmessage = \"UNIT{}_{}\"\nrate = \"Rate\"\n"
-          "counter = \"Counter\"\ncrc = \"Crc\"\ne2e = \"crc8_j1850\"\n",
-          axis, unit, static_cast<char>(axis - 'x' + 'X'));
-    }
-  }
-  text += "[calibration]\nrest_s = 20\nrate_dps = [0.0, 0.0, 0.0]\n[output]\nbus = \"can0\"\n";
-  std::string folder = std::filesystem::temp_directory_path() / "vgyro-units-XXXXXX";
-  if (::mkdtemp(folder.data()) == nullptr) std::abort();
-  std::ofstream(folder + "/units.dbc") << own_messages_dbc();
-  std::ofstream(folder + "/vgyro.toml") << text;
-  auto loaded = load_config(folder + "/vgyro.toml");
-  std::filesystem::remove_all(folder);
-  if (!loaded) throw std::runtime_error(loaded.error().front().message());
-  return std::move(loaded->plan);
-}
-
-/// What becomes of a frame of unit 0 or 1 about a sensor's axis; false: it is lost.
-using Spoil =
-    std::function<bool(std::size_t unit, std::size_t axis, double t_s, can::Frame& frame)>;
-
-/// How often a unit speaks, and how far apart the messages of its axes are.
-struct Pace {
-  Duration interval = kInterval;
-  std::chrono::milliseconds apart{1};
-};
-
-/// Each axis in a message of its own; unit 2 is mounted as its plan says.
-void play_apart(const World& world, const Plan& plan, double from_s, double to_s,
-                Pipeline& pipeline, FrameSink& sink, const Spoil& spoil, std::uint64_t seed = 7,
-                const Pace& pace = {}) {
-  std::mt19937_64 engine(seed);
-  std::normal_distribution<double> noise(0.0, world.noise_dps);
-  const auto first = static_cast<int>(from_s / to_seconds(pace.interval));
-  const auto last = static_cast<int>(to_s / to_seconds(pace.interval));
-  for (int n = first; n < last; ++n) {
-    for (std::size_t unit = 0; unit < 2; ++unit) {
-      for (const GyroPlan& axis : plan.gyros[unit].axes) {
-        const Duration late = pace.apart * static_cast<int>(axis.sensor_axis) +
-                              pace.interval / 4 * static_cast<int>(unit);
-        const TimePoint t = kStart + n * pace.interval + late;
-        const double t_s = to_seconds(t - kStart);
-        const Rates w = world.rate(t_s);
-        double reading = noise(engine);
-        reading += (unit == 0 ? world.first_bias : world.second_bias)[axis.sensor_axis];
-        // The sensor feels the vehicle's rate turned back.
-        for (std::size_t i = 0; i < 3; ++i)
-          reading += plan.gyros[unit].mount.at(i, axis.sensor_axis) * w[i];
-        can::Frame frame = empty_frame(axis.match);
-        put_gyro(axis, reading, static_cast<std::uint64_t>(n), frame);
-        seal(axis.e2e, frame);
-        if (spoil(unit, axis.sensor_axis, t_s, frame)) pipeline.receive(0, frame, t, sink);
-      }
-    }
-  }
-}
 
 /// The state about each axis, and whether a rate is ever further off than σ allows.
 struct Outcome {
