@@ -72,8 +72,10 @@ class Recorder {
       shift(gyro.t_s);
       fill_beginning(gyro.temperature_c);
       fill_beginning(gyro.supply_v);
-      for (std::vector<double>& axis : gyro.other_rate_dps)
+      for (std::vector<double>& axis : gyro.other_rate_dps) {
         fill_beginning(axis);
+        if (!plan_.output.axes.empty()) take_off_level(gyro.t_s, axis);
+      }
     }
     shift(recording_.reference_dps.t_s);
     shift(recording_.acceleration.t_s);
@@ -149,6 +151,19 @@ class Recorder {
       last_s = std::max(last_s, t - earliest_s_);
       t = last_s;
     }
+  }
+
+  // What a unit's other axis says while the platform rests is its bias, which no other axis feels.
+  // Beside a single gyro nobody knows whether the bias is the frame's own.
+  void take_off_level(const std::vector<double>& t_s, std::vector<double>& rate_dps) const {
+    const auto resting = std::lower_bound(t_s.begin(), t_s.end(), recording_.rest_s) - t_s.begin();
+    if (resting == 0 || rate_dps.empty()) return;
+    std::vector<double> rest(rate_dps.begin(), rate_dps.begin() + resting);
+    const auto middle = rest.begin() + resting / 2;
+    std::nth_element(rest.begin(), middle, rest.end());
+    const double level_dps = *middle;
+    for (double& rate : rate_dps)
+      rate -= level_dps;
   }
 
   // It may stand on a page that comes later; what never came is not known.
