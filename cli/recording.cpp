@@ -206,6 +206,7 @@ Expected<std::vector<gap::Recording>> read_recordings(const std::string& log,
       });
   if (!done) return tl::unexpected(done.error());
   std::vector<gap::Recording> recordings;
+  recordings.reserve(plans.size());
   for (std::size_t pair = 0; pair < plans.size(); ++pair) {
     if (const auto missing = frames.missing_gyro(log, pair, recorders[pair].used())) {
       return tl::unexpected(*missing);
