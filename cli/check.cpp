@@ -224,9 +224,10 @@ void print_plan(const gateway::Plan& plan) {
   for (const gateway::GyroPlan& gyro : plan.gyros)
     print_gyro(gyro);
   if (plan.reference) {
-    for (const gateway::Quantity& rate : rates_of(*plan.reference))
+    for (const gateway::Quantity& rate : rates_of(*plan.reference)) {
       print_row("reference", plan.reference->bus, plan.reference->match, plan.reference->message,
                 rate);
+    }
     print_e2e(plan.reference->e2e);
   }
   if (plan.accelerometer) {

@@ -214,7 +214,7 @@ CLI::App* add_simulate(CLI::App& app, SimulateOptions& options) {
 void add_axis(CLI::App& command, std::string& axis) {
   command
       .add_option("--axis", axis,
-                  "of whole units only the pair about this axis of the vehicle: x, y or z;\n"
+                  "of whole units only the pair about the vehicle's x, y or z;\n"
                   "without it all, one after the other")
       ->check(CLI::IsMember({"x", "y", "z"}));
 }

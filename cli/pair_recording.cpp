@@ -107,6 +107,7 @@ Expected<std::vector<analysis::PairRecording>> read_pair_recordings(
       });
   if (!done) return tl::unexpected(done.error());
   std::vector<analysis::PairRecording> recordings;
+  recordings.reserve(plans.size());
   for (std::size_t pair = 0; pair < plans.size(); ++pair) {
     Gatherer& gatherer = gatherers[pair];
     auto complaint = frames.missing_gyro(name_of(logs), pair, gatherer.used());

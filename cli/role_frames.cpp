@@ -12,6 +12,7 @@
 namespace vgyro::cli {
 
 RoleFrames::RoleFrames(std::span<const gateway::Plan> plans) {
+  pairs_.reserve(plans.size());
   for (const gateway::Plan& plan : plans)
     pairs_.push_back({.plan = &plan, .router = gateway::Router(plan)});
 }

@@ -150,7 +150,7 @@ void read_reference(TomlReader& reader, SignalResolver& resolver, Plan& plan) {
   auto rates = read_reference_rates(reader, resolver, of_axes, main);
   const auto last =
       std::find_if(rates.rbegin(), rates.rend(), [](const auto& rate) { return rate.has_value(); });
-  if (last == rates.rend()) {
+  if (main == nullptr || last == rates.rend()) {
     reader.forgive({"sign", "source_address"});
     forgive_e2e(reader);
     return;

@@ -63,6 +63,7 @@ Expected<std::vector<AllanReport>> judge_all(const AllanOptions& options,
 std::vector<std::string> pictures_of(const AllanOptions& options,
                                      const std::vector<gateway::Plan>& pairs) {
   std::vector<std::string> paths;
+  paths.reserve(pairs.size());
   for (const gateway::Plan& pair : pairs)
     paths.push_back(pairs.size() > 1 ? path_of_axis(options.plot, axis_name(pair)) : options.plot);
   return paths;

@@ -54,6 +54,7 @@ void append(Json& list, const Json& more) {
 
 std::string effects_text(const gap::Result& result) {
   std::vector<std::string> names;
+  names.reserve(result.effects.size());
   for (const gap::NamedEffect& named : result.effects) {
     names.push_back(fmt::format("{} of gyro {}{}", model::info(named.effect.kind).name,
                                 named.effect.gyro + 1, named.applied ? "" : " (not applied)"));

@@ -266,9 +266,10 @@ Expected<std::vector<std::string>> write(const std::string& folder, const std::s
   const AxisResult& first = axes.front();
   std::vector<ResultFile> files{
       {"report.html", several ? overview_page(axes) : report_page(first.subject, first.judged)}};
-  for (std::size_t i = 0; several && i < axes.size(); ++i)
+  for (std::size_t i = 0; several && i < axes.size(); ++i) {
     files.push_back(
         {report_name(axes[i].subject), report_page(axes[i].subject, axes[i].judged, axes)});
+  }
   files.push_back({"gap.json", json_text(several ? axes_gap_json(axes)
                                                  : gap_json(first.subject, first.judged))});
   files.push_back({"model.toml", std::move(*model)});
@@ -276,6 +277,7 @@ Expected<std::vector<std::string>> write(const std::string& folder, const std::s
     return tl::unexpected(done.error());
   }
   std::vector<std::string> names;
+  names.reserve(files.size());
   for (const ResultFile& file : files)
     names.push_back(file.name);
   return names;

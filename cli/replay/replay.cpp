@@ -362,6 +362,7 @@ std::optional<Error> explain_silence(const ReplaySummary& summary, const gateway
 std::vector<std::string> pictures_of(const ReplayOptions& options, const gateway::Plan& plan) {
   if (plan.axes.empty()) return {options.plot};
   std::vector<std::string> paths;
+  paths.reserve(plan.axes.size());
   for (const gateway::Plan& axis : plan.axes)
     paths.push_back(path_of_axis(options.plot, axis_name(axis)));
   return paths;

@@ -50,7 +50,7 @@ def is_tilt(effect):
 
 class Gap(Axes):
     def test_the_tilt_between_two_units_is_named_about_every_axis_it_shows_on(self):
-        self.record(460.0, 1, TILTED)
+        self.record(340.0, 1, TILTED)
         found = self.gap("--accept", "gyro=2")
         self.assertEqual([axis["axis"] for axis in found["axes"]], list(AXES))
         named = {(one["axis"], one["parameters"]["from"]): one for one in found["effects"] if is_tilt(one)}
@@ -87,7 +87,7 @@ class Gap(Axes):
         """And the gateway takes it back from there: the two agree to what is left of the tilt."""
         # The sensor feels the vehicle's rate turned back, and is tilted besides.
         felt = MOUNT.T @ TILTED
-        drive = self.record(460.0, 2, felt, more_b=MOUNT_TEXT)
+        drive = self.record(340.0, 2, felt, more_b=MOUNT_TEXT)
         own = felt @ MOUNT  # of the unit's own axes
         found = self.gap("--accept", "gyro=2")
         self.assertLess(abs(found["gap"]["after"]), 0.2 * found["gap"]["before"])
@@ -101,10 +101,10 @@ class Gap(Axes):
                   "--csv", "out.csv", "in.log")
         left_deg = np.abs(json.loads(self.read("out.json"))["misalignment"]["angle_deg"])
         self.assertLess(np.max(left_deg[:2]), 0.05)
-        self.assertEqual(drive.seconds, 460.0)
+        self.assertEqual(drive.seconds, 340.0)
 
     def test_biases_that_nobody_gave_are_told_in_the_units_own_signs(self):
-        self.record(200.0, 3, MOUNT.T, more_b=MOUNT_TEXT)
+        self.record(150.0, 3, MOUNT.T, more_b=MOUNT_TEXT)
         found = self.gap(model=self.empty_model())
         for unit, truth in ((1, BIAS_A), (2, BIAS_B)):
             for axis, bias_dps in zip(AXES, truth):
@@ -118,7 +118,7 @@ class Gap(Axes):
 
     def test_what_is_the_whole_units_is_named_once(self):
         """40 ms of delay: found about the axis that moves most, and known to the others."""
-        self.record(460.0, 4, lag_s=0.04)
+        self.record(300.0, 4, lag_s=0.04)
         found = self.gap("--accept", "gyro=2")
         delays = [one for one in found["effects"] if one["kind"] == "delay" and one["applied"]]
         self.assertEqual(len(delays), 1, found["effects"])
@@ -130,7 +130,7 @@ class Gap(Axes):
         self.good("check", "--model", "found/model.toml", "u.toml")
 
     def test_one_axis_alone_is_what_it_is_among_all(self):
-        self.record(200.0, 5, TILTED)
+        self.record(150.0, 5, TILTED)
         alone = self.compare("--axis", "x")
         self.assertEqual(alone["axis"], "x")
         among = self.compare()
@@ -143,7 +143,7 @@ class Gap(Axes):
             self.assertIn(f"Axis {axis}: in.log", said)
 
     def test_one_axis_writes_the_result_of_one_pair(self):
-        self.record(200.0, 6, TILTED)
+        self.record(120.0, 6, TILTED)
         self.gap()
         found = self.gap("--axis", "x")  # replaces the result of all
         self.assertEqual(found["axis"], "x")
@@ -181,7 +181,7 @@ class Reference(Axes):
         return drive
 
     def test_with_a_reference_of_all_axes_it_is_told_which_unit_is_tilted(self):
-        self.with_table(300.0, 11)
+        self.with_table(240.0, 11)
         found = self.gap()
         for axis in found["axes"]:
             self.assertTrue(axis["recording"]["with_reference"], axis["axis"])
