@@ -11,10 +11,12 @@
 #include "cli/commands.h"
 #include "cli/exit_code.h"
 #include "cli/gap/accept.h"
+#include "cli/gyro_names.h"
 #include "cli/number_option.h"
 #include "cli/output/errors.h"
 #include "cli/output/terminal.h"
 #include "cli/output/unfinished.h"
+#include "cli/usage.h"
 #include "gateway/config.h"
 
 namespace {
@@ -41,12 +43,12 @@ void add_overrides(CLI::App& command, std::string& method, std::optional<std::st
   command.add_option("--model", model, "model file instead of the configured one");
 }
 
-constexpr const char* kLogHelp = "log of any known form, packed or not; - is standard input";
+constexpr const char* kLogHelp = "log in any known form, packed or not; - is standard input";
 
 void add_logs(CLI::App& command, std::vector<std::string>& logs) {
   command
       .add_option("LOG", logs,
-                  "logs of any known form, packed or not; several are merged by stamp;\n"
+                  "logs in any known form, packed or not; several are merged by stamp;\n"
                   "- is standard input")
       ->required();
 }
@@ -54,14 +56,14 @@ void add_logs(CLI::App& command, std::vector<std::string>& logs) {
 void add_digits(CLI::App& command, unsigned& digits) {
   command
       .add_option("--digits", digits,
-                  "digits of a stamp's fraction, 6 or 9; default: as the log has them.\n"
-                  "canplayer wants 6")
+                  "digits of a stamp's fraction, 6 or 9; default: as in the log.\n"
+                  "canplayer needs 6")
       ->check(CLI::IsMember({6, 9}));
 }
 
 CLI::App* add_check(CLI::App& app, CheckOptions& options, std::string& method) {
-  CLI::App* command = app.add_subcommand(
-      "check", "Explain a configuration before it is trusted: which bits are used");
+  CLI::App* command =
+      app.add_subcommand("check", "Show how a configuration is understood, down to the bits");
   command->add_option("CONFIG", options.config, "configuration, e.g. vgyro.toml")->required();
   add_overrides(*command, method, options.model);
   return command;
@@ -87,22 +89,22 @@ void read_ids(const std::vector<std::string>& words, std::vector<std::uint32_t>&
 CLI::App* add_init(CLI::App& app, InitOptions& options) {
   CLI::App* command = app.add_subcommand(
       "init", "Propose a configuration from a log: which two signals are the gyros");
-  command->add_option("--dbc", options.dbc_files, "DBC file; may be given several times")
+  command->add_option("--dbc", options.dbc_files, "DBC file; may be repeated")
       ->allow_extra_args(false);
   command->add_option("-o,--output", options.output, "configuration; - is standard output")
       ->capture_default_str();
-  command->add_flag("--force", options.force, "replaces a file that is there already");
+  command->add_flag("--force", options.force, "replace existing files");
   command
       ->add_option_function<std::vector<std::string>>(
           "--id",
           [&options](const std::vector<std::string>& words) { read_ids(words, options.ids); },
-          "identifier (hex) to look at; may be given several times; without it all are")
+          "identifier (hex) to examine; may be repeated; default: all")
       ->allow_extra_args(false);
   constexpr double kTurnedMost_deg = 1e6;
-  add_number(
-      *command, "--turned", options.turned_deg, {-kTurnedMost_deg, kTurnedMost_deg},
-      "degrees by which the platform turned in the whole log, positive to the left; 0: not known");
-  command->add_option("LOG", options.logs, "log in which both gyros turn; also DBC files")
+  add_number(*command, "--turned", options.turned_deg, {-kTurnedMost_deg, kTurnedMost_deg},
+             "angle by which the platform turned in the whole log, deg, positive to the left;\n0: "
+             "unknown");
+  command->add_option("LOG", options.logs, "logs in which both gyros turn; also DBC files")
       ->required();
   command->footer("Example: vgyro init drive.log --dbc car.dbc --dbc imu.dbc -o vgyro.toml");
   return command;
@@ -117,9 +119,9 @@ void sort_init_files(InitOptions& options) {
 }
 
 CLI::App* add_decode(CLI::App& app, DecodeOptions& options) {
-  CLI::App* command = app.add_subcommand(
-      "decode", "Show what DBC files know of a log, frame by frame, as JSON lines");
-  command->add_option("--dbc", options.dbc_files, "DBC file; may be given several times")
+  CLI::App* command =
+      app.add_subcommand("decode", "Decode a log with DBC files, frame by frame, as JSON lines");
+  command->add_option("--dbc", options.dbc_files, "DBC file; may be repeated")
       ->required()
       ->allow_extra_args(false);
   command->add_flag("--text", options.text, "lines for people instead of JSON");
@@ -130,17 +132,18 @@ CLI::App* add_decode(CLI::App& app, DecodeOptions& options) {
 
 CLI::App* add_convert(CLI::App& app, ConvertOptions& options) {
   CLI::App* command = app.add_subcommand(
-      "convert", "Read logs of any known form and write one that other tools read");
+      "convert", "Convert logs of any known form into one that other tools read");
   command
-      ->add_option("-o,--output", options.output,
-                   "the ending says the form: .log (candump), .asc, .blf (Vector); text\nalso "
-                   "packed: .log.gz, .log.xz, .log.zst; - is a candump log on\nstandard output")
+      ->add_option(
+          "-o,--output", options.output,
+          "output; its ending sets the form: .log (candump), .asc, .blf (Vector);\ntext may be "
+          "packed: .log.gz, .log.xz, .log.zst; - is a candump log on\nstandard output")
       ->required();
   add_digits(*command, options.digits);
   command->add_flag("-q,--quiet", options.quiet, "no summary on stderr");
   add_logs(*command, options.logs);
   command->footer(
-      "Which tool reads what is in docs/log-format.md.\n"
+      "vgyro(1) names the forms.\n"
       "Example: vgyro convert -o drive.log.xz drive.asc");
   return command;
 }
@@ -151,17 +154,17 @@ CLI::App* add_replay(CLI::App& app, ReplayOptions& options, std::string& method)
   command->add_option("--config", options.config, "configuration, e.g. vgyro.toml")->required();
   add_overrides(*command, method, options.model);
   command->add_option("--state", options.state,
-                      "starts with the biases that vgyrod kept in this file; it is only read");
+                      "start with the biases in this state file of vgyrod; it is not changed");
   command->add_option("-o,--output", options.output,
                       "output frames as candump lines; default: standard output");
   command->add_option("--json", options.json, "summary as JSON; - is standard output");
   command->add_option("--csv", options.csv,
-                      "rates, sigmas, biases and heading as a table; - is standard output");
+                      "rates, sigmas, biases and heading as CSV; - is standard output");
   command->add_option("--plot", options.plot, "picture of rates and drifts: .svg, .png or .pdf");
   command
       ->add_option("--map", options.bus_map,
-                   "LOGNAME=CONFIGNAME: the log's interface for one of the configuration;\n"
-                   "may be given several times")
+                   "LOGNAME=CONFIGNAME: use the log's interface for one of the\n"
+                   "configuration; may be repeated")
       ->allow_extra_args(false);
   command->add_flag("-q,--quiet", options.quiet, "no summary on stderr");
   add_digits(*command, options.digits);
@@ -173,7 +176,7 @@ CLI::App* add_replay(CLI::App& app, ReplayOptions& options, std::string& method)
 }
 
 CLI::App* add_model(CLI::App& app) {
-  CLI::App* command = app.add_subcommand("model", "What a model file may hold: model list");
+  CLI::App* command = app.add_subcommand("model", "List what a model file may contain: model list");
   command->add_subcommand("list", "every kind of effect, its parameters and their limits");
   command->require_subcommand(1);
   return command;
@@ -181,31 +184,31 @@ CLI::App* add_model(CLI::App& app) {
 
 CLI::App* add_simulate(CLI::App& app, SimulateOptions& options) {
   CLI::App* command = app.add_subcommand(
-      "simulate", "Play a motion through a model: what such gyros would have recorded");
+      "simulate", "Simulate a recording: a motion as seen by gyros with a model's errors");
   command->add_option("--config", options.config, "configuration, e.g. vgyro.toml")->required();
-  command->add_option("--model", options.model, "model file: what the gyros' errors are")
-      ->required();
+  command->add_option("--model", options.model, "model file with the gyros' errors")->required();
   command
       ->add_option("--profile", options.profile,
                    "motion, CSV: t_s,rate_dps[,temperature_c][,acc_x_g,acc_y_g,acc_z_g][,supply_v]"
                    "[,rate_x_dps,rate_y_dps,rate_z_dps]")
       ->required();
-  add_number(*command, "--seed", options.seed, {}, "of the noise; the same gives the same bytes");
+  add_number(*command, "--seed", options.seed, {},
+             "seed of the noise; the same seed gives the same bytes");
   command->add_option("-o,--output", options.output, "candump log; - is standard output")
       ->capture_default_str();
   const NumberRange<double> rates{0.1, 10'000.0};
   add_numbers(*command, "--gyro-rate", options.gyro_rates_hz, 2, rates,
-              "samples a second, of both or A,B");
-  add_number(*command, "--reference-rate", options.reference_rate_hz, rates, "samples a second");
+              "samples per second, for both or as A,B");
+  add_number(*command, "--reference-rate", options.reference_rate_hz, rates, "samples per second");
   add_number(*command, "--accelerometer-rate", options.accelerometer_rate_hz, rates,
-             "samples a second");
+             "samples per second");
   add_number(*command, "--jitter", options.jitter_s, {0.0, 1.0},
              "every frame is late by |N(0, jitter)| seconds");
   add_number(*command, "--start", options.start_s, {0.0, 4e9},
-             "stamp of the motion's beginning, seconds");
+             "stamp at which the motion begins, seconds");
   command->add_flag("-q,--quiet", options.quiet, "no summary on stderr");
   command->footer(
-      "The forms of the files are in docs/simulate.md and docs/model-file.md.\n"
+      "vgyro(1) describes the files; `vgyro model list` shows what a model may hold.\n"
       "Example: vgyro simulate --config vgyro.toml --model model.toml --profile turns.csv -o "
       "out.log");
   return command;
@@ -214,8 +217,8 @@ CLI::App* add_simulate(CLI::App& app, SimulateOptions& options) {
 void add_axis(CLI::App& command, std::string& axis) {
   command
       .add_option("--axis", axis,
-                  "of whole units only the pair about the vehicle's x, y or z;\n"
-                  "without it all, one after the other")
+                  "for whole units: only the pair about the vehicle's x, y or z;\n"
+                  "default: all, one after the other")
       ->check(CLI::IsMember({"x", "y", "z"}));
 }
 
@@ -225,12 +228,12 @@ CLI::App* add_allan(CLI::App& app, AllanOptions& options) {
   command->add_option("--config", options.config, "configuration, e.g. vgyro.toml")->required();
   command->add_option("--json", options.json, "figures as JSON; - is standard output");
   command->add_option("--plot", options.plot,
-                      "picture of the curves: .svg, .png or .pdf; of several axes one each,\n"
-                      "allan-x.svg ... of allan.svg");
+                      "plot of the curves: .svg, .png or .pdf; one per axis for whole units,\n"
+                      "allan-x.svg ... for allan.svg");
   add_axis(*command, options.axis);
   add_logs(*command, options.logs);
   command->footer(
-      "Best on an hour or more at rest; what the figures mean is in docs/allan.md.\n"
+      "Best on an hour or more at rest; see vgyro(1).\n"
       "Example: vgyro allan --config vgyro.toml --plot allan.svg rest.log.xz");
   return command;
 }
@@ -239,8 +242,9 @@ void add_recording(CLI::App& command, std::string& config, std::vector<std::stri
                    std::string& axis) {
   command.add_option("--config", config, "configuration, e.g. vgyro.toml")->required();
   command
-      .add_option("--measured", measured,
-                  std::string(kLogHelp) + ";\nagain for a further recording of the same pair")
+      .add_option(
+          "--measured", measured,
+          std::string(kLogHelp) + ";\nmay be repeated for further recordings of the same pair")
       ->required()
       ->allow_extra_args(false);
   add_axis(command, axis);
@@ -248,14 +252,14 @@ void add_recording(CLI::App& command, std::string& config, std::vector<std::stri
 
 CLI::App* add_compare(CLI::App& app, CompareOptions& options) {
   CLI::App* command = app.add_subcommand(
-      "compare", "Say how far a model's simulation and a recording disagree, and where");
+      "compare", "Measure how far a model and a recording disagree, and where");
   add_recording(*command, options.config, options.measured, options.axis);
   command->add_option("--model", options.model, "model file")->required();
   command->add_option("--json", options.json, "the same as JSON; - is standard output");
-  add_number(*command, "--seed", options.seed, {}, "of the simulations");
+  add_number(*command, "--seed", options.seed, {}, "seed of the simulations");
   command->add_flag("-q,--quiet", options.quiet, "no table");
   command->footer(
-      "Changes nothing. What the gap means is in docs/gap.md.\n"
+      "Changes nothing; see vgyro(1).\n"
       "Example: vgyro compare --config vgyro.toml --model model.toml --measured drive.log.xz");
   return command;
 }
@@ -265,73 +269,126 @@ constexpr double kTimeLimitMax_s = 1e6;
 
 // Empty for a good one, as CLI11 wants it.
 std::string wrong_acceptance(const std::string& word) {
-  const auto acceptance = acceptance_from(word);
+  const auto numbered = with_gyro_numbers(word, {.names = {}, .any = true});
+  const auto acceptance = acceptance_from(numbered ? *numbered : word);
   if (acceptance) return {};
   return acceptance.error().what + "; " + acceptance.error().remedy;
 }
 
+// A configuration that cannot be read is the command's own complaint.
+vgyro::Expected<void> number_gyros(GapOptions& options) {
+  if (options.accept.empty()) return {};
+  const auto loaded = vgyro::gateway::load_config(options.config);
+  if (!loaded) return {};
+  const auto& gyros = loaded->plan.gyros;
+  for (std::string& word : options.accept) {
+    const auto numbered = with_gyro_numbers(word, {.names = {gyros[0].name, gyros[1].name}});
+    if (!numbered) return tl::unexpected(numbered.error());
+    word = *numbered;
+  }
+  return {};
+}
+
+int number_and_run(GapOptions& options) {
+  if (const auto numbered = number_gyros(options); !numbered) {
+    report(numbered.error());
+    return kWrongUsage;
+  }
+  return run_gap(options);
+}
+
 CLI::App* add_gap(CLI::App& app, GapOptions& options) {
   CLI::App* command =
-      app.add_subcommand("gap", "Find what the model lacks, name it, add it, show the gap shrink");
+      app.add_subcommand("gap", "Find the effects that a model lacks, and add them");
   add_recording(*command, options.config, options.measured, options.axis);
   command->add_option("--model", options.model,
-                      "model file to begin with; default: the configured one, or none");
+                      "model file to start from; default: the configured one, or none");
   command->add_option("--out", options.out, "folder for report.html, gap.json and model.toml")
       ->required();
   command
       ->add_option("--accept", options.accept,
-                   "of ambiguous readings apply that of gyro=N, of kind=KIND, of both with\n"
-                   "a comma between, or the likeliest; may be given again")
+                   "which reading of an ambiguous effect to apply: gyro=N or gyro=NAME,\n"
+                   "kind=KIND, both with a comma between, or likeliest; may be repeated")
       ->allow_extra_args(false)
       ->check(wrong_acceptance);
   add_number(*command, "--time-limit", options.time_limit_s, {0.0, kTimeLimitMax_s},
-             "after so many seconds what is certain is written; 0: no limit");
-  add_number(*command, "--seed", options.seed, {}, "of the simulations");
+             "stop after this many seconds and write what is certain; 0: no limit");
+  add_number(*command, "--seed", options.seed, {}, "seed of the simulations");
   command->add_flag("-q,--quiet", options.quiet, "no summary");
   command->footer(
       "The folder is written whole or not at all; an earlier result in it is replaced.\n"
-      "How to read the result is in docs/gap.md.\n"
+      "vgyro(1) says how to read the result.\n"
       "Example: vgyro gap --config vgyro.toml --measured drive.log.xz --out found");
   return command;
 }
 
 CLI::App* add_status(CLI::App& app, StatusOptions& options) {
   CLI::App* command =
-      app.add_subcommand("status", "Show what the running gateway knows: state, gyros, buses");
+      app.add_subcommand("status", "Show the running gateway's state, gyros and buses");
   CLI::Option* json = command->add_flag("--json", options.json, "the same as JSON");
-  command->add_flag("-w,--watch", options.watch, "a live view; into a pipe: one line each time")
+  command->add_flag("-w,--watch", options.watch, "live view; into a pipe: one line per update")
       ->excludes(json);
   add_number(*command, "--interval", options.interval_s, {0.1, 3600.0},
-             "seconds between two looks with --watch");
-  command->footer("Asks vgyrod over D-Bus. Every field is explained in docs/service.md.");
+             "seconds between updates with --watch");
+  command->footer("Asks vgyrod over D-Bus; see vgyro(1).");
   return command;
 }
 
 CLI::App* add_recalibrate(CLI::App& app) {
   CLI::App* command = app.add_subcommand(
-      "recalibrate", "Let the running gateway forget its biases and calibrate anew");
-  command->footer("Only for root. Platform at rest, unless a reference is configured.");
+      "recalibrate", "Make the running gateway discard its biases and calibrate again");
+  command->footer("For root only. Keep the platform at rest unless a reference is configured.");
   return command;
 }
 
 // CLI11 would only say that a subcommand is missing.
-std::optional<vgyro::Error> unknown_command(const CLI::App& app, int argc, char** argv) {
-  if (argc < 2 || argv[1][0] == '-') return std::nullopt;
-  std::vector<std::string> names;
+std::optional<vgyro::Error> unknown_command(const CLI::App& app,
+                                            const std::vector<std::string>& words) {
+  if (words.empty() || words[0].starts_with('-')) return std::nullopt;
+  std::vector<std::string> names{"help"};
   for (const CLI::App* command : app.get_subcommands([](const CLI::App*) { return true; }))
     names.push_back(command->get_name());
-  const std::string name = argv[1];
-  if (std::find(names.begin(), names.end(), name) != names.end()) return std::nullopt;
-  return vgyro::Error{"vgyro", "there is no command \"" + name + "\"",
-                      vgyro::suggest_name(name, names)};
+  if (std::find(names.begin(), names.end(), words[0]) != names.end()) return std::nullopt;
+  return vgyro::Error{"vgyro",
+                      fmt::format("there is no command \"{}\"", vgyro::printable(words[0])),
+                      vgyro::suggest_name(words[0], names)};
+}
+
+// `vgyro help replay` is `vgyro replay --help`.
+std::vector<std::string> words_of(int argc, char** argv) {
+  std::vector<std::string> words(argv + std::min(argc, 1), argv + argc);
+  if (words.empty() || words[0] != "help") return words;
+  words.erase(words.begin());
+  words.emplace_back("--help");
+  return words;
+}
+
+// Takes the command line. The exit code where that is all: help is given, or the usage is wrong.
+std::optional<int> parse_words(CLI::App& app, std::vector<std::string> words) {
+  try {
+    std::reverse(words.begin(), words.end());  // CLI11 takes them from the back
+    app.parse(std::move(words));
+  } catch (const CLI::ParseError& error) {
+    if (error.get_exit_code() != 0) {
+      report(usage_error(app, error));
+      return kWrongUsage;
+    }
+    std::ostringstream out;
+    app.exit(error, out, out);
+    put_text(stdout, out.str());
+    return kDone;
+  }
+  return std::nullopt;
 }
 
 // The exit code of the command, or of what the command line is instead of one.
 int run(int argc, char** argv) {
-  CLI::App app{"vgyro: two gyros on CAN in, one better gyro out"};
+  CLI::App app{"vgyro: two gyros on CAN in, one better gyro out", "vgyro"};
   app.set_version_flag("--version", "vgyro " VGYRO_VERSION);
   app.require_subcommand(1);
-  app.footer("Exit codes: 0 done, 1 bad input (told on stderr), 2 wrong usage.");
+  app.footer(
+      "`vgyro help COMMAND` explains a command; the manual is vgyro(1).\n"
+      "Exit codes: 0 done, 1 bad input (see stderr), 2 wrong usage.");
   Options options;
   CLI::App* check = add_check(app, options.check, options.method);
   CLI::App* init = add_init(app, options.init);
@@ -345,20 +402,12 @@ int run(int argc, char** argv) {
   CLI::App* simulate = add_simulate(app, options.simulate);
   CLI::App* status = add_status(app, options.status);
   CLI::App* recalibrate = add_recalibrate(app);
-  if (const auto unknown = unknown_command(app, argc, argv)) {
+  std::vector<std::string> words = words_of(argc, argv);
+  if (const auto unknown = unknown_command(app, words)) {
     report(*unknown);
     return kWrongUsage;
   }
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    std::ostringstream out;
-    std::ostringstream complaint;
-    const int code = app.exit(error, out, complaint);
-    put_text(stdout, out.str());
-    put_text(stderr, complaint.str());
-    return code == 0 ? kDone : kWrongUsage;
-  }
+  if (const auto answered = parse_words(app, std::move(words))) return *answered;
   const auto method = vgyro::gateway::method_from(options.method);
   options.check.method = method;
   options.replay.method = method;
@@ -372,7 +421,7 @@ int run(int argc, char** argv) {
   if (model->parsed()) return run_model_list();
   if (allan->parsed()) return run_allan(options.allan);
   if (compare->parsed()) return run_compare(options.compare);
-  if (gap->parsed()) return run_gap(options.gap);
+  if (gap->parsed()) return number_and_run(options.gap);
   if (simulate->parsed()) return run_simulate(options.simulate);
   if (status->parsed()) return run_status(options.status);
   if (recalibrate->parsed()) return run_recalibrate();

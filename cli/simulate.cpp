@@ -496,7 +496,8 @@ int run_simulate(const SimulateOptions& options) {
       if (const auto good = gateway::check_valid(sensor); !good) return report(good.error());
     }
   }
-  auto model = model::load_model(options.model);
+  auto model =
+      model::load_model(options.model, {.names = {plan.gyros[0].name, plan.gyros[1].name}});
   if (!model) return report(model.error());
   auto profile = simulation::load_profile(options.profile);
   if (!profile) return report(profile.error());

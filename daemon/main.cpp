@@ -6,9 +6,12 @@
 #include <string>
 #include <string_view>
 #include <utility>
+#include <vector>
 
 #include <CLI/CLI.hpp>
 
+#include "base/printable.h"
+#include "base/spelling.h"
 #include "daemon/gateway_loop.h"
 #include "daemon/log.h"
 #include "daemon/metrics.h"
@@ -31,6 +34,24 @@ struct Options {
   bool forget = false;
   std::string metrics;
 };
+
+// An unknown option comes first: it is often the reason why another one is missing.
+std::string usage_text(const CLI::App& app, const CLI::ParseError& error) {
+  const std::string help = "; see `vgyrod --help`";
+  for (const std::string& word : app.remaining()) {
+    if (word.size() < 2 || word.front() != '-') continue;
+    const std::string option = word.substr(0, word.find('='));
+    std::vector<std::string> names;
+    for (const CLI::Option* known : app.get_options()) {
+      for (const std::string& name : known->get_lnames())
+        names.push_back("--" + name);
+    }
+    const auto near = vgyro::nearest_name(option, names);
+    return "vgyrod: there is no option " + vgyro::printable(option) +
+           (near ? "; did you mean " + *near + "?" : help);
+  }
+  return "vgyrod: " + vgyro::printable(error.what()) + help;
+}
 
 // systemd names the directory that it made for the service; of several the first.
 std::string default_state() {
@@ -118,7 +139,9 @@ int main(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? kDone : kWrongUsage;
+    if (error.get_exit_code() == 0) return app.exit(error);
+    std::fprintf(stderr, "error: %s\n", usage_text(app, error).c_str());
+    return kWrongUsage;
   }
 
   std::signal(SIGPIPE, SIG_IGN);  // a reader of stderr that went away must not stop the gateway

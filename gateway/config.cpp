@@ -325,7 +325,10 @@ void read_calibration(TomlReader& root, Context& context) {
 
 // A file that cannot be opened is a mistake of the line that names it.
 void read_model(const std::string& path, const std::string& named_at, Context& context) {
-  auto loaded = model::load_model(path);
+  const std::vector<GyroPlan>& gyros = context.resolved.plan.gyros;
+  model::GyroNames names{.names = {}, .any = gyros.size() != 2};
+  if (!names.any) names.names = {gyros[0].name, gyros[1].name};
+  auto loaded = model::load_model(path, names);
   if (loaded) {
     context.resolved.plan.model = std::move(*loaded);
     return;

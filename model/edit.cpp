@@ -78,7 +78,8 @@ std::string table_text(const Effect& effect, std::string_view newline) {
 }
 
 Expected<Model> read(std::string_view text) {
-  auto model = parse_model(text, kFile);
+  // An edit does not know the configuration, and leaves the gyros' names as they are.
+  auto model = parse_model(text, kFile, {.names = {}, .any = true});
   if (!model) return tl::unexpected(model.error().front());
   return *std::move(model);
 }

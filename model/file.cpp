@@ -3,11 +3,13 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <optional>
 
 #include <fmt/core.h>
 
 #include "base/bounded_file.h"
+#include "base/printable.h"
 #include "base/spelling.h"
 #include "base/toml_reader.h"
 #include "model/catalogue.h"
@@ -134,14 +136,35 @@ void read_sigma(const toml::table& table, TomlReader& reader, const std::string&
   }
 }
 
-std::optional<std::size_t> read_gyro(TomlReader& reader) {
+std::optional<std::size_t> read_gyro_name(TomlReader& reader, const GyroNames& gyros) {
+  const auto name = reader.text("gyro");
+  if (!name) return std::nullopt;
+  if (gyros.any) return 0;
+  const auto& [first, second] = gyros.names;
+  const bool is_first = !name->empty() && *name == first;
+  const bool is_second = !name->empty() && *name == second;
+  if (is_first != is_second) return is_first ? 0 : 1;
+  std::vector<std::string> known;
+  std::copy_if(gyros.names.begin(), gyros.names.end(), std::back_inserter(known),
+               [](const std::string& known_name) { return !known_name.empty(); });
+  const bool is_both = is_first && is_second;
+  const std::string what = is_both ? fmt::format("both gyros have the name \"{}\"", *name)
+                                   : fmt::format("there is no gyro \"{}\"", printable(*name));
+  reader.complain(reader.where("gyro"), what,
+                  known.empty() || is_both ? "gyro = 1 or 2" : suggest_name(*name, known));
+  return std::nullopt;
+}
+
+std::optional<std::size_t> read_gyro(const toml::table& table, TomlReader& reader,
+                                     const GyroNames& gyros) {
+  if (table["gyro"].is_string()) return read_gyro_name(reader, gyros);
   const auto number = reader.integer("gyro");
   if (number && (*number == 1 || *number == 2)) return static_cast<std::size_t>(*number - 1);
   if (number || !reader.has("gyro")) {
     reader.complain(
         number ? reader.where("gyro") : reader.where(),
         number ? fmt::format("there is no gyro {}", *number) : std::string("[[effect]] needs gyro"),
-        "gyro = 1 or 2, in the order of the configuration");
+        "gyro = 1 or 2 in the order of the configuration, or the gyro's name");
   }
   return std::nullopt;
 }
@@ -165,10 +188,10 @@ void check_together(TomlReader& reader, const Effect& effect) {
 
 // Without a good kind nobody can say which other keys are right.
 std::optional<Effect> read_effect(const toml::table& table, const std::string& file,
-                                  std::vector<Error>& errors) {
+                                  const GyroNames& gyros, std::vector<Error>& errors) {
   TomlReader reader(table, file, "[[effect]]", errors);
   const std::size_t errors_before = errors.size();
-  const auto gyro = read_gyro(reader);
+  const auto gyro = read_gyro(table, reader, gyros);
   const KindInfo* kind = read_kind(reader);
   if (kind == nullptr) return std::nullopt;
   Effect effect{.gyro = gyro.value_or(0),
@@ -244,7 +267,7 @@ std::string_view key_of(const Parameter& parameter, bool has_unit_axis) {
   return has_unit_axis && parameter.name == kAxisKey ? kFromKey : parameter.name;
 }
 
-ModelResult parse_model(std::string_view text, const std::string& file) {
+ModelResult parse_model(std::string_view text, const std::string& file, const GyroNames& gyros) {
   const auto parsed = parse_toml(text, file, "strings stand in quotes, effects in [[effect]]");
   if (!parsed) return tl::unexpected(std::vector<Error>{parsed.error()});
   std::vector<Error> errors;
@@ -257,25 +280,29 @@ ModelResult parse_model(std::string_view text, const std::string& file) {
     root.complain(root.where("effect"), fmt::format("there are {} effects", count),
                   fmt::format("at most {}", kEffectsMax));
   }
+  bool is_named = false;  // by a name that may be anybody's
   for (std::size_t i = 0; i < std::min(count, kEffectsMax); ++i) {
     const toml::table* table = tables->get(i)->as_table();
     if (table == nullptr) {
       root.complain(root.where("effect"), "effects must be written as [[effect]] tables");
       break;
     }
-    if (const auto effect = read_effect(*table, file, errors)) model.effects.push_back(*effect);
+    if (const auto effect = read_effect(*table, file, gyros, errors))
+      model.effects.push_back(*effect);
   }
   root.finish();
-  check_count(root, Kind::kGaussMarkov, kGaussMarkovMax, model);
-  check_flicker(root, model);
+  if (!is_named) {
+    check_count(root, Kind::kGaussMarkov, kGaussMarkovMax, model);
+    check_flicker(root, model);
+  }
   if (!errors.empty()) return tl::unexpected(std::move(errors));
   return model;
 }
 
-ModelResult load_model(const std::string& path) {
+ModelResult load_model(const std::string& path, const GyroNames& names) {
   const auto text = read_regular_file(path, kFileBytesMax);
   if (!text) return tl::unexpected(std::vector<Error>{text.error()});
-  return parse_model(*text, path);
+  return parse_model(*text, path, names);
 }
 
 }  // namespace vgyro::model

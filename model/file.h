@@ -3,6 +3,7 @@
 // The model file (TOML): a list of effects. docs/model-file.md describes it. All complaints of a
 // file are reported at once, each with its line and what would be right.
 
+#include <array>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -32,8 +33,17 @@ inline constexpr std::string_view kAxisKey = "axis";
 /// depends on is called `from`, as that of cross_axis always is.
 std::string_view key_of(const Parameter& parameter, bool has_unit_axis);
 
-ModelResult load_model(const std::string& path);
+/// What an effect may call its gyro besides 1 and 2.
+struct GyroNames {
+  std::array<std::string, 2> names{};  ///< in the configuration; empty: no name
+  /// Any name is accepted and read as gyro 1, and effects are not counted per gyro: for an edit or
+  /// a check that does not know the configuration.
+  bool any = false;
+};
+
+ModelResult load_model(const std::string& path, const GyroNames& names = {});
 /// `file` names the text in complaints.
-ModelResult parse_model(std::string_view text, const std::string& file);
+ModelResult parse_model(std::string_view text, const std::string& file,
+                        const GyroNames& names = {});
 
 }  // namespace vgyro::model

@@ -170,5 +170,21 @@ TEST(ModelEdit, RefusesWhatItCannotDoRight) {
   EXPECT_NE(refusal(append_effect("", wrong, "")).find("axis"), std::string::npos);
 }
 
+// The names are the configuration's, which an edit does not know.
+TEST(ModelEdit, KeepsTheNamesOfGyros) {
+  const std::string users =
+      "format = 1\n\n[[effect]]\ngyro = \"mems\"  # the cheap one\nkind = \"bias\"\nvalue_dps = "
+      "0.5\n";
+  const auto text =
+      append_effect(users, {.gyro = 0, .kind = Kind::kBias, .parameters = {0.25}}, "");
+  ASSERT_TRUE(text) << text.error().message();
+  EXPECT_EQ(text->substr(0, users.size()), users);
+  const auto model = parse_model(*text, "m", {.names = {"fog", "mems"}});
+  ASSERT_TRUE(model) << model.error().front().message();
+  ASSERT_EQ(model->effects.size(), 2U);
+  EXPECT_EQ(model->effects[0].gyro, 1U);
+  EXPECT_EQ(model->effects[1].gyro, 0U);
+}
+
 }  // namespace
 }  // namespace vgyro::model

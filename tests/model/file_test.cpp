@@ -116,6 +116,51 @@ TEST(ModelFile, CountsDriftsOfEachAxis) {
   EXPECT_EQ(complaints_of(text).size(), 1U);
 }
 
+std::vector<std::string> complaints_of_names(const std::string& text, const GyroNames& names) {
+  const ModelResult result = parse_model(text, "m.toml", names);
+  std::vector<std::string> messages;
+  if (result) return messages;
+  for (const Error& error : result.error())
+    messages.push_back(error.message());
+  return messages;
+}
+
+TEST(ModelFile, CallsAGyroByItsName) {
+  const GyroNames names{.names = {"fog", "mems"}};
+  const std::string text =
+      "format = 1\n[[effect]]\ngyro = \"mems\"\nkind = \"bias\"\nvalue_dps = 1\n"
+      "[[effect]]\ngyro = \"fog\"\nkind = \"bias\"\nvalue_dps = 2\n"
+      "[[effect]]\ngyro = 2\nkind = \"bias\"\nvalue_dps = 3\n";
+  const ModelResult result = parse_model(text, "m.toml", names);
+  ASSERT_TRUE(result) << result.error().front().message();
+  ASSERT_EQ(result->effects.size(), 3U);
+  EXPECT_EQ(result->effects[0].gyro, 1U);
+  EXPECT_EQ(result->effects[1].gyro, 0U);
+  EXPECT_EQ(result->effects[2].gyro, 1U);
+}
+
+TEST(ModelFile, RefusesANameThatIsNoGyros) {
+  const std::string text = effect("gyro = \"mesm\"\nkind = \"bias\"\nvalue_dps = 1\n");
+  EXPECT_EQ(
+      complaints_of_names(text, {.names = {"fog", "mems"}}),
+      std::vector<std::string>{"m.toml:4: there is no gyro \"mesm\"; did you mean \"mems\"?"});
+  EXPECT_EQ(complaints_of_names(text, {}),
+            std::vector<std::string>{"m.toml:4: there is no gyro \"mesm\"; gyro = 1 or 2"});
+  EXPECT_EQ(complaints_of_names(effect("gyro = \"a\"\nkind = \"bias\"\nvalue_dps = 1\n"),
+                                {.names = {"a", "a"}}),
+            std::vector<std::string>{"m.toml:4: both gyros have the name \"a\"; gyro = 1 or 2"});
+  EXPECT_EQ(complaints_of_names(effect("gyro = \"\"\nkind = \"bias\"\nvalue_dps = 1\n"), {}).size(),
+            1U);
+}
+
+TEST(ModelFile, CountsTheEffectsOfANamedGyro) {
+  std::string text = "format = 1\n";
+  for (const char* gyro : {"1", "1", "\"fog\"", "\"fog\""})
+    text += std::string("[[effect]]\ngyro = ") + gyro +
+            "\nkind = \"gauss_markov\"\nsigma_dps = 0.1\ntau_s = 100\n";
+  EXPECT_EQ(complaints_of_names(text, {.names = {"fog", "mems"}}).size(), 1U);
+}
+
 TEST(ModelFile, MayHoldNoEffect) {
   const ModelResult result = parse_model("format = 1\n", "m.toml");
   ASSERT_TRUE(result);
@@ -151,7 +196,8 @@ TEST(ModelFile, NamesLineCauseAndRemedyOfEveryMistake) {
       {effect("gyro = 1\nkind = \"bias\"\nvalue_dps = \"0.1\"\n"),
        "m.toml:6: ", "must be a number"},
       {effect("gyro = 3\nkind = \"bias\"\nvalue_dps = 0.1\n"), "m.toml:4: ", "there is no gyro 3"},
-      {effect("gyro = \"a\"\nkind = \"bias\"\nvalue_dps = 0.1\n"), "m.toml:4: ", "whole number"},
+      {effect("gyro = \"a\"\nkind = \"bias\"\nvalue_dps = 0.1\n"),
+       "m.toml:4: ", "there is no gyro \"a\""},
       {effect("kind = \"bias\"\nvalue_dps = 0.1\n"), "m.toml:3: ", "needs gyro"},
       {effect("gyro = 1\nvalue_dps = 0.1\n"), "m.toml:3: ", "needs kind"},
       {effect("gyro = 1\nkind = \"g_sensitivity\"\naxis = \"w\"\ncoefficient_dps_g = 1\n"),

@@ -38,11 +38,12 @@ class Completion(unittest.TestCase):
         listed = subprocess.run([BIN / "vgyro", "--help"], capture_output=True, text=True, check=True).stdout
         commands = set(re.findall(r"^  ([a-z]+) ", listed.split("Subcommands:\n")[1], re.MULTILINE))
         self.assertGreaterEqual(commands, {"check", "replay", "gap"})
-        self.assertEqual(offered("vgyro", ""), commands)
+        self.assertEqual(offered("vgyro", ""), commands | {"help"})
+        self.assertEqual(offered("vgyro", "help", ""), commands)
         self.assertEqual(offered("vgyro", "rep"), {"replay"})
 
     def test_offers_the_options_of_each_command(self):
-        for command in offered("vgyro", ""):
+        for command in offered("vgyro", "") - {"help"}:
             with self.subTest(command=command):
                 self.assertEqual(offered("vgyro", command, "--"), long_options("vgyro", command))
         self.assertEqual(offered("vgyrod", "--"), long_options("vgyrod"))
@@ -58,6 +59,10 @@ class Completion(unittest.TestCase):
             for option, name in expected.items():
                 with self.subTest(option=option):
                     self.assertEqual(offered("vgyro", "replay", option, "", folder=folder), {name, "deeper"})
+            (Path(folder) / "named.toml").write_text('[[gyro]]\nname = "fog"\n[[gyro]]\nname = "mems"\n[output]\nname = "x"\n')
+            self.assertEqual(offered("vgyro", "gap", "--config", "named.toml", "--accept", "gyro=", folder=folder),
+                             {"gyro=1", "gyro=2", "gyro=fog", "gyro=mems"})
+            (Path(folder) / "named.toml").unlink()
             self.assertEqual(offered("vgyro", "check", "vg", folder=folder), {"vgyro.toml"})
             self.assertEqual(offered("vgyro", "replay", "--config", "vgyro.toml", "dr", folder=folder),
                              {"drive.log", "drive.log.xz"})
