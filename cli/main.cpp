@@ -251,8 +251,8 @@ void add_recording(CLI::App& command, std::string& config, std::vector<std::stri
 }
 
 CLI::App* add_compare(CLI::App& app, CompareOptions& options) {
-  CLI::App* command = app.add_subcommand(
-      "compare", "Measure how far a model and a recording disagree, and where");
+  CLI::App* command =
+      app.add_subcommand("compare", "Measure how far a model and a recording disagree, and where");
   add_recording(*command, options.config, options.measured, options.axis);
   command->add_option("--model", options.model, "model file")->required();
   command->add_option("--json", options.json, "the same as JSON; - is standard output");
