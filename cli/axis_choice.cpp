@@ -27,7 +27,7 @@ std::optional<Error> tilted_unit(const std::string& config, const gateway::Plan&
     return Error{
         config,
         fmt::format("the mount of gyro {} tilts it by other than quarter turns, and noise and "
-                    "effects are told of the sensors' own axes",
+                    "effects belong to the sensors' own axes",
                     unit.name),
         "a copy of the configuration with a mount of 0, 90 or 180 degrees, or with none; what the "
         "axes are apart then shows up as cross_axis"};

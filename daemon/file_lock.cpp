@@ -69,7 +69,7 @@ std::string FileLock::holder() const {
     if (c < '0' || c > '9') break;
     number += c;
   }
-  return number.empty() ? "a process that cannot be told" : "process " + number;
+  return number.empty() ? "an unknown process" : "process " + number;
 }
 
 }  // namespace vgyro::daemon

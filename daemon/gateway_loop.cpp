@@ -520,7 +520,7 @@ Expected<void> GatewayLoop::take_reloaded() {
   }
   if (reload_refused_) {
     log_.tell(Severity::kError, {.cause = "config_refused"},
-              "the new configuration is refused; the old one goes on");
+              "the new configuration is refused; the old one stays in force");
   }
   clock_.begin_turn();
   if (!loader_.is_busy()) notifier_.ready(status_line());

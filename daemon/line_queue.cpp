@@ -11,11 +11,12 @@ namespace {
 constexpr std::chrono::milliseconds kLastPatience{1000};
 
 Line remark_of(std::uint64_t lost) {
-  return {.severity = Severity::kWarning,
-          .message = fmt::format("{} lines of this log are missing here: nobody took them", lost),
-          .gyro = {},
-          .cause = "log_lost",
-          .bus = {}};
+  return {
+      .severity = Severity::kWarning,
+      .message = fmt::format("{} lines of this log are missing here: nothing read the log", lost),
+      .gyro = {},
+      .cause = "log_lost",
+      .bus = {}};
 }
 
 }  // namespace

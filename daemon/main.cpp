@@ -125,7 +125,8 @@ int main(int argc, char** argv) {
   app.add_option("--state", options.state,
                  "keeps the biases across a restart; default: state.toml in $STATE_DIRECTORY")
       ->type_name("FILE");
-  app.add_flag("--forget", options.forget, "removes what --state has kept: calibrates anew");
+  app.add_flag("--forget", options.forget,
+               "discard the state kept by --state, and calibrate again");
   app.add_option("--metrics", options.metrics,
                  "writes Prometheus metrics into this file every 5 seconds")
       ->type_name("FILE");

@@ -95,7 +95,7 @@ void add_rate(Text& text, const Snapshot& now) {
                 status.probability[i]);
   }
   text.family("vgyro_rates_too_far_apart", "gauge",
-              "1 while no pairs can be made: one gyro speaks too much more often.");
+              "1 while no pairs can be formed: the gyros' rates are too far apart.");
   text.sample({}, status.rates_too_far_apart);
   text.family("vgyro_uptime_seconds", "gauge", "Since the start of the process.");
   text.sample({}, now.uptime_s);
@@ -129,7 +129,7 @@ void add_counters(Text& text, const Snapshot& now) {
   text.sample({{"cause", "stale"}}, sent.dropped_stale);
   text.sample({{"cause", "overflow"}}, sent.dropped_overflow);
   text.sample({{"cause", "refused"}}, sent.dropped_failed);
-  text.family("vgyro_log_lines_lost_total", "counter", "Lines of the log that nobody took.");
+  text.family("vgyro_log_lines_lost_total", "counter", "Lines lost because nothing reads the log.");
   text.sample({}, now.log_lines_lost);
   text.family("vgyro_service_messages_lost_total", "counter",
               "Messages that the service manager did not take at once.");
@@ -278,7 +278,7 @@ void add_misalignment(Text& text, const Snapshot& now) {
 void add_supply(Text& text, const Snapshot& now) {
   const auto& gyros = now.plan->gyros;
   if (!gyros[0].supply_voltage && !gyros[1].supply_voltage) return;
-  text.family("vgyro_gyro_supply_volts", "gauge", "NaN where it was not told yet.");
+  text.family("vgyro_gyro_supply_volts", "gauge", "NaN until the first value arrives.");
   for (std::size_t k = 0; k < gyros.size(); ++k) {
     if (gyros[k].supply_voltage)
       text.sample({{"gyro", gyros[k].name}}, now.status.gyros[k].supply_v);
@@ -308,10 +308,11 @@ void add_buses(Text& text, const Snapshot& now) {
   for (const BusStatus& bus : buses)
     text.sample({{"bus", bus.name}}, bus.restamped);
   text.family("vgyro_bus_foreign_frames_total", "counter",
-              "Frames with our identifiers that somebody else sent.");
+              "Frames with our identifiers from another sender.");
   for (const BusStatus& bus : buses)
     text.sample({{"bus", bus.name}}, bus.foreign);
-  text.family("vgyro_bus_errors_total", "counter", "What its controller told, by cause.");
+  text.family("vgyro_bus_errors_total", "counter",
+              "Errors that its controller reported, by cause.");
   for (const BusStatus& bus : buses) {
     for (std::size_t i = 0; i < can::kErrorCauseCount; ++i) {
       text.sample({{"bus", bus.name}, {"cause", to_string(static_cast<can::ErrorCause>(i))}},

@@ -55,7 +55,7 @@ std::string sentence(gateway::Fault fault) {
 const char* sentence(can::ErrorCause cause) {
   switch (cause) {
     case can::ErrorCause::kBusOff:
-      return "bus-off: wiring, bit rate, or nobody else on the bus; `ip link set … type can "
+      return "bus-off: wiring, bit rate, or no other node on the bus; `ip link set … type can "
              "restart-ms 100` brings the controller back by itself;";
     case can::ErrorCause::kRestarted:
       return "the controller is back on the bus, restarted";
@@ -66,7 +66,7 @@ const char* sentence(can::ErrorCause cause) {
     case can::ErrorCause::kLostArbitration:
       return "a frame lost the arbitration and was not sent,";
     case can::ErrorCause::kNotAcknowledged:
-      return "nobody else on the bus acknowledged a frame,";
+      return "no other node on the bus acknowledged a frame,";
     case can::ErrorCause::kOverflow:
       return "the controller's buffers overflowed";
     case can::ErrorCause::kSendTimeout:
@@ -80,7 +80,7 @@ const char* sentence(can::ErrorCause cause) {
 std::string trouble_of(const BusStatus& bus) {
   if (!bus.present) return fmt::format("; {} is not there", bus.name);
   if (!bus.link_up) return fmt::format("; {} is down", bus.name);
-  if (bus.contested) return fmt::format("; somebody else sends our identifiers on {}", bus.name);
+  if (bus.contested) return fmt::format("; another sender uses our identifiers on {}", bus.name);
   switch (bus.controller) {
     case can::ControllerState::kBusOff:
       return fmt::format("; {} is bus-off", bus.name);
@@ -186,7 +186,7 @@ void Reporter::disagreement_changed(const gateway::Status& status) {
   if (!health_lines_.take()) return;
   if (disagree_) {
     log_.tell(Severity::kWarning, {.cause = "disagree"},
-              "the gyros disagree; which one is wrong cannot be told");
+              "the gyros disagree; it is not known which one is wrong");
   } else {
     log_.notice("the gyros no longer disagree");
   }
@@ -313,7 +313,8 @@ void Reporter::tell_pipeline(const gateway::Status& status) {
     log_.warning("{} windows had too few pairs: drifts held", n);
   }
   if (const std::uint64_t n = news(restarts_, status.calibration_restarts); n > 0) {
-    log_.warning("calibration began anew {} times: the platform moved, or frames were missing", n);
+    log_.warning("calibration started over {} times: the platform moved, or frames were missing",
+                 n);
   }
   if (status.moved_in_calibration && !std::exchange(told_of_motion_, true)) {
     log_.warning("calibrated although the platform moved");
@@ -392,7 +393,7 @@ void Reporter::tell_bus(const BusStatus& bus, BusTold& told) {
   if (const std::uint64_t n = news(told.foreign, bus.foreign); n > 0) {
     log_.tell(
         Severity::kWarning, {.cause = "foreign_frames", .bus = bus.name},
-        "{}: {} frames with our identifiers came from somebody else: is there a second "
+        "{}: {} frames with our identifiers came from another sender: is there a second "
         "gateway, or does the vehicle use them? [output] rate_id, bias_id and model_id choose "
         "others; a sensor that an [[output.layout]] takes the place of must be off the bus",
         bus.name, n);

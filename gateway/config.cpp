@@ -93,7 +93,7 @@ void read_gyros(TomlReader& root, Context& context) {
     root.complain(root.where("gyro"),
                   fmt::format("both gyros are read from the same frame: {} on {}", shared->message,
                               shared->bus),
-                  "two different gyros are needed; J1939 gyros of one PGN are told apart by "
+                  "two different gyros are needed; J1939 gyros with one PGN are distinguished by "
                   "source_address = N");
     return;
   }

@@ -24,7 +24,7 @@ namespace {
 Expected<void> check_new(const std::string& path, bool force) {
   std::error_code failed;
   if (force || path == "-" || !std::filesystem::exists(path, failed)) return {};
-  return fail(path, "is there already", "choose another name, or --force replaces it");
+  return fail(path, "exists already", "choose another name, or replace it with --force");
 }
 
 Expected<void> check_inputs(const InitOptions& options) {

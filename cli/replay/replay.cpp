@@ -513,7 +513,7 @@ int write_results(const ReplayOptions& options, const gateway::Plan& plan,
 // Nothing where none is wanted.
 Expected<std::optional<gateway::SavedState>> read_state(const std::string& path,
                                                         const gateway::Plan& plan) {
-  constexpr const char* kRemedy = "leave --state away to calibrate anew";
+  constexpr const char* kRemedy = "omit --state to calibrate again";
   if (path.empty()) return std::nullopt;
   const auto text = read_file(path);
   if (!text) return tl::unexpected(text.error());

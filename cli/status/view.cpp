@@ -325,17 +325,17 @@ std::string head(const Json& status, const ViewOptions& options, const Paint& pa
   remark(contradicted, Mood::kBad,
          (contradiction + "; " + gateway::contradiction_advice()).c_str());
   remark(!contradicted && flag_of(status, "disagree"), Mood::kBad,
-         "the gyros disagree; which one is wrong cannot be told");
+         "the gyros disagree; it is not known which one is wrong");
   text += troubles(status, paint);
   remark(flag_of(status, "config_refused"), Mood::kBad,
          "the new configuration was refused; journalctl -u vgyrod says why");
   for (const Json& bus : at(status, "buses")) {
     remark(flag_of(bus, "contested"), Mood::kBad,
-           ("somebody else sends our identifiers on " + text_of(bus, "name")).c_str());
+           ("another sender uses our identifiers on " + text_of(bus, "name")).c_str());
   }
   const std::uint64_t lines_lost = count_of(at(status, "counters"), "log_lines_lost");
   remark(lines_lost > 0, Mood::kDoubtful,
-         fmt::format("{} lines of its log are lost: nobody took them", lines_lost).c_str());
+         fmt::format("{} lines of its log are lost: nothing reads the log", lines_lost).c_str());
   return text;
 }
 

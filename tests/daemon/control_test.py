@@ -246,8 +246,8 @@ class OnTheBus(Bench):
     def test_status_as_a_table(self):
         done = self.vgyro("status")
         self.assertEqual(done.returncode, 0, done.stderr)
-        self.assertIn("somebody else sends our identifiers on can0\n", done.stdout)
-        self.assertIn("41 lines of its log are lost: nobody took them\n", done.stdout)
+        self.assertIn("another sender uses our identifiers on can0\n", done.stdout)
+        self.assertIn("41 lines of its log are lost: nothing reads the log\n", done.stdout)
         self.assertNotIn("\x1b", done.stdout)
         self.assertRegex(done.stdout, r"(?m)^running  \+5\d\.\d{5} ± 0\.00050 deg/s  two_gyros$")
         self.assertRegex(done.stdout, r'(?m)^left "one" \\  can0 +ok +\+118\.80 ± 0\.72 +\+50\.28300 +21\.5 +1000 +99\.0 % +0  counter repeated 10, crc wrong 7$')

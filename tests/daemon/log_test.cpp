@@ -195,7 +195,7 @@ TEST(LineQueue, SaysBeforeTheNextLineHowManyCouldNotBeWritten) {
     ASSERT_TRUE(lines.flush(kPatience));
   }
   EXPECT_EQ(lines.lost(), 3U);
-  EXPECT_EQ(messages(), (Fields{"3 lines of this log are missing here: nobody took them", "four"}));
+  EXPECT_EQ(messages(), (Fields{"3 lines of this log are missing here: nothing read the log", "four"}));
 }
 
 TEST(LineQueue, SaysWhereLinesAreMissing) {
@@ -214,7 +214,7 @@ TEST(LineQueue, SaysWhereLinesAreMissing) {
   ASSERT_TRUE(lines.flush(kPatience));
   ASSERT_EQ(messages().size(), put - lost + 1);
   EXPECT_EQ(messages().back(),
-            std::to_string(lost) + " lines of this log are missing here: nobody took them");
+            std::to_string(lost) + " lines of this log are missing here: nothing read the log");
   EXPECT_EQ(messages()[messages().size() - 2], std::to_string(put - lost - 1));
 }
 

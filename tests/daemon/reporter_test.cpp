@@ -398,18 +398,18 @@ TEST_F(ReporterTest, TellsOnceAMinuteThatSomebodyElseSendsOurIdentifiers) {
   bus().foreign = 3;
   bus().contested = true;
   const std::string said = second();
-  EXPECT_NE(said.find("can0: 3 frames with our identifiers came from somebody else"),
+  EXPECT_NE(said.find("can0: 3 frames with our identifiers came from another sender"),
             std::string::npos)
       << said;
   EXPECT_NE(said.find("rate_id"), std::string::npos) << said;
-  EXPECT_NE(last_line.find("somebody else sends our identifiers on can0"), std::string::npos);
+  EXPECT_NE(last_line.find("another sender uses our identifiers on can0"), std::string::npos);
   for (int i = 1; i < 60; ++i) {
     bus().foreign += 10;
     EXPECT_EQ(second(), "");
   }
   bus().contested = false;
   EXPECT_NE(second().find("can0: 590 frames"), std::string::npos);
-  EXPECT_EQ(last_line.find("somebody else"), std::string::npos);
+  EXPECT_EQ(last_line.find("another sender"), std::string::npos);
 }
 
 }  // namespace

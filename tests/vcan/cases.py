@@ -654,7 +654,7 @@ class ReloadCase:
             require(run.said.count(text) == 1, f"{text}: {run.said.count(text)} times\n{run.said}")
         line = 1 + (folder / "good.toml").read_text(encoding="utf-8").splitlines().index('rate = "Rate"')
         require(re.search(rf'vgyro\.toml:{line}: .*"Rat".*Rate', run.said), f"no place and remedy\n{run.said}")
-        require("the new configuration is refused; the old one goes on" in run.said, run.said)
+        require("the new configuration is refused; the old one stays in force" in run.said, run.said)
         statuses = [text for _, text in result["notices"]]
         require(any("the new configuration was refused" in text for text in statuses), "STATUS did not say so")
         times = [text for text in statuses if re.match(r"RELOADING=1\nMONOTONIC_USEC=\d+", text)]
@@ -806,10 +806,10 @@ class SharedCase:
         check_life(run)
         second = (folder / "second.err").read_text(encoding="utf-8")
         require(re.search(r"state\.toml: another gateway keeps its biases there \(process \d+\); .*--state FILE", second), second)
-        require("can0: 1 frames with our identifiers came from somebody else" in run.said, run.said)
+        require("can0: 1 frames with our identifiers came from another sender" in run.said, run.said)
         require(not (folder / "state.toml.lock").exists(), "the lock file was left behind")
         statuses = [text for _, text in result["notices"]]
-        require(any("somebody else sends our identifiers on can0" in text for text in statuses), f"{statuses}")
+        require(any("another sender uses our identifiers on can0" in text for text in statuses), f"{statuses}")
         return describe(run)
 
 
@@ -1196,7 +1196,7 @@ window_s = 3.0
         run = read_run(folder, result, (*self.ids, 0x122))
         check_service(run)
         for text in ("its gyros are the same: nothing was interrupted", "in use, with what was learned",
-                     "the new configuration is refused; the old one goes on"):
+                     "the new configuration is refused; the old one stays in force"):
             require(run.said.count(text) == 1, f"{text}: {run.said.count(text)} times\n{run.said}")
         require(re.search(r'vgyro\.toml:\d+: .*"YY"', run.said), f"no place\n{run.said}")
         oracle = verdicts.Oracle(SOURCE / "dbc/vgyro_axes.dbc")
