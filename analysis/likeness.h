@@ -32,7 +32,7 @@ struct Likeness {
   double significance = 0.0;  ///< in standard deviations of chance
   double lag_s = 0.0;         ///< the second is later, where positive
   double scale = 1.0;         ///< the second's change over the first's, total least squares
-  double ratio = 1.0;         ///< likewise by their rms: for signals of different units
+  double ratio = 1.0;         ///< the same ratio by rms: for signals of different units
   double scale_s = 0.0;       ///< time scale that was most telling
   /// Standard error of the scale's logarithm, as far as noise makes it.
   [[nodiscard]] double scale_error() const;

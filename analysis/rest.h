@@ -37,9 +37,9 @@ struct RestBlock {
   double apart_dps = 0.0;
   double common_scatter_dps = 0.0;  ///< standard deviations
   double apart_scatter_dps = 0.0;
-  double common_slow_dps = 0.0;  ///< likewise of the means of its fifths
+  double common_slow_dps = 0.0;  ///< standard deviation of the means of its fifths
   double apart_slow_dps = 0.0;
-  std::array<double, 2> own_scatter_dps{};  ///< likewise, of each gyro
+  std::array<double, 2> own_scatter_dps{};  ///< standard deviation of each gyro
   std::array<double, 2> own_slow_dps{};
 
   [[nodiscard]] double own_dps(std::size_t gyro) const {

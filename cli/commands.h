@@ -50,8 +50,8 @@ struct ReplayOptions {
   std::optional<std::string> model;  ///< path, instead of the configured one
   std::string state;                 ///< file of biases to start with; empty: none
   std::string output;                ///< "-": standard output; empty: nowhere
-  std::string json;                  ///< likewise
-  std::string csv;                   ///< likewise
+  std::string json;                  ///< "-": standard output; empty: none
+  std::string csv;                   ///< "-": standard output; empty: none
   std::string plot;                  ///< empty: none
   std::vector<std::string> bus_map;  ///< "LOGNAME=CONFIGNAME"
   std::vector<std::string> logs;

@@ -18,8 +18,8 @@ struct Snapshot {
   gateway::Status status;
   std::vector<gateway::Status> axes;       ///< of a platform of several, in the order of Plan::axes
   std::array<double, 2> bias_sigma_dps{};  ///< of each gyro; NaN where it is not known
-  std::array<double, 2> slope_dps_s{};     ///< of its bias; likewise
-  std::array<double, 2> slope_sigma_dps_s{};  ///< likewise
+  std::array<double, 2> slope_dps_s{};     ///< of its bias; NaN where it is not known
+  std::array<double, 2> slope_sigma_dps_s{};  ///< of the slope; NaN where it is not known
   Traffic traffic;
   double uptime_s = 0.0;
   std::uint64_t log_lines_lost = 0;         ///< nobody took them

@@ -33,8 +33,9 @@ struct VirtualRate {
 struct Drift {
   std::array<double, 2> bias_dps{};  ///< NaN where the method has none
   double slope_dps_s = 0.0;          ///< of the drift that is taken off the virtual rate; NaN
-  double bias_sigma_dps = 0.0;       ///< of what is taken off the virtual rate; NaN likewise
-  double slope_sigma_dps_s = 0.0;    ///< NaN likewise
+  double bias_sigma_dps =
+      0.0;  ///< of the drift that is subtracted from the virtual rate; NaN where unknown
+  double slope_sigma_dps_s = 0.0;  ///< of the slope; NaN where unknown
 };
 
 struct WindowCounts {

@@ -35,8 +35,8 @@ inline constexpr std::size_t kContradictions = 6;
 struct PairVerdict {
   Contradiction contradiction = Contradiction::kNone;
   double probability = 0.0;  ///< that they contradict each other
-  double slope = 0.0;        ///< gyro 2 moves so many times gyro 1; NaN where nothing is in common
-  double slope_sigma = 0.0;  ///< from how it differs between the blocks; NaN likewise
+  double slope = 0.0;        ///< gyro 2's motion over gyro 1's; NaN where nothing is in common
+  double slope_sigma = 0.0;  ///< by its scatter between the blocks; NaN where the slope is
   double lag_s = 0.0;        ///< gyro 2 is so much later; of kLag, else 0
   std::size_t gyro = 2;      ///< whose values are erratic; of kErratic, else 2
 };
@@ -197,7 +197,7 @@ class PairRelation {
   std::size_t count_ = 0;
   double length_s_ = 0.0;             ///< of a cell, as a rule
   std::size_t since_block_ = 0;       ///< cells since the last one was judged
-  std::size_t since_long_block_ = 0;  ///< likewise
+  std::size_t since_long_block_ = 0;  ///< cells since the last long block was judged
 
   double evidence_ = 0.0;  ///< of blocks: log odds above the prior
   Slopes slopes_;

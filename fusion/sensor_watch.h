@@ -212,7 +212,7 @@ class SensorWatch {
   bool leapt_ = false;         ///< into this run
   Duration longest_run_time_{0};
   std::uint64_t asked_ = 0;        ///< blocks of the other one that were looked at
-  std::uint64_t asked_quick_ = 0;  ///< likewise
+  std::uint64_t asked_quick_ = 0;  ///< quick blocks of the other one that were looked at
   bool unproven_ = false;          ///< dead from the start, until it moves with the other one
   TimePoint alive_since_;          ///< its first change then
   double peak_dps_ = 0.0;          ///< largest magnitude before this run

@@ -183,7 +183,7 @@ class AxisPipeline {
   TimePoint reached_{};               ///< newest time that was believed
   TimePoint suspect_{};               ///< stamp far ahead that nobody has confirmed yet
   std::array<double, 2> bias_dps_{};  ///< for bias_dps()
-  double bias_sigma_dps_;             ///< likewise
+  double bias_sigma_dps_;             ///< for bias_sigma_dps()
   std::uint64_t bias_windows_ = 0;    ///< when that was asked for last
   bool has_cross_ = false;
   double cross_dps_ = 0.0;            ///< what gyro 2 reads of the other axes

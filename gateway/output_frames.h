@@ -53,7 +53,7 @@ struct BiasOutput {
 };
 
 struct ModelOutput {
-  double slope_dps_s = 0.0;  ///< NaN: not available; likewise below
+  double slope_dps_s = 0.0;  ///< NaN: not available, as in the next two
   double bias_sigma_dps = 0.0;
   double slope_sigma_dps_s = 0.0;
 };

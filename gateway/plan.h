@@ -114,7 +114,8 @@ struct E2ePlan {
   friend bool operator==(const E2ePlan&, const E2ePlan&) = default;
 };
 
-/// The vehicle's axes: x forward, y to the left, z up. A sensor numbers its own likewise.
+/// The vehicle's axes: x forward, y to the left, z up. A sensor's own axes are numbered in the same
+/// order.
 inline constexpr std::size_t kAxes = 3;
 inline constexpr std::array<char, kAxes> kAxisNames{'x', 'y', 'z'};
 
@@ -146,7 +147,7 @@ struct GyroPlan {
   E2ePlan e2e = {};
   std::optional<ValidCondition> valid;
   std::optional<double> saturation_dps = {};  ///< from the model file: it clips at ± this
-  double dead_band_dps = 0.0;                 ///< likewise: it reads 0 below; 0: it has none
+  double dead_band_dps = 0.0;                 ///< from the model file: it reads 0 below; 0: none
   std::optional<double> max_bias_dps = {};    ///< no bias of this gyro is larger
   std::string taken_back = {};                ///< digest of what is taken back; empty: nothing
   /// Of a whole unit: its sensor's axes, each as a gyro; what stands above is the first one's.

@@ -85,7 +85,7 @@ class Sender {
   /// The last VG_Rate's; NaN when that was invalid.
   [[nodiscard]] double rate_dps() const { return rate_dps_; }
 
-  /// Its σ; likewise, or where none is stated.
+  /// σ of that rate; NaN when it was invalid, or where the method states none.
   [[nodiscard]] double sigma_dps() const { return sigma_dps_; }
 
   /// The books, and what the last rate said.
@@ -109,7 +109,7 @@ class Sender {
   std::uint64_t biases_ = 0;
   std::uint64_t bias_times_ = 0;
   double rate_dps_;   ///< of the last VG_Rate; NaN when that was invalid
-  double sigma_dps_;  ///< likewise
+  double sigma_dps_;  ///< of the last VG_Rate; NaN when that was invalid
   Quality quality_ = Quality::kUnusable;
 };
 

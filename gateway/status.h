@@ -113,7 +113,7 @@ struct GyroStatus {
   double last_rate_dps = 0.0;
   double bias_dps = 0.0;       ///< NaN until calibrated, and for `mean`, which has none
   double temperature_c = 0.0;  ///< NaN when there is none
-  double supply_v = 0.0;       ///< likewise
+  double supply_v = 0.0;       ///< NaN when there is none
   /// Inputs of the model (model::Need) not heard yet: their effects are not taken back so far.
   std::uint8_t waits_for = 0;
 };
