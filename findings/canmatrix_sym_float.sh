@@ -26,6 +26,7 @@ DBC
 for form in kcd sym; do
   venv/bin/canconvert rate.dbc "rate.$form" >"$form.txt" 2>&1
   venv/bin/canconvert "rate.$form" "$form.dbc" >>said.txt 2>&1
+  [ -e "$form.dbc" ] || mv "${form}_"*.dbc "$form.dbc" # the name of a cluster is added
 done
 cat >decode.py <<'PY'
 import sys, cantools
@@ -33,7 +34,7 @@ print(f"{cantools.database.load_file(sys.argv[1]).messages[0].decode(bytes.fromh
 PY
 for file in rate.dbc kcd.dbc sym.dbc; do echo "$file: $(venv/bin/python decode.py "$file") deg/s"; done | tee seen.txt
 echo "in the SYM file: $(grep '^Var=' rate.sym)"
-grep -v -i click sym.txt | sed "s/^/said of SYM: /" || true
+
 ! grep -Eiq "float|value type" sym.txt || { echo "changed: something is said of the float"; exit 1; }
 
 grep -qx 'rate.dbc: 1.5 deg/s' seen.txt && grep -qx 'kcd.dbc: 1.5 deg/s' seen.txt || { echo "changed: DBC or KCD"; exit 1; }
