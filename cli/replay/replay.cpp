@@ -275,13 +275,30 @@ class Replay {
     const gateway::Status& status = pipeline_.status();
     if (status.biases_out == biases_seen_) return;
     biases_seen_ = status.biases_out;
-    for (std::size_t i = 0; i < plots_.size(); ++i) {
-      const gateway::Status& drawn =
-          pipeline_.axis_count() == 0 ? status : pipeline_.axis_status(i);
-      plots_[i].add_bias(stamp, {drawn.gyros[0].bias_dps, drawn.gyros[1].bias_dps});
+    for (std::size_t i = 0; i < plots_.size(); ++i)
+      plots_[i].add_status(stamp, pipeline_.axis_count() == 0 ? status : pipeline_.axis_status(i));
+    follow_sigma(stamp);
+  }
+
+  // The σ of each drift, as it would be kept across a restart; no more often than a picture shows.
+  void follow_sigma(TimePoint stamp) {
+    if (sigma_seen_ && stamp - *sigma_seen_ < kSigmaEvery) return;
+    sigma_seen_ = stamp;
+    const std::optional<gateway::SavedState> known = pipeline_.memory();
+    if (!known) return;
+    const auto show = [&](ReplayPlot& plot, const fusion::DriftMemory& drift) {
+      plot.add_bias_sigma(
+          stamp, {std::sqrt(drift.bias_covariance[0]), std::sqrt(drift.bias_covariance[2])});
+    };
+    if (pipeline_.axis_count() == 0) return show(plots_.front(), known->drift);
+    for (const gateway::SavedState& axis : known->axes) {
+      for (std::size_t i = 0; i < plots_.size(); ++i) {
+        if (summary_.axes[i].name == gateway::kAxisNames[axis.axis]) show(plots_[i], axis.drift);
+      }
     }
   }
 
+  static constexpr Duration kSigmaEvery = std::chrono::seconds(1);
   const ReplayOptions& options_;
   bool is_drawn_;
   OutputFile& output_;
@@ -296,6 +313,7 @@ class Replay {
   TimePoint last_;
   std::uint64_t frames_seen_ = 0;
   std::uint64_t biases_seen_ = 0;
+  std::optional<TimePoint> sigma_seen_;
 };
 
 std::string causes_of_rejection(const gateway::GyroStatus& gyro) {
@@ -490,6 +508,13 @@ void warn_of_other_senders(const ReplaySummary& summary, const gateway::Plan& pl
   }
 }
 
+// Without folders: a title is short.
+std::string picture_name_of(std::vector<std::string> logs) {
+  for (std::string& log : logs)
+    log = log.substr(log.rfind('/') + 1);
+  return name_of(logs);
+}
+
 int write_results(const ReplayOptions& options, const gateway::Plan& plan,
                   const ReplaySummary& summary, const std::vector<ReplayPlot>& plots) {
   if (!options.json.empty()) {
@@ -501,10 +526,9 @@ int write_results(const ReplayOptions& options, const gateway::Plan& plan,
   const std::vector<std::string> pictures = pictures_of(options, plan);
   for (std::size_t i = 0; !options.plot.empty() && i < plots.size(); ++i) {
     const gateway::Plan& drawn = plan.axes.empty() ? plan : plan.axes[i];
-    const PlotTexts texts{
-        fmt::format("{}{}: {} over {:g}-s windows", name_of(options.logs), about_axis(drawn),
-                    gateway::to_string(plan.corrector.method), plan.corrector.window_s),
-        {plan.gyros[0].name, plan.gyros[1].name}};
+    const PlotTexts texts{fmt::format("{}{}, method {}", picture_name_of(options.logs),
+                                      about_axis(drawn), gateway::to_string(plan.corrector.method)),
+                          {plan.gyros[0].name, plan.gyros[1].name}};
     if (const auto done = plots[i].draw(pictures[i], texts); !done) return report(done.error());
   }
   return kDone;
