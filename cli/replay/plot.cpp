@@ -356,8 +356,7 @@ ReplayPlot::Panel ReplayPlot::off_panel(const PlotTexts& texts) const {
   std::string text = "plot ";
   const bool sigma = has([](const Bucket& b) -> const Mean& { return b.heading_sigma; });
   if (sigma) {
-    put(text,
-        "$rates u 1:(-$14):14 w filledcurves lc rgb '{}' t 'virtual gyro ±{:.2g}°', ",
+    put(text, "$rates u 1:(-$14):14 w filledcurves lc rgb '{}' t 'virtual gyro ±{:.2g}°', ",
         kVirtualBand, std::sqrt(heading_bias_deg_ * heading_bias_deg_ + heading_white_deg2_));
   }
   put(text, "$rates u 1:($13-$13) w l lw 2.5 lc rgb '{}' notitle", kVirtualColour);

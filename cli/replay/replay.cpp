@@ -219,8 +219,12 @@ class Replay {
     summary_.frames_out = sink_.frames;
     summary_.slope_dps_s.fill(std::numeric_limits<double>::quiet_NaN());
     summary_.slope_sigma_dps_s = summary_.slope_dps_s;
+    summary_.bias_sigma_dps = summary_.slope_dps_s;
     const std::optional<gateway::SavedState> known = pipeline_.memory();
     for (std::size_t i = 0; known && i < 2; ++i) {
+      // Of several axes the first one's stands there; a summary of all has no drift.
+      if (pipeline_.axis_count() == 0)
+        summary_.bias_sigma_dps[i] = std::sqrt(known->drift.bias_covariance[2 * i]);
       if (!(known->drift.slope_sigma_dps_s[i] > 0.0)) continue;  // 0 stands for "not known"
       summary_.slope_dps_s[i] = known->drift.slope_dps_s[i];
       summary_.slope_sigma_dps_s[i] = known->drift.slope_sigma_dps_s[i];
@@ -430,6 +434,27 @@ void warn_of_doubts(const ReplaySummary& summary, const gateway::Plan& plan) {
   }
 }
 
+// A virtual gyro that was one gyro for the most part, or that says nothing of its σ.
+void warn_of_weakness(const ReplaySummary& summary, const gateway::Plan& plan) {
+  for (std::size_t i = 0; i < 2; ++i) {
+    if (summary.rates == 0 || 2 * summary.raws[i] >= summary.rates) continue;
+    warn(
+        {"gyro " + plan.gyros[i].name,
+         fmt::format("was aside most of the time: it took part in {} of {} valid rates, the others "
+                     "are of one gyro alone",
+                     summary.raws[i], summary.rates),
+         "the summary's \"faults\" and \"not used\" say why; --plot shows when"});
+  }
+  // What VG_Sigma can say at most: 0xFFE steps of 2e-5 deg/s.
+  constexpr double kSigmaMost_dps = 0xFFE * 2e-5;
+  if (plan.output.fd || !(summary.status.sigma_dps > kSigmaMost_dps)) return;
+  warn({"sigma",
+        fmt::format("at the end it is {:.2g} deg/s, and VG_Sigma carries {:.4f} deg/s at most: it "
+                    "goes out as \"not available\"",
+                    summary.status.sigma_dps, kSigmaMost_dps),
+        "fd = true in [output] carries any; --csv holds it too"});
+}
+
 // What the corrector could not make sense of, with what to look at.
 void warn_of_data(const ReplaySummary& summary, const gateway::Plan& plan) {
   const gateway::Status& status = summary.status;
@@ -601,6 +626,7 @@ int run_replay(const ReplayOptions& options) {
   const int written = write_results(options, plan, summary, replay.plots());
   warn_of_doubts(summary, plan);
   warn_of_data(summary, plan);
+  warn_of_weakness(summary, plan);
   warn_of_senders_missed(summary, plan);
   warn_of_other_senders(summary, plan);
   if (!trouble) trouble = explain_contradiction(summary, plan);

@@ -416,8 +416,7 @@ class Thoughts(Replay):
         self.assertGreaterEqual(stops["learned"], 1)
         self.assertGreaterEqual(stops["refused"], 3)
         number = stops["learned"]
-        self.assertIn(f"{number + stops['refused']} steady stretches: {number} stop{'s' if number > 1 else ''} learned, "
-                      f"{stops['refused']} refused: turning together", said)
+        self.assertIn(f"{number + stops['refused']} stops: {number} learned, {stops['refused']} refused (moving together)", said)
         # Most were refused: a warning that says what to check.
         warnings = [line for line in said.splitlines() if line.startswith("warning: stops: ")]
         self.assertEqual(len(warnings), 1, said)
@@ -478,6 +477,28 @@ class Thoughts(Replay):
         for name, rate in (("gyro left", 0.5), ("gyro right", -0.3), ("mean", 0.1)):
             self.assertAlmostEqual(ends[name] / span, rate, delta=0.02, msg=f"{name} over {span:.1f} s: {ends}")
         self.assertRegex(text, r"virtual gyro ±[0-9.]+°")
+
+    def test_drift_is_told_with_its_sigma_and_two_digits_beyond(self):
+        self.write("in.log", "".join(stops_and_turns(1)))
+        said = self.replay("-o", "out.log", "--json", "s.json", "in.log").stderr.decode()
+        gyros = json.loads(self.read("s.json"))["gyros"]
+        told = re.findall(r"drift now ([+-][0-9.]+) ± ([0-9.]+) deg/s", said)
+        self.assertEqual(len(told), 2, said)
+        for gyro, (drift, sigma), truth in zip(gyros, told, (0.5, -0.3)):
+            self.assertEqual(len(drift.split(".")[1]), len(sigma.split(".")[1]))
+            self.assertRegex(sigma, r"^0\.0*[1-9][0-9]$")
+            self.assertLess(abs(float(sigma) / gyro["bias_sigma_dps"] - 1.0), 0.06)
+            self.assertLess(abs(gyro["bias_dps"] - truth), 5.0 * gyro["bias_sigma_dps"])
+
+    def test_a_gyro_that_is_aside_most_of_the_time_is_warned_of(self):
+        # The right gyro falls silent soon after the calibration and stays so.
+        lines = stops_and_turns(4)
+        begin = float(lines[0].split(")")[0][1:])
+        self.write("in.log", "".join(line for line in lines if not ("can1" in line and float(line.split(")")[0][1:]) - begin > 17.0)))
+        said = self.replay("-o", "out.log", "in.log").stderr.decode()
+        self.assertRegex(said, r"warning: gyro right: was aside most of the time: it took part in \d+ of \d+ valid rates")
+        self.write("in.log", "".join(lines))
+        self.assertNotIn("was aside most", self.replay("-o", "out.log", "in.log").stderr.decode())
 
     def test_picture_names_a_stretch_of_one_gyro_and_its_fault(self):
         # The right gyro is silent for four seconds in the middle.
