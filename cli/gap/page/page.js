@@ -78,15 +78,17 @@ function sizeOf(figure, role) {
   return { rms: Math.sqrt(square), heading: Math.abs(mean) * HEADING_MINUTES * 60 };
 }
 
+const plain = (value) => value.toLocaleString("en", { maximumSignificantDigits: 2, useGrouping: false });
+
 function headline() {
   const lines = data.figures.map((gyro, i) => {
     const before = sizeOf(gyro.time, "before"), after = sizeOf(gyro.time, "after");
     if (!before || !after) return null;
-    return make("p", { class: "headline" }, `Gyro ${data.gyros[i]}: residual ${number(before.rms, 2)} → ${number(after.rms, 2)} deg/s rms; ` +
-      `heading after ${HEADING_MINUTES} minutes ${number(before.heading, 2)} → ${number(after.heading, 2)} deg.`);
+    return make("p", { class: "headline" }, `Gyro ${data.gyros[i]}: residual ${plain(before.rms)} → ${plain(after.rms)} deg/s rms; ` +
+      `heading after ${HEADING_MINUTES} minutes ${plain(before.heading)} → ${plain(after.heading)} deg.`);
   }).filter(Boolean);
   if (lines.length === 0) return [];
-  return [lines, make("p", { class: "soft" }, "Before and after what was found, of the means that the plots over time below show; the heading is what the mean of the residual " +
+  return [...lines, make("p", { class: "soft" }, "Before and after what was found, of the means that the plots over time below show; the heading is what the mean of the residual " +
     `adds up to${data.recording.with_reference ? "" : ", as far as two gyros without a reference can show it"}.`)];
 }
 
@@ -122,12 +124,13 @@ function gapTicks(at, left, right) {
   return ticks;
 }
 
+const shortened = (text, most) => (text.length > most ? text.slice(0, most - 1) + "…" : text); // the table below has all of it
 const NARROW_PX = 700; // below it a row's name stands above its mark
 
 function gapFigure() {
   const rows = gapRows();
   const narrow = document.documentElement.clientWidth < NARROW_PX;
-  const wide = narrow ? 360 : 900, left = narrow ? 14 : 270, right = narrow ? 346 : 850, top = narrow ? 46 : 30, step = narrow ? 52 : 34;
+  const wide = narrow ? 360 : 900, left = narrow ? 14 : 270, right = narrow ? 346 : 850, top = narrow ? 64 : 30, step = narrow ? 52 : 34;
   const bottom = top + step * rows.length;
   const svg = drawing("svg", { viewBox: `0 0 ${wide} ${bottom + 46}`, role: "img",
     "aria-label": `gap ${number(data.gap.before, 3)} before, ${number(data.gap.after, 3)} after` });
@@ -149,7 +152,7 @@ function gapFigure() {
     svg.append(drawing("circle", { cx: x, cy: y, r: 7, style: `fill: var(--${tone})` }));
     const fromRight = x > right - 70 || (i > 0 && rows[i - 1].value > row.value && x > left + 70); // the dashed line comes from there
     svg.append(drawing("text", { x: fromRight ? x - 13 : x + 13, y: y + 4.5, "text-anchor": fromRight ? "end" : "start", style: "font-weight: 600" }, number(row.value, 3)));
-    svg.append(narrow ? drawing("text", { x: left, y: y - 14 }, row.label) : drawing("text", { x: left - 16, y: y + 4.5, "text-anchor": "end" }, row.label));
+    svg.append(narrow ? drawing("text", { x: left, y: y - 14 }, shortened(row.label, 44)) : drawing("text", { x: left - 16, y: y + 4.5, "text-anchor": "end" }, shortened(row.label, 34)));
   });
   svg.append(drawing("text", { x: (left + right) / 2, y: bottom + 38, "text-anchor": "middle", class: "soft" },
     narrow ? "gap, nats per sample" : "gap, nats per sample on samples that took no part; logarithmic beyond the band"));
