@@ -383,7 +383,7 @@ function repaint() {
 
 // A canvas that is drawn anew while the page is being printed stays white, so it is only scaled.
 function fitPaper() {
-  const PAPER_PX = 640, GROW_MOST = 1.3;
+  const PAPER_PX = 400, GROW_MOST = 1.0;
   for (const { host } of plots) {
     const wide = host.offsetWidth, high = host.offsetHeight;
     const scale = Math.min(GROW_MOST, PAPER_PX / wide);
