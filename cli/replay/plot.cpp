@@ -50,9 +50,9 @@ constexpr double kShortest = 0.0015;  // of the picture: what is shorter could n
 // Sizes in pixels.
 constexpr int kWidth = 1200;
 constexpr int kTitle = 46;
-constexpr int kLegend = 62;    // above each panel: what it shows, and below that the legend
+constexpr int kLegend = 78;    // above each panel: what it shows, and below that the legend
 constexpr int kNoLegend = 36;  // where there is no legend
-constexpr int kHeading = 40;   // of these, from the panel to what it shows
+constexpr int kHeading = 56;   // of these, from the panel to what it shows
 constexpr int kFoot = 62;      // the axis of time
 constexpr int kLane = 22;
 constexpr int kLeft = 190;
