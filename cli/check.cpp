@@ -253,6 +253,8 @@ void print_plan(const gateway::Plan& plan) {
   }
   say("\n");
   print_model(plan);
+  if (!plan.output.transmit)
+    say("  {:<14}the gateway sends none of what follows: transmit = false\n", "shadow mode");
   print_output(plan);
   for (const gateway::OutputLayout& layout : plan.output.layouts)
     print_layout(plan, layout);

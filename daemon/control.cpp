@@ -199,6 +199,7 @@ int append_counters(sd_bus_message* reply, const Snapshot& now) {
       {"frames_overflowed", sent.dropped_overflow},
       {"frames_refused", sent.dropped_failed},
       {"send_retries", sent.retries},
+      {"frames_shadowed", now.traffic.shadowed},
       {"log_lines_lost", now.log_lines_lost},
       {"service_messages_lost", now.service_messages_lost},
   };
@@ -255,6 +256,8 @@ constexpr Property kProperties[] = {
      [](sd_bus_message* m, const Snapshot& now) { return append_number(m, now.uptime_s); }},
     {"ConfigRefused",
      [](sd_bus_message* m, const Snapshot& now) { return append_flag(m, now.config_refused); }},
+    {"Transmit", [](sd_bus_message* m,
+                    const Snapshot& now) { return append_flag(m, now.plan->output.transmit); }},
     {"State", [](sd_bus_message* m,
                  const Snapshot& now) { return append_text(m, to_string(now.status.state)); }},
     {"Quality", [](sd_bus_message* m,
@@ -314,6 +317,7 @@ const sd_bus_vtable Control::kInterface[] = {
     SD_BUS_PROPERTY("Method", "s", on_get, 0, 0),
     SD_BUS_PROPERTY("UptimeS", "d", on_get, 0, 0),
     SD_BUS_PROPERTY("ConfigRefused", "b", on_get, 0, SD_BUS_VTABLE_PROPERTY_EMITS_CHANGE),
+    SD_BUS_PROPERTY("Transmit", "b", on_get, 0, SD_BUS_VTABLE_PROPERTY_EMITS_CHANGE),
     SD_BUS_PROPERTY("State", "s", on_get, 0, SD_BUS_VTABLE_PROPERTY_EMITS_CHANGE),
     SD_BUS_PROPERTY("Quality", "s", on_get, 0, SD_BUS_VTABLE_PROPERTY_EMITS_CHANGE),
     SD_BUS_PROPERTY("Restored", "s", on_get, 0, SD_BUS_VTABLE_PROPERTY_EMITS_CHANGE),
@@ -408,10 +412,11 @@ void Control::second_passed() {
 void Control::tell_changes() {
   std::uint64_t queued = 0;
   if (sd_bus_get_n_queued_write(bus_, &queued) < 0 || queued > kQueuedMost) return;
-  sd_bus_emit_properties_changed(
-      bus_, kPath, kName, "State", "Quality", "Restored", "Valid", "Disagree", "Contradiction",
-      "ContradictionText", "Ambiguous", "RatesTooFarApart", "Hypotheses", "RateDps", "SigmaDps",
-      "BiasSigmaDps", "CalibratedS", "ConfigRefused", "Gyros", "Buses", "Counters", nullptr);
+  sd_bus_emit_properties_changed(bus_, kPath, kName, "State", "Quality", "Restored", "Valid",
+                                 "Disagree", "Contradiction", "ContradictionText", "Ambiguous",
+                                 "RatesTooFarApart", "Hypotheses", "RateDps", "SigmaDps",
+                                 "BiasSigmaDps", "CalibratedS", "ConfigRefused", "Transmit",
+                                 "Gyros", "Buses", "Counters", nullptr);
 }
 
 int Control::on_get(sd_bus*, const char*, const char*, const char* property, sd_bus_message* reply,

@@ -71,6 +71,7 @@ class GatewayLoop final : private gateway::FrameSink {
   static Expected<void> open_buses(Setup& setup);
   static Expected<void> check_output(const Setup& setup);
   static Expected<void> check_fd(const Bus& output, const std::string& wanted);
+  void tell_of_shadow(const gateway::OutputPlan& output);
   Expected<void> poll_buses();
   bool poll_bus(std::size_t index);
   [[nodiscard]] bool poll_readable(int fd, std::uint32_t tag) const;

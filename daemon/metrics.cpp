@@ -99,6 +99,8 @@ void add_rate(Text& text, const Snapshot& now) {
   text.sample({}, status.rates_too_far_apart);
   text.family("vgyro_uptime_seconds", "gauge", "Since the start of the process.");
   text.sample({}, now.uptime_s);
+  text.family("vgyro_transmit", "gauge", "1 while frames are sent, 0 in shadow mode.");
+  text.sample({}, now.plan->output.transmit);
   text.family("vgyro_config_refused", "gauge", "1 while a configuration is refused.");
   text.sample({}, now.config_refused);
 }
@@ -129,6 +131,9 @@ void add_counters(Text& text, const Snapshot& now) {
   text.sample({{"cause", "stale"}}, sent.dropped_stale);
   text.sample({{"cause", "overflow"}}, sent.dropped_overflow);
   text.sample({{"cause", "refused"}}, sent.dropped_failed);
+  text.family("vgyro_shadowed_frames_total", "counter",
+              "Frames that shadow mode kept from the buses.");
+  text.sample({}, now.traffic.shadowed);
   text.family("vgyro_log_lines_lost_total", "counter", "Lines of the log that nobody took.");
   text.sample({}, now.log_lines_lost);
   text.family("vgyro_service_messages_lost_total", "counter",

@@ -414,6 +414,7 @@ void read_output(TomlReader& root, Context& context) {
   plan.output.fd = reader.boolean("fd").value_or(false);
   plan.output.rate_is_shared = plan.output.fd && !plan.output.axes.empty();
   plan.output.vgyro_frames = reader.boolean("vgyro_frames").value_or(true);
+  plan.output.transmit = reader.boolean("transmit").value_or(true);
   if (bus.empty()) {
     reader.forgive({"layout"});
   } else {

@@ -33,6 +33,14 @@ class Check(bench.Bench):
                      "VG_Bias 611", "VG_Model 612", "classic CAN"):
             self.assertIn(part, text)
 
+    def test_says_that_shadow_mode_sends_nothing(self):
+        self.assertNotIn("shadow", self.good("check", "vgyro.toml").stdout.decode())
+        self.write("vgyro.toml", bench.CONFIG.replace("[output]", "[output]\ntransmit = false", 1))
+        text = self.good("check", "vgyro.toml").stdout.decode()
+        self.assertRegex(text, r"(?m)^  shadow mode +the gateway sends none of what follows: transmit = false$")
+        self.assertIn("[output] transmit must be true or false",
+                      self.check_replaced("transmit = false", 'transmit = "no"'))
+
     def test_names_the_largest_bias(self):
         # It decides what a stop may teach.
         self.assertNotIn("at most", self.good("check", "vgyro.toml").stdout.decode().split("corrector")[0])

@@ -80,6 +80,10 @@ struct SampleGateway {
     now.traffic.buses = {bus, {.name = "can1"}};
   }
 
+  void begin_shadow() {
+    plan.output.transmit = false;
+    now.traffic.shadowed = 99;
+  }
   Expected<void> save_state() {
     if (now.status.state == gateway::State::kRunning) return {};
     return fail({}, "nothing was learned yet that is worth keeping");
@@ -120,6 +124,7 @@ int main(int argc, char** argv) {
   sample.control = &control;
   std::optional<daemon::MetricsFile> metrics;
   if (argc > 1) sample.metrics = &metrics.emplace(argv[1], sample.log);
+  if (argc > 2 && std::string(argv[2]) == "shadow") sample.begin_shadow();
   sd_event_add_time_relative(events, nullptr, CLOCK_MONOTONIC, 1'000'000, 0, &on_second, &sample);
   return sd_event_loop(events) < 0 ? 1 : 0;
 }

@@ -133,7 +133,7 @@ class OnTheBus(Bench):
         expected |= {f".{name}": ["property", "s"] for name in ("Version", "Method", "State", "Quality", "Restored", "Contradiction",
                                                                 "ContradictionText")}
         expected |= {f".{name}": ["property", "b"] for name in ("Valid", "Disagree", "Ambiguous", "RatesTooFarApart",
-                                                                "ConfigRefused")}
+                                                                "ConfigRefused", "Transmit")}
         expected |= {".Hypotheses": ["property", "a{sd}"]}
         expected |= {f".{name}": ["property", "d"] for name in ("RateDps", "SigmaDps", "BiasSigmaDps", "CalibratedS",
                                                                 "RestS", "UptimeS")}
@@ -242,6 +242,20 @@ class OnTheBus(Bench):
         self.assertEqual(status["hypotheses"], {"standing": 0.75, "turning": 0.25, "warming_up": 0.5})
         self.assertIs(status["ambiguous"], True)
         self.assertEqual([g["slope_dps_s"] for g in status["gyros"]], [1e-6, None])
+
+    def test_shadow_mode_is_said_wherever_one_looks(self):
+        self.assertIs(self.get("Transmit"), True)
+        self.assertNotIn("shadow", self.vgyro("status").stdout)
+        self.end(self.sample)
+        metrics = self.folder / "vgyro.prom"
+        self.start_sample(str(metrics), "shadow")
+        self.assertTrue(until(lambda: self.is_there() and metrics.exists()))
+        self.assertIs(self.get("Transmit"), False)
+        self.assertEqual(self.get("Counters")["frames_shadowed"], 99)
+        self.assertIn("shadow mode: nothing is sent ([output] transmit = false)\n", self.vgyro("status").stdout)
+        self.assertIs(json.loads(self.vgyro("status", "--json").stdout)["transmit"], False)
+        samples = parse_metrics(metrics.read_text())[1]
+        self.assertEqual((samples["vgyro_transmit", ()], samples["vgyro_shadowed_frames_total", ()]), (0, 99))
 
     def test_status_as_a_table(self):
         done = self.vgyro("status")
