@@ -5,6 +5,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "base/instance_name.h"
 #include "base/printable.h"
 #include "base/spelling.h"
 #include "can/frame.h"
@@ -32,6 +33,7 @@ struct Options {
   GapOptions gap;
   SimulateOptions simulate;
   StatusOptions status;
+  WhichGateway recalibrate;
   std::string method;
 };
 
@@ -295,21 +297,34 @@ CLI::App* add_gap(CLI::App& app, GapOptions& options) {
   return command;
 }
 
+CLI::Option* add_which(CLI::App& command, WhichGateway& which) {
+  CLI::Option* instance =
+      command.add_option("--instance", which.instance, "of several gateways: vgyrod@NAME")
+          ->type_name("NAME")
+          ->check([](const std::string& name) {
+            const auto good = vgyro::check_instance_name(name);
+            return good ? std::string() : good.error().message();
+          });
+  return command.add_flag("--all", which.all, "every gateway that is on D-Bus")->excludes(instance);
+}
+
 CLI::App* add_status(CLI::App& app, StatusOptions& options) {
   CLI::App* command =
       app.add_subcommand("status", "Show what the running gateway knows: state, gyros, buses");
   CLI::Option* json = command->add_flag("--json", options.json, "the same as JSON");
   command->add_flag("-w,--watch", options.watch, "a live view; into a pipe: one line each time")
-      ->excludes(json);
+      ->excludes(json)
+      ->excludes(add_which(*command, options.which));
   add_number(*command, "--interval", options.interval_s, {0.1, 3600.0},
              "seconds between two looks with --watch");
   command->footer("Asks vgyrod over D-Bus. Every field is explained in docs/service.md.");
   return command;
 }
 
-CLI::App* add_recalibrate(CLI::App& app) {
+CLI::App* add_recalibrate(CLI::App& app, WhichGateway& which) {
   CLI::App* command = app.add_subcommand(
       "recalibrate", "Let the running gateway forget its biases and calibrate anew");
+  add_which(*command, which);
   command->footer("Only for root. Platform at rest, unless a reference is configured.");
   return command;
 }
@@ -344,7 +359,7 @@ int run(int argc, char** argv) {
   CLI::App* gap = add_gap(app, options.gap);
   CLI::App* simulate = add_simulate(app, options.simulate);
   CLI::App* status = add_status(app, options.status);
-  CLI::App* recalibrate = add_recalibrate(app);
+  CLI::App* recalibrate = add_recalibrate(app, options.recalibrate);
   if (const auto unknown = unknown_command(app, argc, argv)) {
     report(*unknown);
     return kWrongUsage;
@@ -375,7 +390,7 @@ int run(int argc, char** argv) {
   if (gap->parsed()) return run_gap(options.gap);
   if (simulate->parsed()) return run_simulate(options.simulate);
   if (status->parsed()) return run_status(options.status);
-  if (recalibrate->parsed()) return run_recalibrate();
+  if (recalibrate->parsed()) return run_recalibrate(options.recalibrate);
   // Frames are the main result; they give way only to a summary or a table that wants the same
   // place.
   const bool output_given = replay->count("--output") > 0;

@@ -13,6 +13,8 @@
 #include <unistd.h>
 #include <utility>
 
+#include "base/instance_name.h"
+
 namespace vgyro::daemon {
 namespace {
 
@@ -66,14 +68,16 @@ GatewayLoop::Setup::Setup(gateway::Plan the_plan, TurnClock& clock, Log& log)
   }
 }
 
-GatewayLoop::GatewayLoop(gateway::Plan plan, LoadPlan load, StateKeeper* keeper,
-                         MetricsFile* metrics, Log& log)
+GatewayLoop::GatewayLoop(gateway::Plan plan, LoadPlan load, std::string instance,
+                         StateKeeper* keeper, MetricsFile* metrics, Log& log)
     : loader_(std::move(load)),
       keeper_(keeper),
       metrics_(metrics),
       log_(log),
       clock_(&read_clock<CLOCK_REALTIME>, &read_clock<CLOCK_MONOTONIC>),
-      setup_(std::make_unique<Setup>(std::move(plan), clock_, log)) {}
+      setup_(std::make_unique<Setup>(std::move(plan), clock_, log)) {
+  snapshot_.instance = std::move(instance);
+}
 
 GatewayLoop::~GatewayLoop() {
   if (epoll_fd_ >= 0) ::close(epoll_fd_);
@@ -192,7 +196,7 @@ Expected<void> GatewayLoop::run() {
                    Control::Gateway{.snapshot = [this]() -> const Snapshot& { return snapshot(); },
                                     .recalibrate = [this] { recalibration_wanted_ = true; },
                                     .save_state = [this] { return save_state(); }},
-                   log_);
+                   bus_name_of(snapshot_.instance), log_);
   if (Expected<void> armed = serve_events(false); !armed) return armed;
   notifier_.ready(status_line());
   set_alarm();

@@ -33,6 +33,10 @@ std::string escaped(std::string_view value) {
 
 class Text {
  public:
+  /// node_exporter puts the files of all gateways of a host together, so each needs a label.
+  explicit Text(std::string_view instance)
+      : common_(instance.empty() ? "" : fmt::format("gateway=\"{}\"", escaped(instance))) {}
+
   void family(std::string_view name, std::string_view type, std::string_view help) {
     name_ = name;
     fmt::format_to(std::back_inserter(text_), "# HELP {} {}\n# TYPE {} {}\n", name, help, name,
@@ -48,15 +52,18 @@ class Text {
  private:
   void line(const Labels& labels, const std::string& value) {
     text_ += name_;
-    char before = '{';
+    const bool labelled = !labels.empty() || !common_.empty();
+    if (labelled) text_ += '{' + common_;
+    std::string_view before = common_.empty() ? "" : ",";
     for (const auto& [key, content] : labels) {
       fmt::format_to(std::back_inserter(text_), "{}{}=\"{}\"", before, key, escaped(content));
-      before = ',';
+      before = ",";
     }
-    if (!labels.empty()) text_ += '}';
+    if (labelled) text_ += '}';
     fmt::format_to(std::back_inserter(text_), " {}\n", value);
   }
 
+  std::string common_;
   std::string_view name_;
   std::string text_;
 };
@@ -340,7 +347,7 @@ bool write_whole(int fd, std::string_view text) {
 }  // namespace
 
 std::string metrics_text(const Snapshot& now) {
-  Text text;
+  Text text(now.instance);
   add_rate(text, now);
   add_counters(text, now);
   add_layouts(text, now);

@@ -8,6 +8,7 @@
 
 #include <fmt/core.h>
 
+#include "base/instance_name.h"
 #include "daemon/control.h"
 #include "daemon/metrics.h"
 #include "tests/gateway/rig.h"
@@ -114,13 +115,14 @@ int on_second(sd_event_source* source, std::uint64_t, void* self) {
 
 int main(int argc, char** argv) {
   SampleGateway sample;
+  if (argc > 3) sample.now.instance = argv[3];
   sd_event* events = nullptr;
   if (sd_event_new(&events) < 0) return 1;
   daemon::Control control(events,
                           {.snapshot = [&]() -> const daemon::Snapshot& { return sample.now; },
                            .recalibrate = [&] { sample.recalibrate(); },
                            .save_state = [&] { return sample.save_state(); }},
-                          sample.log);
+                          bus_name_of(sample.now.instance), sample.log);
   sample.control = &control;
   std::optional<daemon::MetricsFile> metrics;
   if (argc > 1) sample.metrics = &metrics.emplace(argv[1], sample.log);

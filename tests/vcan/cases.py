@@ -644,7 +644,7 @@ class ShadowCase:
         check_life(run)
         require(len(result["reloads_us"]) == 1, f"{len(result['reloads_us'])} reloads")
         before = [line for line in run.outputs if line.us < result["reloads_us"][0]]
-        require([line.content for line in before] == ["0011223344556677"], f"{len(before)} frames in shadow mode")
+        require(len(before) == 1 and "0011223344556677" in before[0].text, f"{len(before)} frames in shadow mode")
         require(len(run.outputs) > 5, "nothing is sent after the reload either")
         require(run.said.count("shadow mode: everything but sending is done") == 1, run.said)
         require("came from somebody else" in run.said, f"the stranger was not seen\n{run.said}")
