@@ -268,7 +268,11 @@ int run_check(const CheckOptions& options) {
   for (const Error& warning : loaded->warnings)
     warn(warning);
   say("{}: good\n", options.config);
+  say("  {:<14}{}\n", "fingerprint", loaded->fingerprint);
   print_plan(loaded->plan);
+  if (!loaded->origins.empty()) say("  {:<14}as several files say them together\n", "values");
+  for (const TomlOrigin& origin : loaded->origins)
+    say("    {:<32}{:<24} {}\n", origin.key, origin.value, origin.where);
   return kDone;
 }
 

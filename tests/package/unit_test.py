@@ -30,7 +30,7 @@ class Unit(unittest.TestCase):
 
     def test_an_instance_differs_from_the_service_only_in_what_is_its_own(self):
         one, many = (unit.read_text(encoding="utf-8") for unit in (UNIT, TEMPLATE))
-        for own, common in (("/etc/vgyro/%i.toml", "/etc/vgyro/vgyro.toml"), (", instance %i", ""), (" --instance %i", ""),
+        for own, common in (("/etc/vgyro/%i.", "/etc/vgyro/vgyro."), (", instance %i", ""), (" --instance %i", ""),
                             ("/run/vgyro-%i/", "/run/vgyro/"), ("Directory=vgyro-%i", "Directory=vgyro"),
                             ("vgyrod@%i", "vgyrod")):
             self.assertIn(own, many)
