@@ -111,12 +111,19 @@ struct SimulateOptions {
 };
 int run_simulate(const SimulateOptions& options);
 
+/// Of several gateways on a host.
+struct WhichGateway {
+  std::string instance;  ///< empty: the one without a name
+  bool all = false;
+};
+
 struct StatusOptions {
+  WhichGateway which;
   bool json = false;
   bool watch = false;
   double interval_s = 1.0;  ///< of `watch`
 };
 int run_status(const StatusOptions& options);
-int run_recalibrate();
+int run_recalibrate(const WhichGateway& which);
 
 }  // namespace vgyro::cli

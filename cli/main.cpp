@@ -5,6 +5,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "base/instance_name.h"
 #include "base/printable.h"
 #include "base/spelling.h"
 #include "can/frame.h"
@@ -34,6 +35,7 @@ struct Options {
   GapOptions gap;
   SimulateOptions simulate;
   StatusOptions status;
+  WhichGateway recalibrate;
   std::string method;
 };
 
@@ -322,21 +324,34 @@ CLI::App* add_gap(CLI::App& app, GapOptions& options) {
   return command;
 }
 
+CLI::Option* add_which(CLI::App& command, WhichGateway& which) {
+  CLI::Option* instance =
+      command.add_option("--instance", which.instance, "of several gateways: vgyrod@NAME")
+          ->type_name("NAME")
+          ->check([](const std::string& name) {
+            const auto good = vgyro::check_instance_name(name);
+            return good ? std::string() : good.error().message();
+          });
+  return command.add_flag("--all", which.all, "every gateway that is on D-Bus")->excludes(instance);
+}
+
 CLI::App* add_status(CLI::App& app, StatusOptions& options) {
   CLI::App* command =
       app.add_subcommand("status", "Show the running gateway's state, gyros and buses");
   CLI::Option* json = command->add_flag("--json", options.json, "the same as JSON");
   command->add_flag("-w,--watch", options.watch, "live view; into a pipe: one line per update")
-      ->excludes(json);
+      ->excludes(json)
+      ->excludes(add_which(*command, options.which));
   add_number(*command, "--interval", options.interval_s, {0.1, 3600.0},
              "seconds between updates with --watch");
   command->footer("Asks vgyrod over D-Bus; see vgyro(1).");
   return command;
 }
 
-CLI::App* add_recalibrate(CLI::App& app) {
+CLI::App* add_recalibrate(CLI::App& app, WhichGateway& which) {
   CLI::App* command = app.add_subcommand(
       "recalibrate", "Make the running gateway discard its biases and calibrate again");
+  add_which(*command, which);
   command->footer("For root only. Keep the platform at rest unless a reference is configured.");
   return command;
 }
@@ -401,7 +416,7 @@ int run(int argc, char** argv) {
   CLI::App* gap = add_gap(app, options.gap);
   CLI::App* simulate = add_simulate(app, options.simulate);
   CLI::App* status = add_status(app, options.status);
-  CLI::App* recalibrate = add_recalibrate(app);
+  CLI::App* recalibrate = add_recalibrate(app, options.recalibrate);
   std::vector<std::string> words = words_of(argc, argv);
   if (const auto unknown = unknown_command(app, words)) {
     report(*unknown);
@@ -424,7 +439,7 @@ int run(int argc, char** argv) {
   if (gap->parsed()) return number_and_run(options.gap);
   if (simulate->parsed()) return run_simulate(options.simulate);
   if (status->parsed()) return run_status(options.status);
-  if (recalibrate->parsed()) return run_recalibrate();
+  if (recalibrate->parsed()) return run_recalibrate(options.recalibrate);
   // Frames are the main result; they give way only to a summary or a table that wants the same
   // place.
   const bool output_given = replay->count("--output") > 0;

@@ -302,6 +302,7 @@ struct OutputPlan {
   std::uint32_t model_id = 0x612;
   bool fd = false;
   bool vgyro_frames = true;  ///< VG_Rate, VG_Bias and VG_Model
+  bool transmit = true;      ///< false: shadow mode, in which the live gateway sends nothing
   std::vector<OutputLayout> layouts = {};
   /// Of a platform of several axes: which; the identifiers are axis 0's, another's are kAxisIdStep
   /// higher for each. Empty: a single one.
