@@ -141,7 +141,7 @@ tl::unexpected<Error> why(const Reply& reply, int result) {
     return fail("vgyrod", "only root may do this", "try it again with sudo");
   }
   if (result == -ETIMEDOUT || sd_bus_error_has_name(&reply.error, SD_BUS_ERROR_NO_REPLY) != 0) {
-    return fail("vgyrod", "does not answer", "`systemctl status vgyrod` tells more");
+    return fail("vgyrod", "does not answer", "`systemctl status vgyrod` shows why");
   }
   if (reply.error.message != nullptr) return fail("vgyrod", reply.error.message);
   return fail("vgyrod", system_reason(-result));
