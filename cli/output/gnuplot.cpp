@@ -30,8 +30,8 @@ std::string terminal_of(const std::string& path, int width, int height) {
     return fmt::format("pngcairo size {},{} font 'DejaVu Sans,11'", width, height);
   }
   if (ending == ".pdf") {
-    return fmt::format("pdfcairo size {}in font 'DejaVu Sans,11'",
-                       width > height ? "11.7in,8.3" : "8.3in,11.7");
+    return fmt::format("pdfcairo size {}in font 'DejaVu Sans,{}'",
+                       width > height ? "11.7in,8.3" : "8.3in,11.7", width > height ? 11 : 6);
   }
   return {};
 }

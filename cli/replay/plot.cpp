@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include <fmt/format.h>
 
@@ -12,20 +13,68 @@ namespace vgyro::cli {
 namespace {
 
 constexpr double kSecondsPerHour = 3600.0;
+constexpr double kSecondsPerMinute = 60.0;
+// A drift beyond this, in deg/s, has more digits than one reads in deg/h.
+constexpr double kReadableInDegPerHour_dps = 0.3;
 // Of the table: gnuplot draws past a value that is missing, and interrupts the line at one that is
 // no number.
 constexpr const char* kMissing = "-";
 // A hole is as long as the one the summary tells, and longer than a slow gyro's usual pace.
 constexpr double kHole_s = 0.5;
 constexpr double kHoleIntervals = 5.0;
-constexpr std::array<const char*, 2> kColours{"#e0a030", "#70a0d0"};
+// Okabe and Ito's colours, which the colour-blind tell apart: none stands for two things.
+constexpr std::array<const char*, 2> kColours{"#e69f00", "#cc79a7"};
+constexpr const char* kMeanColour = "#808080";
+constexpr const char* kVirtualColour = "#0072b2";
+constexpr const char* kVirtualBand = "#b3d5ea";
+constexpr const char* kDriftColour = "#000000";
+constexpr const char* kDriftBand = "#c8c8c8";
 
 struct ShadeStyle {
-  const char* colour;
-  const char* legend;
+  unsigned colour;
+  const char* lane;
 };
-constexpr std::array<ShadeStyle, 3> kShadeStyles{
-    {{"#d8efd8", "learned as a stop"}, {"#f3d9b8", "refused: turning"}, {"#d9c8ee", "ambiguous"}}};
+// In the order of Shade; of a fault the lane has the gyro's name.
+constexpr std::array<ShadeStyle, 8> kShadeStyles{{{0xf0e442, "calibrating"},
+                                                  {0x009e73, "stop learned"},
+                                                  {0xd55e00, "stop refused: turning"},
+                                                  {0x882255, "ambiguous"},
+                                                  {0x56b4e9, "one gyro alone"},
+                                                  {0x000000, ""},
+                                                  {0x000000, ""},
+                                                  {0x332288, "contradicted"}}};
+constexpr double kTint = 0.2;         // of a shade's colour, the rest is paper
+constexpr double kBlackTint = 0.09;   // black weighs more
+constexpr double kShortest = 0.0015;  // of the picture: what is shorter could not be seen
+
+// Sizes in pixels.
+constexpr int kWidth = 1200;
+constexpr int kTitle = 46;
+constexpr int kLegend = 78;    // above each panel: what it shows, and below that the legend
+constexpr int kNoLegend = 36;  // where there is no legend
+constexpr int kHeading = 56;   // of these, from the panel to what it shows
+constexpr int kFoot = 62;      // the axis of time
+constexpr int kLane = 22;
+constexpr int kLeft = 190;
+constexpr int kRight = 30;
+
+std::string tint(unsigned colour) {
+  constexpr double kPaper = 255.0;
+  const double weight = colour == 0 ? kBlackTint : kTint;
+  unsigned mixed = 0;
+  for (const unsigned shift : {16U, 8U, 0U}) {
+    const double part = (1.0 - weight) * kPaper + weight * ((colour >> shift) & 0xffU);
+    mixed |= static_cast<unsigned>(std::lround(part)) << shift;
+  }
+  return fmt::format("#{:06x}", mixed);
+}
+
+// Two significant digits of the smaller one.
+std::string degrees(double value_deg) {
+  const double size = std::abs(value_deg);
+  const int digits = size >= 100.0 ? 0 : size >= 10.0 ? 1 : size >= 1.0 ? 2 : 3;
+  return fmt::format("{:+.{}f}°", value_deg, digits);
+}
 
 }  // namespace
 
@@ -55,9 +104,75 @@ void ReplayPlot::add_condition(TimePoint t, const fusion::Condition& condition) 
     return condition.probability[static_cast<std::size_t>(which)] > 0.5;
   };
   const bool refused = !condition.stopped && likely(fusion::Hypothesis::kTurning);
-  stretches_[static_cast<std::size_t>(Shade::kStop)].follow(t, condition.stopped);
-  stretches_[static_cast<std::size_t>(Shade::kRefused)].follow(t, refused);
-  stretches_[static_cast<std::size_t>(Shade::kAmbiguous)].follow(t, condition.ambiguous);
+  follow(Shade::kStop, t, condition.stopped);
+  follow(Shade::kRefused, t, refused);
+  follow(Shade::kAmbiguous, t, condition.ambiguous);
+}
+
+void ReplayPlot::add_status(TimePoint t, const gateway::Status& status) {
+  using gateway::State;
+  Bucket& bucket = bucket_at(t);
+  sigma_known_ = std::isfinite(status.sigma_dps) && std::isfinite(status.bias_sigma_dps);
+  sigma_dps_ = sigma_known_ ? status.sigma_dps : 0.0;
+  bias_sigma_dps_ = sigma_known_ ? status.bias_sigma_dps : 0.0;
+  for (std::size_t i = 0; i < 2; ++i) {
+    const gateway::GyroStatus& gyro = status.gyros[i];
+    bucket.bias[i].add(gyro.bias_dps);
+    bucket.temperature[i].add(gyro.temperature_c);
+    const bool silent = !gyro.heard && gyro.frames > 0 && status.pairs > 0;
+    follow(i == 0 ? Shade::kFault1 : Shade::kFault2, t, silent || gyro.fault.has_value());
+    if (silent) faults_[i].insert(gateway::Fault::kSilent);
+    if (gyro.fault) faults_[i].insert(*gyro.fault);
+  }
+  follow(
+      Shade::kCalibrating, t,
+      status.pairs > 0 && (status.state == State::kCalibrating || status.state == State::kWaiting));
+  follow(Shade::kOneGyro, t, status.state == State::kDegraded);
+  follow(Shade::kContradicted, t, status.state == State::kContradicted);
+}
+
+void ReplayPlot::add_bias_sigma(TimePoint t, const std::array<double, 2>& sigma_dps) {
+  Bucket& bucket = bucket_at(t);
+  for (std::size_t i = 0; i < 2; ++i)
+    bucket.bias_sigma[i].add(sigma_dps[i]);
+}
+
+void ReplayPlot::Heading::add(TimePoint t, double rate_dps) {
+  if (!std::isfinite(rate_dps)) return;
+  if (begun) deg += 0.5 * (last_dps + rate_dps) * to_seconds(t - last);
+  begun = true;
+  last = t;
+  last_dps = rate_dps;
+}
+
+// From the first valid rate on all of them count anew: before it there is nothing to compare.
+void ReplayPlot::add_heading(TimePoint t, const std::array<double, 2>& raw_dps,
+                             double virtual_dps) {
+  const bool valid = std::isfinite(virtual_dps);
+  if (valid && !valid_begun_) {
+    valid_begun_ = true;
+    headings_ = {};
+    for (Bucket& bucket : buckets_)
+      bucket.heading = {};
+  }
+  if (valid && headings_[3].begun && sigma_known_) {
+    const double interval_s = to_seconds(t - headings_[3].last);
+    const double white_dps2 =
+        std::max(sigma_dps_ * sigma_dps_ - bias_sigma_dps_ * bias_sigma_dps_, 0.0);
+    heading_bias_deg_ += bias_sigma_dps_ * interval_s;
+    heading_white_deg2_ += white_dps2 * interval_s * interval_s;
+  }
+  const std::array<double, 4> rates{raw_dps[0], raw_dps[1], 0.5 * (raw_dps[0] + raw_dps[1]),
+                                    virtual_dps};
+  Bucket& bucket = bucket_at(t);
+  for (std::size_t i = 0; i < rates.size(); ++i) {
+    headings_[i].add(t, rates[i]);
+    if (std::isfinite(rates[i])) bucket.heading[i].add(headings_[i].deg);
+  }
+  if (valid && sigma_known_) {
+    bucket.heading_sigma.add(
+        std::sqrt(heading_bias_deg_ * heading_bias_deg_ + heading_white_deg2_));
+  }
 }
 
 void ReplayPlot::Mean::add(double value) {
@@ -80,7 +195,12 @@ void ReplayPlot::Bucket::merge(const Bucket& other) {
     raw[i].merge(other.raw[i]);
     excess[i].merge(other.excess[i]);
     bias[i].merge(other.bias[i]);
+    bias_sigma[i].merge(other.bias_sigma[i]);
+    temperature[i].merge(other.temperature[i]);
   }
+  for (std::size_t i = 0; i < heading.size(); ++i)
+    heading[i].merge(other.heading[i]);
+  heading_sigma.merge(other.heading_sigma);
   average.merge(other.average);
   rate.merge(other.rate);
 }
@@ -115,12 +235,7 @@ void ReplayPlot::add_rate(TimePoint t, const std::array<double, 2>& raw_dps, dou
   }
   bucket.average.add(0.5 * (raw_dps[0] + raw_dps[1]));
   bucket.rate.add(virtual_dps);
-}
-
-void ReplayPlot::add_bias(TimePoint t, const std::array<double, 2>& bias_dps) {
-  Bucket& bucket = bucket_at(t);
-  for (std::size_t i = 0; i < 2; ++i)
-    bucket.bias[i].add(bias_dps[i]);
+  add_heading(t, raw_dps, virtual_dps);
 }
 
 // A curve's points are often sparser than the buckets: the line goes on to the next one. Where it
@@ -151,63 +266,227 @@ void ReplayPlot::write_data(std::string& to) const {
     const Mean& (*mean)(const Bucket&);
     double scale;
   };
-  constexpr std::array<Column, 8> kColumns{{
-      {[](const Bucket& b) -> const Mean& { return b.raw[0]; }, 1.0},
-      {[](const Bucket& b) -> const Mean& { return b.raw[1]; }, 1.0},
-      {[](const Bucket& b) -> const Mean& { return b.average; }, 1.0},
-      {[](const Bucket& b) -> const Mean& { return b.rate; }, 1.0},
-      {[](const Bucket& b) -> const Mean& { return b.excess[0]; }, kSecondsPerHour},
-      {[](const Bucket& b) -> const Mean& { return b.excess[1]; }, kSecondsPerHour},
-      {[](const Bucket& b) -> const Mean& { return b.bias[0]; }, kSecondsPerHour},
-      {[](const Bucket& b) -> const Mean& { return b.bias[1]; }, kSecondsPerHour},
+  const double drift = 1.0 / drift_unit().in_base;
+  const std::array<Column, 17> columns{{
+      {[](const Bucket& b) -> const Mean& { return b.raw[0]; }, 1.0},           // 2
+      {[](const Bucket& b) -> const Mean& { return b.raw[1]; }, 1.0},           // 3
+      {[](const Bucket& b) -> const Mean& { return b.average; }, 1.0},          // 4
+      {[](const Bucket& b) -> const Mean& { return b.rate; }, 1.0},             // 5
+      {[](const Bucket& b) -> const Mean& { return b.excess[0]; }, drift},      // 6
+      {[](const Bucket& b) -> const Mean& { return b.excess[1]; }, drift},      // 7
+      {[](const Bucket& b) -> const Mean& { return b.bias[0]; }, drift},        // 8
+      {[](const Bucket& b) -> const Mean& { return b.bias[1]; }, drift},        // 9
+      {[](const Bucket& b) -> const Mean& { return b.heading[0]; }, 1.0},       // 10
+      {[](const Bucket& b) -> const Mean& { return b.heading[1]; }, 1.0},       // 11
+      {[](const Bucket& b) -> const Mean& { return b.heading[2]; }, 1.0},       // 12
+      {[](const Bucket& b) -> const Mean& { return b.heading[3]; }, 1.0},       // 13
+      {[](const Bucket& b) -> const Mean& { return b.heading_sigma; }, 1.0},    // 14
+      {[](const Bucket& b) -> const Mean& { return b.bias_sigma[0]; }, drift},  // 15
+      {[](const Bucket& b) -> const Mean& { return b.bias_sigma[1]; }, drift},  // 16
+      {[](const Bucket& b) -> const Mean& { return b.temperature[0]; }, 1.0},   // 17
+      {[](const Bucket& b) -> const Mean& { return b.temperature[1]; }, 1.0},   // 18
   }};
-  std::array<std::vector<bool>, kColumns.size()> broken;
-  for (std::size_t k = 0; k < kColumns.size(); ++k)
-    broken[k] = breaks(kColumns[k].mean);
+  std::array<std::vector<bool>, 17> broken;
+  for (std::size_t k = 0; k < columns.size(); ++k)
+    broken[k] = breaks(columns[k].mean);
   put(to, "$rates << EOD\n");
   for (std::size_t i = 0; i < buckets_.size(); ++i) {
     std::string row;
     bool empty = true;
-    for (std::size_t k = 0; k < kColumns.size(); ++k) {
-      const Mean& mean = kColumns[k].mean(buckets_[i]);
-      row += broken[k][i] ? std::string(" NaN") : " " + mean.text(kColumns[k].scale);
+    for (std::size_t k = 0; k < columns.size(); ++k) {
+      const Mean& mean = columns[k].mean(buckets_[i]);
+      row += broken[k][i] ? std::string(" NaN") : " " + mean.text(columns[k].scale);
       empty = empty && mean.count == 0 && !broken[k][i];
     }
     if (empty) continue;
-    put(to, "{:.9g}{}\n", to_seconds(width_) * (static_cast<double>(i) + 0.5), row);
+    put(to, "{:.9g}{}\n", to_seconds(width_) * (static_cast<double>(i) + 0.5) / time_unit().in_base,
+        row);
   }
   put(to, "EOD\n");
 }
 
-bool ReplayPlot::has_rates() const {
+bool ReplayPlot::has(const Mean& (*column)(const Bucket&)) const {
   return std::any_of(buckets_.begin(), buckets_.end(),
-                     [](const Bucket& bucket) { return bucket.rate.count > 0; });
+                     [&](const Bucket& bucket) { return column(bucket).count > 0; });
 }
 
-bool ReplayPlot::has_biases() const {
-  return std::any_of(buckets_.begin(), buckets_.end(),
-                     [](const Bucket& bucket) { return bucket.bias[0].count > 0; });
+double ReplayPlot::span_s() const {
+  return to_seconds(width_) * static_cast<double>(buckets_.size());
 }
 
-std::string ReplayPlot::drift_script(const PlotTexts& texts) const {
-  const std::array<std::string, 2> names{gnuplot_text("gyro " + texts.gyro_names[0]),
-                                         gnuplot_text("gyro " + texts.gyro_names[1])};
-  std::string text = fmt::format(
-      "set ylabel 'off the virtual gyro, deg/h'\n"
-      "plot $rates u 1:6 w l lc rgb '{}' t {}, '' u 1:7 w l lc rgb '{}' t {}, "
-      "'' u 1:(0.5*($6+$7)) w l lc rgb '#606060' t 'mean', "
-      "0 w l lw 1.5 lc rgb '#b00020' t 'virtual gyro'\n",
-      kColours[0], names[0], kColours[1], names[1]);
-  if (!has_biases()) return text;
-  for (std::size_t i = 0; i < 2; ++i) {
-    if (i == 1) text += "set xlabel 'time since the first pair, s'\n";
-    text += fmt::format(
-        "set ylabel 'drift, deg/h'\nplot $rates u 1:{} w p pt 7 ps 0.25 lc rgb '{}' t {}, "
-        "'' u 1:{} w l lw 1.5 lc rgb '#202020' t 'drift curve'\n",
-        6 + i, kColours[i], gnuplot_text("gyro " + texts.gyro_names[i] + " less the virtual gyro"),
-        8 + i);
+ReplayPlot::Unit ReplayPlot::time_unit() const {
+  constexpr double kMinutesFrom_s = 600.0;
+  constexpr double kHoursFrom_s = 3.0 * kSecondsPerHour;
+  if (span_s() >= kHoursFrom_s) return {"h", kSecondsPerHour};
+  if (span_s() >= kMinutesFrom_s) return {"min", kSecondsPerMinute};
+  return {"s", 1.0};
+}
+
+ReplayPlot::Unit ReplayPlot::drift_unit() const {
+  double largest_dps = 0.0;
+  for (const Bucket& bucket : buckets_) {
+    for (const Mean& bias : bucket.bias) {
+      if (bias.count > 0) largest_dps = std::max(largest_dps, std::abs(bias.value()));
+    }
   }
-  return text;
+  if (largest_dps > kReadableInDegPerHour_dps) return {"deg/s", 1.0};
+  return {"deg/h", 1.0 / kSecondsPerHour};
+}
+
+ReplayPlot::Panel ReplayPlot::heading_panel(const PlotTexts& texts) const {
+  std::string text = "plot ";
+  if (has([](const Bucket& b) -> const Mean& { return b.heading_sigma; })) {
+    put(text, "$rates u 1:($13-$14):($13+$14) w filledcurves lc rgb '{}' t 'virtual gyro ±σ', ",
+        kVirtualBand);
+  }
+  for (std::size_t i = 0; i < 2; ++i) {
+    put(text, "$rates u 1:{} w l lw 1.5 lc rgb '{}' t {}, ", 10 + i, kColours[i],
+        gnuplot_text("gyro " + texts.gyro_names[i]));
+  }
+  put(text, "$rates u 1:12 w l lw 1.5 dt 2 lc rgb '{}' t 'mean'", kMeanColour);
+  if (valid_begun_)
+    put(text, ", $rates u 1:13 w l lw 2.5 lc rgb '{}' t 'virtual gyro'", kVirtualColour);
+  return {310, "Heading, deg", text + '\n'};
+}
+
+// The ends stand in the legend: they are what one takes away.
+ReplayPlot::Panel ReplayPlot::off_panel(const PlotTexts& texts) const {
+  const std::array<std::string, 3> names{"gyro " + texts.gyro_names[0],
+                                         "gyro " + texts.gyro_names[1], "mean"};
+  std::string text = "plot ";
+  const bool sigma = has([](const Bucket& b) -> const Mean& { return b.heading_sigma; });
+  if (sigma) {
+    put(text, "$rates u 1:(-$14):14 w filledcurves lc rgb '{}' t 'virtual gyro ±{:.2g}°', ",
+        kVirtualBand, std::sqrt(heading_bias_deg_ * heading_bias_deg_ + heading_white_deg2_));
+  }
+  put(text, "$rates u 1:($13-$13) w l lw 2.5 lc rgb '{}' notitle", kVirtualColour);
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    put(text, ", $rates u 1:(${}-$13) w l lw 1.5 {} lc rgb '{}' t {}", 10 + i, i == 2 ? "dt 2" : "",
+        i == 2 ? kMeanColour : kColours[i],
+        gnuplot_text(fmt::format("{} {}", names[i], degrees(headings_[i].deg - headings_[3].deg))));
+  }
+  return {220, "Heading off the virtual gyro, deg (in the legend: at the end)", text + '\n'};
+}
+
+ReplayPlot::Panel ReplayPlot::rate_panel(const PlotTexts& texts) const {
+  std::string text = "plot ";
+  for (std::size_t i = 0; i < 2; ++i) {
+    put(text, "$rates u 1:{} w l lc rgb '{}' t {}, ", 2 + i, kColours[i],
+        gnuplot_text("gyro " + texts.gyro_names[i]));
+  }
+  put(text, "$rates u 1:4 w l lc rgb '{}' t 'mean'", kMeanColour);
+  if (valid_begun_)
+    put(text, ", $rates u 1:5 w l lw 1.5 lc rgb '{}' t 'virtual gyro'", kVirtualColour);
+  return {200, "Rate, deg/s", text + '\n'};
+}
+
+// The curve, its band, and all but the wildest of what was measured, with a margin.
+std::string ReplayPlot::drift_range(std::size_t gyro) const {
+  constexpr double kWild = 0.02;  // of the points, at each end
+  constexpr double kMargin = 0.15;
+  std::vector<double> points;
+  double low = std::numeric_limits<double>::infinity();
+  double high = -low;
+  for (const Bucket& bucket : buckets_) {
+    if (bucket.excess[gyro].count > 0) points.push_back(bucket.excess[gyro].value());
+    if (bucket.bias[gyro].count == 0) continue;
+    const double sigma = bucket.bias_sigma[gyro].count > 0 ? bucket.bias_sigma[gyro].value() : 0.0;
+    low = std::min(low, bucket.bias[gyro].value() - sigma);
+    high = std::max(high, bucket.bias[gyro].value() + sigma);
+  }
+  if (!points.empty()) {
+    std::sort(points.begin(), points.end());
+    const auto aside = static_cast<std::size_t>(kWild * static_cast<double>(points.size()));
+    low = std::min(low, points[aside]);
+    high = std::max(high, points[points.size() - 1 - aside]);
+  }
+  // A simulation without noise: gnuplot wants some height.
+  constexpr double kLeast = 1e-4;
+  if (!(high - low > kLeast * std::abs(high))) return "set autoscale y\n";
+  const double margin = kMargin * (high - low);
+  const double scale = 1.0 / drift_unit().in_base;
+  return fmt::format("set yrange [{:.6g}:{:.6g}]\n", scale * (low - margin),
+                     scale * (high + margin));
+}
+
+ReplayPlot::Panel ReplayPlot::drift_panel(const PlotTexts& texts, std::size_t gyro) const {
+  std::string text = drift_range(gyro);
+  put(text, "plot $rates u 1:{} w p pt 7 ps 0.25 lc rgb '{}' t {}, ", 6 + gyro, kColours[gyro],
+      gnuplot_text("gyro less the virtual gyro"));
+  const bool sigma = gyro == 0
+                         ? has([](const Bucket& b) -> const Mean& { return b.bias_sigma[0]; })
+                         : has([](const Bucket& b) -> const Mean& { return b.bias_sigma[1]; });
+  if (sigma) {
+    put(text,
+        "$known u 1:(${0}-${1}):(${0}+${1}) w filledcurves fs transparent solid 0.7 lc rgb '{2}' "
+        "t 'its ±σ', ",
+        2 + 2 * gyro, 3 + 2 * gyro, kDriftBand);
+  }
+  put(text, "$rates u 1:{} w l lw 1.5 lc rgb '{}' t 'drift'\nset autoscale y\n", 8 + gyro,
+      kDriftColour);
+  return {180, fmt::format("Drift of gyro {}, {}", texts.gyro_names[gyro], drift_unit().name),
+          text};
+}
+
+ReplayPlot::Panel ReplayPlot::temperature_panel(const PlotTexts& texts) const {
+  const std::array<bool, 2> told{
+      has([](const Bucket& b) -> const Mean& { return b.temperature[0]; }),
+      has([](const Bucket& b) -> const Mean& { return b.temperature[1]; })};
+  if (!told[0] && !told[1]) return {0, {}, {}};
+  std::string text = "plot ";
+  for (std::size_t i = 0; i < 2; ++i) {
+    if (!told[i]) continue;
+    put(text, "{}$rates u 1:{} w l lw 1.5 lc rgb '{}' t {}", i == 1 && told[0] ? ", " : "", 17 + i,
+        kColours[i], gnuplot_text("gyro " + texts.gyro_names[i]));
+  }
+  return {130, "Temperature, °C", text + '\n'};
+}
+
+std::string ReplayPlot::lane_name(std::size_t shade, const PlotTexts& texts) const {
+  const std::size_t first = static_cast<std::size_t>(Shade::kFault1);
+  if (shade < first || shade > first + 1) return kShadeStyles[shade].lane;
+  std::string name = texts.gyro_names[shade - first];
+  const char* separator = ": ";
+  for (const gateway::Fault fault : faults_[shade - first]) {
+    name += separator + std::string(to_string(fault));
+    separator = ", ";
+  }
+  std::replace(name.begin(), name.end(), '_', ' ');
+  return name;
+}
+
+// From and to, in the unit of the time axis, wide enough to be seen.
+std::array<double, 2> ReplayPlot::ends(const Stretch& stretch) const {
+  const double from = std::max(to_seconds(stretch.from - begin_), 0.0);
+  const double to = std::max(to_seconds(stretch.to - begin_), from + kShortest * span_s());
+  return {from / time_unit().in_base, to / time_unit().in_base};
+}
+
+// A lane, with its name, for each thing that went on at some time; the same colours shade the
+// panels.
+ReplayPlot::Panel ReplayPlot::events_panel(const PlotTexts& texts) const {
+  std::string boxes;
+  std::string names;
+  int lanes = 0;
+  for (std::size_t shade = 0; shade < kShades; ++shade) {
+    if (stretches_[shade].all().empty()) continue;
+    ++lanes;
+    put(names, "{}{} {}", lanes == 1 ? "" : ", ", gnuplot_text(lane_name(shade, texts)), -lanes);
+    for (const Stretch& stretch : stretches_[shade].all()) {
+      put(boxes,
+          "set object rectangle from first {:.9g},{} to first {:.9g},{} front fs solid 1 border lc "
+          "rgb '#{:06x}' fc rgb '#{:06x}'\n",
+          ends(stretch)[0], -lanes - 0.35, ends(stretch)[1], -lanes + 0.35,
+          kShadeStyles[shade].colour, kShadeStyles[shade].colour);
+    }
+  }
+  if (lanes == 0) return {0, {}, {}};
+  return {kLane * lanes, "What went on",
+          fmt::format("unset object\n{}set yrange [{}:-0.4]\nset ytics ({}) scale 0 "
+                      "noenhanced\nplot NaN notitle\nset autoscale y\nunset "
+                      "object\nset ytics autofreq scale 1\n{}",
+                      boxes, -lanes - 0.6, names, shades_script()),
+          false};
 }
 
 // Rectangles over the whole height of every panel, behind the curves.
@@ -218,44 +497,72 @@ std::string ReplayPlot::shades_script() const {
       put(text,
           "set object rectangle from first {:.9g},graph 0 to first {:.9g},graph 1 behind fs solid "
           "noborder fc rgb '{}'\n",
-          std::max(to_seconds(stretch.from - begin_), 0.0),
-          std::max(to_seconds(stretch.to - begin_), 0.0), kShadeStyles[shade].colour);
+          ends(stretch)[0], ends(stretch)[1], tint(kShadeStyles[shade].colour));
     }
   }
   return text;
 }
 
-// An object has no place in the legend: a curve of nothing stands there for it.
-std::string ReplayPlot::shades_legend() const {
-  std::string text;
-  for (std::size_t shade = 0; shade < kShades; ++shade) {
-    if (stretches_[shade].all().empty()) continue;
-    put(text, ", NaN w boxes fs solid noborder fc rgb '{}' t '{}'", kShadeStyles[shade].colour,
-        kShadeStyles[shade].legend);
-  }
-  return text;
+std::vector<ReplayPlot::Panel> ReplayPlot::panels(const PlotTexts& texts) const {
+  std::vector<Panel> panels{heading_panel(texts)};
+  if (valid_begun_) panels.push_back(off_panel(texts));
+  if (Panel events = events_panel(texts); events.height_px > 0) panels.push_back(events);
+  panels.push_back(rate_panel(texts));
+  const bool biases = has([](const Bucket& b) -> const Mean& { return b.bias[0]; }) &&
+                      has([](const Bucket& b) -> const Mean& { return b.excess[0]; });
+  for (std::size_t gyro = 0; biases && gyro < 2; ++gyro)
+    panels.push_back(drift_panel(texts, gyro));
+  if (Panel temperature = temperature_panel(texts); temperature.height_px > 0)
+    panels.push_back(temperature);
+  return panels;
 }
 
 std::string ReplayPlot::script(const std::string& path, const PlotTexts& texts) const {
-  const bool rates = has_rates();
-  const int panels = !rates ? 1 : has_biases() ? 4 : 2;
+  const std::vector<Panel> drawn = panels(texts);
+  int height = kTitle + kFoot;
+  for (const Panel& panel : drawn)
+    height += (panel.legend ? kLegend : kNoLegend) + panel.height_px;
   std::string text = fmt::format(
-      "{}set multiplot layout {},1 title {} noenhanced\n"
-      "set grid lc rgb '#dddddd'\nset key outside top right horizontal noenhanced\n"
-      "set lmargin 12\nset rmargin 3\nset xrange [0:{:.9g}]\nset datafile missing '-'\n"
-      "set ylabel 'rate, deg/s'\n{}{}"
-      "plot $rates u 1:2 w l lc rgb '{}' t {}, '' u 1:3 w l lc rgb '{}' t {}, "
-      "'' u 1:4 w l lc rgb '#909090' t 'mean'",
-      picture_script(path, 1200, 1250), panels,
-      gnuplot_text(texts.title + (rates ? "" : " (no valid virtual rate)")),
-      to_seconds(width_) * static_cast<double>(buckets_.size()), shades_script(),
-      rates ? "" : "set xlabel 'time since the first pair, s'\n", kColours[0],
-      gnuplot_text("gyro " + texts.gyro_names[0]), kColours[1],
-      gnuplot_text("gyro " + texts.gyro_names[1]));
-  if (rates) text += ", '' u 1:5 w l lw 1.5 lc rgb '#b00020' t 'virtual gyro'";
-  text += shades_legend() + '\n';
-  if (rates) text += drift_script(texts);
-  return text + "\nunset multiplot\n";
+      "{}set multiplot\nset label 1 {} at screen 0.5,{:.6f} center noenhanced font ',15'\n"
+      "set grid xtics ytics lt 1 lw 1 lc rgb '#d5d5d5'\n"
+      "set lmargin at screen {:.6f}\nset rmargin at screen {:.6f}\nset xrange [0:{:.9g}]\n"
+      "set datafile missing '-'\nset tics nomirror\nset format x ''\n{}",
+      picture_script(path, kWidth, height),
+      gnuplot_text(texts.title + (valid_begun_ ? "" : ": no valid virtual rate")),
+      1.0 - 0.5 * kTitle / height, static_cast<double>(kLeft) / kWidth,
+      1.0 - static_cast<double>(kRight) / kWidth, span_s() / time_unit().in_base, shades_script());
+  int above = kTitle;
+  const auto from_top = [&](int pixels) { return 1.0 - static_cast<double>(pixels) / height; };
+  for (const Panel& panel : drawn) {
+    above += panel.legend ? kLegend : kNoLegend;
+    if (&panel == &drawn.back())
+      put(text, "set format x '%g'\nset xlabel 'time, {}'\n", time_unit().name);
+    put(text,
+        "set label 2 {} at screen {:.6f},{:.6f} left noenhanced font ',12'\n"
+        "set key at screen {:.6f},{:.6f} left bottom horizontal Left reverse noenhanced maxrows 1\n"
+        "set tmargin at screen {:.6f}\nset bmargin at screen {:.6f}\n{}unset label 1\n",
+        gnuplot_text(panel.caption), static_cast<double>(kLeft) / kWidth,
+        from_top(above - (panel.legend ? kHeading : kHeading - (kLegend - kNoLegend))),
+        static_cast<double>(kLeft) / kWidth, from_top(above - 6), from_top(above),
+        from_top(above + panel.height_px), panel.script);
+    above += panel.height_px;
+  }
+  return text + "unset multiplot\n";
+}
+
+// What is known of the drifts, row by row: σ comes less often than the drift.
+void ReplayPlot::write_known(std::string& to) const {
+  const double scale = 1.0 / drift_unit().in_base;
+  put(to, "$known << EOD\n");
+  for (std::size_t i = 0; i < buckets_.size(); ++i) {
+    const Bucket& b = buckets_[i];
+    if (b.bias_sigma[0].count == 0 || b.bias[0].count == 0) continue;
+    put(to, "{:.9g} {} {} {} {}\n",
+        to_seconds(width_) * (static_cast<double>(i) + 0.5) / time_unit().in_base,
+        b.bias[0].text(scale), b.bias_sigma[0].text(scale), b.bias[1].text(scale),
+        b.bias_sigma[1].text(scale));
+  }
+  put(to, "EOD\n");
 }
 
 Expected<void> ReplayPlot::draw(const std::string& path, const PlotTexts& texts) const {
@@ -264,6 +571,7 @@ Expected<void> ReplayPlot::draw(const std::string& path, const PlotTexts& texts)
   }
   std::string whole;
   write_data(whole);
+  write_known(whole);
   whole += script(path, texts);
   return run_gnuplot(path, whole);
 }

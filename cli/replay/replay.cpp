@@ -219,8 +219,12 @@ class Replay {
     summary_.frames_out = sink_.frames;
     summary_.slope_dps_s.fill(std::numeric_limits<double>::quiet_NaN());
     summary_.slope_sigma_dps_s = summary_.slope_dps_s;
+    summary_.bias_sigma_dps = summary_.slope_dps_s;
     const std::optional<gateway::SavedState> known = pipeline_.memory();
     for (std::size_t i = 0; known && i < 2; ++i) {
+      // Of several axes the first one's stands there; a summary of all has no drift.
+      if (pipeline_.axis_count() == 0)
+        summary_.bias_sigma_dps[i] = std::sqrt(known->drift.bias_covariance[2 * i]);
       if (!(known->drift.slope_sigma_dps_s[i] > 0.0)) continue;  // 0 stands for "not known"
       summary_.slope_dps_s[i] = known->drift.slope_dps_s[i];
       summary_.slope_sigma_dps_s[i] = known->drift.slope_sigma_dps_s[i];
@@ -275,13 +279,30 @@ class Replay {
     const gateway::Status& status = pipeline_.status();
     if (status.biases_out == biases_seen_) return;
     biases_seen_ = status.biases_out;
-    for (std::size_t i = 0; i < plots_.size(); ++i) {
-      const gateway::Status& drawn =
-          pipeline_.axis_count() == 0 ? status : pipeline_.axis_status(i);
-      plots_[i].add_bias(stamp, {drawn.gyros[0].bias_dps, drawn.gyros[1].bias_dps});
+    for (std::size_t i = 0; i < plots_.size(); ++i)
+      plots_[i].add_status(stamp, pipeline_.axis_count() == 0 ? status : pipeline_.axis_status(i));
+    follow_sigma(stamp);
+  }
+
+  // The σ of each drift, as it would be kept across a restart; no more often than a picture shows.
+  void follow_sigma(TimePoint stamp) {
+    if (sigma_seen_ && stamp - *sigma_seen_ < kSigmaEvery) return;
+    sigma_seen_ = stamp;
+    const std::optional<gateway::SavedState> known = pipeline_.memory();
+    if (!known) return;
+    const auto show = [&](ReplayPlot& plot, const fusion::DriftMemory& drift) {
+      plot.add_bias_sigma(
+          stamp, {std::sqrt(drift.bias_covariance[0]), std::sqrt(drift.bias_covariance[2])});
+    };
+    if (pipeline_.axis_count() == 0) return show(plots_.front(), known->drift);
+    for (const gateway::SavedState& axis : known->axes) {
+      for (std::size_t i = 0; i < plots_.size(); ++i) {
+        if (summary_.axes[i].name == gateway::kAxisNames[axis.axis]) show(plots_[i], axis.drift);
+      }
     }
   }
 
+  static constexpr Duration kSigmaEvery = std::chrono::seconds(1);
   const ReplayOptions& options_;
   bool is_drawn_;
   OutputFile& output_;
@@ -296,6 +317,7 @@ class Replay {
   TimePoint last_;
   std::uint64_t frames_seen_ = 0;
   std::uint64_t biases_seen_ = 0;
+  std::optional<TimePoint> sigma_seen_;
 };
 
 std::string causes_of_rejection(const gateway::GyroStatus& gyro) {
@@ -412,6 +434,27 @@ void warn_of_doubts(const ReplaySummary& summary, const gateway::Plan& plan) {
   }
 }
 
+// A virtual gyro that was one gyro for the most part, or that says nothing of its σ.
+void warn_of_weakness(const ReplaySummary& summary, const gateway::Plan& plan) {
+  for (std::size_t i = 0; i < 2; ++i) {
+    if (summary.rates == 0 || 2 * summary.raws[i] >= summary.rates) continue;
+    warn(
+        {"gyro " + plan.gyros[i].name,
+         fmt::format("was aside most of the time: it took part in {} of {} valid rates, the others "
+                     "are of one gyro alone",
+                     summary.raws[i], summary.rates),
+         "the summary's \"faults\" and \"not used\" say why; --plot shows when"});
+  }
+  // What VG_Sigma can say at most: 0xFFE steps of 2e-5 deg/s.
+  constexpr double kSigmaMost_dps = 0xFFE * 2e-5;
+  if (plan.output.fd || !(summary.status.sigma_dps > kSigmaMost_dps)) return;
+  warn({"sigma",
+        fmt::format("at the end it is {:.2g} deg/s, and VG_Sigma carries {:.4f} deg/s at most: it "
+                    "goes out as \"not available\"",
+                    summary.status.sigma_dps, kSigmaMost_dps),
+        "fd = true in [output] carries any; --csv holds it too"});
+}
+
 // What the corrector could not make sense of, with what to look at.
 void warn_of_data(const ReplaySummary& summary, const gateway::Plan& plan) {
   const gateway::Status& status = summary.status;
@@ -490,6 +533,13 @@ void warn_of_other_senders(const ReplaySummary& summary, const gateway::Plan& pl
   }
 }
 
+// Without folders: a title is short.
+std::string picture_name_of(std::vector<std::string> logs) {
+  for (std::string& log : logs)
+    log = log.substr(log.rfind('/') + 1);
+  return name_of(logs);
+}
+
 int write_results(const ReplayOptions& options, const gateway::Plan& plan,
                   const ReplaySummary& summary, const std::vector<ReplayPlot>& plots) {
   if (!options.json.empty()) {
@@ -501,10 +551,9 @@ int write_results(const ReplayOptions& options, const gateway::Plan& plan,
   const std::vector<std::string> pictures = pictures_of(options, plan);
   for (std::size_t i = 0; !options.plot.empty() && i < plots.size(); ++i) {
     const gateway::Plan& drawn = plan.axes.empty() ? plan : plan.axes[i];
-    const PlotTexts texts{
-        fmt::format("{}{}: {} over {:g}-s windows", name_of(options.logs), about_axis(drawn),
-                    gateway::to_string(plan.corrector.method), plan.corrector.window_s),
-        {plan.gyros[0].name, plan.gyros[1].name}};
+    const PlotTexts texts{fmt::format("{}{}, method {}", picture_name_of(options.logs),
+                                      about_axis(drawn), gateway::to_string(plan.corrector.method)),
+                          {plan.gyros[0].name, plan.gyros[1].name}};
     if (const auto done = plots[i].draw(pictures[i], texts); !done) return report(done.error());
   }
   return kDone;
@@ -577,6 +626,7 @@ int run_replay(const ReplayOptions& options) {
   const int written = write_results(options, plan, summary, replay.plots());
   warn_of_doubts(summary, plan);
   warn_of_data(summary, plan);
+  warn_of_weakness(summary, plan);
   warn_of_senders_missed(summary, plan);
   warn_of_other_senders(summary, plan);
   if (!trouble) trouble = explain_contradiction(summary, plan);

@@ -86,6 +86,7 @@ Json gyro_json(const ReplaySummary& summary, const gateway::Plan& plan, std::siz
             {"faults", faults_json(gyro)},
             {"mean_rate_dps", number(mean_of(summary.raw_sum_dps[index], summary.raws[index]))},
             {"bias_dps", number(gyro.bias_dps)},
+            {"bias_sigma_dps", number(summary.bias_sigma_dps[index])},
             {"slope_dps_s", number(summary.slope_dps_s[index])},
             {"slope_sigma_dps_s", number(summary.slope_sigma_dps_s[index])},
             {"temperature_c", number(gyro.temperature_c)}};
@@ -320,6 +321,44 @@ Json to_json(const ReplaySummary& summary, const gateway::Plan& plan) {
 
 namespace {
 
+// A drift beyond this, in deg/s, has more digits than one reads in deg/h.
+constexpr double kReadableInDegPerHour_dps = 0.3;
+
+// As many digits as leave σ two that count.
+int digits_for(double sigma) {
+  constexpr int kDigitsMost = 9;
+  return std::clamp(1 - static_cast<int>(std::floor(std::log10(sigma))), 0, kDigitsMost);
+}
+
+// "+0.033032 ± 0.000042 deg/s = +118.92 ± 0.15 deg/h"; without σ where it is not known.
+std::string drift_text(double bias_dps, double sigma_dps) {
+  const bool known = sigma_dps > 0.0 && std::isfinite(sigma_dps);
+  const auto text = [&](double scale, const char* unit, int digits) {
+    return known ? fmt::format("{:+.{}f} ± {:.{}f} {}", scale * bias_dps,
+                               digits_for(scale * sigma_dps), scale * sigma_dps,
+                               digits_for(scale * sigma_dps), unit)
+                 : fmt::format("{:+.{}f} {}", scale * bias_dps, digits, unit);
+  };
+  std::string all = text(1.0, "deg/s", 6);
+  if (std::abs(bias_dps) <= kReadableInDegPerHour_dps)
+    all += " = " + text(kSecondsPerHour, "deg/h", 3);
+  return all;
+}
+
+// "8 stops: 7 learned, 1 refused (moving together)".
+std::string stops_text(const gateway::SteadyStretches& stretches) {
+  const std::uint64_t all = stretches.learned + stretches.refused;
+  if (all == 0) return {};
+  std::string text = fmt::format("{}: {} learned", count_of(all, "stop"), stretches.learned);
+  if (stretches.refused > 0)
+    text += fmt::format(", {} refused (moving together)", stretches.refused);
+  if (stretches.open > 0) {
+    text +=
+        fmt::format("; {} left open: standing or turning could not be told apart", stretches.open);
+  }
+  return text;
+}
+
 std::string how_often(std::uint64_t times) {
   return times == 1 ? "once" : fmt::format("{} times", times);
 }
@@ -363,7 +402,7 @@ void put_opinion(fmt::memory_buffer& text, const ReplaySummary& summary,
     if (!words.empty()) fmt::format_to(to, "\n{:<13} {}", title, words);
   };
   line("pair", gateway::contradiction_text(status.pair, names));
-  line("stops", gateway::stretches_text(gateway::steady_stretches(status)));
+  line("stops", stops_text(gateway::steady_stretches(status)));
   line("at the end", status.ambiguous ? gateway::ambiguity_text(status.probability, names)
                                       : gateway::hypotheses_text(status.probability, names));
   const std::string kind = gateway::drift_kind_text(status.probability);
@@ -385,8 +424,7 @@ void put_gyro(fmt::memory_buffer& text, const ReplaySummary& summary, const gate
                    summary.raw_sum_dps[i] / static_cast<double>(summary.raws[i]));
   }
   if (std::isfinite(gyro.bias_dps)) {
-    fmt::format_to(to, ", drift now {:+.6f} deg/s = {:+.3f} deg/h", gyro.bias_dps,
-                   gyro.bias_dps * kSecondsPerHour);
+    fmt::format_to(to, ", drift now {}", drift_text(gyro.bias_dps, summary.bias_sigma_dps[i]));
   }
   if (gyro.missing > 0) fmt::format_to(to, ", {} missing by its counter", gyro.missing);
   if (rejected_total(gyro) > 0) {

@@ -79,6 +79,7 @@ struct ReplaySummary {
   gateway::Status status;
   std::array<double, 2> slope_dps_s{};        ///< of the biases, at the end
   std::array<double, 2> slope_sigma_dps_s{};  ///< of these; NaN where they are not known
+  std::array<double, 2> bias_sigma_dps{};     ///< of the biases; NaN where it is not known
   std::uint64_t frames_out = 0;
   double first_s = 0.0;  ///< stamps of the first and the last frame
   double last_s = 0.0;

@@ -3,6 +3,7 @@
 
 import collections
 import gzip
+import html
 import json
 import lzma
 import math
@@ -415,8 +416,7 @@ class Thoughts(Replay):
         self.assertGreaterEqual(stops["learned"], 1)
         self.assertGreaterEqual(stops["refused"], 3)
         number = stops["learned"]
-        self.assertIn(f"{number + stops['refused']} steady stretches: {number} stop{'s' if number > 1 else ''} learned, "
-                      f"{stops['refused']} refused: turning together", said)
+        self.assertIn(f"{number + stops['refused']} stops: {number} learned, {stops['refused']} refused (moving together)", said)
         # Most were refused: a warning that says what to check.
         warnings = [line for line in said.splitlines() if line.startswith("warning: stops: ")]
         self.assertEqual(len(warnings), 1, said)
@@ -457,12 +457,61 @@ class Thoughts(Replay):
         self.write("in.log", "".join(stops_and_turns(4)))
         self.replay("-q", "-o", "out.log", "--plot", "a.svg", "in.log")
         svg = self.read("a.svg")
-        self.assertIn("learned as a stop", svg)
-        self.assertIn("refused: turning", svg)
+        self.assertIn("stop learned", svg)
+        self.assertIn("stop refused: turning", svg)
         self.assertNotIn("ambiguous", svg, "nothing here is")
-        for colour in ("rgb(216, 239, 216)", "rgb(243, 217, 184)"):
-            # In each of the four panels, and once in the legend.
-            self.assertGreaterEqual(svg.count(colour), 5, colour)
+        for colour in ("rgb(204, 236, 227)", "rgb(247, 223, 204)"):
+            self.assertGreaterEqual(svg.count(colour), 5, f"{colour} is in each panel with an axis of time")
+        for colour in ("rgb(  0, 158, 115)", "rgb(213,  94,   0)"):
+            self.assertGreaterEqual(svg.count(colour), 1, f"{colour} is in its lane")
+
+    def test_picture_shows_what_the_heading_came_to(self):
+        # The raw gyros read 0.5 and -0.3 deg/s too much; what the legend says of them is that, over the valid time.
+        self.write("in.log", "".join(stops_and_turns(4)))
+        self.replay("-q", "-o", "out.log", "--csv", "out.csv", "--plot", "a.svg", "in.log")
+        rows = [line.split(",") for line in self.read("out.csv").splitlines()[1:]]
+        valid = [float(row[0]) for row in rows if row[2 + 1] == "1"]
+        span = valid[-1] - valid[0]
+        text = html.unescape(re.sub(r"<[^>]*>", " ", self.read("a.svg")))
+        ends = {name: float(end) for name, end in re.findall(r"(gyro left|gyro right|mean)\s+([+-][0-9.]+)°", text)}
+        for name, rate in (("gyro left", 0.5), ("gyro right", -0.3), ("mean", 0.1)):
+            self.assertAlmostEqual(ends[name] / span, rate, delta=0.02, msg=f"{name} over {span:.1f} s: {ends}")
+        self.assertRegex(text, r"virtual gyro ±[0-9.]+°")
+
+    def test_drift_is_told_with_its_sigma_and_two_digits_beyond(self):
+        self.write("in.log", "".join(stops_and_turns(1)))
+        said = self.replay("-o", "out.log", "--json", "s.json", "in.log").stderr.decode()
+        gyros = json.loads(self.read("s.json"))["gyros"]
+        told = re.findall(r"drift now ([+-][0-9.]+) ± ([0-9.]+) deg/s", said)
+        self.assertEqual(len(told), 2, said)
+        for gyro, (drift, sigma), truth in zip(gyros, told, (0.5, -0.3)):
+            self.assertEqual(len(drift.split(".")[1]), len(sigma.split(".")[1]))
+            self.assertRegex(sigma, r"^0\.0*[1-9][0-9]$")
+            self.assertLess(abs(float(sigma) / gyro["bias_sigma_dps"] - 1.0), 0.06)
+            self.assertLess(abs(gyro["bias_dps"] - truth), 5.0 * gyro["bias_sigma_dps"])
+
+    def test_a_gyro_that_is_aside_most_of_the_time_is_warned_of(self):
+        # The right gyro falls silent soon after the calibration and stays so.
+        lines = stops_and_turns(4)
+        begin = float(lines[0].split(")")[0][1:])
+        self.write("in.log", "".join(line for line in lines if not ("can1" in line and float(line.split(")")[0][1:]) - begin > 17.0)))
+        said = self.replay("-o", "out.log", "in.log").stderr.decode()
+        self.assertRegex(said, r"warning: gyro right: was aside most of the time: it took part in \d+ of \d+ valid rates")
+        self.write("in.log", "".join(lines))
+        self.assertNotIn("was aside most", self.replay("-o", "out.log", "in.log").stderr.decode())
+
+    def test_picture_names_a_stretch_of_one_gyro_and_its_fault(self):
+        # The right gyro is silent for four seconds in the middle.
+        lines = stops_and_turns(4)
+        begin = float(lines[0].split(")")[0][1:])
+        gone = [line for line in lines if not ("can1" in line and 17.0 < float(line.split(")")[0][1:]) - begin < 21.0)]
+        self.assertLess(len(gone), len(lines))
+        self.write("in.log", "".join(gone))
+        self.replay("-q", "-o", "out.log", "--plot", "a.svg", "in.log")
+        svg = self.read("a.svg")
+        self.assertTrue("one gyro alone" in svg, "one gyro alone")
+        self.assertTrue("right: silent" in svg, "right: silent")
+        self.assertTrue("calibrating" in svg, "calibrating")
 
     def test_a_step_of_a_gyro_is_told_as_such_until_it_is_settled(self):
         # In motion nobody can tell whose step it was: either gyro's is likely, and σ spans both.
@@ -497,7 +546,7 @@ class Thoughts(Replay):
             drawn = [to - before for (_, before), (kind, to) in zip(points, points[1:]) if kind == "L"]
             width = max(x for _, x in points[2:]) - min(x for _, x in points[2:])
             self.assertLess(max(drawn[1:]), 0.05 * width)
-        self.assertEqual(curves, 9, "of the rates, of what is off the virtual gyro, and of the two drifts")
+        self.assertEqual(curves, 13, "four headings, three off the virtual gyro, four rates, two drifts")
         shades = [float(to) - float(begin) for begin, to in re.findall(r"<polygon fill = '[^']*' points = '([0-9.]+),[^ ]* ([0-9.]+),", picture)]
         self.assertGreater(len(shades), 8, "four pictures, each with its stops")
         self.assertLess(max(shades), 0.2 * width)

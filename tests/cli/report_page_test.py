@@ -4,6 +4,7 @@ and takes no name for markup. Where there is no Chromium, only its text is judge
 
 import html
 import json
+import math
 import os
 import re
 import shutil
@@ -58,6 +59,7 @@ addEventListener("load", () => setTimeout(() => {
     text: document.body.innerText, title: document.title, images: document.images.length,
     background: getComputedStyle(document.body).backgroundColor,
     overflow: document.documentElement.scrollWidth - innerWidth,
+    cut: [...document.querySelectorAll(".scroll, figure")].filter((box) => box.scrollWidth > box.clientWidth + 1).map((box) => box.innerText.slice(0, 60)),
   };
   seen.links = [...document.querySelectorAll("main a")].map((link) => link.getAttribute("href"));
   const press = (key) => charts[0].dispatchEvent(new KeyboardEvent("keydown", { key, bubbles: true }));
@@ -165,7 +167,34 @@ class Page(unittest.TestCase):
 
     def test_fits_a_narrow_window(self):
         # What is wider scrolls inside its own box.
-        self.assertLessEqual(self.look(500)["overflow"], 0)
+        for width in (500, 800, 1300):  # no narrower: a headless window has a least width
+            self.assertLessEqual(self.look(width)["overflow"], 0, width)
+            self.assertEqual(self.look(width)["cut"], [], f"tables and pictures wider than their place at {width}")
+
+    def test_begins_with_degrees(self):
+        # The made-up "before" is 2e-3·(1.5 + sin) deg/s, "after" a fifth of it.
+        wave = [2e-3 * (1.5 + math.sin(2.0 * math.pi * i / 60.0)) for i in range(1, 101)]
+        text = self.look()["text"]
+        said = re.search(r"residual ([0-9.]+) → ([0-9.]+) deg/s rms; heading after 10 minutes ([0-9.]+) → ([0-9.]+) deg", text)
+        self.assertTrue(said, text[:600])
+        rms_before, rms_after, heading_before, heading_after = map(float, said.groups())
+        self.assertAlmostEqual(rms_before, (sum(y * y for y in wave) / len(wave)) ** 0.5, delta=1e-4)
+        self.assertAlmostEqual(rms_before / rms_after, 5.0, delta=0.5)
+        self.assertAlmostEqual(heading_before, 600 * sum(wave) / len(wave), delta=0.06)
+        self.assertAlmostEqual(heading_before / heading_after, 5.0, delta=0.5)
+        self.assertLess(said.start(), text.index("nat"), "degrees come first")
+        self.assertIn("−421.2 ± 3.1 ppm", text)
+
+    def test_prints_on_four_pages(self):
+        if not CHROMIUM:
+            self.skipTest("chromium is not installed")
+        with tempfile.TemporaryDirectory(prefix="vgyro-page-") as folder:
+            path = Path(folder) / "report.html"
+            path.write_text(self.page)
+            subprocess.run([CHROMIUM, "--headless=new", "--no-sandbox", "--disable-gpu", f"--user-data-dir={folder}/profile", "--no-first-run",
+                            "--virtual-time-budget=5000", f"--print-to-pdf={folder}/report.pdf", path.as_uri()], capture_output=True, check=True, timeout=100)
+            pages = len(re.findall(rb"/Type\s*/Page\b", (Path(folder) / "report.pdf").read_bytes()))
+        self.assertTrue(1 <= pages <= 4, pages)
 
 
 if __name__ == "__main__":

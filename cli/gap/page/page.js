@@ -40,11 +40,11 @@ function colour(name) {
 }
 
 function table(head, rows) {
-  const cell = (tag, content, numeric) => make(tag, numeric ? { class: "number" } : {}, content);
+  const cell = (tag, content, numeric, label) => make(tag, { ...(numeric ? { class: "number" } : {}), ...(label ? { "data-label": label } : {}) }, content);
   return make("div", { class: "scroll" }, make("table", {},
     make("thead", {}, make("tr", {}, head.map((text) => cell("th", text)))),
-    make("tbody", {}, rows.map((row) => make("tr", {}, row.map((part) =>
-      typeof part === "object" && !(part instanceof Node) ? cell("td", part.number, true) : cell("td", part)))))));
+    make("tbody", {}, rows.map((row) => make("tr", {}, row.map((part, i) =>
+      typeof part === "object" && !(part instanceof Node) ? cell("td", part.number, true, head[i]) : cell("td", part, false, head[i])))))));
 }
 
 const sentence = (text) => text.replace(/^what /, "What ").replace(/\.?$/, "."); // it may begin with a sensor's name
@@ -53,6 +53,44 @@ const ownAxis = (part) => (part.axis ? `, its ${part.axis}` : ""); // of a whole
 const effectName = (effect) => `${effect.kind}, gyro ${gyroName(effect.gyro)}${ownAxis(effect)}`;
 const readings = (effect) => effect.ambiguous_with.map(effectName).join("; ");
 const stretch = (from, to) => `${number(from, 4)} to ${number(to, 4)} s`;
+
+// Where ppm is what one says: a scale factor's error.
+function valueOf(effect) {
+  const error = effect.parameters && effect.parameters.error;
+  if (!Number.isFinite(error)) return effect.value;
+  const sigma = effect.sigma && effect.sigma.error;
+  const digits = sigma > 0 ? Math.min(Math.max(1 - Math.floor(Math.log10(sigma * 1e6)), 0), 6) : 1;
+  const ppm = (value) => (value * 1e6).toFixed(digits).replace(/^-/, "−");
+  return `${effect.value} (${ppm(error)}${sigma > 0 ? " ± " + ppm(sigma) : ""} ppm)`;
+}
+
+// --- what it means, in degrees ------------------------------------------------------------------
+
+const HEADING_MINUTES = 10;
+
+// Root mean square of a curve, and the heading that its mean adds up to.
+function sizeOf(figure, role) {
+  const curve = figure.curves.find((one) => roleOf(one.label) === role);
+  const values = curve ? curve.y.filter((y) => Number.isFinite(y)) : [];
+  if (values.length === 0) return null;
+  const mean = values.reduce((sum, y) => sum + y, 0) / values.length;
+  const square = values.reduce((sum, y) => sum + y * y, 0) / values.length;
+  return { rms: Math.sqrt(square), heading: Math.abs(mean) * HEADING_MINUTES * 60 };
+}
+
+const plain = (value) => value.toLocaleString("en", { maximumSignificantDigits: 2, useGrouping: false });
+
+function headline() {
+  const lines = data.figures.map((gyro, i) => {
+    const before = sizeOf(gyro.time, "before"), after = sizeOf(gyro.time, "after");
+    if (!before || !after) return null;
+    return make("p", { class: "headline" }, `Gyro ${data.gyros[i]}: residual ${plain(before.rms)} → ${plain(after.rms)} deg/s rms; ` +
+      `heading after ${HEADING_MINUTES} minutes ${plain(before.heading)} → ${plain(after.heading)} deg.`);
+  }).filter(Boolean);
+  if (lines.length === 0) return [];
+  return [...lines, make("p", { class: "soft" }, "Before and after what was found, of the means that the plots over time below show; the heading is what the mean of the residual " +
+    `adds up to${data.recording.with_reference ? "" : ", as far as two gyros without a reference can show it"}.`)];
+}
 
 // --- the gap at a glance ------------------------------------------------------------------------
 
@@ -86,9 +124,13 @@ function gapTicks(at, left, right) {
   return ticks;
 }
 
+const shortened = (text, most) => (text.length > most ? text.slice(0, most - 1) + "…" : text); // the table below has all of it
+const NARROW_PX = 700; // below it a row's name stands above its mark
+
 function gapFigure() {
   const rows = gapRows();
-  const wide = 900, left = 270, right = 850, top = 30, step = 34;
+  const narrow = document.documentElement.clientWidth < NARROW_PX;
+  const wide = narrow ? 360 : 900, left = narrow ? 14 : 270, right = narrow ? 346 : 850, top = narrow ? 64 : 30, step = narrow ? 52 : 34;
   const bottom = top + step * rows.length;
   const svg = drawing("svg", { viewBox: `0 0 ${wide} ${bottom + 46}`, role: "img",
     "aria-label": `gap ${number(data.gap.before, 3)} before, ${number(data.gap.after, 3)} after` });
@@ -108,12 +150,12 @@ function gapFigure() {
       svg.append(drawing("path", { d: `M${from} ${y - step + 7} V${y} H${x}`, style: "fill: none; stroke: var(--soft); stroke-dasharray: 3 3" }));
     }
     svg.append(drawing("circle", { cx: x, cy: y, r: 7, style: `fill: var(--${tone})` }));
-    const fromRight = i > 0 && rows[i - 1].value > row.value; // the dashed line comes from there
+    const fromRight = x > right - 70 || (i > 0 && rows[i - 1].value > row.value && x > left + 70); // the dashed line comes from there
     svg.append(drawing("text", { x: fromRight ? x - 13 : x + 13, y: y + 4.5, "text-anchor": fromRight ? "end" : "start", style: "font-weight: 600" }, number(row.value, 3)));
-    svg.append(drawing("text", { x: left - 16, y: y + 4.5, "text-anchor": "end" }, row.label));
+    svg.append(narrow ? drawing("text", { x: left, y: y - 14 }, shortened(row.label, 44)) : drawing("text", { x: left - 16, y: y + 4.5, "text-anchor": "end" }, shortened(row.label, 34)));
   });
   svg.append(drawing("text", { x: (left + right) / 2, y: bottom + 38, "text-anchor": "middle", class: "soft" },
-    "gap, nats per sample on samples that took no part; logarithmic beyond the band"));
+    narrow ? "gap, nats per sample" : "gap, nats per sample on samples that took no part; logarithmic beyond the band"));
   return make("figure", { id: "gap" }, make("figcaption", {}, "The gap, round by round"), svg);
 }
 
@@ -173,7 +215,7 @@ function axesOpening() {
 
 function axesEffects() {
   const rows = data.axes.flatMap((axis) => axis.effects.map((effect) => [axis.axis, gyroName(effect.gyro) + ownAxis(effect), effect.kind,
-    { number: effect.value }, effect.applied ? "yes" : "no", readings(effect) || "–"]));
+    { number: valueOf(effect) }, effect.applied ? "yes" : "no", readings(effect) || "–"]));
   return rows.length === 0 ? [] : [make("h2", {}, "What was found"), table(["axis", "gyro", "effect", "value ± σ", "in model.toml", "may also be"], rows)];
 }
 
@@ -341,7 +383,7 @@ function repaint() {
 
 // A canvas that is drawn anew while the page is being printed stays white, so it is only scaled.
 function fitPaper() {
-  const PAPER_PX = 640, GROW_MOST = 1.3;
+  const PAPER_PX = 400, GROW_MOST = 1.0;
   for (const { host } of plots) {
     const wide = host.offsetWidth, high = host.offsetHeight;
     const scale = Math.min(GROW_MOST, PAPER_PX / wide);
@@ -364,8 +406,10 @@ function opening() {
     make("p", { class: "soft" }, `${data.log}: ${number(recording.seconds, 5)} s; samples: ${samples}; ` +
       `${recording.with_reference ? "with" : "without"} a reference; ${recording.held_out} held out. ` +
       `Model: ${data.model || "none"}. Configuration: ${data.config}.`),
+    headline(),
     make("p", { class: "verdict " + data.verdict }, data.verdict_text + "."),
     gapFigure(),
+    make("p", { class: "soft" }, "A nat measures how much less likely a sample is than it should be: a gap of 0.1 makes every sample e^0.1 = 1.1 times less likely than a perfect model would."),
     (recording.parts || []).map((part, i) => make("p", { class: "soft" }, `Recording ${i + 1}: ${stretch(part.from_s, part.to_s)}.`)),
     data.notes.map((note) => make("p", { class: "soft" }, "Note: " + note + ".")),
   ];
@@ -375,7 +419,7 @@ function rounds() {
   if (data.effects.length === 0) return [];
   const rows = data.effects.map((effect, i) => [
     { number: String(i + 1) }, { number: number(effect.gap_before, 4) }, { number: number(effect.gap_after, 4) },
-    gyroName(effect.gyro), effect.kind, { number: effect.value }, { number: effect.p_value > 0 ? number(effect.p_value, 2) : "≈ 0" }, effect.applied ? "yes" : "no", readings(effect) || "–"]);
+    gyroName(effect.gyro), effect.kind, { number: valueOf(effect) }, { number: effect.p_value > 0 ? number(effect.p_value, 2) : "≈ 0" }, effect.applied ? "yes" : "no", readings(effect) || "–"]);
   return [make("h2", {}, "What was found"),
     table(["round", "gap before", "after", "gyro", "effect", "value ± σ", "p", "in model.toml", "may also be"], rows)];
 }
@@ -383,7 +427,7 @@ function rounds() {
 function effectSection(effect, i) {
   const lines = [make("h3", {}, `${i + 1}. ${effectName(effect)}`),
     make("p", { class: "soft" }, `The gyro reads, in addition: ${effect.meaning}.`),
-    make("p", {}, make("span", { class: "number" }, effect.value))];
+    make("p", {}, make("span", { class: "number" }, valueOf(effect)))];
   if (effect.evidence) lines.push(make("p", {}, sentence(effect.evidence)));
   const band = effect.where.band_hz;
   if (effect.where.to_s > effect.where.from_s) lines.push(make("p", { class: "soft" }, `Seen from ${stretch(effect.where.from_s, effect.where.to_s)}, ` +
@@ -447,6 +491,13 @@ const sections = data.axes ? [axesOpening(), axesEffects(), axesRemains(), axesN
   : [opening(), rounds(), effects(), residuals(), remains(), untold(), glossary()];
 document.getElementById("page").append(...sections.flat(2));
 plots.forEach(draw);
+let wasNarrow = document.documentElement.clientWidth < NARROW_PX;
+window.addEventListener("resize", () => {
+  const isNarrow = document.documentElement.clientWidth < NARROW_PX;
+  if (isNarrow === wasNarrow || data.axes) return;
+  wasNarrow = isNarrow;
+  document.getElementById("gap").replaceWith(gapFigure());
+});
 window.addEventListener("beforeprint", fitPaper);
 window.addEventListener("afterprint", leavePaper);
 window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", repaint);
