@@ -103,7 +103,7 @@ Expected<std::unique_ptr<LogReader>> BlfReader::open(std::unique_ptr<ByteSource>
                               : load_little<std::uint32_t>(&head[blf::file::kHeadBytes]);
   if (head_bytes < blf::file::kBytesMin || head_bytes > blf::file::kBytesMax) {
     return fail(window->name(), "begins like a BLF file, but its head is none or cut off",
-                "the file may be damaged; if Vector's tools open it, they can write it anew");
+                "the file may be damaged; if Vector's tools open it, save it from there");
   }
   const std::string kept(head);
   window->pass(head_bytes);

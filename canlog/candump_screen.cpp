@@ -249,7 +249,7 @@ bool is_stampless_screen_line(std::string_view line) {
 }
 
 Expected<std::unique_ptr<LogReader>> refuse_stampless_screen(std::unique_ptr<ByteSource> bytes) {
-  return fail(bytes->name(), "is what candump prints without stamps, so it tells no time",
+  return fail(bytes->name(), "is what candump prints without stamps, so it holds no times",
               "record with `candump -l` or `candump -L`, which also keep all bits of a frame");
 }
 

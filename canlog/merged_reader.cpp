@@ -65,7 +65,7 @@ std::optional<Error> MergedReader::mismatch() const {
   if (since_epoch == nullptr || since_start == nullptr) return std::nullopt;
   return Error{since_start->part.path,
                fmt::format("its stamps count from its own beginning ({} s), those of {} from the "
-                           "epoch ({} s): nobody can tell what was at the same time",
+                           "epoch ({} s): which frames were simultaneous is unknown",
                            seconds_text(since_start->next->record.stamp), since_epoch->part.path,
                            seconds_text(since_epoch->next->record.stamp)),
                "logs with stamps of one clock are needed"};

@@ -84,7 +84,8 @@ Expected<std::vector<gateway::Plan>> chosen_pairs(const std::string& config,
       name_other_axes(plan.gyros[gyro], pairs.back().gyros[gyro]);
   }
   if (!pairs.empty()) return pairs;
-  return fail(config, fmt::format("has no axis {}: its units tell {}", axis, names_of(plan.axes)),
+  return fail(config,
+              fmt::format("has no axis {}: its units measure {}", axis, names_of(plan.axes)),
               "one of these for --axis, or none for all of them");
 }
 

@@ -104,7 +104,7 @@ CLI::App* add_init(CLI::App& app, InitOptions& options) {
       ->allow_extra_args(false);
   constexpr double kTurnedMost_deg = 1e6;
   add_number(*command, "--turned", options.turned_deg, {-kTurnedMost_deg, kTurnedMost_deg},
-             "angle by which the platform turned in the whole log, deg, positive to the left;\n0: "
+             "angle that the platform turned in the whole log, deg, positive to the left;\n0: "
              "unknown");
   command->add_option("LOG", options.logs, "logs in which both gyros turn; also DBC files")
       ->required();

@@ -63,7 +63,7 @@ std::optional<Error> RoleFrames::missing_gyro(const std::string& name, std::size
     if (frames[i] > 0) {
       return Error{name,
                    fmt::format("none of the {} frames of gyro {} could be used", frames[i], who),
-                   "`vgyro replay` tells the causes, `vgyro check` which bits are read"};
+                   "`vgyro replay` shows the causes, `vgyro check` which bits are read"};
     }
     std::string names;
     for (const std::string& bus : interfaces_)

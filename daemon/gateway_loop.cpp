@@ -437,10 +437,10 @@ Expected<void> GatewayLoop::do_what_was_asked() {
 }
 
 void GatewayLoop::recalibrate() {
-  log_.tell(Severity::kNotice, {.cause = "recalibrate"}, "asked to calibrate anew");
+  log_.tell(Severity::kNotice, {.cause = "recalibrate"}, "calibration requested");
   const Expected<void> replaced = try_to_replace_setup(setup_->plan, false);
   if (!replaced) {
-    log_.error("calibrating anew: {}", replaced.error().message());
+    log_.error("calibrating again: {}", replaced.error().message());
     return;
   }
   inheritance_.forget();
@@ -590,13 +590,13 @@ std::string GatewayLoop::hand_over(Setup& next) {
     return "the new configuration is in use, with what was learned";
   }
   if (known) inheritance_.keep(*known);
-  return "the new configuration is in use; calibrating anew: " + resumed.error().message();
+  return "the new configuration is in use; calibrating again: " + resumed.error().message();
 }
 
 std::string GatewayLoop::begin_anew(Setup& next) {
   next.pipeline.count_on_from(setup_->pipeline);
   next.reporter->start_from(setup_->outlets.counts());
-  return "calibrating anew";
+  return "calibrating again";
 }
 
 int GatewayLoop::on_stop(sd_event_source*, const signalfd_siginfo*, void* self) {

@@ -128,7 +128,7 @@ void add_counters(Text& text, const Snapshot& now) {
   text.sample({{"verdict", "refused"}}, status.stops_refused);
   text.sample({{"verdict", "open"}}, status.stops_open);
   text.family("vgyro_estimate_restarts_total", "counter",
-              "Times that the estimate was not finite and began anew: a fault of vgyro.");
+              "Times that the estimate was not finite and was restarted: a fault of vgyro.");
   text.sample({}, status.estimate_restarts);
   text.family("vgyro_clock_steps_total", "counter", "Times that the stamps were set back.");
   text.sample({}, status.clock_steps);
@@ -203,7 +203,7 @@ void add_gyros(Text& text, const Snapshot& now) {
   each([&](Name name, Gyro, std::size_t k) {
     text.sample({{"gyro", name}}, now.slope_sigma_dps_s[k]);
   });
-  text.family("vgyro_gyro_temperature_celsius", "gauge", "NaN where it tells none.");
+  text.family("vgyro_gyro_temperature_celsius", "gauge", "NaN if the gyro sends none.");
   each([&](Name name, Gyro gyro, std::size_t) {
     text.sample({{"gyro", name}}, gyro.temperature_c);
   });

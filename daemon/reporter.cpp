@@ -72,7 +72,7 @@ const char* sentence(can::ErrorCause cause) {
     case can::ErrorCause::kSendTimeout:
       return "the driver gave up a frame that could not be sent,";
     case can::ErrorCause::kTransceiver:
-      return "the transceiver tells of a fault of the wires,";
+      return "the transceiver reports a fault of the wires,";
   }
   return "";
 }

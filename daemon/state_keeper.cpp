@@ -53,7 +53,7 @@ void StateKeeper::forget() {
   if (const Expected<void> removed = file_.remove(); !removed) {
     log_.warning("{}", removed.error().message());
   } else {
-    log_.notice("{}: forgotten; calibrating anew", file_.path());
+    log_.notice("{}: discarded; calibrating again", file_.path());
   }
 }
 

@@ -207,14 +207,14 @@ void find_axes(TomlReader& root, Plan& plan) {
   if (axes[0] != axes[1]) {
     root.complain(
         root.where("gyro"),
-        fmt::format("gyro {} tells the vehicle's axes {}, and gyro {} tells {}", plan.gyros[0].name,
-                    names_of(axes[0]), plan.gyros[1].name, names_of(axes[1])),
+        fmt::format("gyro {} measures the vehicle's axes {}, and gyro {} measures {}",
+                    plan.gyros[0].name, names_of(axes[0]), plan.gyros[1].name, names_of(axes[1])),
         "the same axes of both, as mounted: name the missing one, or leave it out of both");
     return;
   }
   if (axes[0].size() < 2) {
     root.complain(root.where("gyro"),
-                  fmt::format("as they are mounted the units tell {} whole axis of the vehicle",
+                  fmt::format("as they are mounted, the units measure {} whole axis of the vehicle",
                               names_of(axes[0])),
                   "the sensor's third axis, or a mount that turns about it");
     return;

@@ -93,7 +93,7 @@ std::string stretches_text(const SteadyStretches& stretches) {
     add(parts, ", ", fmt::format("{} refused: turning together", stretches.refused));
   text += parts;
   if (stretches.open > 0) {
-    text += fmt::format("; {} of these left open: standing or turning could not be told apart",
+    text += fmt::format("; {} of these left open: stop and turn could not be distinguished",
                         stretches.open);
   }
   return text;
@@ -105,7 +105,7 @@ std::string stretches_advice(const SteadyStretches& stretches) {
   if (fruitless < kFruitlessMin || 2 * fruitless <= all) return {};
   return "most of them taught little: if the platform stood still in them, check the true "
          "rate at rest (rate_dps or latitude_deg in [calibration]) and max_bias_dps of both gyros; "
-         "wheel speeds ([speed]) tell stops from turns";
+         "wheel speeds ([speed]) distinguish stops from turns";
 }
 
 std::string hypotheses_text(const Probabilities& probability, const GyroNames& names) {
@@ -204,7 +204,7 @@ std::string contradiction_text(const fusion::PairVerdict& pair, const GyroNames&
 }
 
 std::string contradiction_advice() {
-  return "nothing tells which of the two is wrong, so no rate is valid until they move together; "
+  return "which of the two is wrong cannot be seen, so no rate is valid until they move together; "
          "look at sign, unit, message and signal of both (`vgyro check` shows them)";
 }
 
@@ -215,14 +215,14 @@ std::string counter_text(const GyroStatus& gyro) {
 }
 
 std::string rates_too_far_apart_text() {
-  return "one gyro speaks so much more often than the other that no pairs can be made of them; up "
+  return "one gyro sends so much more often than the other that no pairs can be made of them; up "
          "to "
          "2000 times as often is possible";
 }
 
 std::string restarts_text(std::uint64_t restarts) {
   return fmt::format(
-      "the estimate was not finite and began anew {}: a fault of vgyro itself, please "
+      "the estimate was not finite and was restarted {}: a fault of vgyro itself, please "
       "report it with the recording",
       restarts == 1 ? std::string("once") : fmt::format("{} times", restarts));
 }

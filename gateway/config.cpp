@@ -293,7 +293,7 @@ void check_reference(TomlReader& root, TomlReader& reader, const Plan& plan) {
     if (plan.reference->axes[axis]) continue;
     reader.complain(
         reader.where("source"),
-        fmt::format("the reference does not tell the rate about {}", kAxisNames[axis]),
+        fmt::format("the reference does not give the rate about {}", kAxisNames[axis]),
         "rate_x, rate_y, rate_z in [reference], as many as the units have; or source = \"rest\"");
     return;
   }

@@ -142,7 +142,7 @@ void warn_of_conflicts(TomlReader& root, const Plan& plan, const DatabaseCache& 
   if (plan.gyros[0].name == plan.gyros[1].name) {
     warnings.push_back({root.where("gyro"),
                         fmt::format("both gyros have the name \"{}\"", plan.gyros[0].name),
-                        "a name for each: messages and summaries tell them apart by it"});
+                        "a name for each: messages and summaries use it"});
   }
   for (const auto& [bus, path] : files) {
     const dbc::Database* database = cache.loaded(path);

@@ -632,7 +632,7 @@ void LayoutReader::warn_of_resting(const dbc::Signal& signal, const RawValue& va
   if (!is_crc && !named(kCounterNames)) return;
   context_.warnings.push_back(
       {reader_.where("message"),
-       fmt::format("{} of {} is always {}: whoever checks it takes no frame", signal.name,
+       fmt::format("{} of {} is always {}: a receiver that checks it accepts no frame", signal.name,
                    layout_->message, value.text),
        is_crc ? fmt::format("crc = \"{}\" and e2e, or fill", signal.name)
               : fmt::format("counter = \"{}\", or fill", signal.name)});

@@ -21,7 +21,7 @@ namespace {
 constexpr std::int64_t kFormat = 1;
 // Of a platform of several axes: what format 1 holds stands in [axis.x] … instead.
 constexpr std::int64_t kFormatOfAxes = 2;
-constexpr const char* kRemedy = "the gateway calibrates anew; nothing has to be done";
+constexpr const char* kRemedy = "the gateway calibrates again; nothing has to be done";
 
 // The text ends with this and eight digits, so that whatever is cut off takes the checksum along.
 constexpr std::string_view kSealHead = "\n[checksum]\ncrc32 = \"";
@@ -341,7 +341,7 @@ namespace {
 
 constexpr const char* kHead =
     "# Biases of two gyros, kept by vgyrod so that a restart need not calibrate again.\n"
-    "# Without this file the gateway calibrates anew. A file changed by hand is refused.\n";
+    "# Without this file the gateway calibrates again. A file changed by hand is refused.\n";
 
 std::string pair_text(const SavedState& state) {
   std::string text = fmt::format("rate_stamp_ns = {}\nrest_rate_dps = {}\n",

@@ -155,10 +155,10 @@ Expected<void> check_columns(const model::Model& model, const Profile& profile) 
   for (const Effect& effect : model.effects) {
     const std::string column = missing_column(effect, profile);
     if (column.empty()) continue;
-    return fail(
-        at_line(model.file, effect.line),
-        fmt::format("{} needs what {} does not tell", model::info(effect.kind).name, profile.file),
-        "a profile with the column " + column);
+    return fail(at_line(model.file, effect.line),
+                fmt::format("{} needs what {} does not contain", model::info(effect.kind).name,
+                            profile.file),
+                "a profile with the column " + column);
   }
   return {};
 }

@@ -277,7 +277,7 @@ Companions find_companions(const Found& found, const dbc::Signal& rate) {
   for (const dbc::Signal& signal : found.message->signals) {
     if (e2e || !has_any(lower(signal.name), {"crc", "checksum", "chksum"})) continue;
     companions.remarks.push_back(fmt::format(
-        "{} looks like a check value; none of the kinds that `e2e` knows agrees with the frames",
+        "{} looks like a check value; none of the kinds that `e2e` supports agrees with the frames",
         signal.name));
   }
   return companions;

@@ -195,7 +195,7 @@ Scales by_usual_pairs(const Candidate& first, const Candidate& second,
     return std::get<0>(a) < std::get<0>(b);
   });
   Scales scales;
-  scales.why = "Nothing in the log tells the scale, only that of both to each other.";
+  scales.why = "The log does not show the scale, only the ratio of the two.";
   if (options.empty()) {
     scales.first = firsts.front().dps;
     scales.second = rounded(scales.first / ratio, 6);
@@ -423,7 +423,8 @@ std::unique_ptr<Described> describe(std::vector<Candidate>& candidates, Choice& 
   described->database.path = path;
   const Scales scales = scales_of(first, second, choice.pair->likeness, turned_deg);
   described->remarks = {
-      "No DBC file knows one of these gyros or both: the layout was found by trial. In a vehicle "
+      "No DBC file describes one of these gyros or both: the layout was found by trial. In a "
+      "vehicle "
       "steering angle, lateral acceleration and differences of wheel speeds move like a yaw rate: "
       "is each of the two a gyro? One that is rests where the vehicle rests, however the wheels "
       "are "

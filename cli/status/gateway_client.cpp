@@ -145,7 +145,7 @@ tl::unexpected<Error> why(const Reply& reply, int result, const std::string& uni
     return fail(unit, "only root may do this", "try it again with sudo");
   }
   if (result == -ETIMEDOUT || sd_bus_error_has_name(&reply.error, SD_BUS_ERROR_NO_REPLY) != 0) {
-    return fail(unit, "does not answer", "`systemctl status " + unit + "` tells more");
+    return fail(unit, "does not answer", "`systemctl status " + unit + "` shows why");
   }
   if (reply.error.message != nullptr) return fail(unit, reply.error.message);
   return fail(unit, system_reason(-result));

@@ -67,7 +67,7 @@ TEST(MergedReader, RefusesStampsOfTwoClocks) {
   EXPECT_EQ(
       merged({line(1'700'000'000, "can0 001#"), line(0.5, "can1 002#")}),
       Lines{"1.log: its stamps count from its own beginning (0.500 s), those of 0.log from the "
-            "epoch (1700000000.000 s): nobody can tell what was at the same time; logs with "
+            "epoch (1700000000.000 s): which frames were simultaneous is unknown; logs with "
             "stamps of one clock are needed"});
 }
 

@@ -215,7 +215,7 @@ class Reference(Axes):
     def test_it_must_tell_every_axis_to_calibrate(self):
         self.write("u.toml", config(calibration='source = "reference"') + TABLE + 'rate_x = "TableX"\nrate_z = "TableZ"\n')
         said = self.bad("check", "u.toml")
-        self.assertIn("the reference does not tell the rate about y", said)
+        self.assertIn("the reference does not give the rate about y", said)
         self.assertIn("rate_x, rate_y, rate_z in [reference]", said)
 
     def test_beside_gyros_of_one_axis_it_tells_one_rate(self):
@@ -318,7 +318,7 @@ class BadChoice(Axes):
                 self.assertIn(words, message)
 
     def test_an_axis_that_the_units_do_not_tell(self):
-        self.refused(config(calibration="rate_dps = [0.0, 0.0]").replace('rate_x = "X"\n', ""), "has no axis x: its units tell y, z", "one of these for --axis")
+        self.refused(config(calibration="rate_dps = [0.0, 0.0]").replace('rate_x = "X"\n', ""), "has no axis x: its units measure y, z", "one of these for --axis")
 
     def test_two_gyros_of_one_axis(self):
         single = config().replace('rate_x = "X"\nrate_y = "Y"\nrate_z = "Z"\n', 'rate = "Z"\n').replace("rate_dps = [0.0, 0.0, 0.0]", "rate_dps = 0.0")

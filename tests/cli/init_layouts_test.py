@@ -138,7 +138,7 @@ class InitLayouts(bench.Bench):
                 slopes = self.slopes(drive, text)
                 self.assertEqual(len(slopes), 2, said + text)
                 self.assertAlmostEqual(slopes[0x1A0] / slopes[0x2B0], 1.0, delta=0.04)  # same sign, usual scales
-                self.assertIn("Nothing in the log tells the scale", text)
+                self.assertIn("The log does not show the scale", text)
                 self.assertIn("multiply the factors", self.read("vgyro-guess.dbc"))
                 self.assertEqual(len(re.findall(r'(?m)^counter = "Counter_56"', text)), 2)
                 self.assertIn("vgyro.toml: good", self.good("check", "vgyro.toml").stdout.decode())

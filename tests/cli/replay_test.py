@@ -107,7 +107,7 @@ class Output(Replay):
 
     def test_logs_that_cannot_belong_together_are_refused(self):
         self.write("relative.log", bench.line_b(3_000_000, 0.3))
-        self.assertIn("nobody can tell what was at the same time", self.refuse("in.log", "relative.log"))
+        self.assertIn("which frames were simultaneous is unknown", self.refuse("in.log", "relative.log"))
         self.assertIn("is named twice", self.refuse("in.log", "in.log"))
 
     def test_stamps_have_as_many_digits_as_asked_for(self):

@@ -215,7 +215,7 @@ class Simulate(bench.Bench):
         self.assertIn("at least two", said(profile="bad.csv"))
         self.assertIn("none.csv: ", said(profile="none.csv"))
         self.write("warm.toml", rig.model(effect("bias", value_dps=1.0), effect("temperature_bias", 2, coefficient_dps_k=1e-3)))
-        self.assertIn("warm.toml:8: temperature_bias needs what profile.csv does not tell; a profile with the column temperature_c",
+        self.assertIn("warm.toml:8: temperature_bias needs what profile.csv does not contain; a profile with the column temperature_c",
                       said(model="warm.toml"))
         self.write("g.toml", rig.model(effect("g_sensitivity", axis="y", coefficient_dps_g=1e-3)))
         self.assertIn("acc_y_g", said(model="g.toml"))

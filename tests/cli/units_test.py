@@ -403,7 +403,7 @@ class BadInput(Units):
             self.assertIn(words, message)
 
     def test_an_axis_missing_in_one_unit(self):
-        self.refused(config().replace('rate_z = "Z"\n', "", 1), "left tells the vehicle's axes x, y", "right tells x, y, z", "name the missing one")
+        self.refused(config().replace('rate_z = "Z"\n', "", 1), "left measures the vehicle's axes x, y", "right measures x, y, z", "name the missing one")
 
     def test_two_axes_of_one_signal(self):
         self.refused(config().replace('rate_y = "Y"', 'rate_y = "X"', 1), "axes x and y are read from the same signal: X of IMU_A", "a signal for each axis")

@@ -315,10 +315,10 @@ class OnTheBus(Bench):
                      "the drifts: warming up 50 %, random walk 50 %",
                      f"the biases move by {GYRO} +13.0 ± 2.6 deg/h an hour",
                      "7 steady stretches: 2 stops learned, 5 refused: turning together; "
-                     "1 of these left open: standing or turning could not be told apart"):
+                     "1 of these left open: stop and turn could not be distinguished"):
             self.assertIn(line, said)
-        for beginning in ("most of them taught little: ", "one gyro speaks so much more often than the other",
-                          "the estimate was not finite and began anew 3 times: a fault of vgyro itself"):
+        for beginning in ("most of them taught little: ", "one gyro sends so much more often than the other",
+                          "the estimate was not finite and was restarted 3 times: a fault of vgyro itself"):
             self.assertEqual(sum(line.startswith(beginning) for line in said), 1, said)
 
     def test_watch_writes_lines_into_a_pipe(self):

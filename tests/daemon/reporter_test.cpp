@@ -202,7 +202,7 @@ TEST_F(ReporterTest, TellsOnceThatMostStopsAreRefusedAndWhatToLookAt) {
 TEST_F(ReporterTest, TellsThatTheEstimateWasLostAndThatItIsOurOwnFault) {
   status.estimate_restarts = 1;
   const std::string said = second();
-  EXPECT_EQ(count_of("began anew once: a fault of vgyro itself, please report it", said), 1U)
+  EXPECT_EQ(count_of("was restarted once: a fault of vgyro itself, please report it", said), 1U)
       << said;
   EXPECT_EQ(second(), "");
 }

@@ -107,8 +107,8 @@ TEST_F(StateKeeperTest, ADamagedFileIsToldAndSetAside) {
   scratch.put("state.toml", text);
   StateKeeper keeper(path, log);
   const std::string said = said_during([&] { EXPECT_FALSE(keeper.load(plan)); });
-  for (const std::string& part :
-       {path + ": is damaged", std::string("calibrates anew"), "renamed to " + path + ".refused"}) {
+  for (const std::string& part : {path + ": is damaged", std::string("calibrates again"),
+                                  "renamed to " + path + ".refused"}) {
     EXPECT_NE(said.find(part), std::string::npos) << said;
   }
   EXPECT_EQ(scratch.text("state.toml.refused"), text);

@@ -86,8 +86,9 @@ TEST(ConditionText, TellsSlopesToTheSecondDigitOfTheirDoubt) {
 }
 
 TEST(ConditionText, TakesALostEstimateForAFaultOfOurOwn) {
-  EXPECT_NE(restarts_text(1).find("began anew once: a fault of vgyro itself"), std::string::npos);
-  EXPECT_NE(restarts_text(2).find("began anew 2 times"), std::string::npos);
+  EXPECT_NE(restarts_text(1).find("was restarted once: a fault of vgyro itself"),
+            std::string::npos);
+  EXPECT_NE(restarts_text(2).find("was restarted 2 times"), std::string::npos);
 }
 
 fusion::PairVerdict pair_of(fusion::Contradiction contradiction, double slope) {

@@ -696,7 +696,7 @@ TEST_F(OutputLayoutTest, WarnsOfWhatReadersCheckAndNobodyMakes) {
   };
   const std::vector<std::string> both = warnings_of("");
   ASSERT_EQ(both.size(), 2U) << fmt::format("{}", both);
-  EXPECT_NE(both[0].find("Crc of Guarded is always 0: whoever checks it takes no frame; "
+  EXPECT_NE(both[0].find("Crc of Guarded is always 0: a receiver that checks it accepts no frame; "
                          "crc = \"Crc\" and e2e, or fill"),
             std::string::npos)
       << both[0];

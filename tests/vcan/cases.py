@@ -929,7 +929,7 @@ class InheritedCase:
     def judge(self, folder, result):
         run = read_run(folder, result)
         check_service(run)
-        for text, times in (("in use, with what was learned", 2), ("calibrating anew", 1), ("contradicts what was known", 1)):
+        for text, times in (("in use, with what was learned", 2), ("calibrating again", 1), ("contradicts what was known", 1)):
             require(run.said.count(text) == times, f"{text}: {run.said.count(text)} times\n{run.said}")
         biases = RestartCase().check_file(folder / "state.toml")["drift"]["bias_dps"]
         verdicts.check_protection(run.of(0x610), 0x610)
