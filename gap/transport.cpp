@@ -28,6 +28,12 @@ constexpr double kStampResolution_s = 3e-6;
 constexpr std::size_t kBunchFrames = 100;
 constexpr double kAtOnce = 0.5;
 constexpr double kBunchShare = 0.45;
+// Where more than this share of steps are further than this from a whole number of intervals, a
+// long step may be a late frame as well as a lost one: a lost one shows only beyond what all but
+// one in so many steps reach.
+constexpr double kUnevenSteps = 0.25;
+constexpr double kUnevenShare = 0.1;
+constexpr std::size_t kUnevenOneIn = 1000;
 
 // One or two losses are told in a note: they are no property of the bus. Nor is one pause, which
 // holds more than half of what is missing.
@@ -414,7 +420,30 @@ class Check {
     }
     // What comes in bunches says nothing of what is missing.
     if (bunch_ > 0.0) return 1.0;
-    return std::round((series_.t_s[i] - series_.t_s[i - 1]) / result_.interval_s);
+    return std::round((series_.t_s[i] - series_.t_s[i - 1]) / result_.interval_s - late_intervals_);
+  }
+
+  // Stamps that scatter by much of the interval. Their median step is not the clock's, and a frame
+  // that is late is no frame lost.
+  void allow_for_scatter(const std::vector<double>& steps_s, double mean_s) {
+    if (is_counted()) return;
+    const auto uneven = std::count_if(steps_s.begin(), steps_s.end(), [&](double step_s) {
+      const double intervals = step_s / result_.interval_s;
+      return std::abs(intervals - std::round(intervals)) > kUnevenSteps;
+    });
+    if (static_cast<double>(uneven) < kUnevenShare * static_cast<double>(steps_s.size())) return;
+    std::vector<double> longest_s = steps_s;
+    const auto reach =
+        longest_s.begin() +
+        static_cast<std::ptrdiff_t>(longest_s.size() - 1 - longest_s.size() / kUnevenOneIn);
+    std::nth_element(longest_s.begin(), reach, longest_s.end());
+    result_.interval_s = mean_s;
+    late_intervals_ = std::max(0.0, *reach / mean_s - 1.0);
+    result_.notes.push_back(
+        fmt::format("{}: the stamps scatter by more than a quarter of their interval of {:.4g} ms: "
+                    "single missing frames cannot be told from late ones; name the frame's alive "
+                    "counter, if it has one",
+                    series_.name, kMilli * mean_s));
   }
 
   // An adapter that waits hands out its frames in bunches: most follow at once, and a pause is no
@@ -439,7 +468,8 @@ class Check {
     if (mean_s <= 0.0) return;
     const auto at_once = std::count_if(steps_s.begin(), steps_s.end(),
                                        [&](double step_s) { return step_s < kAtOnce * mean_s; });
-    if (static_cast<double>(at_once) < kBunchShare * static_cast<double>(steps_s.size())) return;
+    if (static_cast<double>(at_once) < kBunchShare * static_cast<double>(steps_s.size()))
+      return allow_for_scatter(steps_s, mean_s);
     result_.interval_s = mean_s;
     std::vector<double> pauses_s;
     for (const double step_s : steps_s) {
@@ -815,6 +845,8 @@ class Check {
   std::vector<double>::const_iterator least_;  ///< values; of the whole recording
   std::vector<double>::const_iterator most_;
   double bunch_ = 0.0;  ///< frames that are handed out at once; 0: each by itself
+  // How late a frame may be, in intervals, before one counts as missing.
+  double late_intervals_ = 0.0;
   bool coarse_ = false;
   Transport result_;
 };

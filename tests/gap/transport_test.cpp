@@ -458,6 +458,40 @@ TEST(Frames, AreCountedByTimeWhereThereIsNoCounter) {
   EXPECT_NEAR(finding->cost_nats, frames * share * std::log(1e6), 1e-6);
 }
 
+// Stamps of a poll every 5.44 ms, of frames every 12 ms: late by half an interval, none lost.
+GyroSeries polled(unsigned seed) {
+  constexpr double kPoll_s = 5.44e-3;
+  constexpr double kFrames_s = 12e-3;
+  GyroSeries series = clean(seed);
+  series.counter.clear();
+  series.counter_modulus = 0;
+  std::mt19937_64 random(seed);
+  std::uniform_real_distribution<double> read(0.0, 1.5e-3);
+  for (std::size_t i = 0; i < series.t_s.size(); ++i) {
+    const double sent_s = kFrames_s * static_cast<double>(i);
+    series.t_s[i] = kPoll_s * std::ceil(sent_s / kPoll_s) + read(random);
+  }
+  return series;
+}
+
+TEST(Frames, ThatAreLateAreNotLost) {
+  const Transport transport = check_transport(polled(63), 0, {});
+  EXPECT_EQ(found(transport, Kind::kDroppedFrames), nullptr);
+  EXPECT_EQ(transport.lost_share, 0.0);
+  EXPECT_NEAR(transport.interval_s, 12e-3, 1e-6);
+  // The clock shows through the lateness: what is left of it is a shift of all stamps.
+  for (std::size_t i = 0; i < kSamples; i += 97)
+    EXPECT_NEAR(transport.t_s[i] - transport.t_s[0], 12e-3 * static_cast<double>(i), 1e-4) << i;
+}
+
+TEST(Frames, OfLateOnesAPauseStillCounts) {
+  GyroSeries series = polled(64);
+  lose(series, [](std::size_t i) { return i >= 5000 && i < 5100; });
+  const Transport transport = check_transport(series, 0, {});
+  EXPECT_NEAR(transport.lost_share, 100.0 / kSamples_d, 2.0 / kSamples_d);
+  EXPECT_EQ(found(transport, Kind::kDroppedFrames), nullptr) << "one pause";
+}
+
 TEST(Plateaus, CostHalfOfAllThatIsMasked) {
   for (const Kind kind : {Kind::kSaturation, Kind::kDeadBand}) {
     GyroSeries series = clean(71);
