@@ -160,14 +160,17 @@ std::string range_text(const gateway::OutputField& field) {
   return text;
 }
 
-void print_layout_rate(const gateway::OutputLayout& layout) {
-  const gateway::OutputField& rate = layout.rate;
+void print_flag(const gateway::OutputFlag& flag, const char* otherwise) {
+  detail("valid", fmt::format("{}: 0x{:X}, and 0x{:X} {}", flag.text, flag.valid_raw,
+                              flag.invalid_raw, otherwise));
+}
+
+void print_layout_rate(const gateway::OutputLayout& layout, const gateway::LayoutRate& one) {
+  const gateway::OutputField& rate = one.rate;
   detail("carries", range_text(rate) + (rate.scale < 0 ? ", sign flipped" : ""));
-  if (layout.sign) detail("sign", "in a signal of its own: 1 is negative");
-  if (layout.valid) {
-    detail("valid", fmt::format("{}: 0x{:X}, and 0x{:X} when no rate is valid", layout.valid->text,
-                                layout.valid->valid_raw, layout.valid->invalid_raw));
-  }
+  if (one.sign) detail("sign", "in a signal of its own: 1 is negative");
+  if (one.valid) print_flag(*one.valid, "when this rate is not valid");
+  if (layout.rates.size() == 1 && layout.valid) print_flag(*layout.valid, "when no rate is valid");
   if (!layout.can_say_invalid()) {
     detail("not valid",
            "silence: neither the rate nor another signal can say it; `valid` or "
@@ -179,8 +182,14 @@ void print_layout_rate(const gateway::OutputLayout& layout) {
     detail("beyond", fmt::format("0x{:X}, out of range", rate.beyond_raw));
 }
 
+void print_layout_sigma(const gateway::OutputField& sigma) {
+  detail("sigma", fmt::format("{}, {}; unknown or beyond: {}", sigma.name, range_text(sigma),
+                              sigma.has_code ? sigma.code : "the rate is not valid"));
+}
+
 void print_layout(const gateway::Plan& plan, const gateway::OutputLayout& layout) {
-  const gateway::OutputField& rate = layout.rate;
+  const gateway::OutputField& rate = layout.rates.front().rate;
+  const bool several = layout.rates.size() > 1;
   const std::string id = gateway::to_string(gateway::FrameId{layout.id, layout.extended});
   say("  {:<14}{:<8}{:<10}{:<26}{:<8}{}\n", "layout", plan.buses[layout.bus], id,
       layout.message + "." + rate.name, printable(rate.unit), rate.layout);
@@ -188,16 +197,26 @@ void print_layout(const gateway::Plan& plan, const gateway::OutputLayout& layout
          fmt::format("{} bytes{}, {}", layout.bytes, layout.fd ? ", CAN FD" : "",
                      layout.every ? fmt::format("every {:g} ms", to_seconds(*layout.every) * 1e3)
                                   : "with every rate"));
-  print_layout_rate(layout);
-  if (layout.sigma) {
-    detail(
-        "sigma",
-        fmt::format("{}, {}; unknown or beyond: {}", layout.sigma->name, range_text(*layout.sigma),
-                    layout.sigma->has_code ? layout.sigma->code : "the rate is not valid"));
+  for (const gateway::LayoutRate& one : layout.rates) {
+    if (!plan.axes.empty()) {
+      detail("axis", fmt::format("{}: {}, {}", gateway::kAxisNames[one.axis], one.rate.name,
+                                 one.rate.layout));
+    }
+    print_layout_rate(layout, one);
+    if (one.sigma) print_layout_sigma(*one.sigma);
   }
+  if (several && layout.valid) print_flag(*layout.valid, "when not all rates are valid");
   print_e2e(layout.e2e);
   for (const gateway::RestingSignal& signal : layout.resting)
     detail("fixed", fmt::format("{}: {}", signal.name, signal.says));
+}
+
+std::vector<gateway::Quantity> rates_of(const gateway::ReferencePlan& reference) {
+  std::vector<gateway::Quantity> rates;
+  for (const auto& axis : reference.axes) {
+    if (axis) rates.push_back(*axis);
+  }
+  return rates.empty() ? std::vector{reference.rate} : rates;
 }
 
 void print_plan(const gateway::Plan& plan) {
@@ -205,8 +224,10 @@ void print_plan(const gateway::Plan& plan) {
   for (const gateway::GyroPlan& gyro : plan.gyros)
     print_gyro(gyro);
   if (plan.reference) {
-    print_row("reference", plan.reference->bus, plan.reference->match, plan.reference->message,
-              plan.reference->rate);
+    for (const gateway::Quantity& rate : rates_of(*plan.reference)) {
+      print_row("reference", plan.reference->bus, plan.reference->match, plan.reference->message,
+                rate);
+    }
     print_e2e(plan.reference->e2e);
   }
   if (plan.accelerometer) {

@@ -65,6 +65,7 @@ int run_model_list();
 
 struct AllanOptions {
   std::string config;
+  std::string axis;  ///< "x", "y" or "z" of whole units; empty: all
   std::string json;  ///< "-": standard output; empty: nowhere
   std::string plot;  ///< empty: none
   std::vector<std::string> logs;
@@ -75,6 +76,7 @@ struct CompareOptions {
   std::string config;
   std::string model;
   std::vector<std::string> measured;  ///< logs, each a recording of its own
+  std::string axis;                   ///< "x", "y" or "z" of whole units; empty: all
   std::string json;                   ///< "-": standard output; empty: nowhere
   std::uint64_t seed = 1;
   bool quiet = false;
@@ -85,6 +87,7 @@ struct GapOptions {
   std::string config;
   std::optional<std::string> model;   ///< path, instead of the configured one
   std::vector<std::string> measured;  ///< logs, each a recording of its own
+  std::string axis;                   ///< "x", "y" or "z" of whole units; empty: all
   std::string out;                    ///< folder
   std::vector<std::string> accept;    ///< "gyro=2", "kind=delay,gyro=1", "likeliest"
   double time_limit_s = 0.0;          ///< 0: none

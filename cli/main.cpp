@@ -211,12 +211,23 @@ CLI::App* add_simulate(CLI::App& app, SimulateOptions& options) {
   return command;
 }
 
+void add_axis(CLI::App& command, std::string& axis) {
+  command
+      .add_option("--axis", axis,
+                  "of whole units only the pair about the vehicle's x, y or z;\n"
+                  "without it all, one after the other")
+      ->check(CLI::IsMember({"x", "y", "z"}));
+}
+
 CLI::App* add_allan(CLI::App& app, AllanOptions& options) {
   CLI::App* command =
       app.add_subcommand("allan", "Measure the gyros' noise (Allan deviation); recommend a window");
   command->add_option("--config", options.config, "configuration, e.g. vgyro.toml")->required();
   command->add_option("--json", options.json, "figures as JSON; - is standard output");
-  command->add_option("--plot", options.plot, "picture of the curves: .svg, .png or .pdf");
+  command->add_option("--plot", options.plot,
+                      "picture of the curves: .svg, .png or .pdf; of several axes one each,\n"
+                      "allan-x.svg ... of allan.svg");
+  add_axis(*command, options.axis);
   add_logs(*command, options.logs);
   command->footer(
       "Best on an hour or more at rest; what the figures mean is in docs/allan.md.\n"
@@ -224,19 +235,21 @@ CLI::App* add_allan(CLI::App& app, AllanOptions& options) {
   return command;
 }
 
-void add_recording(CLI::App& command, std::string& config, std::vector<std::string>& measured) {
+void add_recording(CLI::App& command, std::string& config, std::vector<std::string>& measured,
+                   std::string& axis) {
   command.add_option("--config", config, "configuration, e.g. vgyro.toml")->required();
   command
       .add_option("--measured", measured,
                   std::string(kLogHelp) + ";\nagain for a further recording of the same pair")
       ->required()
       ->allow_extra_args(false);
+  add_axis(command, axis);
 }
 
 CLI::App* add_compare(CLI::App& app, CompareOptions& options) {
   CLI::App* command = app.add_subcommand(
       "compare", "Say how far a model's simulation and a recording disagree, and where");
-  add_recording(*command, options.config, options.measured);
+  add_recording(*command, options.config, options.measured, options.axis);
   command->add_option("--model", options.model, "model file")->required();
   command->add_option("--json", options.json, "the same as JSON; - is standard output");
   add_number(*command, "--seed", options.seed, {}, "of the simulations");
@@ -260,7 +273,7 @@ std::string wrong_acceptance(const std::string& word) {
 CLI::App* add_gap(CLI::App& app, GapOptions& options) {
   CLI::App* command =
       app.add_subcommand("gap", "Find what the model lacks, name it, add it, show the gap shrink");
-  add_recording(*command, options.config, options.measured);
+  add_recording(*command, options.config, options.measured, options.axis);
   command->add_option("--model", options.model,
                       "model file to begin with; default: the configured one, or none");
   command->add_option("--out", options.out, "folder for report.html, gap.json and model.toml")

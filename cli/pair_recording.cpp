@@ -6,6 +6,7 @@
 #include <fmt/core.h>
 
 #include "analysis/resolution.h"
+#include "cli/axis_choice.h"
 #include "cli/log_notes.h"
 #include "cli/role_frames.h"
 #include "fusion/alignment.h"
@@ -20,23 +21,21 @@ class Gatherer {
  public:
   explicit Gatherer(const gateway::Plan& plan)
       : plan_(plan),
-        frames_(plan),
         inputs_{gateway::GyroIntake(0, gateway::GyroInput(plan.gyros[0])),
                 gateway::GyroIntake(1, gateway::GyroInput(plan.gyros[1]))} {}
 
-  Expected<void> read(const std::vector<std::string>& logs) {
-    return frames_.read(logs, "allan", [this](std::uint8_t roles, const canlog::LogRecord& record) {
-      if ((roles & gateway::kGyro1) != 0) take_gyro(0, record);
-      if ((roles & gateway::kGyro2) != 0) take_gyro(1, record);
-    });
+  void take(std::uint8_t roles, const canlog::LogRecord& record) {
+    if ((roles & gateway::kGyro1) != 0) take_gyro(0, record);
+    if ((roles & gateway::kGyro2) != 0) take_gyro(1, record);
   }
 
-  [[nodiscard]] std::optional<Error> complaint(const std::string& log) const {
-    if (auto missing = frames_.missing_gyro(log, samples_)) return missing;
+  [[nodiscard]] const std::array<std::uint64_t, 2>& used() const { return samples_; }
+
+  [[nodiscard]] std::optional<Error> no_pair(const std::string& log) const {
     if (pairs_ > 0) return std::nullopt;
     return Error{log,
-                 fmt::format("the gyros {} and {} never spoke at the same time, or too shortly",
-                             plan_.gyros[0].name, plan_.gyros[1].name),
+                 fmt::format("the gyros {} and {} never spoke at the same time{}, or too shortly",
+                             plan_.gyros[0].name, plan_.gyros[1].name, about_axis(plan_)),
                  "a recording in which both are there is needed"};
   }
 
@@ -81,7 +80,6 @@ class Gatherer {
   }
 
   const gateway::Plan& plan_;
-  RoleFrames frames_;
   std::array<gateway::GyroIntake, 2> inputs_;
   fusion::StampGuard guard_;
   fusion::Aligner aligner_;
@@ -96,12 +94,28 @@ class Gatherer {
 
 }  // namespace
 
-Expected<analysis::PairRecording> read_pair_recording(const std::vector<std::string>& logs,
-                                                      const gateway::Plan& plan) {
-  Gatherer gatherer(plan);
-  if (auto done = gatherer.read(logs); !done) return tl::unexpected(done.error());
-  if (const auto complaint = gatherer.complaint(name_of(logs))) return tl::unexpected(*complaint);
-  return gatherer.finish();
+Expected<std::vector<analysis::PairRecording>> read_pair_recordings(
+    const std::vector<std::string>& logs, std::span<const gateway::Plan> plans) {
+  RoleFrames frames(plans);
+  std::vector<Gatherer> gatherers;
+  gatherers.reserve(plans.size());
+  for (const gateway::Plan& plan : plans)
+    gatherers.emplace_back(plan);
+  const auto done = frames.read(
+      logs, "allan", [&](std::size_t pair, std::uint8_t roles, const canlog::LogRecord& record) {
+        gatherers[pair].take(roles, record);
+      });
+  if (!done) return tl::unexpected(done.error());
+  std::vector<analysis::PairRecording> recordings;
+  recordings.reserve(plans.size());
+  for (std::size_t pair = 0; pair < plans.size(); ++pair) {
+    Gatherer& gatherer = gatherers[pair];
+    auto complaint = frames.missing_gyro(name_of(logs), pair, gatherer.used());
+    if (!complaint) complaint = gatherer.no_pair(name_of(logs));
+    if (complaint) return tl::unexpected(*std::move(complaint));
+    recordings.push_back(gatherer.finish());
+  }
+  return recordings;
 }
 
 }  // namespace vgyro::cli

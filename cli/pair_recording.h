@@ -3,6 +3,7 @@
 // Logs → both gyros' rates on even grids, each alone and in pairs, through the gateway's own
 // decoding, stamp guard and alignment. Memory: 32 bytes a pair of samples.
 
+#include <span>
 #include <string>
 #include <vector>
 
@@ -12,8 +13,9 @@
 
 namespace vgyro::cli {
 
-/// Error when a log cannot be read, or a gyro is not in them.
-Expected<analysis::PairRecording> read_pair_recording(const std::vector<std::string>& logs,
-                                                      const gateway::Plan& plan);
+/// Of each of these pairs, in one reading of the logs. Error when a log cannot be read, or a gyro
+/// is not in them.
+Expected<std::vector<analysis::PairRecording>> read_pair_recordings(
+    const std::vector<std::string>& logs, std::span<const gateway::Plan> plans);
 
 }  // namespace vgyro::cli

@@ -72,8 +72,10 @@ class Recorder {
       shift(gyro.t_s);
       fill_beginning(gyro.temperature_c);
       fill_beginning(gyro.supply_v);
-      for (std::vector<double>& axis : gyro.other_rate_dps)
+      for (std::vector<double>& axis : gyro.other_rate_dps) {
         fill_beginning(axis);
+        if (!plan_.output.axes.empty()) take_off_level(gyro.t_s, axis);
+      }
     }
     shift(recording_.reference_dps.t_s);
     shift(recording_.acceleration.t_s);
@@ -151,6 +153,19 @@ class Recorder {
     }
   }
 
+  // What a unit's other axis says while the platform rests is its bias, which no other axis feels.
+  // Beside a single gyro nobody knows whether the bias is the frame's own.
+  void take_off_level(const std::vector<double>& t_s, std::vector<double>& rate_dps) const {
+    const auto resting = std::lower_bound(t_s.begin(), t_s.end(), recording_.rest_s) - t_s.begin();
+    if (resting == 0 || rate_dps.empty()) return;
+    std::vector<double> rest(rate_dps.begin(), rate_dps.begin() + resting);
+    const auto middle = rest.begin() + resting / 2;
+    std::nth_element(rest.begin(), middle, rest.end());
+    const double level_dps = *middle;
+    for (double& rate : rate_dps)
+      rate -= level_dps;
+  }
+
   // It may stand on a page that comes later; what never came is not known.
   static void fill_beginning(std::vector<double>& beside) {
     const auto known = std::find_if_not(beside.begin(), beside.end(),
@@ -177,18 +192,28 @@ class Recorder {
 
 }  // namespace
 
-Expected<gap::Recording> read_recording(const std::string& log, const gateway::Plan& plan,
-                                        const std::string& doing) {
-  RoleFrames frames(plan);
-  Recorder recorder(plan);
+Expected<std::vector<gap::Recording>> read_recordings(const std::string& log,
+                                                      std::span<const gateway::Plan> plans,
+                                                      const std::string& doing) {
+  RoleFrames frames(plans);
+  std::vector<Recorder> recorders;
+  recorders.reserve(plans.size());
+  for (const gateway::Plan& plan : plans)
+    recorders.emplace_back(plan);
   const auto done = frames.read(
-      {log}, doing,
-      [&](std::uint8_t roles, const canlog::LogRecord& record) { recorder.take(roles, record); });
+      {log}, doing, [&](std::size_t pair, std::uint8_t roles, const canlog::LogRecord& record) {
+        recorders[pair].take(roles, record);
+      });
   if (!done) return tl::unexpected(done.error());
-  if (const auto missing = frames.missing_gyro(log, recorder.used())) {
-    return tl::unexpected(*missing);
+  std::vector<gap::Recording> recordings;
+  recordings.reserve(plans.size());
+  for (std::size_t pair = 0; pair < plans.size(); ++pair) {
+    if (const auto missing = frames.missing_gyro(log, pair, recorders[pair].used())) {
+      return tl::unexpected(*missing);
+    }
+    recordings.push_back(recorders[pair].finish());
   }
-  return recorder.finish();
+  return recordings;
 }
 
 }  // namespace vgyro::cli

@@ -5,7 +5,9 @@
 // is not applied. Stamps that are garbage are refused as the live path refuses them. Memory: 28
 // bytes a gyro frame.
 
+#include <span>
 #include <string>
+#include <vector>
 
 #include "base/error.h"
 #include "gap/recording.h"
@@ -13,8 +15,10 @@
 
 namespace vgyro::cli {
 
-/// Error when the log cannot be read, or a gyro is not in it. `doing` is for the line of progress.
-Expected<gap::Recording> read_recording(const std::string& log, const gateway::Plan& plan,
-                                        const std::string& doing);
+/// Of each of these pairs, in one reading of the log. Error when the log cannot be read, or a gyro
+/// is not in it. `doing` is for the line of progress.
+Expected<std::vector<gap::Recording>> read_recordings(const std::string& log,
+                                                      std::span<const gateway::Plan> plans,
+                                                      const std::string& doing);
 
 }  // namespace vgyro::cli

@@ -165,6 +165,7 @@ class Recording {
   [[nodiscard]] bool lost(const SimulatedMessage& message) const;
   [[nodiscard]] can::Frame frame(const SimulatedMessage& message);
   void put(Part part, const FrameMatch& match, std::size_t n, can::Frame& frame);
+  void put_reference(std::size_t n, can::Frame& frame);
   void put_sensors(Part part, const FrameMatch& match, std::size_t n, can::Frame& frame);
   [[nodiscard]] const gateway::E2ePlan& e2e_of(Part part, const FrameMatch& match) const;
   /// The first that stands in this message: it tells what the message tells besides rates.
@@ -180,6 +181,8 @@ class Recording {
   std::vector<SimulatedMessage> messages_;
   Sensors sensors_;
   std::vector<simulation::RateSample> reference_;
+  /// Of a platform of several axes: about each of the vehicle's, at the same instants.
+  std::array<std::vector<simulation::RateSample>, gateway::kAxes> reference_axes_;
   std::vector<simulation::AccelerationSample> acceleration_;
   std::uint64_t frames_ = 0;
 };
@@ -195,6 +198,9 @@ Recording::Recording(const Plan& plan, const simulation::Simulator& simulator, S
       if (part == kReference) reference_ = simulator.reference();
       if (part == kAccelerometer) acceleration_ = simulator.acceleration();
     }
+  }
+  for (std::size_t axis = 0; !reference_.empty() && axis < gateway::kAxes; ++axis) {
+    if (plan_.reference->axes[axis]) reference_axes_[axis] = simulator.reference(axis);
   }
   add_pages(kGyroA);
   add_pages(kGyroB);
@@ -252,7 +258,7 @@ bool Recording::find_next(SimulatedMessage& message) const {
 
 void Recording::put(Part part, const FrameMatch& match, std::size_t n, can::Frame& frame) {
   if (part == kReference) {
-    gateway::put_quantity(plan_.reference->rate, reference_[n].rate_dps, frame);
+    put_reference(n, frame);
     gateway::put_counter(plan_.reference->e2e, n, frame);
     return;
   }
@@ -265,6 +271,17 @@ void Recording::put(Part part, const FrameMatch& match, std::size_t n, can::Fram
     return;
   }
   put_sensors(part, match, n, frame);
+}
+
+void Recording::put_reference(std::size_t n, can::Frame& frame) {
+  if (plan_.axes.empty()) {
+    gateway::put_quantity(plan_.reference->rate, reference_[n].rate_dps, frame);
+    return;
+  }
+  for (std::size_t axis = 0; axis < gateway::kAxes; ++axis) {
+    const auto& rate = plan_.reference->axes[axis];
+    if (rate) gateway::put_quantity(*rate, reference_axes_[axis][n].rate_dps, frame);
+  }
 }
 
 void Recording::put_sensors(Part part, const FrameMatch& match, std::size_t n, can::Frame& frame) {

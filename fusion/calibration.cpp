@@ -15,7 +15,8 @@ Calibrator::Calibrator(int order, double rest_s, WhenMoving when_moving)
       rest_s_(rest_s),
       when_moving_(when_moving),
       sums_(empty_sums(0.0)),
-      calm_(sums_) {}
+      calm_(sums_),
+      calmer_(sums_) {}
 
 Calibrator::Sums Calibrator::empty_sums(double from_s) const {
   return {LeastSquares(order_, from_s, rest_s_), LeastSquares(0, from_s, rest_s_),
@@ -31,6 +32,8 @@ void Calibrator::begin(double t_s) {
   covered_s_ = 0.0;
   sums_ = empty_sums(t_s);
   calm_ = sums_;
+  calmer_until_s_ = t_s;
+  calmer_ = sums_;
   block_ = StillnessBlock{.from_s = t_s};
 }
 
@@ -73,6 +76,22 @@ void Calibrator::reject() {
   covered_s_ = 0.0;
 }
 
+bool Calibrator::cut_short(double t_s, double still_until_s) {
+  if (when_moving_ != WhenMoving::kWait || !started_) return false;
+  // Stamps of one instant come by way of different sums.
+  constexpr double kRounding_s = 1e-6;
+  const bool last_too = calm_until_s_ <= still_until_s + kRounding_s;
+  const double until_s = last_too ? calm_until_s_ : calmer_until_s_;
+  const bool enough = until_s - from_s_ >= kEnoughShare * rest_s_;
+  if (enough && finish(last_too ? calm_ : calmer_, t_s, until_s)) return true;
+  reject();
+  return false;
+}
+
+void Calibrator::note_motion() {
+  moved_ = moved_ || (started_ && when_moving_ == WhenMoving::kAccept);
+}
+
 bool Calibrator::add(double t_s, const std::array<double, 2>& rate_dps, double true_rate_dps) {
   if (!started_) begin(t_s);
   const bool complete = t_s - from_s_ >= rest_s_;
@@ -91,6 +110,8 @@ bool Calibrator::add(double t_s, const std::array<double, 2>& rate_dps, double t
       ++restarts_;
       begin(t_s);
     } else {
+      calmer_ = calm_;
+      calmer_until_s_ = calm_until_s_;
       calm_ = sums_;
       calm_until_s_ = t_s;
       block_ = StillnessBlock{.from_s = t_s};

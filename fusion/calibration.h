@@ -20,6 +20,9 @@ struct Calibration {
   Polynomial difference;      ///< P₁⁰ − P₂⁰, deg/s
   bool in_motion = false;     ///< the platform moved, and that was accepted
 
+  /// Motion has ended it before its time.
+  [[nodiscard]] bool cut_short() const { return used_until_s < end_s; }
+
   [[nodiscard]] double bias_dps(std::size_t gyro, double t_s) const {
     return 0.5 * (sum.at(t_s) + (gyro == 0 ? difference.at(t_s) : -difference.at(t_s)));
   }
@@ -69,6 +72,14 @@ class Calibrator {
   /// The result is not believed: begin again with the next pair.
   void reject();
 
+  /// Somebody else saw that the platform moves, and stood still until `still_until_s`, a block ago
+  /// at most; asked before add() has returned false. As if these pairs had shown it: true when the
+  /// calibration is complete, else it begins again, or goes on where motion is accepted or known.
+  bool cut_short(double t_s, double still_until_s);
+  /// Motion was accepted, here or, by note_motion(), elsewhere.
+  [[nodiscard]] bool moved() const { return moved_; }
+  void note_motion();
+
  private:
   struct Sums {
     LeastSquares sum;
@@ -101,6 +112,8 @@ class Calibrator {
   Sums sums_;
   Sums calm_;  ///< up to the last block that was judged still
   double calm_until_s_ = 0.0;
+  Sums calmer_;  ///< up to the one before
+  double calmer_until_s_ = 0.0;
   StillnessBlock block_;
   double level_dps_ = 0.0;  ///< common rate of the last blocks, smoothed
   bool level_known_ = false;

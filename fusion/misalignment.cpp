@@ -2,18 +2,17 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 
+#include "base/angle.h"
 #include "fusion/quadratic.h"
 
 namespace vgyro::fusion {
 
 namespace {
 
-constexpr double kRadPerDeg = std::numbers::pi / 180.0;
 constexpr double kPrior_rad = Misalignment::kPrior_deg * kRadPerDeg;
 // Data sheets of cheap gyros; a bus that delivers one unit later than the other.
 constexpr double kScalePrior = 0.02;

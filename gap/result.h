@@ -148,6 +148,7 @@ struct Comparison {
   double seconds = 0.0;      ///< of the recording, or of all
   std::vector<Span> drives;  ///< when each of several begins and ends; empty for one
   std::array<std::size_t, 2> samples{};
+  std::size_t held_out = 0;  ///< samples that the gap is counted on
   bool with_reference = false;
   std::vector<std::string> notes;
 };

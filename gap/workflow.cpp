@@ -240,8 +240,7 @@ Expected<Comparison> compare(const std::vector<Recording>& recordings, const mod
   comparison.drives = study.drives();
   comparison.with_reference = study.recording().has_reference;
   comparison.notes = study.notes();
-  std::size_t held_out = 0;
-  fill_facts(study, held_out, comparison.samples);
+  fill_facts(study, comparison.held_out, comparison.samples);
   comparison.differences = differences(study, model.effects);
   comparison.figures = gyro_figures(study, model.effects, model.effects, settings.seed);
   return comparison;

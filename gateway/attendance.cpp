@@ -35,6 +35,7 @@ void Attendance::set_opinion(TimePoint t, const fusion::Condition& condition) {
 
 void Attendance::hear(std::size_t gyro, TimePoint t) {
   in_use_[gyro] = true;
+  without_in_row_[gyro] = 0;
   last_heard_[gyro] = std::max(last_heard_[gyro], t);
 }
 
@@ -42,6 +43,16 @@ bool Attendance::hear_refused(std::size_t gyro, TimePoint t) {
   if (!health_[gyro].set_aside()) return false;
   last_heard_[gyro] = std::max(last_heard_[gyro], t);
   if (!in_use_[gyro]) return false;
+  in_use_[gyro] = false;
+  pairing_ = false;
+  return true;
+}
+
+bool Attendance::go_without(std::size_t gyro, bool at_once) {
+  // A frame that is lost makes a hole like any other.
+  constexpr std::uint32_t kHolesMost = 2;
+  const bool goes = ++without_in_row_[gyro] > kHolesMost || at_once;
+  if (!goes || !in_use_[gyro]) return false;
   in_use_[gyro] = false;
   pairing_ = false;
   return true;

@@ -57,6 +57,11 @@ class Attendance {
   void hear(std::size_t gyro, TimePoint t);
   /// A frame of `t` that may not be used. True when its gyro is set aside with it.
   bool hear_refused(std::size_t gyro, TimePoint t);
+  /// A sample that another axis of the unit spoils: turned into the vehicle's axes it is none. True
+  /// when this gyro goes out of use with it: at once, or after the third in a row.
+  bool go_without(std::size_t gyro, bool at_once);
+  /// Its own sensor's values, or what its frames say of it, are not to be used for now.
+  [[nodiscard]] bool set_aside(std::size_t gyro) const { return health_[gyro].set_aside(); }
   /// A pair has come. True when none had since the start, or since one gyro went.
   bool hear_pair();
   /// A rate of this gyro alone goes out.
@@ -87,6 +92,7 @@ class Attendance {
   const fusion::StampGuard& guard_;
   std::array<GyroHealth, 2> health_;
   std::array<bool, 2> in_use_{};
+  std::array<std::uint32_t, 2> without_in_row_{};  ///< of go_without()
   std::array<TimePoint, 2> last_heard_{};  ///< newest frame, even of a gyro that is set aside
   TimePoint waiting_since_;
   bool pairing_ = false;

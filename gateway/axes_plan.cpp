@@ -2,21 +2,17 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <numeric>
 #include <string>
 
 #include <fmt/core.h>
 
+#include "base/angle.h"
 #include "gateway/model_plan.h"
 
 namespace vgyro::gateway {
 
-const double kEarthRate_dps = 7.292115e-5 * 180.0 / std::numbers::pi;
-
 namespace {
-
-constexpr double kRadPerDeg = std::numbers::pi / 180.0;
 
 const GyroPlan* sensor_axis(const GyroPlan& unit, std::size_t axis) {
   const auto found = std::find_if(unit.axes.begin(), unit.axes.end(),
@@ -97,10 +93,8 @@ model::Model effects_about(const model::Model& model, const Plan& pair) {
 void read_other_axes(const model::Model& model, const Plan& platform, Plan& pair) {
   for (const model::Effect& effect : model.effects) {
     if (!depends_on_other_axes(effect)) continue;
-    const auto from = static_cast<std::size_t>(effect.parameters[0]);
-    GyroPlan& gyro = pair.gyros[effect.gyro];
-    const GyroPlan* other = sensor_axis(platform.gyros[effect.gyro], from);
-    if (other != nullptr && other->match == gyro.match) gyro.*kOtherAxes[from] = other->rate;
+    name_other_axis(platform.gyros[effect.gyro], static_cast<std::size_t>(effect.parameters[0]),
+                    pair.gyros[effect.gyro]);
   }
 }
 
@@ -122,6 +116,21 @@ void set_true_rate(const CalibrationPlan& configured, std::size_t place, std::si
     calibration.doubt_dps = known ? 0.0 : north_dps / std::sqrt(2.0);
   }
   calibration.stop_rate_dps = calibration.rate_dps;
+  // What the reference tells while calibrating nobody tells at a stop.
+  const bool is_told = !configured.axis_rate_dps.empty() || configured.latitude_deg;
+  if (!configured.from_reference || is_told) return;
+  calibration.stop_rate_dps = std::nullopt;
+  calibration.doubt_dps = 0.0;
+}
+
+// Of the reference what it tells about this axis, if it does.
+void set_reference(std::size_t axis, Plan& pair) {
+  if (!pair.reference) return;
+  if (const auto rate = pair.reference->axes[axis]) {
+    pair.reference->rate = *rate;
+  } else {
+    pair.reference.reset();
+  }
 }
 
 void set_output(const OutputPlan& configured, std::size_t axis, OutputPlan& output) {
@@ -129,7 +138,7 @@ void set_output(const OutputPlan& configured, std::size_t axis, OutputPlan& outp
   output.rate_id = configured.rate_id + step;
   output.bias_id = configured.bias_id + step;
   output.model_id = configured.model_id + step;
-  std::erase_if(output.layouts, [&](const OutputLayout& layout) { return layout.axis != axis; });
+  output.layouts.clear();  // the platform's
 }
 
 void set_noise(Plan& pair) {
@@ -152,6 +161,7 @@ Plan plan_about(const Plan& platform, std::size_t place,
   for (std::size_t gyro = 0; gyro < 2; ++gyro)
     pair.gyros[gyro] = gyro_about(platform.gyros[gyro], axis, sensors[gyro][axis]);
   set_true_rate(platform.calibration, place, axis, pair.calibration);
+  set_reference(axis, pair);
   set_output(platform.output, axis, pair.output);
   set_noise(pair);
   if (!platform.model) return pair;
@@ -176,15 +186,21 @@ void drop_repeated(std::vector<Error>& errors) {
 
 }  // namespace
 
+void name_other_axis(const GyroPlan& unit, std::size_t from, GyroPlan& gyro) {
+  const GyroPlan* other = sensor_axis(unit, from);
+  if (other != nullptr && other->match == gyro.match) gyro.*kOtherAxes[from] = other->rate;
+}
+
 void find_axes(TomlReader& root, Plan& plan) {
   const std::array<bool, 2> is_unit{!plan.gyros[0].axes.empty(), !plan.gyros[1].axes.empty()};
   if (!is_unit[0] && !is_unit[1]) return;
   if (is_unit[0] != is_unit[1]) {
     const std::size_t unit = is_unit[0] ? 0 : 1;
-    root.complain(root.where("gyro"),
-                  fmt::format("gyro {} has {} axes, and gyro {} has one", plan.gyros[unit].name,
-                              plan.gyros[unit].axes.size(), plan.gyros[1 - unit].name),
-                  "rate_x, rate_y, rate_z in both [[gyro]] tables, or rate in both");
+    root.complain(
+        root.where("gyro"),
+        fmt::format("gyro {} has {} axes, and gyro {} has one", plan.gyros[unit].name,
+                    plan.gyros[unit].axes.size(), plan.gyros[1 - unit].name),
+        "rate_x, rate_y, rate_z instead of rate in both [[gyro]] tables, or rate in both");
     return;
   }
   std::array<std::vector<std::size_t>, 2> axes{axes_of(plan.gyros[0]), axes_of(plan.gyros[1])};

@@ -4,6 +4,8 @@
 // which, what the mounts leave out, identifiers, true rates at rest and the model's effects of each
 // pair. Fills Plan::axes.
 
+#include <cstddef>
+#include <numbers>
 #include <vector>
 
 #include "base/error.h"
@@ -24,7 +26,11 @@ void find_axes(TomlReader& root, Plan& plan);
 /// CalibrationPlan::doubt_dps. Precondition: all of the configuration is read.
 void build_axes(Plan& plan, std::vector<Error>& errors);
 
+/// Says where `gyro` reads the rate about the unit's own axis `from`: nowhere, where that stands in
+/// another message.
+void name_other_axis(const GyroPlan& unit, std::size_t from, GyroPlan& gyro);
+
 /// IERS: the Earth turns 7.292115e-5 rad/s against the stars.
-extern const double kEarthRate_dps;
+inline constexpr double kEarthRate_dps = 7.292115e-5 * 180.0 / std::numbers::pi;
 
 }  // namespace vgyro::gateway

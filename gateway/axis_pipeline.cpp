@@ -49,7 +49,9 @@ AxisPipeline::AxisPipeline(const Plan& the_plan, std::unique_ptr<fusion::Correct
       attendance_(plan_, aligner_, guard_),
       estimator_(plan_, std::move(corrector)),
       sender_(plan_.output),
-      newest_(kNever) {
+      newest_(kNever),
+      bias_sigma_dps_(kNone),
+      earth_doubt_dps_(plan_.calibration.doubt_dps) {
   if (plan_.reference) reference_input_.emplace(reference_intake(*plan_.reference));
   for (GyroStatus& gyro : status_.gyros)
     gyro.last_rate_dps = kNone;
@@ -124,10 +126,11 @@ bool AxisPipeline::offer(std::size_t gyro, const Reading& reading, double rate_d
   return true;
 }
 
-// Whatever is wrong with the other axis is wrong with this one as far as anybody can tell.
-void AxisPipeline::go_without(std::size_t gyro, TimePoint t) {
-  attendance_.judge_refused(gyro, t, Reject::kFlaggedInvalid);
-  refuse(gyro, Reject::kFlaggedInvalid, t);
+// Nothing is wrong with the sensor's own axis here, and others may need it.
+void AxisPipeline::go_without(std::size_t gyro, TimePoint t, bool other_is_sick) {
+  ++status_.gyros[gyro].rejected[static_cast<std::size_t>(Reject::kOtherAxis)];
+  if (attendance_.go_without(gyro, other_is_sick)) carry_on_without(gyro, t);
+  if (t >= deadline_) do_what_is_due(t);
 }
 
 // A frame without a sample. One that is sick tells of its gyro where its stamp can be believed;
@@ -288,6 +291,12 @@ void AxisPipeline::take_pair(const fusion::AlignedPair& pair) {
   if (!too_late) publish(rate, valid, pair.t, age);
 }
 
+void AxisPipeline::end_calibration(TimePoint t, TimePoint still_until) {
+  if (estimator_.calibrated() || !estimator_.begun()) return;
+  estimator_.end_calibration(t, still_until);
+  if (estimator_.calibrated()) enter_state();
+}
+
 void AxisPipeline::take_single(std::size_t gyro, TimePoint t, double rate_dps, Duration age) {
   if (t <= newest_) return;
   newest_ = t;
@@ -356,7 +365,7 @@ void AxisPipeline::add_cross_doubt(fusion::VirtualRate& rate) const {
   const double share = estimator_.shares()[1];
   rate.sigma_dps =
       std::sqrt(rate.sigma_dps * rate.sigma_dps + share * share * cross_variance_dps2_ +
-                plan_.calibration.doubt_dps * plan_.calibration.doubt_dps);
+                earth_doubt_dps_ * earth_doubt_dps_);
 }
 
 // The corrector's opinion of both; of one gyro alone it has none that is new.
@@ -457,7 +466,9 @@ const std::array<double, 2>& AxisPipeline::bias_dps() {
   const std::uint64_t windows = estimator_.windows();
   if (windows == bias_windows_ && windows > 0) return bias_dps_;
   bias_windows_ = windows;
-  bias_dps_ = estimator_.drift(newest_).bias_dps;
+  const fusion::Drift drift = estimator_.drift(newest_);
+  bias_dps_ = drift.bias_dps;
+  bias_sigma_dps_ = drift.bias_sigma_dps;
   for (double& bias_dps : bias_dps_)
     bias_dps = std::isfinite(bias_dps) ? bias_dps : 0.0;
   return bias_dps_;

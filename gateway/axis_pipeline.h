@@ -80,13 +80,16 @@ class AxisPipeline {
   };
   /// False where the frame gives none; that is dealt with then.
   bool admit(std::size_t gyro, const can::Frame& frame, TimePoint stamp, Reading& reading);
-  /// Of an axis that cannot be told, because another axis of its unit is set aside.
-  void go_without(std::size_t gyro, TimePoint t);
+  /// Of an axis that cannot be told, because another one of its unit is not: for that is sick, or
+  /// what it said last is too old.
+  void go_without(std::size_t gyro, TimePoint t, bool other_is_sick);
   /// The reading, turned into the vehicle's axes. False where it comes too late to be used.
   bool offer(std::size_t gyro, const Reading& reading, double rate_dps);
   /// The next pair; to be followed by take_pair().
   bool pop(fusion::AlignedPair& pair) { return aligner_.pop(pair); }
   void take_pair(const fusion::AlignedPair& pair);
+  /// Another axis's calibration was ended by motion at `t`.
+  void end_calibration(TimePoint t, TimePoint still_until);
   /// A reading that was offered is heard: first what is due, then …
   void arrive(std::size_t gyro, TimePoint t);
   /// … the pairs that came of it, and this, where none does because the other gyro is not there.
@@ -99,6 +102,15 @@ class AxisPipeline {
   [[nodiscard]] const Estimator& estimator() const { return estimator_; }
   /// The newest virtual rate; NaN where that is not valid.
   [[nodiscard]] double rate_dps() const { return sender_.rate_dps(); }
+  /// 1σ of what the Earth's rate may have been instead while the biases were learned.
+  void set_earth_doubt(double doubt_dps) { earth_doubt_dps_ = doubt_dps; }
+  [[nodiscard]] double earth_doubt_dps() const { return earth_doubt_dps_; }
+  /// Its σ, and that of the bias in it as of the last window; NaN where none is stated.
+  [[nodiscard]] double sigma_dps() const { return sender_.sigma_dps(); }
+  [[nodiscard]] double bias_sigma_dps() {
+    (void)bias_dps();
+    return bias_sigma_dps_;
+  }
   /// Of both gyros, as of the last window; 0 before there are any.
   [[nodiscard]] const std::array<double, 2>& bias_dps();
   /// A time of the pairs on the clock of the frames.
@@ -106,6 +118,12 @@ class AxisPipeline {
   [[nodiscard]] const Status& status() const { return status_; }
   [[nodiscard]] bool in_use(std::size_t gyro) const { return attendance_.in_use(gyro); }
   [[nodiscard]] bool pairing() const { return attendance_.pairing(); }
+  /// Its own sensor axis may not be used for now.
+  [[nodiscard]] bool set_aside(std::size_t gyro) const { return attendance_.set_aside(gyro); }
+  /// Between its samples; 0 while nobody knows.
+  [[nodiscard]] Duration interval(std::size_t gyro) const {
+    return aligner_.chosen() ? attendance_.usual_interval(gyro) : guard_.interval(gyro);
+  }
 
  private:
   /// Code of its own for each gyro, to which the places of all that belongs to it are constants,
@@ -165,10 +183,12 @@ class AxisPipeline {
   TimePoint reached_{};               ///< newest time that was believed
   TimePoint suspect_{};               ///< stamp far ahead that nobody has confirmed yet
   std::array<double, 2> bias_dps_{};  ///< for bias_dps()
+  double bias_sigma_dps_;             ///< likewise
   std::uint64_t bias_windows_ = 0;    ///< when that was asked for last
   bool has_cross_ = false;
   double cross_dps_ = 0.0;            ///< what gyro 2 reads of the other axes
   double cross_variance_dps2_ = 0.0;  ///< and how far that may be wrong
+  double earth_doubt_dps_;            ///< for add_cross_doubt()
 };
 
 }  // namespace vgyro::gateway

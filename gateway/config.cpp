@@ -73,7 +73,10 @@ void read_gyros(TomlReader& root, Context& context) {
   const std::size_t count = tables == nullptr ? 0 : tables->size();
   if (count != 2) {
     root.complain(count == 0 ? context.file : root.where("gyro"),
-                  fmt::format("there are {} [[gyro]] tables", count), "exactly two are needed");
+                  fmt::format("there are {} [[gyro]] tables", count),
+                  count < 2 ? "exactly two are needed"
+                            : "exactly two are needed; several axes of one unit stand in its own "
+                              "table: rate_x, rate_y, rate_z");
     return;
   }
   std::vector<GyroPlan> gyros;
@@ -110,19 +113,55 @@ void read_optional(TomlReader& root, std::string_view key, Context& context, Rea
   reader.finish();
 }
 
-void read_reference(TomlReader& reader, SignalResolver& resolver, Plan& plan) {
-  const dbc::Signal* signal = resolver.signal("rate", true);
+constexpr std::array<const char*, kAxes> kReferenceAxes{"rate_x", "rate_y", "rate_z"};
+
+// The rates that a table of a reference names: one, or of a platform of several axes one for each.
+// One alone is then about z, about which a vehicle turns.
+std::array<std::optional<Quantity>, kAxes> read_reference_rates(TomlReader& reader,
+                                                                SignalResolver& resolver,
+                                                                bool of_axes,
+                                                                const dbc::Signal*& main) {
+  std::array<std::optional<Quantity>, kAxes> rates;
   const auto unit = reader.text("unit");
-  auto rate =
-      signal == nullptr ? std::nullopt : resolver.quantity(*signal, "rate", Dimension::kRate, unit);
-  if (!rate) {
+  const auto read = [&](const char* key, std::size_t axis, bool required) {
+    const dbc::Signal* signal = resolver.signal(key, required);
+    if (signal == nullptr) return;
+    rates[axis] = resolver.quantity(*signal, key, Dimension::kRate, unit);
+    main = signal;
+  };
+  const bool named = std::any_of(kReferenceAxes.begin(), kReferenceAxes.end(),
+                                 [&](const char* key) { return reader.has(key); });
+  if (!of_axes && named) {
+    reader.forgive({"rate", "rate_x", "rate_y", "rate_z"});
+    reader.complain(reader.where(), "rate_x, rate_y, rate_z are of a reference of whole units",
+                    "rate = \"SIGNAL\" beside gyros of one axis each");
+  } else if (!of_axes || !named) {
+    read("rate", kAxes - 1, true);
+  } else {
+    for (std::size_t axis = 0; axis < kAxes; ++axis)
+      read(kReferenceAxes[axis], axis, false);
+  }
+  return rates;
+}
+
+void read_reference(TomlReader& reader, SignalResolver& resolver, Plan& plan) {
+  const bool of_axes = !plan.output.axes.empty();
+  const dbc::Signal* main = nullptr;
+  auto rates = read_reference_rates(reader, resolver, of_axes, main);
+  const auto last =
+      std::find_if(rates.rbegin(), rates.rend(), [](const auto& rate) { return rate.has_value(); });
+  if (main == nullptr || last == rates.rend()) {
     reader.forgive({"sign", "source_address"});
     forgive_e2e(reader);
     return;
   }
-  read_sign(reader, *rate);
-  plan.reference = ReferencePlan{resolver.bus(), resolver.message().name, resolver.match(), *rate,
-                                 read_e2e(reader, resolver, *signal)};
+  const double sign = sign_of(reader).value_or(1.0);
+  for (auto& rate : rates) {
+    if (rate) rate->scale *= sign;
+  }
+  plan.reference = ReferencePlan{resolver.bus(), resolver.message().name, resolver.match(), **last,
+                                 read_e2e(reader, resolver, *main)};
+  if (of_axes) plan.reference->axes = rates;
   read_source_address(reader, resolver.message(), plan.reference->match);
 }
 
@@ -136,7 +175,7 @@ void read_accelerometer(TomlReader& reader, SignalResolver& resolver, Plan& plan
       axes.push_back(*axis);
     last = signal;
   }
-  if (axes.size() != 3) {
+  if (axes.size() != 3 || last == nullptr) {
     reader.forgive({"source_address"});
     forgive_e2e(reader);
     return;
@@ -215,7 +254,10 @@ void read_true_rate(TomlReader& reader, const toml::table& table, const Plan& pl
                     CalibrationPlan& plan) {
   read_axis_rates(reader, platform, plan);
   // After trouble with the units nobody knows how many axes there are.
-  if (platform.gyros.empty() && table["rate_dps"].is_array()) {
+  const bool any_unit = std::any_of(platform.gyros.begin(), platform.gyros.end(),
+                                    [](const GyroPlan& gyro) { return !gyro.axes.empty(); });
+  const bool troubled = platform.gyros.empty() || (any_unit && platform.output.axes.empty());
+  if (troubled && table["rate_dps"].is_array()) {
     reader.forgive({"rate_dps", "latitude_deg", "heading_deg"});
     return;
   }
@@ -242,6 +284,23 @@ void read_true_rate(TomlReader& reader, const toml::table& table, const Plan& pl
   plan.rate_dps = kEarthRate_dps * std::sin(*plan.latitude_deg * std::numbers::pi / 180.0);
 }
 
+// What calibrates a platform must tell the rate about each of its axes.
+void check_reference(TomlReader& root, TomlReader& reader, const Plan& plan) {
+  if (!root.has("reference")) {
+    reader.complain(reader.where("source"), "source = \"reference\" needs a [reference] table");
+    return;
+  }
+  if (!plan.reference) return;  // it has been complained of
+  for (const std::size_t axis : plan.output.axes) {
+    if (plan.reference->axes[axis]) continue;
+    reader.complain(
+        reader.where("source"),
+        fmt::format("the reference does not tell the rate about {}", kAxisNames[axis]),
+        "rate_x, rate_y, rate_z in [reference], as many as the units have; or source = \"rest\"");
+    return;
+  }
+}
+
 void read_calibration(TomlReader& root, Context& context) {
   CalibrationPlan& plan = context.resolved.plan.calibration;
   const toml::table* table = root.table("calibration");
@@ -260,14 +319,7 @@ void read_calibration(TomlReader& root, Context& context) {
   const bool is_told = reader.has("rate_dps") || reader.has("latitude_deg");
   if (plan.from_reference && !is_told) plan.stop_rate_dps = std::nullopt;
   read_when_moving(reader, plan);
-  if (plan.from_reference && !context.resolved.plan.output.axes.empty()) {
-    reader.complain(reader.where("source"),
-                    "a reference about one axis cannot calibrate a platform of several",
-                    "source = \"rest\"");
-  }
-  if (plan.from_reference && !root.has("reference")) {
-    reader.complain(reader.where("source"), "source = \"reference\" needs a [reference] table");
-  }
+  if (plan.from_reference) check_reference(root, reader, context.resolved.plan);
   reader.finish();
 }
 
@@ -365,10 +417,7 @@ void read_output(TomlReader& root, Context& context) {
   if (bus.empty()) {
     reader.forgive({"layout"});
   } else {
-    read_output_layouts(
-        reader,
-        {context.file, context.folder, context.cache, context.errors, context.resolved.warnings},
-        plan);
+    read_output_layouts(reader, tables_of(context), plan);
   }
   check_output_ids(reader, plan);
   const bool failed = !context.errors.empty();

@@ -75,6 +75,10 @@ void Estimator::calibrate_with(const fusion::AlignedPair& pair, double true_rate
     corrector_->calibrate({seconds(pair.t), pair.rate_dps, pair.noise_gain}, true_rate_dps);
     return;
   }
+  take_result();
+}
+
+void Estimator::take_result() {
   if (!result_can_be()) {
     calibrator_.reject();
     corrector_->restart_calibration();
@@ -83,12 +87,26 @@ void Estimator::calibrate_with(const fusion::AlignedPair& pair, double true_rate
   corrector_->start(calibrator_.result());
   calibrated_ = true;
   moved_in_calibration_ = calibrator_.result().in_motion;
+  if (calibrator_.result().cut_short())
+    cut_at_ = origin_ + from_seconds(calibrator_.result().used_until_s);
 }
 
 void Estimator::restart_calibration() {
   if (calibrated_) return;
   calibrator_.reject();
   corrector_->restart_calibration();
+}
+
+void Estimator::end_calibration(TimePoint t, TimePoint still_until) {
+  if (calibrated_) return;
+  const std::uint64_t restarts = calibrator_.restarts();
+  const bool complete = calibrator_.cut_short(seconds(t), seconds(still_until));
+  if (calibrator_.restarts() != restarts) corrector_->restart_calibration();
+  if (complete) take_result();
+}
+
+void Estimator::note_motion_in_calibration() {
+  if (!calibrated_) calibrator_.note_motion();
 }
 
 // Only where the calibration waits for rest can it begin again: motion would give the same result

@@ -69,6 +69,16 @@ class Estimator {
   void set_stop_rate(double rate_dps) { corrector_->set_stop_rate(rate_dps); }
   /// The platform moved about another axis: what was gathered of this one was no rest.
   [[gnu::cold, gnu::noinline]] void restart_calibration();
+  /// Likewise, and about that axis it had rested for long enough: this one's calibration ends too,
+  /// or begins again where it has too little yet.
+  [[gnu::cold, gnu::noinline]] void end_calibration(TimePoint t, TimePoint still_until);
+  /// Motion has ended the calibration before its time: until when the platform rested.
+  [[nodiscard]] const std::optional<TimePoint>& calibration_cut_at() const { return cut_at_; }
+  /// Motion in the calibration that was accepted is one of the platform.
+  [[nodiscard]] bool moved_in_calibration() const {
+    return moved_in_calibration_ || (!calibrated_ && calibrator_.moved());
+  }
+  void note_motion_in_calibration();
   [[nodiscard]] std::uint64_t calibration_restarts() const { return calibrator_.restarts(); }
 
   /// A pair before calibrated().
@@ -85,6 +95,10 @@ class Estimator {
   [[nodiscard]] std::array<double, 2> shares() const { return corrector_->shares(); }
   /// What the corrector thinks of its data, as of the newest rate.
   [[nodiscard]] const fusion::Condition& condition() const { return condition_; }
+  /// Grows when that, or whether it is calibrated, says something new.
+  [[nodiscard]] std::uint64_t condition_edition() const {
+    return 2 * condition_edition_ + (calibrated_ ? 1 : 0);
+  }
   /// What is known of the drifts at `t`. Precondition: knows_gyros().
   [[nodiscard]] fusion::Drift drift(TimePoint t) const { return corrector_->drift(seconds(t)); }
   /// Do the gyros contradict each other, at present or altogether?
@@ -109,6 +123,7 @@ class Estimator {
   void calibrate_with_reference();
   void read_condition();
   void calibrate_with(const fusion::AlignedPair& pair, double true_rate_dps);
+  void take_result();
   [[nodiscard]] bool result_can_be() const;
   [[nodiscard]] double seconds(TimePoint t) const { return to_seconds(t - origin_); }
 
@@ -123,6 +138,7 @@ class Estimator {
   bool begun_ = false;
   bool calibrated_;
   bool moved_in_calibration_ = false;  ///< and that was accepted
+  std::optional<TimePoint> cut_at_;
 
   std::optional<SavedState> saved_;  ///< to be taken up by the first pair
   Restored restored_ = Restored::kNothing;

@@ -8,6 +8,7 @@
 
 #include "base/printable.h"
 #include "base/spelling.h"
+#include "gateway/axes_plan.h"
 #include "gateway/e2e_config.h"
 #include "gateway/mount.h"
 #include "gateway/valid_config.h"
@@ -34,22 +35,13 @@ std::optional<double> number_within(TomlReader& reader, std::string_view key, co
   return std::nullopt;
 }
 
-namespace {
-
-/// 1 or -1; nothing where the key is not there, or after a complaint.
-std::optional<double> sign_of(TomlReader& reader) {
-  const auto sign = reader.integer("sign");
+std::optional<double> sign_of(TomlReader& reader, std::string_view key) {
+  const auto sign = reader.integer(key);
   if (!sign) return std::nullopt;
   if (*sign == 1 || *sign == -1) return static_cast<double>(*sign);
-  reader.complain(reader.where("sign"), fmt::format("sign is {}", *sign),
+  reader.complain(reader.where(key), fmt::format("{} is {}", key, *sign),
                   "1, or -1 to flip the axis");
   return std::nullopt;
-}
-
-}  // namespace
-
-void read_sign(TomlReader& reader, Quantity& rate) {
-  if (const auto sign = sign_of(reader)) rate.scale *= *sign;
 }
 
 void read_source_address(TomlReader& reader, const dbc::Message& message, FrameMatch& match) {
@@ -110,7 +102,7 @@ std::optional<GyroPlan> read_single(TomlReader& reader, SignalResolver& resolver
                           .e2e = {},
                           .valid = {},
                           .saturation_dps = {}});
-    read_sign(reader, gyro->rate);
+    gyro->rate.scale *= sign_of(reader).value_or(1.0);
     read_source_address(reader, resolver.message(), gyro->match);
     gyro->e2e = read_e2e(reader, resolver, *rate_signal);
     if (const auto valid = read_condition(reader, resolver, *rate_signal))
@@ -308,6 +300,32 @@ void check_signals(const std::vector<GyroPlan>& axes, TomlReader& reader) {
   }
 }
 
+// Readings of two messages are of two instants, and may come at two rates.
+void warn_of_mixed_messages(const std::vector<GyroPlan>& axes, const Mount& mount,
+                            TomlReader& reader, std::vector<Error>& warnings) {
+  const auto needs = [&](std::size_t axis, const GyroPlan& sensor) {
+    return std::abs(mount.at(axis, sensor.sensor_axis)) > kShareMissed;
+  };
+  for (std::size_t axis = 0; axis < kAxes; ++axis) {
+    const auto first = std::find_if(axes.begin(), axes.end(),
+                                    [&](const GyroPlan& one) { return needs(axis, one); });
+    if (first == axes.end()) continue;
+    const auto other = std::find_if(first, axes.end(), [&](const GyroPlan& one) {
+      return needs(axis, one) && !(one.match == first->match);
+    });
+    if (other == axes.end()) continue;
+    warnings.push_back(
+        {reader.where("mount"),
+         fmt::format("mount mixes {} of {} and {} of {} about the vehicle's {}: they come at "
+                     "instants of their own, so that while it turns the mixture is off by what "
+                     "changes between the two",
+                     first->rate.name, first->message, other->rate.name, other->message,
+                     kAxisNames[axis]),
+         "axes of one message, or a mount that only swaps axes and signs"});
+    return;
+  }
+}
+
 std::optional<GyroPlan> read_unit(TomlReader& reader, SignalResolver& resolver,
                                   const std::string& name, TableContext context) {
   const AxisEntries entries = entries_of(reader, context);
@@ -335,6 +353,7 @@ std::optional<GyroPlan> read_unit(TomlReader& reader, SignalResolver& resolver,
                     "rate = \"SIGNAL\" where the gyro has one axis only");
   }
   check_signals(axes, reader);
+  warn_of_mixed_messages(axes, mount, reader, context.warnings);
   if (axes.empty()) return std::nullopt;
   GyroPlan gyro = axes.front();
   gyro.max_bias_dps = max_bias_dps;

@@ -42,8 +42,9 @@ struct Limits {
 std::optional<double> number_within(TomlReader& reader, std::string_view key, const Limits& limits,
                                     std::string_view unit);
 
-/// The key `sign` of any table that reads a rate.
-void read_sign(TomlReader& reader, Quantity& rate);
+/// The key `sign` of any table that names rates, or another one like it: 1 or -1; nothing where it
+/// is not there, or after a complaint.
+std::optional<double> sign_of(TomlReader& reader, std::string_view key = "sign");
 /// The key `source_address` of any table that reads a message.
 void read_source_address(TomlReader& reader, const dbc::Message& message, FrameMatch& match);
 

@@ -15,6 +15,8 @@ using Matrix = std::array<double, kAxes * kAxes>;
 
 // Beyond a whole turn each way nobody means an angle.
 constexpr double kAngleMost_deg = 360.0;
+// What is flatter has no rotation that is the nearest, in the digits that people write.
+constexpr double kDeterminantMin = 0.01;
 // The iteration doubles its digits with each step.
 constexpr int kStepsMost = 20;
 
@@ -92,7 +94,7 @@ std::optional<Mount> checked_matrix(TomlReader& reader, const std::vector<double
   Matrix given{};
   std::copy(numbers.begin(), numbers.end(), given.begin());
   const double det = determinant(given, cofactors(given));
-  if (det < -0.5) {
+  if (det < -kDeterminantMin) {
     reader.complain(reader.where("mount"),
                     fmt::format("mount mirrors: its determinant is {:.3g}", det),
                     "a rotation, whose determinant is 1: one axis has the wrong sign, or two are "
@@ -100,12 +102,13 @@ std::optional<Mount> checked_matrix(TomlReader& reader, const std::vector<double
     return std::nullopt;
   }
   Mount mount;
-  if (det > 0.5) mount.matrix = nearest_rotation(given);
+  const bool has_nearest = det > kDeterminantMin;
+  if (has_nearest) mount.matrix = nearest_rotation(given);
   mount.corrected = furthest(given, mount.matrix);
-  if (det > 0.5 && mount.corrected <= kMountRounding) return mount;
+  if (has_nearest && mount.corrected <= kMountRounding) return mount;
   reader.complain(
       reader.where("mount"),
-      det > 0.5
+      has_nearest
           ? fmt::format("mount is no rotation: the nearest one differs by {:.2g} in an element",
                         mount.corrected)
           : fmt::format("mount is no rotation: its determinant is {:.3g}", det),

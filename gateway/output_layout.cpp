@@ -1,8 +1,11 @@
 #include "gateway/output_layout.h"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
+#include <limits>
 #include <span>
+#include <utility>
 
 namespace vgyro::gateway {
 
@@ -15,6 +18,10 @@ constexpr Duration::rep kEarlyShare = 4;  // of the period, where that is shorte
 // Frames that came late are made up for, but not in heaps.
 constexpr Duration::rep kCloseShare = 2;
 constexpr double kRoundingSlack_steps = 1e-6;
+// Between the axes of one bunch and between bunches there is more of a difference than jitter
+// makes.
+constexpr Duration::rep kLongerPause = 2;
+constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
 std::span<std::uint8_t> payload_of(can::Frame& frame) {
   return {frame.data.data(), frame.length};
@@ -27,6 +34,13 @@ double in_unit_of(const OutputField& field, double value) {
 // False for NaN too.
 bool fits(const OutputField& field, double in_unit) {
   return in_unit >= field.minimum && in_unit <= field.maximum;
+}
+
+bool can_say(const LayoutRate& one, const RateOutput& output) {
+  const double in_unit = in_unit_of(one.rate, output.rate_dps);
+  if (!fits(one.rate, one.sign ? std::abs(in_unit) : in_unit)) return false;
+  return !one.sigma || one.sigma->has_code ||
+         fits(*one.sigma, in_unit_of(*one.sigma, output.sigma_dps));
 }
 
 can::Frame blank_frame(const OutputLayout& plan) {
@@ -54,26 +68,36 @@ void LayoutEncoder::go_on_from(const LayoutEncoder& before) {
 }
 
 const can::Frame* LayoutEncoder::rate(const RateOutput& output, TimePoint stamp) {
-  const bool in_range = can_say(output);
-  const bool valid = output.valid && in_range;
-  if (output.valid && !in_range) ++counts_.out_of_range;
-  if (!valid && !plan_.can_say_invalid()) {
+  assert(plan_.rates.size() == 1);
+  Rates only{};
+  only[plan_.rates[0].axis] = &output;
+  return rates(only, stamp);
+}
+
+const can::Frame* LayoutEncoder::rates(const Rates& rates, TimePoint stamp) {
+  bool all_valid = true;
+  bool all_in_range = true;
+  std::array<bool, kAxes> valid{};
+  for (const LayoutRate& one : plan_.rates) {
+    const RateOutput* output = rates[one.axis];
+    const bool wanted = output != nullptr && output->valid;
+    valid[one.axis] = wanted && can_say(one, *output);
+    all_valid = all_valid && valid[one.axis];
+    all_in_range = all_in_range && valid[one.axis] == wanted;
+  }
+  if (!all_in_range) ++counts_.out_of_range;
+  if (!all_valid && !plan_.can_say_invalid()) {
     ++counts_.withheld;
     return nullptr;
   }
   if (!is_due(stamp)) return nullptr;
   ++counts_.frames;
-  if (valid) ++counts_.valid;
-  put_rate(output, valid);
+  if (all_valid) ++counts_.valid;
+  for (const LayoutRate& one : plan_.rates)
+    put_rate(one, rates[one.axis], valid[one.axis]);
+  if (plan_.valid) put_flag(*plan_.valid, all_valid);
   protect();
   return &frame_;
-}
-
-bool LayoutEncoder::can_say(const RateOutput& output) const {
-  const double in_unit = in_unit_of(plan_.rate, output.rate_dps);
-  if (!fits(plan_.rate, plan_.sign ? std::abs(in_unit) : in_unit)) return false;
-  return !plan_.sigma || plan_.sigma->has_code ||
-         fits(*plan_.sigma, in_unit_of(*plan_.sigma, output.sigma_dps));
 }
 
 // Each frame a period after the last one was due, so that the average is right whatever the rates'
@@ -89,25 +113,27 @@ bool LayoutEncoder::is_due(TimePoint stamp) {
   return true;
 }
 
-void LayoutEncoder::put_rate(const RateOutput& output, bool valid) {
+void LayoutEncoder::put_rate(const LayoutRate& one, const RateOutput* output, bool valid) {
   const std::span<std::uint8_t> payload = payload_of(frame_);
-  const OutputField& rate = plan_.rate;
-  const double in_unit = in_unit_of(rate, output.rate_dps);
+  const OutputField& rate = one.rate;
+  const double in_unit = valid ? in_unit_of(rate, output->rate_dps) : 0.0;
   if (valid) {
-    rate.codec.encode(plan_.sign ? std::abs(in_unit) : in_unit, payload);
+    rate.codec.encode(one.sign ? std::abs(in_unit) : in_unit, payload);
   } else {
-    rate.codec.encode_raw(output.valid ? rate.beyond_raw : rate.none_raw, payload);
+    const bool beyond = output != nullptr && output->valid;
+    rate.codec.encode_raw(beyond ? rate.beyond_raw : rate.none_raw, payload);
   }
-  if (plan_.sign) {
+  if (one.sign) {
     // What is rounded to zero has no sign.
     const bool negative = valid && in_unit < 0.0 && rate.codec.decode(payload).raw != 0;
-    plan_.sign->encode_raw(negative ? 1 : 0, payload);
+    one.sign->encode_raw(negative ? 1 : 0, payload);
   }
-  if (plan_.sigma) put_sigma(*plan_.sigma, output.sigma_dps, valid);
-  if (plan_.valid) {
-    plan_.valid->codec.encode_raw(valid ? plan_.valid->valid_raw : plan_.valid->invalid_raw,
-                                  payload);
-  }
+  if (one.sigma) put_sigma(*one.sigma, valid ? output->sigma_dps : kNone, valid);
+  if (one.valid) put_flag(*one.valid, valid);
+}
+
+void LayoutEncoder::put_flag(const OutputFlag& flag, bool valid) {
+  flag.codec.encode_raw(valid ? flag.valid_raw : flag.invalid_raw, payload_of(frame_));
 }
 
 // Rounded up: rounded to zero it would claim a rate without error.
@@ -129,6 +155,117 @@ void LayoutEncoder::protect() {
     counter_ = counter_ + 1 >= plan_.e2e.counter->modulus ? 0 : counter_ + 1;
   }
   if (plan_.e2e.crc) plan_.e2e.crc->protection.seal(payload);
+}
+
+// --- all layouts ---------------------------------------------------------------------------------
+
+LayoutSet::LayoutSet(const OutputPlan& plan)
+    : layouts_(plan.layouts.begin(), plan.layouts.end()),
+      bus_(plan.bus),
+      any_of_several_(
+          std::any_of(plan.layouts.begin(), plan.layouts.end(),
+                      [](const OutputLayout& layout) { return layout.rates.size() > 1; })) {
+  assert(layouts_.size() <= kOutputLayoutsMost);
+}
+
+void LayoutSet::take(std::size_t axis, const RateOutput& output, TimePoint stamp, FrameSink& sink) {
+  for (LayoutEncoder& layout : layouts_) {
+    const std::vector<LayoutRate>& rates = layout.plan().rates;
+    if (rates.size() == 1 && rates[0].axis == axis)
+      put(layout, layout.rate(output, stamp), stamp, sink);
+  }
+  if (!any_of_several_) return;
+  begin_round(output.instant);
+  // Whoever is waited for has missed its turn.
+  if (newest_[axis].fresh) send_all_axes(stamp, sink);
+  newest_[axis] = {.output = output, .there = true, .fresh = true};
+  newest_instant_ = output.instant;
+}
+
+// Axes in messages of their own come in bunches. A pause much longer than the one before the bunch
+// that is being gathered says that this one is the end of another.
+void LayoutSet::begin_round(TimePoint instant) {
+  const Duration pause = span(newest_instant_, instant);
+  const bool gathering =
+      std::any_of(newest_.begin(), newest_.end(), [](const Newest& one) { return one.fresh; });
+  if (gathering && pause / kLongerPause <= pause_before_) return;
+  for (Newest& one : newest_)
+    one.fresh = false;
+  pause_before_ = std::max(pause, Duration::zero());
+}
+
+void LayoutSet::settle(TimePoint stamp, FrameSink& sink) {
+  if (!any_of_several_) return;
+  const bool any_fresh =
+      std::any_of(newest_.begin(), newest_.end(), [](const Newest& one) { return one.fresh; });
+  const bool all_fresh = std::all_of(newest_.begin(), newest_.end(),
+                                     [&](const Newest& one) { return one.fresh || !speaks(one); });
+  if (any_fresh && all_fresh) send_all_axes(stamp, sink);
+}
+
+// A clock that is set back leaves rates of a time to come.
+bool LayoutSet::speaks(const Newest& one) const {
+  if (!one.there) return false;
+  const Duration apart = span(one.output.instant, newest_instant_);
+  return apart <= kApartMost && apart >= -kApartMost;
+}
+
+void LayoutSet::send_all_axes(TimePoint stamp, FrameSink& sink) {
+  LayoutEncoder::Rates rates{};
+  for (std::size_t axis = 0; axis < kAxes; ++axis) {
+    rates[axis] = speaks(newest_[axis]) ? &newest_[axis].output : nullptr;
+    newest_[axis].fresh = false;
+  }
+  for (LayoutEncoder& layout : layouts_) {
+    if (layout.plan().rates.size() > 1) put(layout, layout.rates(rates, stamp), stamp, sink);
+  }
+}
+
+void LayoutSet::put(const LayoutEncoder& layout, const can::Frame* frame, TimePoint stamp,
+                    FrameSink& sink) const {
+  if (frame == nullptr) return;
+  if (layout.plan().bus == bus_) {
+    sink.put(*frame, stamp);
+  } else {
+    sink.put_on(layout.plan().bus, *frame, stamp);
+  }
+}
+
+// One identifier may go out on several buses: the first of them goes on from the first, and so on.
+const LayoutEncoder* LayoutSet::predecessor(std::size_t index, const LayoutSet& before) const {
+  const LayoutEncoder& layout = layouts_[index];
+  const auto is_same = [&](const LayoutEncoder& other) { return layout.sends_same_frame(other); };
+  auto left = std::count_if(layouts_.begin(), layouts_.begin() + static_cast<std::ptrdiff_t>(index),
+                            is_same);
+  for (const LayoutEncoder& other : before.layouts_) {
+    if (is_same(other) && left-- == 0) return &other;
+  }
+  return nullptr;
+}
+
+void LayoutSet::count_on_from(const LayoutSet& before) {
+  for (std::size_t i = 0; i < layouts_.size(); ++i) {
+    if (const LayoutEncoder* other = predecessor(i, before)) layouts_[i].go_on_from(*other);
+  }
+}
+
+void LayoutSet::change_plan(const OutputPlan& plan) {
+  LayoutSet changed(plan);
+  changed.count_on_from(*this);
+  for (std::size_t i = 0; i < changed.layouts_.size(); ++i) {
+    if (const LayoutEncoder* other = changed.predecessor(i, *this))
+      changed.layouts_[i].take_books_of(*other);
+  }
+  changed.newest_ = newest_;
+  changed.newest_instant_ = newest_instant_;
+  changed.pause_before_ = pause_before_;
+  *this = std::move(changed);
+}
+
+void LayoutSet::tell(Status& status) const {
+  status.layouts_out = {};
+  for (std::size_t i = 0; i < layouts_.size(); ++i)
+    status.layouts_out[i] = layouts_[i].counts();
 }
 
 }  // namespace vgyro::gateway

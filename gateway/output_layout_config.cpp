@@ -76,10 +76,37 @@ void add(Payload& to, const Payload& mask) {
     to[i] = static_cast<std::uint8_t>(to[i] | mask[i]);
 }
 
+/// One rate on its way into the plan: the keys that say how it goes out, and their signals.
+struct RateEntry {
+  std::size_t axis = 0;
+  std::string rate, sign, sign_signal, sigma, valid, invalid;  ///< keys
+  const dbc::Signal* rate_signal = nullptr;
+  const dbc::Signal* sign_signal_found = nullptr;
+  const dbc::Signal* sigma_signal = nullptr;
+};
+
+constexpr std::array<std::string_view, 3> kOfOneRate{"rate", "sign_signal", "sigma"};
+
+RateEntry entry_named(std::string_view ending, std::size_t axis) {
+  const auto key = [&](std::string_view name) { return fmt::format("{}{}", name, ending); };
+  return {.axis = axis,
+          .rate = key("rate"),
+          .sign = key("sign"),
+          .sign_signal = key("sign_signal"),
+          .sigma = key("sigma"),
+          .valid = key("valid"),
+          .invalid = key("invalid")};
+}
+
+/// "_x" of the vehicle's axis x.
+std::string ending_of(std::size_t axis) {
+  return fmt::format("_{}", kAxisNames[axis]);
+}
+
 /// One table.
 class LayoutReader {
  public:
-  LayoutReader(const toml::table& table, LayoutContext context, Plan& plan)
+  LayoutReader(const toml::table& table, TableContext context, Plan& plan)
       : reader_(table, context.file, "[[output.layout]]", context.errors),
         context_(context),
         resolver_(reader_, context.cache, context.folder, plan.buses, context.warnings,
@@ -90,11 +117,18 @@ class LayoutReader {
   std::optional<OutputLayout> read();
 
  private:
-  void read_rate(const dbc::Signal& signal);
-  void read_sign(const dbc::Signal* signal);
-  void read_sigma(const dbc::Signal& signal);
-  void read_valid();
-  void read_flag_raw(const NamedCondition& valid);
+  void find_entries();
+  void refuse_besides(const RateEntry& entry);
+  void check_axes_keys();
+  void forgive_all();
+  void begin_layout(const Quantity& quantity);
+  void read_rate(const RateEntry& entry);
+  void read_entry(const RateEntry& entry, LayoutRate& one);
+  void read_sign(const RateEntry& entry, LayoutRate& one);
+  void read_sigma(const RateEntry& entry, LayoutRate& one);
+  std::optional<OutputFlag> read_valid(const std::string& key, const std::string& invalid);
+  std::optional<OutputFlag> flag_of(const NamedCondition& valid, const std::string& key,
+                                    const std::string& invalid);
   void read_protection();
   void check_header(const CheckValue& crc);
   bool read_fd();
@@ -108,56 +142,134 @@ class LayoutReader {
   std::optional<RawValue> filled(const dbc::Signal& signal, const toml::table* fill);
   void check_fill(const toml::table* fill);
   void warn_of_resting(const dbc::Signal& signal, const RawValue& value);
-  void warn_of_rate();
+  void warn_of_rate(const RateEntry& entry, const LayoutRate& one);
   void complain(std::string_view key, const Error& error) {
     reader_.complain(reader_.where(key), error.what, error.remedy);
   }
 
   TomlReader reader_;
-  LayoutContext context_;
+  TableContext context_;
   SignalResolver resolver_;
   Method method_;
   const std::vector<std::size_t>& axes_;  ///< of the platform; empty: a single one
+  bool by_axes_ = false;                  ///< rate_x … instead of rate
+  std::vector<RateEntry> entries_;
+  std::optional<std::string> unit_;  ///< of all rates; likewise the two below
+  std::optional<std::int64_t> none_raw_;
+  double sign_ = 1.0;
   bool fd_ = false;
   dbc::CodeRules rules_ = dbc::CodeRules::kNone;
-  const dbc::Signal* rate_ = nullptr;
-  std::optional<OutputLayout> layout_;  ///< as soon as the rate is known
+  const dbc::Signal* rate_ = nullptr;   ///< the first one
+  std::optional<OutputLayout> layout_;  ///< as soon as a rate is known
   Payload taken_{};                     ///< bits that a key has named, or that choose the page
 };
 
 std::optional<OutputLayout> LayoutReader::read() {
   const std::size_t errors_before = context_.errors.size();
-  rate_ = resolver_.signal("rate", true);
-  const dbc::Signal* sign = resolver_.signal("sign_signal", false);
-  const dbc::Signal* sigma = resolver_.signal("sigma", false);
+  find_entries();
+  rate_ = entries_.front().rate_signal;
   if (rate_ != nullptr) {
     fd_ = read_fd();
     rules_ = resolver_.rules();
-    read_rate(*rate_);
+    unit_ = reader_.text("unit");
+    none_raw_ = reader_.integer("rate_not_available");
+    for (const RateEntry& entry : entries_) {
+      if (entry.rate_signal != nullptr) read_rate(entry);
+    }
   }
   if (layout_ && context_.errors.size() == errors_before) {
     read_id();
     read_source_address();
-    read_sign(sign);
-    if (sigma != nullptr) read_sigma(*sigma);
-    read_valid();
+    sign_ = sign_of(reader_).value_or(1.0);
+    for (std::size_t i = 0; i < entries_.size(); ++i)
+      read_entry(entries_[i], layout_->rates[i]);
+    layout_->valid = read_valid("valid", "invalid");
     read_protection();
     read_every();
     read_axis();
     fill_rest();
-    warn_of_rate();
+    for (std::size_t i = 0; i < entries_.size(); ++i)
+      warn_of_rate(entries_[i], layout_->rates[i]);
   } else {
-    reader_.forgive({"unit", "sign", "rate_not_available", "id", "source_address", "valid",
-                     "invalid", "every_ms", "fd", "fill", "axis"});
-    forgive_e2e(reader_);
+    forgive_all();
   }
   reader_.finish();
   if (context_.errors.size() > errors_before) return std::nullopt;
   return layout_;
 }
 
-// Of a platform of several axes a layout carries one of them.
+// What the table names: one rate, or those about some of the axes.
+void LayoutReader::find_entries() {
+  for (std::size_t axis = 0; axis < kAxes; ++axis) {
+    RateEntry entry = entry_named(ending_of(axis), axis);
+    if (reader_.has(entry.rate)) {
+      entries_.push_back(std::move(entry));
+    } else {
+      refuse_besides(entry);
+    }
+  }
+  by_axes_ = !entries_.empty();
+  if (by_axes_) check_axes_keys();
+  if (!by_axes_) entries_.push_back(entry_named("", 0));
+  for (RateEntry& entry : entries_) {
+    entry.rate_signal = resolver_.signal(entry.rate, !by_axes_);
+    entry.sign_signal_found = resolver_.signal(entry.sign_signal, false);
+    entry.sigma_signal = resolver_.signal(entry.sigma, false);
+  }
+}
+
+// What is said of an axis whose rate the table does not name.
+void LayoutReader::refuse_besides(const RateEntry& entry) {
+  for (const std::string& key :
+       {entry.sign, entry.sign_signal, entry.sigma, entry.valid, entry.invalid}) {
+    if (!reader_.has(key)) continue;
+    reader_.forgive({key});
+    reader_.complain(reader_.where(key), fmt::format("{} without {}", key, entry.rate),
+                     fmt::format("{} = \"SIGNAL\", the rate that it is of", entry.rate));
+  }
+}
+
+void LayoutReader::check_axes_keys() {
+  const std::string& key = entries_.front().rate;
+  if (axes_.empty()) {
+    reader_.complain(reader_.where(key), fmt::format("{} is of a platform of several axes", key),
+                     "rate = \"SIGNAL\", or rate_x, rate_y, rate_z in the [[gyro]] tables");
+    return;
+  }
+  for (const std::string_view one : kOfOneRate) {
+    if (!reader_.has(one)) continue;
+    reader_.forgive({one});
+    reader_.complain(reader_.where(one), fmt::format("{} stands beside {}", one, key),
+                     fmt::format("{}{} for the axis that it is of", one, ending_of(axes_.back())));
+  }
+  for (const RateEntry& entry : entries_) {
+    if (std::find(axes_.begin(), axes_.end(), entry.axis) != axes_.end()) continue;
+    reader_.complain(
+        reader_.where(entry.rate),
+        fmt::format("the units have no axis \"{}\"", kAxisNames[entry.axis]),
+        fmt::format("leave {} out, or name that axis in both [[gyro]] tables", entry.rate));
+  }
+}
+
+// After other trouble nobody reads these keys.
+void LayoutReader::forgive_all() {
+  reader_.forgive({"unit", "sign", "rate_not_available", "id", "source_address", "valid", "invalid",
+                   "every_ms", "fd", "fill", "axis"});
+  for (const RateEntry& entry : entries_)
+    reader_.forgive({entry.sign, entry.valid, entry.invalid});
+  forgive_e2e(reader_);
+}
+
+// Of a platform of several axes a layout with one rate carries one of them.
 void LayoutReader::read_axis() {
+  if (by_axes_) {
+    if (!reader_.has("axis")) return;
+    reader_.forgive({"axis"});
+    reader_.complain(reader_.where("axis"),
+                     fmt::format("axis stands beside {}", entries_.front().rate),
+                     "leave it out, or rate = \"SIGNAL\" where the message carries one axis");
+    return;
+  }
   if (axes_.empty()) {
     if (!reader_.has("axis")) return;
     reader_.forgive({"axis"});
@@ -166,13 +278,15 @@ void LayoutReader::read_axis() {
     return;
   }
   std::string names;
-  for (const std::size_t axis : axes_)
-    names += fmt::format("{}\"{}\"", names.empty() ? "" : ", ", kAxisNames[axis]);
+  bool found = false;
   const std::string name = reader_.required_text("axis", "z");
   for (const std::size_t axis : axes_) {
-    if (name.size() == 1 && name[0] == kAxisNames[axis]) layout_->axis = axis;
+    names += fmt::format("{}\"{}\"", names.empty() ? "" : ", ", kAxisNames[axis]);
+    if (name.size() != 1 || name[0] != kAxisNames[axis]) continue;
+    layout_->rates.front().axis = axis;
+    found = true;
   }
-  if (layout_->axis || name.empty()) return;
+  if (found || name.empty()) return;
   reader_.complain(reader_.where("axis"), fmt::format("the units have no axis \"{}\"", name),
                    names);
 }
@@ -196,89 +310,99 @@ bool LayoutReader::on_page(std::string_view key, const dbc::Signal& signal) {
   return false;
 }
 
-void LayoutReader::read_rate(const dbc::Signal& signal) {
-  const auto quantity = resolver_.quantity(signal, "rate", Dimension::kRate, reader_.text("unit"));
-  const auto none_raw = reader_.integer("rate_not_available");
+void LayoutReader::read_rate(const RateEntry& entry) {
+  const auto quantity = resolver_.quantity(*entry.rate_signal, entry.rate, Dimension::kRate, unit_);
   if (!quantity) return;
-  auto field = output_field(signal, *quantity, rules_, none_raw);
-  if (!field) return complain(none_raw ? "rate_not_available" : "rate", field.error());
-  const dbc::Message& message = resolver_.message();
+  auto field = output_field(*entry.rate_signal, *quantity, rules_, none_raw_);
+  if (!field) return complain(none_raw_ ? "rate_not_available" : entry.rate, field.error());
+  if (!layout_) begin_layout(*quantity);
+  if (!on_page(entry.rate, *entry.rate_signal)) return;
+  take(entry.rate, mask_of(field->codec));
+  layout_->rates.push_back({.rate = std::move(*field), .axis = entry.axis});
+}
+
+// The frame, turned to the page of the first rate.
+void LayoutReader::begin_layout(const Quantity& quantity) {
   layout_.emplace(OutputLayout{
       .bus = resolver_.match().bus,
-      .message = message.name,
+      .message = resolver_.message().name,
       .fd = fd_,
-      .bytes = static_cast<std::uint8_t>(can::fd_padded_length(resolver_.match().bytes)),
-      .rate = std::move(*field)});
+      .bytes = static_cast<std::uint8_t>(can::fd_padded_length(resolver_.match().bytes))});
   // What J1939 and NMEA 2000 do not use is all ones.
   if (rules_ != dbc::CodeRules::kNone) layout_->blank.fill(0xFF);
-  quantity->presence.arrange(layout_->blank);
-  add(taken_, mask_of(quantity->presence));
-  take("rate", mask_of(layout_->rate.codec));
+  quantity.presence.arrange(layout_->blank);
+  add(taken_, mask_of(quantity.presence));
 }
 
-void LayoutReader::read_sign(const dbc::Signal* signal) {
-  const auto sign = reader_.integer("sign");
-  if (sign && *sign != 1 && *sign != -1) {
-    reader_.complain(reader_.where("sign"), fmt::format("sign is {}", *sign),
-                     "1, or -1 to flip the axis");
-  }
-  if (sign) layout_->rate.scale *= static_cast<double>(*sign);
-  if (signal == nullptr || !on_page("sign_signal", *signal)) return;
+void LayoutReader::read_entry(const RateEntry& entry, LayoutRate& one) {
+  read_sign(entry, one);
+  if (entry.sigma_signal != nullptr) read_sigma(entry, one);
+  // Of a single rate it is the frame's.
+  if (by_axes_) one.valid = read_valid(entry.valid, entry.invalid);
+}
+
+void LayoutReader::read_sign(const RateEntry& entry, LayoutRate& one) {
+  if (by_axes_) one.rate.scale *= sign_of(reader_, entry.sign).value_or(1.0);
+  one.rate.scale *= sign_;
+  const dbc::Signal* signal = entry.sign_signal_found;
+  if (signal == nullptr || !on_page(entry.sign_signal, *signal)) return;
   const auto codec = resolver_.codec(*signal);
   if (!codec) return;
-  layout_->sign = *codec;
-  take("sign_signal", mask_of(*codec));
+  one.sign = *codec;
+  take(entry.sign_signal, mask_of(*codec));
 }
 
-void LayoutReader::read_sigma(const dbc::Signal& signal) {
-  const auto quantity = resolver_.quantity(signal, "sigma", Dimension::kRate);
-  if (!quantity || !on_page("sigma", signal)) return;
+void LayoutReader::read_sigma(const RateEntry& entry, LayoutRate& one) {
+  const dbc::Signal& signal = *entry.sigma_signal;
+  const auto quantity = resolver_.quantity(signal, entry.sigma, Dimension::kRate);
+  if (!quantity || !on_page(entry.sigma, signal)) return;
   auto field = output_field(signal, *quantity, rules_);
-  if (!field) return complain("sigma", field.error());
+  if (!field) return complain(entry.sigma, field.error());
   field->minimum = std::max(field->minimum, 0.0);
   if (!field->has_code) {
     if (method_ != Method::kOptimal) {
-      reader_.complain(reader_.where("sigma"),
+      reader_.complain(reader_.where(entry.sigma),
                        fmt::format("{} states no σ, and {} has no code for \"not available\"",
                                    to_string(method_), signal.name),
-                       "leave sigma out, or method = \"optimal\"");
+                       fmt::format("leave {} out, or method = \"optimal\"", entry.sigma));
     }
     // Beside a rate that is not valid: as much as can be said.
     Payload scratch{};
     field->codec.encode(field->maximum, scratch);
     field->none_raw = static_cast<std::uint64_t>(field->codec.decode(scratch).raw);
   }
-  take("sigma", mask_of(field->codec));
-  layout_->sigma = std::move(*field);
+  take(entry.sigma, mask_of(field->codec));
+  one.sigma = std::move(*field);
 }
 
-void LayoutReader::read_valid() {
-  const auto valid = read_condition(reader_, resolver_, *rate_);
+std::optional<OutputFlag> LayoutReader::read_valid(const std::string& key,
+                                                   const std::string& invalid) {
+  const auto valid = read_condition(reader_, resolver_, *rate_, key);
   if (!valid) {
-    if (reader_.has("invalid") && !reader_.has("valid")) {
-      reader_.complain(reader_.where("invalid"), "invalid without valid",
-                       "valid = \"Status == 0\", which names the signal");
+    if (reader_.has(invalid) && !reader_.has(key)) {
+      reader_.complain(reader_.where(invalid), fmt::format("{} without {}", invalid, key),
+                       fmt::format("{} = \"Status == 0\", which names the signal", key));
     }
-    reader_.forgive({"invalid"});
-    return;
+    reader_.forgive({invalid});
+    return std::nullopt;
   }
-  if (!on_page("valid", *valid->signal)) return;
-  take("valid", mask_of(valid->condition.codec));
-  read_flag_raw(*valid);
+  if (!on_page(key, *valid->signal)) return std::nullopt;
+  take(key, mask_of(valid->condition.codec));
+  return flag_of(*valid, key, invalid);
 }
 
 // What to write where the comparison shall hold, and where it must not.
-void LayoutReader::read_flag_raw(const NamedCondition& valid) {
+std::optional<OutputFlag> LayoutReader::flag_of(const NamedCondition& valid, const std::string& key,
+                                                const std::string& invalid) {
   const dbc::SignalCodec& codec = valid.condition.codec;
   OutputFlag flag{.name = valid.signal->name, .codec = codec, .text = valid.condition.text};
   Payload scratch{};
   const auto says_valid = [&] { return holds(valid.condition, codec.decode(scratch).value); };
   const auto raw = [&] { return static_cast<std::uint64_t>(codec.decode(scratch).raw); };
   if (!put_valid(valid.condition, scratch)) {
-    reader_.complain(
-        reader_.where("valid"),
-        fmt::format("no value of the signal fulfils valid = \"{}\"", valid.condition.text));
-    return;
+    reader_.complain(reader_.where(key), fmt::format("no value of the signal fulfils {} = \"{}\"",
+                                                     key, valid.condition.text));
+    return std::nullopt;
   }
   flag.valid_raw = raw();
   bool found = false;
@@ -289,14 +413,14 @@ void LayoutReader::read_flag_raw(const NamedCondition& valid) {
       found = true;
     }
   };
-  if (const auto wanted = reader_.number("invalid")) {
+  if (const auto wanted = reader_.number(invalid)) {
     codec.encode(*wanted, scratch);
     if (says_valid() || codec.decode(scratch).value != *wanted) {
-      reader_.complain(reader_.where("invalid"),
-                       fmt::format("{} = {:g} {}", flag.name, *wanted,
-                                   says_valid() ? "is what `valid` calls valid" : "cannot be said"),
+      const std::string why =
+          says_valid() ? fmt::format("is what `{}` calls valid", key) : "cannot be said";
+      reader_.complain(reader_.where(invalid), fmt::format("{} = {:g} {}", flag.name, *wanted, why),
                        "a value of the signal for which the comparison is false");
-      return;
+      return std::nullopt;
     }
     flag.invalid_raw = raw();
     found = true;
@@ -309,11 +433,11 @@ void LayoutReader::read_flag_raw(const NamedCondition& valid) {
     offer(raw());
   }
   if (!found) {
-    reader_.complain(reader_.where("valid"),
-                     fmt::format("every value fulfils valid = \"{}\"", flag.text),
+    reader_.complain(reader_.where(key),
+                     fmt::format("every value fulfils {} = \"{}\"", key, flag.text),
                      "a comparison that is false when the rate is not valid");
   }
-  layout_->valid = flag;
+  return flag;
 }
 
 void LayoutReader::read_protection() {
@@ -514,10 +638,10 @@ void LayoutReader::warn_of_resting(const dbc::Signal& signal, const RawValue& va
               : fmt::format("counter = \"{}\", or fill", signal.name)});
 }
 
-void LayoutReader::warn_of_rate() {
-  const OutputField& rate = layout_->rate;
+void LayoutReader::warn_of_rate(const RateEntry& entry, const LayoutRate& one) {
+  const OutputField& rate = one.rate;
   const auto warn = [&](std::string what, std::string remedy) {
-    context_.warnings.push_back({reader_.where("rate"), std::move(what), std::move(remedy)});
+    context_.warnings.push_back({reader_.where(entry.rate), std::move(what), std::move(remedy)});
   };
   if (rate.step > kCoarse_dps) {
     warn(fmt::format("one step of {} is {:.3g} deg/s: its readers see little of what the virtual "
@@ -527,13 +651,14 @@ void LayoutReader::warn_of_rate() {
   }
   const double most = std::max(std::abs(rate.minimum), std::abs(rate.maximum));
   const double least = std::min(std::abs(rate.minimum), std::abs(rate.maximum));
-  const double reach_dps = (layout_->sign ? most : least) * std::abs(rate.scale);
+  const double reach_dps = (one.sign ? most : least) * std::abs(rate.scale);
   if (reach_dps < kNarrow_dps) {
     warn(fmt::format("{} carries rates up to {:.4g} deg/s only{}; faster ones go out as not valid",
                      rate.name, reach_dps, reach_dps == 0.0 ? " in one direction" : ""),
-         layout_->sign || rate.minimum < 0.0
+         one.sign || rate.minimum < 0.0
              ? ""
-             : "if the sign has a signal of its own, name it: sign_signal = \"NAME\"");
+             : fmt::format("if the sign has a signal of its own, name it: {} = \"NAME\"",
+                           entry.sign_signal));
   }
 }
 
@@ -548,7 +673,7 @@ std::string id_text(const FrameId& id) {
 
 }  // namespace
 
-void read_output_layouts(TomlReader& output, LayoutContext context, Plan& plan) {
+void read_output_layouts(TomlReader& output, TableContext context, Plan& plan) {
   const toml::array* tables = output.array("layout", "a list of tables: [[output.layout]]");
   if (tables == nullptr) return;
   if (tables->size() > kOutputLayoutsMost) {

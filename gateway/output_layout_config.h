@@ -4,27 +4,14 @@
 // as it can be before there is a rate: which bits, which range, what stands for "not available",
 // and what all the bits say that nobody fills. Complaints carry file and line, as gateway/config.
 
-#include <string>
-#include <vector>
-
-#include "base/error.h"
 #include "base/toml_reader.h"
+#include "gateway/gyro_config.h"
 #include "gateway/plan.h"
-#include "gateway/signal_resolver.h"
 
 namespace vgyro::gateway {
 
-/// What the tables of a configuration share.
-struct LayoutContext {
-  const std::string& file;    ///< the configuration's own path
-  const std::string& folder;  ///< DBC paths are relative to it
-  DatabaseCache& cache;
-  std::vector<Error>& errors;
-  std::vector<Error>& warnings;
-};
-
 /// Reads the key `layout` of [output] into `plan.output`, whose bus is known, and adds their buses.
-void read_output_layouts(TomlReader& output, LayoutContext context, Plan& plan);
+void read_output_layouts(TomlReader& output, TableContext context, Plan& plan);
 
 /// No output is read back as an input, and none has the identifier of another.
 void check_output_ids(TomlReader& output, const Plan& plan);

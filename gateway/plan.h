@@ -167,8 +167,10 @@ struct ReferencePlan {
   std::string bus;
   std::string message;
   FrameMatch match;
-  Quantity rate;
+  Quantity rate;  ///< of a platform of several axes: the last of those below
   E2ePlan e2e = {};
+  /// Of a platform of several axes: the rates about the vehicle's that it tells.
+  std::array<std::optional<Quantity>, kAxes> axes = {};
 
   friend bool operator==(const ReferencePlan&, const ReferencePlan&) = default;
 };
@@ -256,7 +258,18 @@ struct RestingSignal {
   friend bool operator==(const RestingSignal&, const RestingSignal&) = default;
 };
 
-/// The virtual rate in a message that a vehicle already reads.
+/// One rate in a message that a vehicle already reads.
+struct LayoutRate {
+  OutputField rate;                           ///< the direction is part of the scale
+  std::optional<dbc::SignalCodec> sign = {};  ///< of its own: 1 means negative
+  std::optional<OutputField> sigma = {};
+  std::optional<OutputFlag> valid = {};  ///< of this one of several alone
+  std::size_t axis = 0;                  ///< of a platform of several: about which it is
+
+  friend bool operator==(const LayoutRate&, const LayoutRate&) = default;
+};
+
+/// The virtual rate, or those about several axes, in a message that a vehicle already reads.
 struct OutputLayout {
   can::BusIndex bus = 0;
   std::string message = {};
@@ -265,17 +278,18 @@ struct OutputLayout {
   bool fd = false;
   std::uint8_t bytes = can::kClassicBytesMax;          ///< of the frame
   std::array<std::uint8_t, can::kFdBytesMax> blank{};  ///< all but what is filled in
-  OutputField rate;                                    ///< the sign is part of the scale
-  std::optional<dbc::SignalCodec> sign = {};           ///< of its own: 1 means negative
-  std::optional<OutputField> sigma = {};
-  std::optional<OutputFlag> valid = {};
+  std::vector<LayoutRate> rates = {};                  ///< one, or one for each axis
+  std::optional<OutputFlag> valid = {};                ///< of all rates of the frame
   E2ePlan e2e = {};
   std::optional<Duration> every = {};  ///< at most one frame in this time; nothing: with every rate
   std::vector<RestingSignal> resting = {};
-  std::optional<std::size_t> axis = {};  ///< of a platform of several: whose rate it carries
 
-  /// Can its frames say that there is no valid rate? Where they cannot, none is sent then.
-  [[nodiscard]] bool can_say_invalid() const { return valid || rate.has_code; }
+  /// Can its frames say of each rate that it is not valid? Where they cannot, none is sent then.
+  [[nodiscard]] bool can_say_invalid() const {
+    return valid || std::all_of(rates.begin(), rates.end(), [](const LayoutRate& one) {
+             return one.valid || one.rate.has_code;
+           });
+  }
 
   friend bool operator==(const OutputLayout&, const OutputLayout&) = default;
 };

@@ -299,12 +299,14 @@ std::string device_of(const GyroPlan& gyro) {
 }
 
 Expected<void> check_devices(const SavedState& state, const Plan& plan) {
-  if (!state.axes.empty() && plan.axes.empty())
+  if (!state.axes.empty() && plan.axes.empty()) {
     return fail({}, "is of units of several axes, but the gyros of the configuration have one",
                 kRemedy);
-  if (state.axes.empty() && !plan.axes.empty())
+  }
+  if (state.axes.empty() && !plan.axes.empty()) {
     return fail({}, "is of two single gyros, but the configuration has units of several axes",
                 kRemedy);
+  }
   for (const SavedState& one : state.axes) {
     const auto pair = std::find_if(plan.axes.begin(), plan.axes.end(),
                                    [&](const Plan& each) { return each.axis == one.axis; });
@@ -375,9 +377,16 @@ std::string axes_text(const SavedState& state) {
         "angle_rad = {}\ncovariance = {}\n",
         listed(state.misalignment->angle_rad), listed(state.misalignment->covariance));
   }
+  if (state.heading) {
+    text +=
+        fmt::format("\n[heading]  # of x, clockwise from north\nheading_rad = {}\nsigma_rad = {}\n",
+                    shortest(state.heading->heading_rad), shortest(state.heading->sigma_rad));
+  }
   for (const SavedState& one : state.axes) {
     const char axis = kAxisNames[one.axis];
     text += fmt::format("\n[axis.{}]\n{}", axis, pair_text(one));
+    if (one.earth_doubt_dps)
+      text += fmt::format("earth_doubt_dps = {}\n", shortest(*one.earth_doubt_dps));
     text += drift_text(one.drift, fmt::format("axis.{}.drift", axis));
   }
   return text;
@@ -411,6 +420,7 @@ Expected<SavedState> pair_from(const toml::table& root, const std::string& where
         top.optional_number(temperature_key(gyro), kTemperatureMin_c, kTemperatureMax_c);
   }
   state.pair = contradiction_from(top);
+  state.earth_doubt_dps = top.optional_number("earth_doubt_dps", 0.0, kRateMax_dps);
   top.pass_over("drift");
   if (const std::optional<Error> error = top.finish()) return tl::unexpected(*error);
   Numbers table(*drift, where, "[drift]");
@@ -421,6 +431,8 @@ Expected<SavedState> pair_from(const toml::table& root, const std::string& where
 
 // Units that face each other are no small rotation.
 constexpr double kAngleMax_rad = 3.2;
+// As configured it may be anything that people call a direction.
+constexpr double kHeadingMax_rad = 100.0;
 
 Expected<fusion::MisalignmentMemory> misalignment_from(const toml::table& root,
                                                        const std::string& where) {
@@ -433,9 +445,18 @@ Expected<fusion::MisalignmentMemory> misalignment_from(const toml::table& root,
   return memory;
 }
 
+Expected<HeadingMemory> heading_from(const toml::table& root, const std::string& where) {
+  Numbers table(root, where, "[heading]");
+  HeadingMemory memory;
+  memory.heading_rad = table.number("heading_rad", -kHeadingMax_rad, kHeadingMax_rad);
+  memory.sigma_rad = table.number("sigma_rad", 0.0, Heading::kSigmaMost_rad);
+  if (const std::optional<Error> error = table.finish()) return tl::unexpected(*error);
+  return memory;
+}
+
 Expected<SavedState> axes_from(const toml::table& root, const std::string& where) {
   Numbers top(root, where, "saved state");
-  for (const char* key : {"format", "axis", "misalignment"})
+  for (const char* key : {"format", "axis", "misalignment", "heading"})
     top.pass_over(key);
   if (const std::optional<Error> error = top.finish()) return tl::unexpected(*error);
   const toml::table* tables = root["axis"].as_table();
@@ -457,6 +478,11 @@ Expected<SavedState> axes_from(const toml::table& root, const std::string& where
     const auto misalignment = misalignment_from(*table, where);
     if (!misalignment) return tl::unexpected(misalignment.error());
     state.misalignment = *misalignment;
+  }
+  if (const toml::table* table = root["heading"].as_table()) {
+    const auto heading = heading_from(*table, where);
+    if (!heading) return tl::unexpected(heading.error());
+    state.heading = *heading;
   }
   return state;
 }

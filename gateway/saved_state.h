@@ -16,6 +16,7 @@
 #include "fusion/drift_memory.h"
 #include "fusion/misalignment.h"
 #include "fusion/pair_relation.h"
+#include "gateway/heading.h"
 #include "gateway/plan.h"
 
 namespace vgyro::gateway {
@@ -32,8 +33,10 @@ struct SavedState {
   fusion::PairVerdict pair;  ///< a contradiction, which only motion can take back
   /// Of a platform of several axes: a state of each that has one; what stands above is the first's.
   std::vector<SavedState> axes = {};
-  std::size_t axis = 0;  ///< of one of these: which
+  std::size_t axis = 0;                        ///< of one of these: which
+  std::optional<double> earth_doubt_dps = {};  ///< of one of these: AxisPipeline::earth_doubt_dps()
   std::optional<fusion::MisalignmentMemory> misalignment = {};
+  std::optional<HeadingMemory> heading = {};
 };
 
 /// What must be the same for the biases of a gyro to mean the same: bus, identifier, signal, scale,

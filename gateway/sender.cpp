@@ -4,7 +4,6 @@
 #include <cassert>
 #include <cmath>
 #include <limits>
-#include <utility>
 
 namespace vgyro::gateway {
 
@@ -27,13 +26,10 @@ Sender::Turn::Turn(Sender& sender, FrameSink& sink, TimePoint stamp) : sender_(s
 
 Sender::Sender(const OutputPlan& plan)
     : encoder_(plan),
-      layouts_(plan.layouts.begin(), plan.layouts.end()),
-      bus_(plan.bus),
+      layouts_(plan),
       vgyro_frames_(plan.vgyro_frames),
       rate_dps_(kNone),
-      sigma_dps_(kNone) {
-  assert(layouts_.size() <= kOutputLayoutsMost);
-}
+      sigma_dps_(kNone) {}
 
 bool Sender::send_rate(const RateOutput& output) {
   assert(sink_ != nullptr);
@@ -52,20 +48,13 @@ bool Sender::send_rate(const RateOutput& output) {
   } else if (vgyro_frames_) {
     sink_->put(encoder_.rate(output), stamp_);
   }
-  if (!layouts_.empty()) send_layouts(output);
+  if (shared_layouts_ != nullptr || !layouts_.empty()) send_layouts(output);
   return valid;
 }
 
 void Sender::send_layouts(const RateOutput& output) {
-  for (LayoutEncoder& layout : layouts_) {
-    const can::Frame* frame = layout.rate(output, stamp_);
-    if (frame == nullptr) continue;
-    if (layout.bus() == bus_) {
-      sink_->put(*frame, stamp_);
-    } else {
-      sink_->put_on(layout.bus(), *frame, stamp_);
-    }
-  }
+  LayoutSet& layouts = shared_layouts_ != nullptr ? *shared_layouts_ : layouts_;
+  layouts.take(axis_, output, stamp_, *sink_);
 }
 
 void Sender::send_bias(const BiasOutput& bias, const ModelOutput& model) {
@@ -94,35 +83,16 @@ TimePoint Sender::grid_missed_at(Duration sample_interval) const {
   return next_bias_ + std::max<Duration>(kBiasGrace, 2 * sample_interval);
 }
 
-// One identifier may go out on several buses: the first of them goes on from the first, and so on.
-const LayoutEncoder* Sender::predecessor(std::size_t index, const Sender& before) const {
-  const LayoutEncoder& layout = layouts_[index];
-  const auto is_same = [&](const LayoutEncoder& other) { return layout.sends_same_frame(other); };
-  auto left = std::count_if(layouts_.begin(), layouts_.begin() + static_cast<std::ptrdiff_t>(index),
-                            is_same);
-  for (const LayoutEncoder& other : before.layouts_) {
-    if (is_same(other) && left-- == 0) return &other;
-  }
-  return nullptr;
-}
-
 void Sender::count_on_from(const Sender& before) {
   encoder_.count_on_from(before.encoder_);
-  for (std::size_t i = 0; i < layouts_.size(); ++i) {
-    if (const LayoutEncoder* other = predecessor(i, before)) layouts_[i].go_on_from(*other);
-  }
+  layouts_.count_on_from(before.layouts_);
 }
 
 void Sender::change_plan(const OutputPlan& plan) {
   Sender changed(plan);
   changed.count_on_from(*this);
-  for (std::size_t i = 0; i < changed.layouts_.size(); ++i) {
-    if (const LayoutEncoder* other = changed.predecessor(i, *this))
-      changed.layouts_[i].take_books_of(*other);
-  }
   encoder_ = changed.encoder_;
-  layouts_ = std::move(changed.layouts_);
-  bus_ = changed.bus_;
+  layouts_.change_plan(plan);
   vgyro_frames_ = changed.vgyro_frames_;
 }
 
@@ -131,9 +101,7 @@ void Sender::tell(Status& status) const {
   status.rates_out_valid = rates_valid_;
   status.rates_out_of_range = rates_out_of_range_;
   status.biases_out = biases_;
-  status.layouts_out = {};
-  for (std::size_t i = 0; i < layouts_.size(); ++i)
-    status.layouts_out[i] = layouts_[i].counts();
+  layouts_.tell(status);
   status.rate_dps = rate_dps_;
   status.sigma_dps = sigma_dps_;
   status.quality = quality_;

@@ -8,7 +8,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <vector>
 
 #include "base/time.h"
 #include "gateway/frame_sink.h"
@@ -55,6 +54,11 @@ class Sender {
     collector_ = collector;
     axis_ = axis;
   }
+  /// From now on rates of this axis go out in these layouts; there are none of our own.
+  void share_layouts(LayoutSet* layouts, std::size_t axis) {
+    shared_layouts_ = layouts;
+    axis_ = axis;
+  }
 
   /// Precondition of both: a Turn. A rate that the frame cannot carry goes out as invalid: false
   /// then, and where it was not valid before.
@@ -81,17 +85,18 @@ class Sender {
   /// The last VG_Rate's; NaN when that was invalid.
   [[nodiscard]] double rate_dps() const { return rate_dps_; }
 
+  /// Its σ; likewise, or where none is stated.
+  [[nodiscard]] double sigma_dps() const { return sigma_dps_; }
+
   /// The books, and what the last rate said.
   void tell(Status& status) const;
 
  private:
   [[gnu::noinline]] void send_layouts(const RateOutput& output);
-  /// The layout of `before` that the frame of our layout `index` was; null: there was none.
-  [[nodiscard]] const LayoutEncoder* predecessor(std::size_t index, const Sender& before) const;
 
   OutputEncoder encoder_;
-  std::vector<LayoutEncoder> layouts_;
-  can::BusIndex bus_;
+  LayoutSet layouts_;
+  LayoutSet* shared_layouts_ = nullptr;
   bool vgyro_frames_;
   FrameSink* sink_ = nullptr;
   RateCollector* collector_ = nullptr;

@@ -35,7 +35,7 @@ std::string_view to_string(Reject reject) {
       "not_data",     "other_page",       "truncated",      "flagged_invalid", "not_finite",
       "out_of_range", "counter_repeated", "wrong_sequence", "crc_wrong",       "stamp_repeated",
       "late",         "stamp_jump",       "saturated",      "stuck",           "dead_band",
-      "recovering",   "no_measurement"};
+      "recovering",   "no_measurement",   "other_axis"};
   return kNames[static_cast<std::size_t>(reject)];
 }
 

@@ -56,9 +56,10 @@ enum class Reject : std::uint8_t {
   kStuck,            ///< the value stands still and should not
   kDeadBand,         ///< 0 of a sensor with a dead band, while the other gyro carries on
   kRecovering,       ///< good again, but not for long enough after a fault
-  kNoMeasurement     ///< J1939's or NMEA 2000's code for "error", "not available" and the like
+  kNoMeasurement,    ///< J1939's or NMEA 2000's code for "error", "not available" and the like
+  kOtherAxis         ///< of a unit that is turned: an axis that is mixed into this one is not told
 };
-inline constexpr std::size_t kRejectCount = 17;
+inline constexpr std::size_t kRejectCount = 18;
 std::string_view to_string(Reject reject);
 
 /// What became of the biases that an earlier run had saved.

@@ -4,11 +4,12 @@
 #include <cmath>
 #include <numbers>
 
+#include "base/angle.h"
+
 namespace vgyro::gateway {
 
 namespace {
 
-constexpr double kRadPerDeg = std::numbers::pi / 180.0;
 constexpr double kTurn_rad = 2.0 * std::numbers::pi;
 
 fusion::TemperatureFilter filter_of(const GyroPlan& gyro) {

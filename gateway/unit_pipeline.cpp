@@ -6,22 +6,20 @@
 #include <numbers>
 #include <utility>
 
+#include "base/angle.h"
 #include "gateway/axes_plan.h"
 
 namespace vgyro::gateway {
 
 namespace {
 
-constexpr double kRadPerDeg = std::numbers::pi / 180.0;
 // What one axis shows of a turn counts for no more than this with the others: a wrong opinion must
 // not last for ever.
 constexpr double kLogTurningMost = 6.0;
 // From this probability on a steady turn about one axis is motion of the platform: nobody stands.
 constexpr double kSurelyTurning = 0.9;
-// The true rate at a stop follows the heading in steps of so much, a ten-thousandth of the Earth's.
-constexpr double kHeadingLeap_s = 1.0;
 // Pairs of different axes that are further apart are of different motion.
-constexpr Duration kApartMost = std::chrono::milliseconds(25);
+constexpr Duration kApartMost = LayoutSet::kApartMost;
 constexpr std::array<std::uint8_t, 2> kGyroRoles{kGyro1, kGyro2};
 
 double finite_or_0(double value) {
@@ -68,13 +66,11 @@ void SharedRates::flush() {
 class UnitPipeline::Turn {
  public:
   Turn(UnitPipeline& units, FrameSink& sink, TimePoint stamp) : units_(units) {
-    if (units.shared_) units.shared_->begin(sink, stamp);
+    units.begin_output(sink, stamp);
     for (std::size_t place = 0; place < units.axes_.size(); ++place)
       turns_[place].emplace(units.axes_[place]->sender(), sink, stamp);
   }
-  ~Turn() {
-    if (units_.shared_) units_.shared_->end();
-  }
+  ~Turn() { units_.end_output(); }
   Turn(const Turn&) = delete;
   Turn& operator=(const Turn&) = delete;
 
@@ -83,17 +79,40 @@ class UnitPipeline::Turn {
   std::array<std::optional<AxisPipeline::Turn>, kAxes> turns_;
 };
 
-UnitPipeline::UnitPipeline(const Plan& plan) : plan_(plan), router_(plan_) {
+UnitPipeline::UnitPipeline(const Plan& plan)
+    : plan_(plan), router_(plan_), layouts_(plan_.output), heading_(plan_.calibration) {
   for (const Plan& pair : plan_.axes)
     axes_.push_back(std::make_unique<AxisPipeline>(pair, make_corrector(pair)));
   for (std::size_t gyro = 0; gyro < 2; ++gyro)
     units_[gyro] = unit_of(gyro);
   learns_misalignment_ = plan_.corrector.method == Method::kOptimal;
-  if (plan_.output.rate_is_shared && plan_.output.vgyro_frames) {
-    shared_.emplace(plan_.output);
-    for (const auto& axis : axes_)
-      axis->sender().share_rates(&*shared_, axis->plan().axis);
+  if (plan_.output.rate_is_shared && plan_.output.vgyro_frames) shared_.emplace(plan_.output);
+  share_output();
+}
+
+void UnitPipeline::share_output() {
+  for (const auto& axis : axes_) {
+    axis->sender().share_rates(shared_ ? &*shared_ : nullptr, axis->plan().axis);
+    axis->sender().share_layouts(layouts_.empty() ? nullptr : &layouts_, axis->plan().axis);
   }
+}
+
+void UnitPipeline::begin_output(FrameSink& sink, TimePoint stamp) {
+  sink_ = &sink;
+  stamp_ = stamp;
+  if (shared_) shared_->begin(sink, stamp);
+}
+
+void UnitPipeline::end_output() {
+  if (shared_) shared_->end();
+  layouts_.settle(stamp_, *sink_);
+  sink_ = nullptr;
+}
+
+// The rates of one instant are all there.
+void UnitPipeline::settle_output() {
+  if (shared_) shared_->flush();
+  layouts_.settle(stamp_, *sink_);
 }
 
 UnitPipeline::Unit UnitPipeline::unit_of(std::size_t gyro) const {
@@ -103,6 +122,7 @@ UnitPipeline::Unit UnitPipeline::unit_of(std::size_t gyro) const {
       const GyroPlan& sensor = plan_.axes[other].gyros[gyro];
       const double share = plan_.gyros[gyro].mount.at(plan_.axes[place].axis, sensor.sensor_axis);
       unit.share[place][other] = sensor.flipped ? -share : share;
+      unit.together[place][other] = sensor.match == plan_.axes[place].gyros[gyro].match;
       unit.turns = unit.turns || unit.share[place][other] != (place == other ? 1.0 : 0.0);
     }
   }
@@ -143,17 +163,19 @@ void UnitPipeline::receive_unit(std::size_t gyro, std::uint8_t role,
   for (std::size_t place = 0; place < axes_.size(); ++place) {
     if ((roles[place] & role) == 0) continue;
     heard[place] = axes_[place]->admit(gyro, frame, stamp, readings[place]);
-    unit.known[place] = heard[place];
-    if (heard[place]) unit.reading_dps[place] = readings[place].rate_dps;
+    if (!heard[place]) continue;
+    unit.reading_dps[place] = readings[place].rate_dps;
+    unit.read_at[place] = stamp;
   }
   std::array<double, kAxes> rate_dps{};
   for (std::size_t place = 0; place < axes_.size(); ++place) {
     if (!heard[place]) continue;
-    const std::optional<double> rate =
-        unit.turns ? turned(gyro, place) : std::optional(readings[place].rate_dps);
-    if (!rate) axes_[place]->go_without(gyro, readings[place].t);
-    heard[place] = rate && axes_[place]->offer(gyro, readings[place], *rate);
-    rate_dps[place] = rate.value_or(0.0);
+    rate_dps[place] = readings[place].rate_dps;
+    const Worth worth = unit.turns ? turn(gyro, place, stamp, rate_dps[place]) : Worth::kNew;
+    if (worth != Worth::kNew)
+      axes_[place]->go_without(gyro, readings[place].t, worth == Worth::kSick);
+    heard[place] =
+        worth == Worth::kNew && axes_[place]->offer(gyro, readings[place], rate_dps[place]);
   }
   for (std::size_t place = 0; place < axes_.size(); ++place) {
     if (heard[place]) axes_[place]->arrive(gyro, readings[place].t);
@@ -163,25 +185,40 @@ void UnitPipeline::receive_unit(std::size_t gyro, std::uint8_t role,
     if (!heard[place] || axes_[place]->pairing()) continue;
     note_single(gyro, place, rate_dps[place]);
     axes_[place]->speak_alone(gyro, readings[place].t, rate_dps[place]);
+    follow_heading(readings[place].t);
   }
 }
 
-// In place of a sensor axis that is set aside, and has little to say here, stands what is known of
-// the vehicle's rate about it.
-std::optional<double> UnitPipeline::turned(std::size_t gyro, std::size_t place) const {
+UnitPipeline::Worth UnitPipeline::worth(std::size_t gyro, std::size_t place, std::size_t other,
+                                        TimePoint stamp) const {
   const Unit& unit = units_[gyro];
-  double rate_dps = 0.0;
+  if (axes_[other]->set_aside(gyro)) return Worth::kSick;
+  const Duration age = span(unit.read_at[other], stamp);
+  if (unit.together[place][other]) return age == Duration::zero() ? Worth::kNew : Worth::kOld;
+  const Duration interval = axes_[other]->interval(gyro);
+  const Duration most = interval > Duration::zero() ? interval + interval / 2 : kApartMost;
+  return age <= most && age >= -most ? Worth::kNew : Worth::kOld;
+}
+
+// In place of a sensor axis that has little to say here, and nothing new, stands what is known of
+// the vehicle's rate about it.
+UnitPipeline::Worth UnitPipeline::turn(std::size_t gyro, std::size_t place, TimePoint stamp,
+                                       double& rate_dps) const {
+  const Unit& unit = units_[gyro];
+  Worth all = Worth::kNew;
+  rate_dps = 0.0;
   for (std::size_t other = 0; other < axes_.size(); ++other) {
     const double share = unit.share[place][other];
-    if (unit.known[other]) {
+    const Worth one = share == 0.0 ? Worth::kNew : worth(gyro, place, other, stamp);
+    if (one == Worth::kNew) {
       rate_dps += share * unit.reading_dps[other];
     } else if (std::abs(share) > kShareMissed) {
-      return std::nullopt;
+      all = std::max(all, one);
     } else {
       rate_dps += share * rate_dps_[plan_.axes[other].axis];
     }
   }
-  return rate_dps;
+  return all;
 }
 
 // --- rates ---------------------------------------------------------------------------------------
@@ -217,7 +254,8 @@ void UnitPipeline::take_round(Pairs& pairs) {
     axes_[place]->take_pair(*pairs[place]);
     t = pairs[place]->t;
   }
-  if (shared_) shared_->flush();
+  settle_output();
+  share_calibrations(t);
   share_motion();
   follow_heading(t);
 }
@@ -291,15 +329,28 @@ void UnitPipeline::begin(TimePoint t) {
   if (begun_) return;
   begun_ = true;
   origin_ = t;
-  if (!saved_) return;
-  const double age_s = std::max(to_seconds(axes_[0]->stamp_of(t) - saved_stamp_), 0.0);
-  (void)misalignment_.resume(*saved_, age_s);
+  if (!resumed_) return;
+  heading_.age(age_s(t));
+  if (saved_) (void)misalignment_.resume(*saved_, age_s(t));
+}
+
+// As of an axis: a clock that stands before the state tells nothing.
+double UnitPipeline::age_s(TimePoint t) const {
+  const TimePoint stamp = axes_[0]->stamp_of(t);
+  if (stamp < saved_stamp_) return Estimator::kUnknownAge_s;
+  return to_seconds(stamp - saved_stamp_);
 }
 
 // --- what the axes tell each other ---------------------------------------------------------------
 
 // A stop is a stop of all axes, and a turn about one of them is one of the platform.
 void UnitPipeline::share_motion() {
+  std::array<std::uint64_t, kAxes> editions{};
+  for (std::size_t place = 0; place < axes_.size(); ++place)
+    editions[place] = axes_[place]->estimator().condition_edition();
+  // They say the same for some hundred pairs.
+  if (editions == told_of_) return;
+  told_of_ = editions;
   for (std::size_t place = 0; place < axes_.size(); ++place) {
     fusion::Elsewhere elsewhere;
     for (std::size_t other = 0; other < axes_.size(); ++other) {
@@ -322,6 +373,25 @@ void UnitPipeline::share_motion() {
   }
 }
 
+// A stop that ends for one axis ends for all: whoever has rested for long enough is calibrated as
+// well, whoever has not begins again. Motion that is accepted is motion of all.
+void UnitPipeline::share_calibrations(TimePoint t) {
+  bool moved = false;
+  std::optional<TimePoint> still_until;
+  bool all_calibrated = true;
+  for (const auto& axis : axes_) {
+    moved = moved || axis->estimator().moved_in_calibration();
+    if (!still_until) still_until = axis->estimator().calibration_cut_at();
+    all_calibrated = all_calibrated && axis->estimator().calibrated();
+  }
+  if (all_calibrated) return;
+  for (const auto& axis : axes_) {
+    if (still_until && !cut_short_) axis->end_calibration(t, *still_until);
+    if (moved) axis->estimator().note_motion_in_calibration();
+  }
+  cut_short_ = still_until.has_value();
+}
+
 void UnitPipeline::share_restarts() {
   std::array<bool, kAxes> restarted{};
   bool any = false;
@@ -338,32 +408,49 @@ void UnitPipeline::share_restarts() {
 
 // The Earth's rate about the vehicle's horizontal axes turns with its heading.
 void UnitPipeline::follow_heading(TimePoint t) {
-  const CalibrationPlan& calibration = plan_.calibration;
-  if (!calibration.heading_deg || !calibration.latitude_deg) return;
-  if (!heading_known_) {
-    heading_known_ = true;
-    heading_rad_ = *calibration.heading_deg * kRadPerDeg;
-    heading_at_ = t;
-  }
-  const double since_s = to_seconds(t - heading_at_);
-  heading_at_ = std::max(heading_at_, t);
-  if (since_s <= 0.0 || since_s > kHeadingLeap_s) return;
-  // Compasses count clockwise, gyros the other way.
-  heading_rad_ -= rate_dps_[2] * kRadPerDeg * since_s;
-  const double north_dps = kEarthRate_dps * std::cos(*calibration.latitude_deg * kRadPerDeg);
+  if (!heading_.is_told()) return;
+  begin(t);
+  const bool rests = std::none_of(axes_.begin(), axes_.end(),
+                                  [](const auto& axis) { return axis->estimator().calibrated(); });
+  heading_.follow(t, turn_about_z(), rests);
+  share_heading();
+}
+
+std::optional<Heading::Turn> UnitPipeline::turn_about_z() {
+  AxisPipeline& axis = *axes_.back();
+  const State state = axis.status().state;
+  const bool speaks = state == State::kRunning || state == State::kDegraded;
+  if (axis.plan().axis != 2 || !speaks || !std::isfinite(axis.rate_dps())) return std::nullopt;
+  return Heading::Turn{.rate_dps = axis.rate_dps(),
+                       .sigma_dps = finite_or_0(axis.sigma_dps()),
+                       .bias_sigma_dps = finite_or_0(axis.bias_sigma_dps())};
+}
+
+// What is learned at a stop, or in a calibration, is as wrong as what is expected of the Earth
+// then.
+void UnitPipeline::share_heading() {
   for (const auto& axis : axes_) {
-    if (axis->plan().axis == 0) axis->estimator().set_stop_rate(north_dps * std::cos(heading_rad_));
-    if (axis->plan().axis == 1) axis->estimator().set_stop_rate(north_dps * std::sin(heading_rad_));
+    const std::size_t about = axis->plan().axis;
+    if (about == 2) continue;
+    Estimator& estimator = axis->estimator();
+    const double rate_dps = heading_.earth_rate_dps(about);
+    const double doubt_dps = heading_.earth_doubt_dps(about);
+    estimator.set_stop_rate(rate_dps);
+    if (!estimator.calibrated()) {
+      axis->set_earth_doubt(std::hypot(doubt_dps, rate_dps - axis->plan().calibration.rate_dps));
+    } else if (estimator.condition().stopped) {
+      axis->set_earth_doubt(doubt_dps);
+    }
   }
 }
 
 // --- time ----------------------------------------------------------------------------------------
 
 void UnitPipeline::advance(TimePoint now, FrameSink& sink) {
-  if (shared_) shared_->begin(sink, now);
+  begin_output(sink, now);
   for (const auto& axis : axes_)
     axis->advance(now, sink);
-  if (shared_) shared_->end();
+  end_output();
 }
 
 TimePoint UnitPipeline::next_deadline() const {
@@ -388,13 +475,22 @@ std::optional<SavedState> UnitPipeline::memory() const {
     auto state = axis->memory();
     if (!state) continue;
     state->axis = axis->plan().axis;
+    state->earth_doubt_dps = axis->earth_doubt_dps();
     axes.push_back(std::move(*state));
   }
   if (axes.empty()) return std::nullopt;
   SavedState all = axes.front();
   all.axes = std::move(axes);
   if (learns_misalignment_) all.misalignment = begun_ || !saved_ ? misalignment_.memory() : *saved_;
+  all.heading = heading_.memory();
   return all;
+}
+
+// An older state does not say where the vehicle pointed when it learned.
+double UnitPipeline::doubt_of(const SavedState& state, const Plan& pair) const {
+  if (state.earth_doubt_dps) return std::max(*state.earth_doubt_dps, pair.calibration.doubt_dps);
+  const bool turns = heading_.is_told() && pair.axis != 2;
+  return turns ? heading_.north_dps() / std::numbers::sqrt2 : pair.calibration.doubt_dps;
 }
 
 Expected<void> UnitPipeline::resume(const SavedState& state) {
@@ -403,8 +499,11 @@ Expected<void> UnitPipeline::resume(const SavedState& state) {
     for (const auto& axis : axes_) {
       if (axis->plan().axis != one.axis) continue;
       if (auto taken = axis->resume(one); !taken) return taken;
+      axis->set_earth_doubt(doubt_of(one, axis->plan()));
     }
   }
+  resumed_ = true;
+  heading_.resume(state.heading);
   saved_ = state.misalignment;
   saved_stamp_ = state.rate_stamp;
   return {};
@@ -417,6 +516,7 @@ void UnitPipeline::count_on_from(const UnitPipeline& before) {
     }
   }
   if (shared_ && before.shared_) shared_->count_on_from(*before.shared_);
+  layouts_.count_on_from(before.layouts_);
 }
 
 void UnitPipeline::change_output(const Plan& plan) {
@@ -427,8 +527,8 @@ void UnitPipeline::change_output(const Plan& plan) {
   if (plan_.output.rate_is_shared && plan_.output.vgyro_frames) shared.emplace(plan_.output);
   if (shared && shared_) shared->count_on_from(*shared_);
   shared_ = shared;
-  for (const auto& axis : axes_)
-    axis->sender().share_rates(shared_ ? &*shared_ : nullptr, axis->plan().axis);
+  layouts_.change_plan(plan_.output);
+  share_output();
 }
 
 // --- the whole platform --------------------------------------------------------------------------
@@ -487,15 +587,7 @@ const Status& UnitPipeline::refreshed_status() {
   status_ = axes_.back()->refreshed_status();
   for (std::size_t place = 0; place + 1 < axes_.size(); ++place)
     add_axis(axes_[place]->refreshed_status(), status_);
-  // The platform's own layouts, each of which one axis sends.
-  status_.layouts_out = {};
-  std::array<std::size_t, kAxes> sent{};
-  for (std::size_t i = 0; i < plan_.output.layouts.size(); ++i) {
-    for (std::size_t place = 0; place < axes_.size(); ++place) {
-      if (plan_.output.layouts[i].axis != plan_.axes[place].axis) continue;
-      status_.layouts_out[i] = axes_[place]->status().layouts_out[sent[place]++];
-    }
-  }
+  layouts_.tell(status_);
   status_.misalignment_segments = misalignment_.segments();
   for (std::size_t axis = 0; axis < kAxes; ++axis) {
     status_.misalignment_deg[axis] = misalignment_.angle_rad()[axis] / kRadPerDeg;

@@ -17,7 +17,9 @@
 #include "fusion/misalignment.h"
 #include "gateway/axis_pipeline.h"
 #include "gateway/frame_sink.h"
+#include "gateway/heading.h"
 #include "gateway/output_frames.h"
+#include "gateway/output_layout.h"
 #include "gateway/plan.h"
 #include "gateway/router.h"
 #include "gateway/saved_state.h"
@@ -77,34 +79,53 @@ class UnitPipeline {
   struct Unit {
     std::array<std::array<double, kAxes>, kAxes> share{};
     bool turns = false;
+    /// Both axes stand in one message.
+    std::array<std::array<bool, kAxes>, kAxes> together{};
     std::array<double, kAxes> reading_dps{};
-    std::array<bool, kAxes> known{};
+    std::array<TimePoint, kAxes> read_at{};  ///< stamp of the reading
   };
+  /// What a reading is worth to another axis.
+  enum class Worth : std::uint8_t { kNew, kOld, kSick };
   class Turn;
 
+  /// Between the two, what concerns all axes goes to this sink.
+  void begin_output(FrameSink& sink, TimePoint stamp);
+  void end_output();
+  void share_output();
+  void settle_output();
   [[nodiscard]] Unit unit_of(std::size_t gyro) const;
   [[nodiscard]] bool nothing_due(TimePoint stamp) const;
   void receive_unit(std::size_t gyro, std::uint8_t role,
                     const std::array<std::uint8_t, kAxes>& roles, const can::Frame& frame,
                     TimePoint stamp);
-  /// The rate about an axis of the vehicle; nothing where what is missing matters there.
-  [[nodiscard]] std::optional<double> turned(std::size_t gyro, std::size_t place) const;
+  [[nodiscard]] Worth worth(std::size_t gyro, std::size_t place, std::size_t other,
+                            TimePoint stamp) const;
+  /// The rate about an axis of the vehicle. Where what is missing matters there: kOld or kSick.
+  Worth turn(std::size_t gyro, std::size_t place, TimePoint stamp, double& rate_dps) const;
   void take_pairs();
   void take_round(Pairs& pairs);
   void note_rates(const Pairs& pairs);
   void learn_misalignment(const Pairs& pairs);
   void begin(TimePoint t);
+  [[nodiscard]] double age_s(TimePoint t) const;
+  [[nodiscard]] double doubt_of(const SavedState& state, const Plan& pair) const;
   void set_cross(std::size_t place);
   void note_single(std::size_t gyro, std::size_t place, double rate_dps);
   void share_motion();
+  void share_calibrations(TimePoint t);
   void share_restarts();
   void follow_heading(TimePoint t);
+  [[nodiscard]] std::optional<Heading::Turn> turn_about_z();
+  void share_heading();
 
   Plan plan_;
   Router router_;
   std::vector<std::unique_ptr<AxisPipeline>> axes_;
   std::array<Unit, 2> units_;
   std::optional<SharedRates> shared_;
+  LayoutSet layouts_;
+  FrameSink* sink_ = nullptr;
+  TimePoint stamp_;
   fusion::Misalignment misalignment_;
   bool learns_misalignment_ = false;
   fusion::AxisRates rate_dps_{};  ///< about x, y, z: the newest of the platform, biases taken off
@@ -112,13 +133,14 @@ class UnitPipeline {
   bool begun_ = false;
   std::optional<fusion::MisalignmentMemory> saved_;
   TimePoint saved_stamp_;
+  bool resumed_ = false;
   Pairs waiting_;  ///< for the pairs of the other axes
 
   std::array<fusion::Elsewhere, kAxes> told_{};
+  std::array<std::uint64_t, kAxes> told_of_{};  ///< editions of the conditions that made it
   std::array<std::uint64_t, kAxes> restarts_{};
-  double heading_rad_ = 0.0;  ///< clockwise from north
-  TimePoint heading_at_;
-  bool heading_known_ = false;
+  bool cut_short_ = false;  ///< the calibrations of all axes, by the motion that one of them saw
+  Heading heading_;
   Status status_;
 };
 

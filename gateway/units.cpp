@@ -3,9 +3,10 @@
 #include <algorithm>
 #include <cctype>
 #include <iterator>
-#include <numbers>
 
 #include <fmt/format.h>
+
+#include "base/angle.h"
 
 namespace vgyro::gateway {
 
@@ -17,7 +18,6 @@ struct Spelling {
   Conversion conversion;
 };
 
-constexpr double kDegPerRad = 180.0 / std::numbers::pi;
 constexpr double kStandardGravity = 9.80665;  // m/s², CGPM 1901
 constexpr double kMetrePerMile = 1609.344;
 

@@ -49,17 +49,18 @@ std::optional<ComparisonText> parse_comparison(std::string_view text) {
 }  // namespace
 
 std::optional<NamedCondition> read_condition(TomlReader& reader, SignalResolver& resolver,
-                                             const dbc::Signal& main) {
-  const auto text = reader.text("valid");
+                                             const dbc::Signal& main, std::string_view key) {
+  const auto text = reader.text(key);
   if (!text) return std::nullopt;
   const auto parsed = parse_comparison(*text);
   if (!parsed) {
-    reader.complain(reader.where("valid"), fmt::format("\"{}\" is no comparison", *text),
-                    "for example valid = \"Status == 0\"; ==, !=, <, <=, >, >= and a number");
+    reader.complain(
+        reader.where(key), fmt::format("\"{}\" is no comparison", *text),
+        fmt::format("for example {} = \"Status == 0\"; ==, !=, <, <=, >, >= and a number", key));
     return std::nullopt;
   }
-  const dbc::Signal* signal = resolver.signal_named(parsed->signal, "valid");
-  if (signal == nullptr || !resolver.shares_page("valid", *signal, main)) return std::nullopt;
+  const dbc::Signal* signal = resolver.signal_named(parsed->signal, key);
+  if (signal == nullptr || !resolver.shares_page(key, *signal, main)) return std::nullopt;
   const auto codec = resolver.codec(*signal);
   if (!codec) return std::nullopt;
   return NamedCondition{signal, {*codec, parsed->comparison, parsed->value, *text}};

@@ -3,6 +3,7 @@
 // The key `valid` of a table of the configuration: "Status == 0", a comparison on one signal.
 
 #include <optional>
+#include <string_view>
 
 #include "base/toml_reader.h"
 #include "gateway/plan.h"
@@ -18,6 +19,7 @@ struct NamedCondition {
 /// `main` is the signal that the message is read, or sent, for. Nothing where the key is not there,
 /// or after a complaint.
 std::optional<NamedCondition> read_condition(TomlReader& reader, SignalResolver& resolver,
-                                             const dbc::Signal& main);
+                                             const dbc::Signal& main,
+                                             std::string_view key = "valid");
 
 }  // namespace vgyro::gateway

@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
-#include <numbers>
 #include <span>
 
 #include <fmt/core.h>
 
+#include "base/angle.h"
 #include "model/catalogue.h"
 #include "model/equation.h"
 #include "model/temperature_past.h"
@@ -22,7 +22,6 @@ namespace {
 using model::Effect;
 using model::Kind;
 
-constexpr double kRadPerDeg = std::numbers::pi / 180.0;
 constexpr double kVibrationWindow_s = 1.0;
 // A bus keeps the order of a sender's frames; a log tells them apart by a microsecond.
 constexpr double kStampStep_s = 1e-6;
@@ -318,12 +317,14 @@ std::vector<GyroSample> Simulator::gyro(std::size_t index) const {
   return samples;
 }
 
-std::vector<RateSample> Simulator::reference() const {
+std::vector<RateSample> Simulator::reference(std::optional<std::size_t> axis) const {
+  const Curve* rate_dps = &profile_.rate_dps;
+  if (axis) rate_dps = profile_.other_rate_dps[*axis] ? &*profile_.other_rate_dps[*axis] : nullptr;
   Stamps stamps({}, settings_, kReferenceSender);
   std::vector<RateSample> samples(sample_count(settings_.reference, profile_.length_s));
   for (std::size_t n = 0; n < samples.size(); ++n) {
     const double t_s = sample_time_s(settings_.reference, n);
-    samples[n] = {stamps.next(t_s), profile_.rate_dps.value(t_s)};
+    samples[n] = {stamps.next(t_s), rate_dps == nullptr ? 0.0 : rate_dps->value(t_s)};
   }
   return samples;
 }

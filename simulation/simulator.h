@@ -6,6 +6,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "base/error.h"
@@ -59,7 +60,9 @@ class Simulator {
 
   /// 0 or 1.
   [[nodiscard]] std::vector<GyroSample> gyro(std::size_t index) const;
-  [[nodiscard]] std::vector<RateSample> reference() const;
+  /// The true rate; with `axis` that about x, y or z, which is 0 where the profile does not have
+  /// it.
+  [[nodiscard]] std::vector<RateSample> reference(std::optional<std::size_t> axis = {}) const;
   /// An axis that the profile does not have is 0.
   [[nodiscard]] std::vector<AccelerationSample> acceleration() const;
 

@@ -7,6 +7,7 @@
 #include "analysis/recommendation.h"
 #include "cli/allan/plot.h"
 #include "cli/allan/report.h"
+#include "cli/axis_choice.h"
 #include "cli/commands.h"
 #include "cli/exit_code.h"
 #include "cli/log_notes.h"
@@ -16,7 +17,6 @@
 #include "cli/output/overwrite.h"
 #include "cli/output/terminal.h"
 #include "cli/pair_recording.h"
-#include "cli/role_frames.h"
 #include "gateway/config.h"
 
 namespace vgyro::cli {
@@ -26,22 +26,75 @@ namespace {
 // Where not even white noise can be told from nothing.
 constexpr double kSecondsMin = 10.0;
 
-Expected<AllanReport> judge(const AllanOptions& options, const gateway::Plan& plan) {
-  const auto recording = read_pair_recording(options.logs, plan);
-  if (!recording) return tl::unexpected(recording.error());
-  const double seconds = recording->paired[0].seconds();
+Expected<AllanReport> judge(const AllanOptions& options, const gateway::Plan& plan,
+                            const analysis::PairRecording& recording) {
+  const double seconds = recording.paired[0].seconds();
   if (seconds < kSecondsMin) {
-    return fail(
-        name_of(options.logs),
-        fmt::format("holds {:.1f} s of both gyros, too short to tell noise from drift", seconds),
-        fmt::format("{:g} s at the least; an hour at rest shows drift", kSecondsMin));
+    return fail(name_of(options.logs),
+                fmt::format("holds {:.1f} s of both gyros{}, too short to tell noise from drift",
+                            seconds, about_axis(plan)),
+                fmt::format("{:g} s at the least; an hour at rest shows drift", kSecondsMin));
   }
   AllanReport report{name_of(options.logs), {plan.gyros[0].name, plan.gyros[1].name}, {}, {}};
-  report.noise = analysis::judge_pair(*recording);
+  report.axis = axis_name(plan);
+  if (!report.axis.empty())
+    report.sensor_axis = {plan.gyros[0].sensor_axis, plan.gyros[1].sensor_axis};
+  report.noise = analysis::judge_pair(recording);
   if (const auto& fit = report.noise.difference.fit) {
     report.recommendation = analysis::recommend(*fit, report.noise.difference.seconds);
   }
   return report;
+}
+
+Expected<std::vector<AllanReport>> judge_all(const AllanOptions& options,
+                                             const std::vector<gateway::Plan>& pairs) {
+  const auto recordings = read_pair_recordings(options.logs, pairs);
+  if (!recordings) return tl::unexpected(recordings.error());
+  std::vector<AllanReport> reports;
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    auto one = judge(options, pairs[i], (*recordings)[i]);
+    if (!one) return tl::unexpected(one.error());
+    reports.push_back(*std::move(one));
+  }
+  return reports;
+}
+
+// Of several axes each has a picture of its own.
+std::vector<std::string> pictures_of(const AllanOptions& options,
+                                     const std::vector<gateway::Plan>& pairs) {
+  std::vector<std::string> paths;
+  paths.reserve(pairs.size());
+  for (const gateway::Plan& pair : pairs)
+    paths.push_back(pairs.size() > 1 ? path_of_axis(options.plot, axis_name(pair)) : options.plot);
+  return paths;
+}
+
+std::string text_of(const std::vector<AllanReport>& reports) {
+  std::string text;
+  for (const AllanReport& report : reports)
+    text += (text.empty() ? "" : "\n") + to_text(report);
+  return text;
+}
+
+nlohmann::ordered_json json_of(const std::vector<AllanReport>& reports) {
+  if (reports.size() == 1) return to_json(reports.front());
+  nlohmann::ordered_json json{{"format", 1}, {"log", reports.front().log}};
+  for (const AllanReport& report : reports)
+    json["axes"].push_back(to_json(report));
+  return json;
+}
+
+Expected<void> write(const AllanOptions& options, const std::vector<AllanReport>& reports,
+                     const std::vector<std::string>& pictures) {
+  // JSON on standard output stands there alone.
+  put_text(options.json == "-" ? stderr : stdout, text_of(reports));
+  if (!options.json.empty()) {
+    if (auto done = write_json(options.json, json_of(reports)); !done) return done;
+  }
+  for (std::size_t i = 0; !options.plot.empty() && i < reports.size(); ++i) {
+    if (auto done = draw_allan(pictures[i], reports[i]); !done) return done;
+  }
+  return {};
 }
 
 }  // namespace
@@ -49,8 +102,8 @@ Expected<AllanReport> judge(const AllanOptions& options, const gateway::Plan& pl
 int run_allan(const AllanOptions& options) {
   const auto loaded = gateway::load_config(options.config);
   if (!loaded) return report(loaded.error());
-  if (const auto units = several_axes(options.config, loaded->plan, "allan"); units)
-    return report(*units);
+  const auto pairs = chosen_pairs(options.config, loaded->plan, options.axis);
+  if (!pairs) return report(pairs.error());
   for (const Error& warning : loaded->warnings)
     warn(warning);
   if (!options.plot.empty()) {
@@ -58,20 +111,14 @@ int run_allan(const AllanOptions& options) {
   }
   std::vector<std::string> inputs = loaded->files;
   inputs.insert(inputs.end(), options.logs.begin(), options.logs.end());
-  const auto free = check_outputs(inputs, {options.json, options.plot});
-  if (!free) return report(free.error());
-  const auto judged = judge(options, loaded->plan);
-  if (!judged) return report(judged.error());
-  // JSON on standard output stands there alone.
-  put_text(options.json == "-" ? stderr : stdout, to_text(*judged));
-  if (!options.json.empty()) {
-    if (const auto done = write_json(options.json, to_json(*judged)); !done)
-      return report(done.error());
-  }
-  if (!options.plot.empty()) {
-    if (const auto done = draw_allan(options.plot, *judged); !done) return report(done.error());
-  }
-  return kDone;
+  const std::vector<std::string> pictures = pictures_of(options, *pairs);
+  std::vector<std::string> outputs = pictures;
+  outputs.push_back(options.json);
+  if (const auto free = check_outputs(inputs, outputs); !free) return report(free.error());
+  const auto reports = judge_all(options, *pairs);
+  if (!reports) return report(reports.error());
+  const auto written = write(options, *reports, pictures);
+  return written ? kDone : report(written.error());
 }
 
 }  // namespace vgyro::cli

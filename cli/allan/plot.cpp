@@ -77,7 +77,8 @@ class Picture {
         "set lmargin 10\nset rmargin 2\nset bars 0.4\n"
         "set xlabel 'averaging time, s'\nset ylabel 'Allan deviation, deg/h'\n",
         picture_script(path, 1300, 1050),
-        gnuplot_text("Allan deviation: " + std::filesystem::path(report_.log).filename().string()),
+        gnuplot_text("Allan deviation" + (report_.axis.empty() ? "" : " about " + report_.axis) +
+                     ": " + std::filesystem::path(report_.log).filename().string()),
         tau_s_.low, tau_s_.high, deviation_.low, deviation_.high);
     overview(to);
     for (std::size_t i = 0; i < 3; ++i)

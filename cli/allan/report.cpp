@@ -9,6 +9,8 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "model/file.h"
+
 namespace vgyro::cli {
 
 namespace {
@@ -277,14 +279,21 @@ nlohmann::ordered_json noise_json(const SeriesNoise& noise) {
   return json;
 }
 
-void effect(std::string& text, std::size_t gyro, const char* kind, const std::string& parameters) {
-  fmt::format_to(std::back_inserter(text), "[[effect]]\ngyro = {}\nkind = \"{}\"\n{}\n", gyro + 1,
-                 kind, parameters);
+struct Gyro {
+  std::size_t number;
+  std::optional<std::size_t> axis;  ///< of a unit's own
+};
+
+void effect(std::string& text, const Gyro& gyro, const char* kind, const std::string& parameters) {
+  const std::string axis =
+      gyro.axis ? fmt::format("{} = \"{}\"\n", model::kAxisKey, "xyz"[*gyro.axis]) : "";
+  fmt::format_to(std::back_inserter(text), "[[effect]]\ngyro = {}\nkind = \"{}\"\n{}{}\n",
+                 gyro.number, kind, axis, parameters);
 }
 
 // Flicker noise as three Gauss-Markov processes a decade apart around the bottom of the Allan
 // curve.
-void add_flicker(std::string& text, std::size_t gyro, const SeriesNoise& noise) {
+void add_flicker(std::string& text, const Gyro& gyro, const SeriesNoise& noise) {
   const double flicker = noise.fit->flicker_dps.value;
   const double sigma_dps = flicker * std::sqrt(std::numbers::ln10 / std::numbers::pi);
   const double white = noise.fit->white_dps_rthz.value;
@@ -312,31 +321,33 @@ std::string model_toml(const AllanReport& report) {
   std::string text;
   for (std::size_t i = 0; i < 2; ++i) {
     const SeriesNoise& noise = report.noise.gyros[i];
+    const Gyro gyro{i + 1, report.sensor_axis[i]};
     if (!noise.fit) continue;
     const NoiseFit& fit = *noise.fit;
     if (fit.white_dps_rthz.resolved) {
-      effect(text, i, "white_noise",
+      effect(text, gyro, "white_noise",
              fmt::format("density_dps_rthz = {:.4e}\n", fit.white_dps_rthz.value));
     }
     if (fit.walk_dps_rts.resolved) {
-      effect(text, i, "rate_random_walk",
+      effect(text, gyro, "rate_random_walk",
              fmt::format("density_dps_rts = {:.4e}\n", fit.walk_dps_rts.value));
     }
     if (fit.markov) {
-      effect(text, i, "gauss_markov",
+      effect(text, gyro, "gauss_markov",
              fmt::format("sigma_dps = {:.3e}\ntau_s = {:.3g}\n", fit.markov->sigma_dps,
                          fit.markov->tau_s));
     }
-    if (fit.flicker_dps.resolved) add_flicker(text, i, noise);
+    if (fit.flicker_dps.resolved) add_flicker(text, gyro, noise);
     if (fit.ramp_significance() > analysis::kRampSigmas) {
-      effect(text, i, "bias_ramp", fmt::format("slope_dps_s = {:.4e}\n", fit.ramp_dps_s));
+      effect(text, gyro, "bias_ramp", fmt::format("slope_dps_s = {:.4e}\n", fit.ramp_dps_s));
     }
   }
   return text.empty() ? text : "format = 1\n\n" + text.substr(0, text.size() - 1);
 }
 
 std::string to_text(const AllanReport& report) {
-  std::string text = report.log + "\n" + motion_text(report) + "\n" + table(report) + "\n" +
+  std::string text = (report.axis.empty() ? "" : fmt::format("Axis {}: ", report.axis)) +
+                     report.log + "\n" + motion_text(report) + "\n" + table(report) + "\n" +
                      correlation_text(report);
   const std::string doubts = cautions(report);
   if (!doubts.empty()) text += "\n" + doubts;
@@ -354,6 +365,7 @@ nlohmann::ordered_json to_json(const AllanReport& report) {
   nlohmann::ordered_json json;
   json["format"] = 1;
   json["log"] = report.log;
+  if (!report.axis.empty()) json["axis"] = report.axis;
   json["at_rest"] = motion.at_rest;
   json["turned_up_to_dps"] = motion.turned_up_to_dps;
   json["rest"] = motion.rest ? nlohmann::ordered_json{{"from_s", motion.rest->from_s},

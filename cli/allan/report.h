@@ -3,6 +3,7 @@
 // What `vgyro allan` says: as text, as JSON (docs/allan.md has the fields), and as TOML to paste.
 
 #include <array>
+#include <optional>
 #include <string>
 
 #include <nlohmann/json_fwd.hpp>
@@ -17,6 +18,9 @@ struct AllanReport {
   std::array<std::string, 2> gyro_names;
   analysis::PairNoise noise;
   analysis::Recommendation recommendation;
+  std::string axis = {};  ///< of the vehicle; empty: of two single gyros
+  /// Of a pair about an axis: which of each unit's own lies along it.
+  std::array<std::optional<std::size_t>, 2> sensor_axis = {};
 };
 
 std::string to_text(const AllanReport& report);

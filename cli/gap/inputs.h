@@ -1,7 +1,10 @@
 #pragma once
 
-// What `vgyro gap` and `vgyro compare` begin with: configuration, model file, recording.
+// What `vgyro gap` and `vgyro compare` begin with: configuration, model file, recordings; of two
+// whole units once for each axis that is looked at. The workflow knows pairs of gyros and no axes:
+// effects go to it in the sign in which the pair's readings are, and come back in the sensor's own.
 
+#include <array>
 #include <optional>
 #include <string>
 #include <vector>
@@ -17,23 +20,40 @@
 
 namespace vgyro::cli {
 
-struct GapInputs {
+struct GapPair {
   GapSubject subject;
-  model::Model model;  ///< empty when there is none
+  model::Model model;  ///< what is of this pair, in its readings' sign; empty when there is none
   std::vector<gap::Recording> recordings;
+  std::array<bool, 2> flipped{};  ///< the readings are against the sensor's sign
+
+  /// As the model file and people know it: which of the unit's axes, in the sensor's sign.
+  [[nodiscard]] model::Effect for_file(const model::Effect& effect) const;
+  /// The same of everything that was found.
+  void tell_of_sensors(gap::Result& result) const;
+  /// "gap, axis z", for the line of progress.
+  [[nodiscard]] std::string doing(const std::string& command) const;
 };
 
-/// `model` comes before the configuration's own; `doing` is for the line of progress;
-/// `outputs` must be none of the files that are read.
+struct GapInputs {
+  model::Model model;          ///< the whole file; empty when there is none
+  std::vector<GapPair> pairs;  ///< one; of two whole units one for each axis, in the order x, y, z
+};
+
+struct GapRequest {
+  std::string config;
+  std::optional<std::string> model;  ///< before the configuration's own
+  std::vector<std::string> logs;
+  std::string axis;  ///< of whole units; empty: all
+};
+
+/// `command` is for the line of progress; `outputs` must be none of the files that are read.
 tl::expected<GapInputs, std::vector<Error>> load_gap_inputs(
-    const std::string& config, const std::optional<std::string>& model,
-    const std::vector<std::string>& logs, const std::string& doing,
-    const std::vector<std::string>& outputs);
+    const GapRequest& request, const std::string& command, const std::vector<std::string>& outputs);
 
 /// Of the workflow; it tells `progress`, which must live as long, how far it is.
 gap::Settings settings_of(std::uint64_t seed, Progress& progress);
 
 /// An error of the workflow, which does not know the log's name.
-Error at_log(Error error, const std::string& log);
+Error at_log(Error error, const GapSubject& subject);
 
 }  // namespace vgyro::cli

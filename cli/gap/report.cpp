@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "model/catalogue.h"
+#include "model/file.h"
 
 namespace vgyro::cli {
 
@@ -99,22 +100,40 @@ void add_where(Json& json, const gap::Where& where) {
   json["band_hz"] = {where.low_hz, where.high_hz};
 }
 
-Json parameters_json(model::Kind kind, const model::Parameters& parameters) {
+// As the model file calls them.
+Json parameters_json(model::Kind kind, const model::Parameters& parameters, bool has_axis) {
   Json json = Json::object();
   const auto rows = model::info(kind).parameters;
-  for (std::size_t i = 0; i < rows.size(); ++i)
-    json[std::string(rows[i].name)] = parameter_json(rows[i], parameters[i]);
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    const std::string key(model::key_of(rows[i], has_axis));
+    json[key] = parameter_json(rows[i], parameters[i]);
+  }
   return json;
 }
 
-Json reading_json(const gap::Reading& reading) {
-  Json json{{"kind", kind_name(reading.kind)}, {"gyro", gyro_number(reading.gyro)}};
-  if (reading.is_fitted()) json["parameters"] = parameters_json(reading.kind, reading.parameters);
+// Beside "gyro", of a unit: which of its own axes; nothing where it is all of them.
+void add_axis(Json& json, const GapSubject& subject, model::Kind kind, std::size_t gyro) {
+  if (const auto axis = subject.axis_of(kind, gyro)) json["axis"] = std::string(1, "xyz"[*axis]);
+}
+
+Json kind_json(const GapSubject& subject, model::Kind kind, std::size_t gyro) {
+  Json json{{"kind", kind_name(kind)}, {"gyro", gyro_number(gyro)}};
+  add_axis(json, subject, kind, gyro);
   return json;
 }
 
-Json effect_json(const gap::NamedEffect& named) {
-  const Json values = parameters_json(named.effect.kind, named.effect.parameters);
+Json reading_json(const GapSubject& subject, const gap::Reading& reading) {
+  Json json = kind_json(subject, reading.kind, reading.gyro);
+  if (reading.is_fitted()) {
+    json["parameters"] = parameters_json(reading.kind, reading.parameters, json.contains("axis"));
+  }
+  return json;
+}
+
+Json effect_json(const GapSubject& subject, const gap::NamedEffect& named) {
+  Json json = kind_json(subject, named.effect.kind, named.effect.gyro);
+  json["parameters"] =
+      parameters_json(named.effect.kind, named.effect.parameters, json.contains("axis"));
   Json sigma = Json::object();
   const auto parameters = model::info(named.effect.kind).parameters;
   for (std::size_t i = 0; i < parameters.size(); ++i) {
@@ -124,26 +143,27 @@ Json effect_json(const gap::NamedEffect& named) {
   add_where(where, named.where);
   Json ambiguous = Json::array();
   for (const gap::Reading& reading : named.ambiguous_with)
-    ambiguous.push_back(reading_json(reading));
-  return {{"kind", kind_name(named.effect.kind)},
-          {"gyro", gyro_number(named.effect.gyro)},
-          {"parameters", values},
-          {"sigma", sigma},
-          {"p_value", named.p_value},
-          {"statistic", named.statistic},
-          {"gap_before", named.gap_before},
-          {"gap_after", named.gap_after},
-          {"where", where},
-          {"ambiguous_with", ambiguous},
-          {"applied", named.applied},
-          {"checked", named.checked},
-          {"evidence", named.evidence},
-          {"experiment", named.experiment}};
+    ambiguous.push_back(reading_json(subject, reading));
+  json["sigma"] = sigma;
+  json["p_value"] = named.p_value;
+  json["statistic"] = named.statistic;
+  json["gap_before"] = named.gap_before;
+  json["gap_after"] = named.gap_after;
+  json["where"] = where;
+  json["ambiguous_with"] = ambiguous;
+  json["applied"] = named.applied;
+  json["checked"] = named.checked;
+  json["evidence"] = named.evidence;
+  json["experiment"] = named.experiment;
+  return json;
 }
 
-Json unexplained_json(const gap::Unexplained& rest) {
+Json unexplained_json(const GapSubject& subject, const gap::Unexplained& rest) {
   Json json{{"signature", rest.signature}, {"gyro", nullptr}};
-  if (rest.gyro) json["gyro"] = gyro_number(*rest.gyro);
+  if (rest.gyro) {
+    json["gyro"] = gyro_number(*rest.gyro);
+    add_axis(json, subject, model::Kind::kBias, *rest.gyro);
+  }
   if (rest.frequency_hz) json["frequency_hz"] = *rest.frequency_hz;
   if (rest.amplitude_dps) json["amplitude_dps"] = *rest.amplitude_dps;
   json["from_s"] = rest.from_s;
@@ -171,10 +191,6 @@ std::string rounded_text(double value, double sigma) {
   return fmt::format("{:.{}g} ± {:.2g}", value, digits_for(value, sigma, 2), sigma);
 }
 
-std::string gap_number(double nats) {
-  return fmt::format("{:.4g}", std::abs(nats) < 5e-7 ? 0.0 : nats);
-}
-
 std::string reading_text(const GapSubject& subject, const gap::Reading& reading) {
   return fmt::format("{} {}", subject.gyros[reading.gyro], model::info(reading.kind).name);
 }
@@ -182,7 +198,8 @@ std::string reading_text(const GapSubject& subject, const gap::Reading& reading)
 template <class Judged>
 std::string subject_text(const GapSubject& subject, const Judged& judged) {
   std::string text =
-      fmt::format("{}: {:.1f} s, {} samples of {}, {} of {}, {} reference\n", subject.log,
+      fmt::format("{}{}: {:.1f} s, {} samples of {}, {} of {}, {} reference\n",
+                  subject.axis.empty() ? "" : fmt::format("Axis {}: ", subject.axis), subject.log,
                   judged.seconds, judged.samples[0], subject.gyros[0], judged.samples[1],
                   subject.gyros[1], judged.with_reference ? "with a" : "no");
   for (std::size_t i = 0; i < judged.drives.size(); ++i) {
@@ -203,26 +220,6 @@ std::size_t width_of(const std::string& text) {
   return static_cast<std::size_t>(std::count_if(text.begin(), text.end(), [](char c) {
     return (static_cast<unsigned char>(c) & 0xC0U) != 0x80U;
   }));
-}
-
-// Columns as wide as they need, the last one as it is.
-std::string table(const Rows& rows) {
-  std::vector<std::size_t> widths;
-  for (const auto& row : rows) {
-    widths.resize(std::max(widths.size(), row.size()));
-    for (std::size_t i = 0; i < row.size(); ++i)
-      widths[i] = std::max(widths[i], width_of(row[i]));
-  }
-  std::string text;
-  for (const auto& row : rows) {
-    std::string line = "  ";
-    for (std::size_t i = 0; i < row.size(); ++i) {
-      line += row[i];
-      line.append(widths[i] - width_of(row[i]) + 2, ' ');
-    }
-    text += line.substr(0, line.find_last_not_of(' ') + 1) + '\n';
-  }
-  return text;
 }
 
 std::string starting_text(const GapSubject& subject, const gap::Result& result) {
@@ -277,6 +274,34 @@ void add_once(std::vector<std::string>& list, const std::string& text) {
 
 }  // namespace
 
+std::optional<std::size_t> GapSubject::axis_of(model::Kind kind, std::size_t gyro) const {
+  if (axis.empty() || model::acts_on_unit(kind)) return std::nullopt;
+  return sensor_axis[gyro];
+}
+
+std::string gap_number(double nats) {
+  return fmt::format("{:.4g}", std::abs(nats) < 5e-7 ? 0.0 : nats);
+}
+
+std::string table(const std::vector<std::vector<std::string>>& rows) {
+  std::vector<std::size_t> widths;
+  for (const auto& row : rows) {
+    widths.resize(std::max(widths.size(), row.size()));
+    for (std::size_t i = 0; i < row.size(); ++i)
+      widths[i] = std::max(widths[i], width_of(row[i]));
+  }
+  std::string text;
+  for (const auto& row : rows) {
+    std::string line = "  ";
+    for (std::size_t i = 0; i < row.size(); ++i) {
+      line += row[i];
+      line.append(widths[i] - width_of(row[i]) + 2, ' ');
+    }
+    text += line.substr(0, line.find_last_not_of(' ') + 1) + '\n';
+  }
+  return text;
+}
+
 void round_to_sigma(gap::Result& result) {
   for (auto* list : {&result.starting, &result.effects}) {
     for (gap::NamedEffect& named : *list) {
@@ -294,8 +319,10 @@ void round_to_sigma(gap::Result& result) {
   }
 }
 
-Json gap_json(const gap::Result& result) {
-  Json json{{"format", kFormat}, {"verdict", std::string(gap::verdict_name(result.verdict))}};
+Json gap_json(const GapSubject& subject, const gap::Result& result) {
+  Json json{{"format", kFormat}};
+  if (!subject.axis.empty()) json["axis"] = subject.axis;
+  json["verdict"] = std::string(gap::verdict_name(result.verdict));
   json["gap"] = {{"unit", kUnit},
                  {"before", result.gap.before},
                  {"after", result.gap.after},
@@ -305,25 +332,25 @@ Json gap_json(const gap::Result& result) {
   if (!result.starting.empty()) {
     json["starting_model"] = Json::array();
     for (const gap::NamedEffect& one : result.starting) {
-      const Json whole = effect_json(one);
-      json["starting_model"].push_back({{"kind", whole["kind"]},
-                                        {"gyro", whole["gyro"]},
-                                        {"parameters", whole["parameters"]},
-                                        {"sigma", whole["sigma"]}});
+      Json fitted = effect_json(subject, one);
+      for (const char* key : {"p_value", "statistic", "gap_before", "gap_after", "where",
+                              "ambiguous_with", "applied", "checked", "evidence", "experiment"})
+        fitted.erase(key);
+      json["starting_model"].push_back(std::move(fitted));
     }
   }
   json["effects"] = Json::array();
   for (const gap::NamedEffect& named : result.effects)
-    json["effects"].push_back(effect_json(named));
+    json["effects"].push_back(effect_json(subject, named));
   json["unexplained"] = Json::array();
   for (const gap::Unexplained& rest : result.unexplained)
-    json["unexplained"].push_back(unexplained_json(rest));
+    json["unexplained"].push_back(unexplained_json(subject, rest));
   json["not_identifiable"] = Json::array();
   for (const gap::NotIdentifiable& kind : result.not_identifiable) {
-    json["not_identifiable"].push_back({{"kind", kind_name(kind.kind)},
-                                        {"gyro", gyro_number(kind.gyro)},
-                                        {"why", kind.why},
-                                        {"experiment", kind.experiment}});
+    Json one = kind_json(subject, kind.kind, kind.gyro);
+    one["why"] = kind.why;
+    one["experiment"] = kind.experiment;
+    json["not_identifiable"].push_back(std::move(one));
   }
   json["recording"] = recording_json(result);
   json["recording"]["held_out"] = result.held_out;
@@ -338,8 +365,9 @@ Json gap_json(const gap::Result& result) {
   return json;
 }
 
-Json comparison_json(const gap::Comparison& comparison) {
+Json comparison_json(const GapSubject& subject, const gap::Comparison& comparison) {
   Json json{{"format", kFormat}};
+  if (!subject.axis.empty()) json["axis"] = subject.axis;
   json["gap"] = {{"unit", kUnit},
                  {"value", comparison.gap.before},
                  {"floor", kFloor},
@@ -347,6 +375,7 @@ Json comparison_json(const gap::Comparison& comparison) {
   json["where"] = Json::array();
   for (const gap::Difference& difference : comparison.differences) {
     Json where{{"gyro", gyro_number(difference.gyro)}};
+    add_axis(where, subject, model::Kind::kBias, difference.gyro);
     add_where(where, difference.where);
     where["against"] = difference.against;
     where["nats"] = difference.nats;
@@ -363,7 +392,8 @@ std::string value_text(const gap::NamedEffect& named) {
   std::string text;
   for (std::size_t i = 0; i < parameters.size(); ++i) {
     const double value = named.effect.parameters[i];
-    text += fmt::format("{}{} ", text.empty() ? "" : ", ", parameters[i].name);
+    text += fmt::format("{}{} ", text.empty() ? "" : ", ",
+                        model::key_of(parameters[i], named.effect.of_axis.has_value()));
     if (parameters[i].form == Parameter::Form::kAxis) {
       text += "xyz"[static_cast<std::size_t>(value)];
     } else if (estimated(named.sigma[i])) {

@@ -4,6 +4,7 @@
 // terminal). The fields of the JSON are an interface: they change only with a new `format`.
 
 #include <array>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -19,14 +20,22 @@ struct GapSubject {
   std::string model;  ///< empty: none was given
   std::string log;
   std::array<std::string, 2> gyros;  ///< their names
+  /// Of a pair about one axis of whole units: "x", "y" or "z" of the vehicle; empty: of two single
+  /// gyros.
+  std::string axis = {};
+  std::array<std::size_t, 2> sensor_axis = {};  ///< which of the unit's own lies along it
+
+  /// For the model file: nothing of two single gyros, or where the kind is all the unit's.
+  [[nodiscard]] std::optional<std::size_t> axis_of(model::Kind kind, std::size_t gyro) const;
 };
 
 /// Parameters of the named effects with no more digits than their σ justifies: the rest would look
 /// like knowledge. Files and tables then say the same number.
 void round_to_sigma(gap::Result& result);
 
-nlohmann::ordered_json gap_json(const gap::Result& result);
-nlohmann::ordered_json comparison_json(const gap::Comparison& comparison);
+nlohmann::ordered_json gap_json(const GapSubject& subject, const gap::Result& result);
+nlohmann::ordered_json comparison_json(const GapSubject& subject,
+                                       const gap::Comparison& comparison);
 
 /// Some twenty lines.
 std::string gap_text(const GapSubject& subject, const gap::Result& result);
@@ -51,5 +60,11 @@ std::string not_applied_text(const gap::Result& result);
 
 /// One sentence.
 std::string verdict_text(const gap::Result& result);
+
+/// "0.0312", and "0" of what is next to nothing.
+std::string gap_number(double nats);
+
+/// Columns as wide as they need, the last one as it is.
+std::string table(const std::vector<std::vector<std::string>>& rows);
 
 }  // namespace vgyro::cli

@@ -46,12 +46,19 @@ Json figure_json(const gap::Figure& figure) {
           {"log_x", figure.log_x}, {"log_y", figure.log_y},     {"curves", std::move(curves)}};
 }
 
-Json page_data(const GapSubject& subject, const gap::Result& result) {
-  Json json = gap_json(result);
+void add_subject(Json& json, const GapSubject& subject) {
   json["config"] = subject.config;
   json["log"] = subject.log;
   json["model"] = subject.model;
   json["gyros"] = subject.gyros;
+}
+
+Json page_data(const GapSubject& subject, const gap::Result& result,
+               std::span<const AxisResult> axes) {
+  Json json = gap_json(subject, result);
+  add_subject(json, subject);
+  for (const AxisResult& axis : axes)
+    json["pages"].push_back({{"axis", axis.subject.axis}, {"file", report_name(axis.subject)}});
   json["verdict_text"] = verdict_text(result);
   for (std::size_t i = 0; i < result.effects.size(); ++i) {
     const gap::NamedEffect& named = result.effects[i];
@@ -110,15 +117,32 @@ std::string filled(std::string_view page, const std::map<std::string_view, std::
   return text;
 }
 
-}  // namespace
-
-std::string report_page(const GapSubject& subject, const gap::Result& result) {
-  const std::string data = harmless(page_data(subject, result));
+std::string page_of(const Json& json) {
+  const std::string data = harmless(json);
   return filled(report::page, {{"style", report::style},
                                {"script", report::script},
                                {"library", without_source_map(report::library)},
                                {"library_style", without_source_map(report::library_style)},
                                {"data", data}});
+}
+
+}  // namespace
+
+std::string report_page(const GapSubject& subject, const gap::Result& result,
+                        std::span<const AxisResult> axes) {
+  return page_of(page_data(subject, result, axes));
+}
+
+std::string overview_page(std::span<const AxisResult> axes) {
+  Json json = axes_gap_json(axes);
+  add_subject(json, axes.front().subject);
+  for (std::size_t i = 0; i < axes.size(); ++i) {
+    Json& axis = json["axes"][i];
+    axis["verdict_text"] = verdict_text(axes[i].judged);
+    for (std::size_t k = 0; k < axes[i].judged.effects.size(); ++k)
+      axis["effects"][k]["value"] = value_text(axes[i].judged.effects[k]);
+  }
+  return page_of(json);
 }
 
 }  // namespace vgyro::cli

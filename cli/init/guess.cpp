@@ -11,6 +11,7 @@
 
 #include <fmt/core.h>
 
+#include "base/angle.h"
 #include "cli/init/layouts.h"
 #include "cli/output/progress.h"
 #include "dbc/writer.h"
@@ -25,7 +26,6 @@ constexpr std::size_t kGuessedMost = 30;  // whose figures are worked out
 constexpr double kQuickLeast = 0.5;       // a little below what a pair needs
 constexpr double kGapMost_s = 0.5;
 constexpr double kZero_s = 3.0;
-constexpr double kDegPerRad = 57.29577951308232;
 
 std::string name_of(const Stream& stream, std::set<std::string>& names) {
   std::string name = fmt::format("Frame_{:0{}X}", stream.id, stream.extended ? 8 : 3);

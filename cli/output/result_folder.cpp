@@ -103,10 +103,8 @@ Expected<void> check_result_folder(const std::string& folder,
   return {};
 }
 
-Expected<void> write_result_folder(const std::string& folder,
-                                   const std::vector<ResultFile>& files) {
-  std::vector<std::string> names;
-  names.reserve(files.size());
+Expected<void> write_result_folder(const std::string& folder, const std::vector<ResultFile>& files,
+                                   std::vector<std::string> names) {
   for (const ResultFile& file : files)
     names.push_back(file.name);
   if (auto free = check_result_folder(folder, names); !free) return free;

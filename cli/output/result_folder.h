@@ -21,7 +21,8 @@ struct ResultFile {
 Expected<void> check_result_folder(const std::string& folder,
                                    const std::vector<std::string>& names);
 
-/// Checks again, then writes.
-Expected<void> write_result_folder(const std::string& folder, const std::vector<ResultFile>& files);
+/// Checks again, then writes. `names`: what an earlier result may consist of besides these files.
+Expected<void> write_result_folder(const std::string& folder, const std::vector<ResultFile>& files,
+                                   std::vector<std::string> names = {});
 
 }  // namespace vgyro::cli

@@ -12,6 +12,7 @@
 #include "base/spelling.h"
 #include "canlog/candump.h"
 #include "canlog/merged_reader.h"
+#include "cli/axis_choice.h"
 #include "cli/commands.h"
 #include "cli/exit_code.h"
 #include "cli/log_notes.h"
@@ -106,16 +107,20 @@ class Totals final : public gateway::RateObserver {
 /// Of one axis of several.
 class AxisTotals final : public gateway::RateObserver {
  public:
-  explicit AxisTotals(AxisSummary& summary) : summary_(&summary) {}
-  void on_rate(TimePoint /*t*/, const std::array<double, 2>& /*raw_dps*/,
-               double virtual_dps) override {
+  AxisTotals(AxisSummary& summary, ReplayPlot* plot) : summary_(&summary), plot_(plot) {}
+  void on_rate(TimePoint t, const std::array<double, 2>& raw_dps, double virtual_dps) override {
+    if (plot_ != nullptr) plot_->add_rate(t, raw_dps, virtual_dps);
     if (std::isnan(virtual_dps)) return;
     summary_->rate_sum_dps += virtual_dps;
     ++summary_->rates;
   }
+  void on_condition(TimePoint t, const fusion::Condition& condition) override {
+    if (plot_ != nullptr) plot_->add_condition(t, condition);
+  }
 
  private:
   AxisSummary* summary_;
+  ReplayPlot* plot_;
 };
 
 // Interface names of the log → indices of the plan, through the user's --map.
@@ -178,7 +183,8 @@ class Replay {
         buses_(std::move(buses)),
         pipeline_(plan),
         sink_(output, plan),
-        totals_(summary_, options.plot.empty() ? nullptr : &plot_) {
+        plots_(std::max<std::size_t>(pipeline_.axis_count(), 1)),
+        totals_(summary_, options.plot.empty() ? nullptr : &plots_.front()) {
     if (pipeline_.axis_count() == 0) pipeline_.observe(&totals_);
     observe_axes(plan);
   }
@@ -222,20 +228,19 @@ class Replay {
     return summary_;
   }
 
-  const ReplayPlot& plot() const { return plot_; }
+  /// One, or one for each axis.
+  const std::vector<ReplayPlot>& plots() const { return plots_; }
 
  private:
-  // A picture is of the last of the axes, about which a vehicle turns.
   void observe_axes(const gateway::Plan& plan) {
     const std::size_t count = pipeline_.axis_count();
     summary_.axes.resize(count);
     for (std::size_t place = 0; place < count; ++place) {
       summary_.axes[place].name = gateway::kAxisNames[plan.axes[place].axis];
-      axis_totals_.emplace_back(summary_.axes[place]);
+      axis_totals_.emplace_back(summary_.axes[place], is_drawn_ ? &plots_[place] : nullptr);
     }
     for (std::size_t place = 0; place < count; ++place)
       pipeline_.observe(&axis_totals_[place], place);
-    if (count > 0 && is_drawn_) pipeline_.observe(&totals_, count - 1);
   }
 
   void run_records(const std::string& name, canlog::LogReader& reader) {
@@ -270,9 +275,11 @@ class Replay {
     const gateway::Status& status = pipeline_.status();
     if (status.biases_out == biases_seen_) return;
     biases_seen_ = status.biases_out;
-    const std::size_t axes = pipeline_.axis_count();
-    const gateway::Status& drawn = axes == 0 ? status : pipeline_.axis_status(axes - 1);
-    plot_.add_bias(stamp, {drawn.gyros[0].bias_dps, drawn.gyros[1].bias_dps});
+    for (std::size_t i = 0; i < plots_.size(); ++i) {
+      const gateway::Status& drawn =
+          pipeline_.axis_count() == 0 ? status : pipeline_.axis_status(i);
+      plots_[i].add_bias(stamp, {drawn.gyros[0].bias_dps, drawn.gyros[1].bias_dps});
+    }
   }
 
   const ReplayOptions& options_;
@@ -282,7 +289,7 @@ class Replay {
   gateway::Pipeline pipeline_;
   LineSink sink_;
   ReplaySummary summary_;
-  ReplayPlot plot_;
+  std::vector<ReplayPlot> plots_;  ///< one, or one for each axis
   Totals totals_;
   std::vector<AxisTotals> axis_totals_;
   bool first_ = true;
@@ -351,9 +358,20 @@ std::optional<Error> explain_silence(const ReplaySummary& summary, const gateway
   return explain_no_pair(summary.status, plan, logs);
 }
 
+// Of several axes each has a picture of its own.
+std::vector<std::string> pictures_of(const ReplayOptions& options, const gateway::Plan& plan) {
+  if (plan.axes.empty()) return {options.plot};
+  std::vector<std::string> paths;
+  paths.reserve(plan.axes.size());
+  for (const gateway::Plan& axis : plan.axes)
+    paths.push_back(path_of_axis(options.plot, axis_name(axis)));
+  return paths;
+}
+
 // Before an output of an earlier run is written over: are the logs there, and is no input an
 // output?
-Expected<void> check_files(const ReplayOptions& options, std::vector<std::string> inputs) {
+Expected<void> check_files(const ReplayOptions& options, const gateway::Plan& plan,
+                           std::vector<std::string> inputs) {
   for (const std::string& log : options.logs) {
     struct stat input {};
     if (log == "-") continue;
@@ -363,7 +381,9 @@ Expected<void> check_files(const ReplayOptions& options, std::vector<std::string
   }
   inputs.insert(inputs.end(), options.logs.begin(), options.logs.end());
   inputs.push_back(options.state);
-  return check_outputs(inputs, {options.output, options.json, options.csv, options.plot});
+  std::vector<std::string> outputs = pictures_of(options, plan);
+  outputs.insert(outputs.end(), {options.output, options.json, options.csv});
+  return check_outputs(inputs, outputs);
 }
 
 void warn_of_doubts(const ReplaySummary& summary, const gateway::Plan& plan) {
@@ -471,19 +491,21 @@ void warn_of_other_senders(const ReplaySummary& summary, const gateway::Plan& pl
 }
 
 int write_results(const ReplayOptions& options, const gateway::Plan& plan,
-                  const ReplaySummary& summary, const ReplayPlot& plot) {
+                  const ReplaySummary& summary, const std::vector<ReplayPlot>& plots) {
   if (!options.json.empty()) {
     // A log's interface names may be any bytes.
     const auto done = write_json(options.json, to_json(summary, plan));
     if (!done) return report(done.error());
   }
   if (!options.quiet) put_text(stderr, to_text(summary, plan));
-  if (!options.plot.empty()) {
+  const std::vector<std::string> pictures = pictures_of(options, plan);
+  for (std::size_t i = 0; !options.plot.empty() && i < plots.size(); ++i) {
+    const gateway::Plan& drawn = plan.axes.empty() ? plan : plan.axes[i];
     const PlotTexts texts{
-        fmt::format("{}: {} over {:g}-s windows", name_of(options.logs),
+        fmt::format("{}{}: {} over {:g}-s windows", name_of(options.logs), about_axis(drawn),
                     gateway::to_string(plan.corrector.method), plan.corrector.window_s),
         {plan.gyros[0].name, plan.gyros[1].name}};
-    if (const auto drawn = plot.draw(options.plot, texts); !drawn) return report(drawn.error());
+    if (const auto done = plots[i].draw(pictures[i], texts); !done) return report(done.error());
   }
   return kDone;
 }
@@ -525,7 +547,8 @@ int run_replay(const ReplayOptions& options) {
   }
   auto buses = BusMap::make(options.bus_map, plan);
   if (!buses) return report(buses.error());
-  if (const auto good = check_files(options, loaded->files); !good) return report(good.error());
+  if (const auto good = check_files(options, plan, loaded->files); !good)
+    return report(good.error());
   const auto state = read_state(options.state, plan);
   if (!state) return report(state.error());
   // Several logs are merged by stamp.
@@ -551,7 +574,7 @@ int run_replay(const ReplayOptions& options) {
     if (const auto closed = (*table)->close(); !closed) return report(closed.error());
   }
   if (!trouble) trouble = explain_silence(summary, plan, name_of(options.logs));
-  const int written = write_results(options, plan, summary, replay.plot());
+  const int written = write_results(options, plan, summary, replay.plots());
   warn_of_doubts(summary, plan);
   warn_of_data(summary, plan);
   warn_of_senders_missed(summary, plan);

@@ -16,7 +16,7 @@ GapSubject plain_subject() {
 
 TEST(GapReportTest, HoldsTheFieldsOfTheInterface) {
   // Programs rely on these names; gyros count from 1 there.
-  const Json json = gap_json(made_up_result());
+  const Json json = gap_json(plain_subject(), made_up_result());
   EXPECT_EQ(json["format"], 1);
   EXPECT_EQ(json["verdict"], "partly_explained");
   EXPECT_EQ(json["gap"], Json::parse(R"({"unit": "nats_per_sample", "before": 0.81, "after": 0.014,
@@ -38,14 +38,14 @@ TEST(GapReportTest, HoldsTheFieldsOfTheInterface) {
 
 TEST(GapReportTest, NamesAnAxisByItsLetterAndGivesSigmaOfEstimatesAlone) {
   // An axis is chosen, not measured: it has no error bar.
-  const Json tilt = gap_json(made_up_result())["effects"][1];
+  const Json tilt = gap_json(plain_subject(), made_up_result())["effects"][1];
   EXPECT_EQ(tilt["parameters"], Json::parse(R"({"axis": "z", "coefficient_dps_g": 0.00123})"));
   EXPECT_EQ(tilt["sigma"], Json::parse(R"({"coefficient_dps_g": 2e-5})"));
 }
 
 TEST(GapReportTest, LeavesOutWhatAnUnexplainedRestDoesNotHave) {
   // A slow rest has no frequency; null would be a number that was lost.
-  const Json rest = gap_json(made_up_result())["unexplained"];
+  const Json rest = gap_json(plain_subject(), made_up_result())["unexplained"];
   EXPECT_EQ(rest[0]["frequency_hz"], 37.02);
   EXPECT_EQ(rest[0]["amplitude_dps"], 0.001);
   EXPECT_FALSE(rest[1].contains("frequency_hz"));
@@ -56,7 +56,7 @@ TEST(GapReportTest, ComparisonHoldsTheFieldsOfTheInterface) {
   gap::Comparison comparison;
   comparison.gap = {.before = 0.81, .after = 0.81, .band95 = {-0.006, 0.007}};
   comparison.differences = {{1, {60.0, 410.0, 0.0, 8.0}, "rate", 900.0, "too little"}};
-  const Json json = comparison_json(comparison);
+  const Json json = comparison_json(plain_subject(), comparison);
   EXPECT_EQ(json["format"], 1);
   EXPECT_EQ(json["gap"], Json::parse(R"({"unit": "nats_per_sample", "value": 0.81, "floor": 0.0,
                                          "band95": [-0.006, 0.007]})"));
@@ -108,7 +108,7 @@ TEST(GapReportTest, SaysWhatTheTimeWasTooShortFor) {
   gap::Result result = made_up_result();
   result.open = {"whether there are further effects", "what noise the model lacks"};
   result.effects[1].checked = result.effects[1].applied = false;
-  const Json json = gap_json(result);
+  const Json json = gap_json(plain_subject(), result);
   EXPECT_EQ(json["complete"], false);
   EXPECT_EQ(json["open"].size(), 2U);
   EXPECT_EQ(json["effects"][1]["checked"], false);
@@ -123,11 +123,11 @@ TEST(GapReportTest, SaysWhatTheTimeWasTooShortFor) {
 TEST(GapReportTest, TellsWhenEachOfSeveralRecordingsWas) {
   gap::Result result = made_up_result();
   result.drives = {{0.0, 190.5}, {210.0, 400.0}};
-  EXPECT_EQ(gap_json(result)["recording"]["parts"],
+  EXPECT_EQ(gap_json(plain_subject(), result)["recording"]["parts"],
             Json::parse(R"([{"from_s": 0.0, "to_s": 190.5}, {"from_s": 210.0, "to_s": 400.0}])"));
   EXPECT_NE(gap_text(plain_subject(), result).find("recording 2 from 210 to 400 s"),
             std::string::npos);
-  EXPECT_FALSE(gap_json(made_up_result())["recording"].contains("parts"));
+  EXPECT_FALSE(gap_json(plain_subject(), made_up_result())["recording"].contains("parts"));
 }
 
 TEST(GapReportTest, SaysThatAComparisonFoundNothing) {

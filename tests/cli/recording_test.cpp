@@ -101,7 +101,9 @@ class RecordingTest : public testing::Test {
     auto loaded = gateway::load_config(root_ / "vgyro.toml");
     EXPECT_TRUE(loaded);
     if (!loaded) return fail("vgyro.toml", loaded.error().front().message());
-    return read_recording(root_ / "in.log", loaded->plan, "test");
+    auto recordings = read_recordings(root_ / "in.log", std::span(&loaded->plan, 1), "test");
+    if (!recordings) return tl::unexpected(recordings.error());
+    return std::move(recordings->front());
   }
 
   fs::path root_;

@@ -59,10 +59,11 @@ addEventListener("load", () => setTimeout(() => {
     background: getComputedStyle(document.body).backgroundColor,
     overflow: document.documentElement.scrollWidth - innerWidth,
   };
+  seen.links = [...document.querySelectorAll("main a")].map((link) => link.getAttribute("href"));
   const press = (key) => charts[0].dispatchEvent(new KeyboardEvent("keydown", { key, bubbles: true }));
   const range = () => plots[0].chart.xAxisRange();
-  seen.ranges = [range()];
-  for (const key of ["+", "ArrowRight", "Escape"]) { press(key); seen.ranges.push(range()); }
+  seen.ranges = charts.length > 0 ? [range()] : [];
+  for (const key of charts.length > 0 ? ["+", "ArrowRight", "Escape"] : []) { press(key); seen.ranges.push(range()); }
   const out = document.createElement("pre");
   out.id = "seen";
   out.textContent = JSON.stringify(seen);
@@ -86,10 +87,10 @@ class Page(unittest.TestCase):
             self.seen[width, options] = self.visit(width, *options)
         return self.seen[width, options]
 
-    def visit(self, width, *options):
+    def visit(self, width, *options, page=None):
         with tempfile.TemporaryDirectory(prefix="vgyro-page-") as folder:
             path = Path(folder) / "report.html"
-            page = self.page.replace('<meta charset="utf-8">', '<meta charset="utf-8">' + LISTENER, 1)
+            page = (page or self.page).replace('<meta charset="utf-8">', '<meta charset="utf-8">' + LISTENER, 1)
             path.write_text(page.replace("</body>", PROBE + "</body>"))
             done = subprocess.run(
                 [CHROMIUM, "--headless=new", "--no-sandbox", "--disable-gpu", f"--user-data-dir={folder}/profile", "--no-first-run",
@@ -125,10 +126,22 @@ class Page(unittest.TestCase):
 
     def test_tells_the_whole_story(self):
         text = self.look()["text"]
-        for part in ("Partly explained", "What was added", "What gave it away", "Measured less predicted", "What remains",
+        for part in ("Partly explained", "What was found", "What gave it away", "Measured less predicted", "What remains",
                      "What could not be told", "What the numbers mean", "error -0.0004212 ± 3.1e-06", "record a rate table",
                      "line at 37.02 ± 0.01 Hz", "let it change by 10 K", "3 samples were left out"):
             self.assertIn(part, text)
+
+    def test_the_first_page_of_several_axes_leads_to_each(self):
+        page = subprocess.run([BIN / "report_page_sample", "axes"], stdout=subprocess.PIPE, check=True, timeout=60).stdout.decode()
+        self.assertEqual(len(json.loads(re.search(r'<script type="application/json" id="data">(.*?)</script>', page, re.DOTALL).group(1))["axes"]), 2)
+        if not CHROMIUM:
+            self.skipTest("chromium is not installed")
+        seen = self.visit(1200, page=page)
+        self.assertEqual(seen["problems"], [])
+        self.assertEqual(seen["images"], 0)
+        self.assertEqual(seen["links"], ["report-x.html", "report-x.html", "report-y.html", "report-y.html"])
+        for part in ("axis by axis", "partly explained", "What was found", "What remains", "its z", "its y", "error -0.0004212 ± 3.1e-06", HOSTILE):
+            self.assertIn(part, seen["text"])
 
     def test_takes_no_name_for_markup(self):
         # A sensor's name and a log's name are anything that somebody typed.

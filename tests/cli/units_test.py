@@ -99,6 +99,17 @@ class Drive:
         return t, self.rate(t) @ np.asarray(turn).T + np.asarray(bias_dps) + walk + noise
 
 
+SBG = f"""\
+[[output.layout]]
+dbc = "{SOURCE}/dbc/profiles/sbg_ellipse.dbc"
+message = "SBG_ImuGyro"
+rate_x = "RateX"
+rate_y = "RateY"
+rate_z = "RateZ"
+sign_y = -1
+sign_z = -1
+rate_not_available = -32768
+"""
 BIAS_A, BIAS_B = (0.1, -0.2, 0.3), (-0.07, 0.15, -0.25)
 TILT_DEG = np.array([0.3, -0.32, 0.24])  # half a degree in all
 
@@ -113,6 +124,22 @@ def frames(t, readings, identifier, counter=None):
         data = raw[i].tobytes() + bytes([count, 0, 0, 0])
         lines.append((us, f"({us // 1_000_000}.{us % 1_000_000:06d}) can0 {identifier:03X}##1{data.hex().upper()}\n"))
     return lines
+
+
+def yaw_frames(t, yaw_dps):
+    """(time, line) of each sample of unit B's yaw in a message of its own, 0.3 ms behind the others."""
+    lines = []
+    for i, t_s in enumerate(t):
+        us = START_US + round(t_s * 1e6) + 300
+        raw = np.rint(np.radians(yaw_dps[i]) * 1e6).astype("<i4").tobytes() + bytes([i % 256, 0, 0, 0])
+        lines.append((us, f"({us // 1_000_000}.{us % 1_000_000:06d}) can0 103#{raw.hex().upper()}\n"))
+    return lines
+
+
+def config_of_own_yaw(more=""):
+    return config().replace('message = "IMU_B"\nrate_x = "X"\nrate_y = "Y"\nrate_z = "Z"\ncounter = "Counter"\n',
+                            'message = "IMU_B"\nrate_x = "X"\nrate_y = "Y"\ncounter = "Counter"\n'
+                            f'[[gyro.axis]]\naxis = "z"\nmessage = "YAW_B"\nrate = "Yaw"\n{more}counter = "YawCounter"\n')
 
 
 def log_of(*streams):
@@ -216,14 +243,8 @@ class Truth(Units):
         """Yaw of one unit from another sensor, half as often."""
         drive, a, b = self.drive(seed=14)
         t, readings = b
-        lines = []
-        for n, i in enumerate(range(0, len(t), 2)):
-            us = START_US + round(t[i] * 1e6) + 300
-            raw = np.rint(np.radians(readings[i, 2]) * 1e6).astype("<i4").tobytes() + bytes([n % 256, 0, 0, 0])
-            lines.append((us, f"({us // 1_000_000}.{us % 1_000_000:06d}) can0 103#{raw.hex().upper()}\n"))
-        text = config().replace('message = "IMU_B"\nrate_x = "X"\nrate_y = "Y"\nrate_z = "Z"\ncounter = "Counter"\n',
-                                'message = "IMU_B"\nrate_x = "X"\nrate_y = "Y"\ncounter = "Counter"\n'
-                                '[[gyro.axis]]\naxis = "z"\nmessage = "YAW_B"\nrate = "Yaw"\ncounter = "YawCounter"\n')
+        lines = yaw_frames(t[::2], readings[::2, 2])
+        text = config_of_own_yaw()
         rows, summary = self.replay(log_of(frames(*a, 0x101), frames(*b, 0x102), lines), text)
         self.judge(rows, drive, axes="xy")
         self.assertEqual(summary["final_state"], "running")
@@ -251,14 +272,8 @@ class Truth(Units):
     def test_an_axis_may_have_a_message_sign_and_unit_of_its_own(self):
         drive, a, b = self.drive(seed=7)
         t, readings = b
-        lines = []
-        for i, t_s in enumerate(t):
-            us = START_US + round(t_s * 1e6) + 300
-            raw = np.rint(-np.radians(readings[i, 2]) * 1e6).astype("<i4").tobytes() + bytes([i % 256, 0, 0, 0])
-            lines.append((us, f"({us // 1_000_000}.{us % 1_000_000:06d}) can0 103#{raw.hex().upper()}\n"))
-        text = config().replace('message = "IMU_B"\nrate_x = "X"\nrate_y = "Y"\nrate_z = "Z"\ncounter = "Counter"\n',
-                                'message = "IMU_B"\nrate_x = "X"\nrate_y = "Y"\ncounter = "Counter"\n'
-                                '[[gyro.axis]]\naxis = "z"\nmessage = "YAW_B"\nrate = "Yaw"\nsign = -1\ncounter = "YawCounter"\n')
+        lines = yaw_frames(t, -readings[:, 2])
+        text = config_of_own_yaw("sign = -1\n")
         rows, summary = self.replay(log_of(frames(*a, 0x101), frames(*b, 0x102), lines), text)
         # Lines of axes whose messages differ stand at instants of their own.
         self.judge(rows, drive, axes="xy")
@@ -330,6 +345,31 @@ class Frames(Units):
         rows, summary = self.replay(log_of(frames(*a, 0x101), frames(*b, 0x102)), config(output=layout))
         self.assertEqual(summary["out"]["layouts"][0]["valid"], sum(row["valid_z"] == "1" for row in rows))
 
+    def test_a_layout_carries_all_axes(self):
+        """In SBG's frame, of which y points to the right and z down."""
+        _, a, b = self.drive(seconds=90.0, seed=15)
+        rows, summary = self.replay(log_of(frames(*a, 0x101), frames(*b, 0x102)), config(output=SBG))
+        self.assertEqual(self.judge_layout(rows), len(rows))
+        valid = sum(all(row[f"valid_{axis}"] == "1" for axis in AXES) for row in rows)
+        self.assertEqual(summary["out"]["layouts"][0], {"bus": "can0", "id": 290, "message": "SBG_ImuGyro", "frames": len(rows),
+                                                        "valid": valid, "out_of_range": 0, "withheld": 0})
+        checked = self.good("check", "u.toml").stdout.decode()
+        for said in ("SBG_ImuGyro.RateX", "y: RateY", "z: RateZ, bit 32, 16 bits", "sign flipped"):
+            self.assertIn(said, checked)
+
+    def judge_layout(self, rows):
+        """Each frame is the table's line, or says "not available"; how many there are."""
+        lines = [line.split() for line in self.read("out.log").splitlines() if " 122#" in line]
+        table = {axis: [float(row[f"rate_{axis}_dps"]) if row[f"valid_{axis}"] == "1" else None for row in rows] for axis in AXES}
+        for i, line in enumerate(lines):
+            raw = np.frombuffer(bytes.fromhex(line[2].split("#")[1]), "<i2")
+            for axis, value, sign in zip(AXES, raw, (1, -1, -1)):
+                wanted = table[axis][i]
+                self.assertEqual(value == -32768, wanted is None, line)
+                if wanted is not None:
+                    self.assertAlmostEqual(sign * np.degrees(value * 1e-3), wanted, delta=np.degrees(0.5e-3) + 1e-6)
+        return len(lines)
+
     def test_two_simulated_units_are_replayed_to_the_truth(self):
         drive = Drive(240.0, 12)
         t = np.arange(0.0, 240.0, 0.05)
@@ -373,6 +413,7 @@ class BadInput(Units):
 
     def test_a_mount_that_is_no_rotation(self):
         self.refused(config(more_a="mount = [1, 0.2, 0, 0, 1, 0, 0, 0, 1]"), "mount is no rotation", "right angles")
+        self.refused(config(more_a="mount = [0.7, 0, 0, 0, 0.7, 0, 0, 0, 0.7]"), "mount is no rotation: the nearest one differs by 0.3 in an element")
         self.refused(config(more_a="mount = [0, 0, 0, 0, 0, 0, 0, 0, 0]"), "mount is no rotation: its determinant is 0")
         self.refused(config(more_a="mount = [1, 2]"), "neither three numbers nor nine")
         self.refused(config(more_a="mount = [0, 0, 900]"), "an angle of 900 deg", "-360 to 360")
@@ -387,6 +428,60 @@ class BadInput(Units):
         single = '[[gyro]]\nname = "right"\nbus = "can0"\ndbc = "units.dbc"\nmessage = "IMU_B"\nrate = "Z"\n'
         self.refused(config().replace(gyro("right", "IMU_B"), single), "gyro left has 3 axes, and gyro right has one", "in both [[gyro]] tables")
 
+    def test_one_axis_and_three_are_one_complaint(self):
+        single = '[[gyro]]\nname = "right"\nbus = "can0"\ndbc = "units.dbc"\nmessage = "IMU_B"\nrate = "Z"\n'
+        self.write("u.toml", config().replace(gyro("right", "IMU_B"), single))
+        message = self.bad("check", "u.toml")
+        self.assertNotIn("rate_dps", message)
+        self.assertEqual(message.count("error:"), 1, message)
+
+    def test_more_than_two_units(self):
+        self.refused(config() + gyro("third", "IMU_B"), "there are 3 [[gyro]] tables", "exactly two are needed", "in its own table: rate_x, rate_y, rate_z")
+        axes = "".join(f'[[gyro]]\nname = "{unit}{axis}"\nbus = "can0"\ndbc = "units.dbc"\nmessage = "IMU_{unit}"\nrate = "{axis}"\n'
+                       for unit in "AB" for axis in "XYZ")
+        self.refused(axes + '[output]\nbus = "can0"\n', "there are 6 [[gyro]] tables", "several axes of one unit stand in its own table")
+
+    def test_two_units_of_one_message(self):
+        self.refused(config().replace("IMU_B", "IMU_A"), "both gyros are read from the same frame: IMU_A on can0", "two different gyros are needed")
+        text = config().replace('message = "IMU_B"\nrate_x = "X"\nrate_y = "Y"\nrate_z = "Z"\ncounter = "Counter"\n',
+                                'message = "IMU_B"\nrate_x = "X"\nrate_y = "Y"\ncounter = "Counter"\n'
+                                '[[gyro.axis]]\naxis = "z"\nmessage = "IMU_A"\nrate = "Z"\n')
+        self.refused(text, "both gyros are read from the same frame: IMU_A on can0")
+
+    def test_a_mount_that_mixes_axes_of_two_messages_is_warned_of(self):
+        """Their rates may differ, which no file says."""
+        def unit(mount):
+            return config().replace('message = "IMU_B"\nrate_x = "X"\nrate_y = "Y"\nrate_z = "Z"\ncounter = "Counter"\n',
+                                    f'message = "IMU_B"\nrate_x = "X"\nrate_y = "Y"\ncounter = "Counter"\nmount = {mount}\n'
+                                    '[[gyro.axis]]\naxis = "z"\nmessage = "YAW_B"\nrate = "Yaw"\ncounter = "YawCounter"\n')
+        self.write("u.toml", unit("[20, 0, 0]"))
+        said = self.good("check", "u.toml").stderr.decode()
+        self.assertRegex(said, r"u\.toml:19: mount mixes Y of IMU_B and Yaw of YAW_B about the vehicle's y")
+        self.assertIn("only swaps axes and signs", said)
+        self.write("u.toml", unit("[180, 0, 90]"))
+        self.assertNotIn("mount mixes", self.good("check", "u.toml").stderr.decode())
+
+    def test_axes_at_different_rates_under_a_mount_are_right_within_sigma(self):
+        """Yaw of one unit comes half as often, and the mount mixes it with pitch."""
+        drive, a, b = self.drive(seconds=240.0, seed=16, turn=rotation(np.radians([20, 0, 0])).T)
+        t, readings = b
+        readings = readings.copy()
+        lines = []
+        for n, i in enumerate(range(0, len(t), 2)):
+            us = START_US + round(t[i] * 1e6) + 300
+            raw = np.rint(np.radians(readings[i, 2]) * 1e6).astype("<i4").tobytes() + bytes([n % 256, 0, 0, 0])
+            lines.append((us, f"({us // 1_000_000}.{us % 1_000_000:06d}) can0 103#{raw.hex().upper()}\n"))
+        text = config().replace('message = "IMU_B"\nrate_x = "X"\nrate_y = "Y"\nrate_z = "Z"\ncounter = "Counter"\n',
+                                'message = "IMU_B"\nrate_x = "X"\nrate_y = "Y"\ncounter = "Counter"\nmount = [20, 0, 0]\n'
+                                '[[gyro.axis]]\naxis = "z"\nmessage = "YAW_B"\nrate = "Yaw"\ncounter = "YawCounter"\n')
+        rows, summary = self.replay(log_of(frames(*a, 0x101), frames(*b, 0x102), lines), text)
+        for axis in AXES:
+            relative, _ = self.errors(rows, drive, axis)
+            self.assertGreater(len(relative), 5000, axis)
+            self.assertLess(np.mean(relative ** 2), 1.5, axis)
+            self.assertLess(np.max(np.abs(relative)), 7.0, axis)
+        self.assertEqual(summary["final_state"], "running")
+
     def test_a_unit_of_one_axis(self):
         self.refused(config().replace('rate_x = "X"\nrate_y = "Y"\n', ""), "a unit of one axis", 'rate = "SIGNAL"')
 
@@ -397,13 +492,6 @@ class BadInput(Units):
         self.refused(config(calibration="rate_dps = 0.1"), "rate_dps must be a list of 3 numbers, one for each axis")
         self.refused(config(calibration="rate_dps = [0.1]"), "rate_dps is not a list of 3 numbers")
         self.refused(config(calibration="heading_deg = 12"), "heading_deg stands without latitude_deg")
-
-    def test_commands_that_look_at_one_pair(self):
-        self.write("u.toml", config())
-        self.write("one.log", "")
-        self.write("m.toml", "format = 1\n")
-        for command in (("allan", "one.log"), ("compare", "--model", "m.toml", "--measured", "one.log"), ("gap", "--measured", "one.log", "--out", "found")):
-            self.assertIn("has units of 3 axes", self.bad(command[0], "--config", "u.toml", *command[1:]))
 
     def test_axes_of_the_model_file(self):
         self.write("u.toml", config())

@@ -9,11 +9,11 @@ import bench
 COMMANDS = {
     "check": {"CONFIG", "--method", "--model"},
     "decode": {"--dbc", "--text", "LOG"},
-    "allan": {"--config", "--json", "--plot", "LOG"},
+    "allan": {"--config", "--axis", "--json", "--plot", "LOG"},
     "replay": {"--config", "--method", "--model", "--state", "-o", "--output", "--json", "--csv", "--plot", "--map", "--digits", "-q", "--quiet",
                "LOG"},
-    "compare": {"--config", "--model", "--measured", "--json", "--seed", "-q", "--quiet"},
-    "gap": {"--config", "--model", "--measured", "--out", "--accept", "--time-limit", "--seed", "-q", "--quiet"},
+    "compare": {"--config", "--model", "--measured", "--axis", "--json", "--seed", "-q", "--quiet"},
+    "gap": {"--config", "--model", "--measured", "--axis", "--out", "--accept", "--time-limit", "--seed", "-q", "--quiet"},
     "convert": {"-o", "--output", "--digits", "-q", "--quiet", "LOG"},
 }
 

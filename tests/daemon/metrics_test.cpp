@@ -78,7 +78,7 @@ TEST(Metrics, EveryLayoutHasASampleOfItsOwn) {
       .message = "ARI",
       .id = 0x0CF02A31,
       .extended = true,
-      .rate = {.name = "Rate", .codec = codec_of(signal_of(0, 16, 0.01))}};
+      .rates = {{.rate = {.name = "Rate", .codec = codec_of(signal_of(0, 16, 0.01))}}}};
   plan.output.layouts = {layout, layout, layout};
   plan.output.layouts[1].bus = 1;
   plan.output.layouts[2].id = 0x0CF02A32;

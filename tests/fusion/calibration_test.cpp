@@ -261,5 +261,33 @@ TEST(Calibrator, ForgetsMotionBeforeAHole) {
   EXPECT_FALSE(calibrator.result().in_motion);
 }
 
+// What somebody else saw counts as what was seen here: nine tenths are enough, less is nothing.
+TEST(Calibrator, IsEndedByMotionThatAnotherOneSees) {
+  for (const double until_s : {17.0, 19.0}) {
+    SCOPED_TRACE(until_s);
+    Random random(3);
+    Pair pair;
+    pair.sigma_dps = 0.01;
+    Calibrator calibrator(1, kRest_s);
+    feed(calibrator, pair, random, 0.0, until_s);
+    const bool enough = until_s > 0.9 * kRest_s;
+    EXPECT_EQ(calibrator.cut_short(until_s, until_s - 1.0), enough);
+    EXPECT_EQ(calibrator.restarts(), enough ? 0U : 1U);
+    if (!enough) continue;
+    EXPECT_TRUE(calibrator.result().cut_short());
+    EXPECT_NEAR(calibrator.result().used_until_s, 18.0, 0.05) << "the last second may hold motion";
+    EXPECT_NEAR(calibrator.result().bias_dps(0, 9.0), 0.033, 5.0 * 0.01 / std::sqrt(1800.0));
+  }
+  Calibrator accepting(1, kRest_s, WhenMoving::kAccept);
+  Random random(3);
+  feed(accepting, Pair{}, random, 0.0, 10.0);
+  EXPECT_FALSE(accepting.cut_short(10.0, 9.0));
+  EXPECT_EQ(accepting.restarts(), 0U) << "motion is accepted";
+  accepting.note_motion();
+  EXPECT_LT(feed(accepting, Pair{}, random, 10.0), 1000.0);
+  EXPECT_TRUE(accepting.result().in_motion);
+  EXPECT_FALSE(accepting.result().cut_short());
+}
+
 }  // namespace
 }  // namespace vgyro::fusion

@@ -62,7 +62,34 @@ def configurations():
     # Every key that the manual has, over frames that have everything.
     bench = (ROOT / "tests/fuzz/pipeline_fuzzer.cpp").read_text(encoding="utf-8").split('R"(')[1].split(')"')[0]
     yield EVERYTHING.encode() + b"\0" + bench.encode()
+    # Whole units: axes in one message and in their own, mounts in both forms, layouts of one axis and of several.
+    for text in UNITS:
+        yield text.encode() + b"\0" + UNITS_DBC.encode()
 
+
+UNITS_DBC = "".join(f"""\
+BO_ {can_id} {name}: 16 RIG
+ SG_ X : 0|24@1- (1E-004,0) [-800|800] "deg/s" RIG
+ SG_ Y : 24|24@1- (1E-004,0) [-800|800] "deg/s" RIG
+ SG_ Z : 48|24@1- (1E-004,0) [-800|800] "deg/s" RIG
+ SG_ Temp : 72|8@1- (1,0) [-40|125] "degC" RIG
+ SG_ Counter : 80|4@1+ (1,0) [0|15] "" RIG
+ SG_ Crc : 88|8@1+ (1,0) [0|255] "" RIG
+ SG_ Good : 96|1@1+ (1,0) [0|1] "" RIG
+""" for can_id, name in ((257, "A"), (258, "B"), (259, "BZ"), (260, "OUT")))
+GUARD = 'counter = "Counter"\ncrc = "Crc"\ne2e = "crc8_j1850"\n'
+UNIT_A = '[[gyro]]\nname = "a"\nbus = "can0"\ndbc = "201"\nmessage = "A"\nrate_x = "X"\nrate_y = "Y"\nrate_z = "Z"\n' + GUARD
+LAYOUT = '[[output.layout]]\ndbc = "201"\nmessage = "OUT"\n'
+UNITS = [
+    UNIT_A + 'temperature = "Temp"\nvalid = "Good == 1"\nmount = [10, -20.5, 90]\nmax_bias_dps = 3\n' +
+    UNIT_A.replace('"a"', '"b"').replace('"A"', '"B"') + 'sign = -1\nmount = [[0, -1, 0], [1, 0, 0], [0, 0, 1]]\n'
+    '[calibration]\nrest_s = 2\nlatitude_deg = 50\nheading_deg = 120\n[output]\nbus = "can1"\nfd = true\n' + LAYOUT +
+    'rate_x = "X"\nrate_y = "Y"\nrate_z = "Z"\nsign_y = -1\nrate_not_available = -8388608\nvalid_z = "Good == 1"\ninvalid_z = 0\n' + GUARD,
+    UNIT_A.replace('rate_y = "Y"\n', '') + '[[gyro]]\nname = "b"\nbus = "can1"\ndbc = "201"\nmessage = "B"\nrate_x = "X"\n' + GUARD +
+    '[[gyro.axis]]\naxis = "z"\nmessage = "BZ"\nrate = "Z"\nsign = -1\nunit = "rad/s"\n' + GUARD +
+    '[calibration]\nrate_dps = [0.001, 0.003]\nwhen_moving = "accept"\n[corrector]\nmethod = "mean"\n[output]\nbus = "can0"\n' + LAYOUT +
+    'rate = "Z"\naxis = "z"\nevery_ms = 20\n',
+]
 
 EVERYTHING = """\
 [[gyro]]

@@ -364,8 +364,8 @@ class EveryLayout : public OutputLayoutTest {
 };
 
 double decoded_dps(const OutputLayout& plan, const can::Frame& frame) {
-  const double value = plan.rate.codec.decode(frame.payload()).value;
-  return value * plan.rate.scale + plan.rate.shift;
+  const double value = plan.rates[0].rate.codec.decode(frame.payload()).value;
+  return value * plan.rates[0].rate.scale + plan.rates[0].rate.shift;
 }
 
 // To the nearest step, and in order.
@@ -383,7 +383,7 @@ TEST_F(EveryLayout, RoundsToTheNearestStepAndKeepsTheOrder) {
       ASSERT_NE(frame, nullptr) << plan.message << ' ' << rate_dps;
       const double seen_dps = decoded_dps(plan, *frame);
       const double off = std::abs(seen_dps - rate_dps);
-      EXPECT_LE(off, 0.5 * plan.rate.step + 1e-6 * std::abs(rate_dps)) << plan.message;
+      EXPECT_LE(off, 0.5 * plan.rates[0].rate.step + 1e-6 * std::abs(rate_dps)) << plan.message;
       EXPECT_GE(seen_dps, before) << plan.message << ' ' << rate_dps;
       before = seen_dps;
     }
@@ -394,7 +394,7 @@ TEST_F(EveryLayout, RoundsToTheNearestStepAndKeepsTheOrder) {
 
 /// A reader that knows the profile: does the frame carry a rate that may be used?
 bool readable_as_valid(const OutputLayout& plan, const can::Frame& frame) {
-  const std::int64_t raw = plan.rate.codec.decode(frame.payload()).raw;
+  const std::int64_t raw = plan.rates[0].rate.codec.decode(frame.payload()).raw;
   const auto bits = static_cast<std::uint64_t>(raw);
   if (plan.message == "MM7_Yaw") return rig::bits(frame, 20, 4) == 0;
   if (plan.message == "ARI") return bits <= 0xFAFF && (!plan.valid || rig::bits(frame, 52, 2) == 0);
@@ -422,7 +422,7 @@ TEST_F(EveryLayout, IsNeverReadAsValidWhenItIsNot) {
       if (!readable_as_valid(plan, *frame)) continue;
       EXPECT_TRUE(output.valid) << plan.message << ' ' << text_of(frame);
       const double off = std::abs(decoded_dps(plan, *frame) - output.rate_dps);
-      EXPECT_LE(off, 0.5 * plan.rate.step + 1e-6 * std::abs(output.rate_dps))
+      EXPECT_LE(off, 0.5 * plan.rates[0].rate.step + 1e-6 * std::abs(output.rate_dps))
           << plan.message << ' ' << output.rate_dps << ' ' << text_of(frame);
     }
     EXPECT_EQ(encoder.counts().frames, frames);

@@ -79,13 +79,13 @@ TEST(PipelineAllocation, NeverHappensWithAForeignLayout) {
   OutputLayout layout{.bus = 1,
                       .message = "FOREIGN",
                       .id = 0x123,
-                      .rate = {.name = "Rate",
-                               .codec = rig::codec_of(rig::signal_of(0, 16, 0.01)),
-                               .minimum = -327.0,
-                               .maximum = 327.0,
-                               .none_raw = 0x8000,
-                               .beyond_raw = 0x8000,
-                               .has_code = true}};
+                      .rates = {{.rate = {.name = "Rate",
+                                          .codec = rig::codec_of(rig::signal_of(0, 16, 0.01)),
+                                          .minimum = -327.0,
+                                          .maximum = 327.0,
+                                          .none_raw = 0x8000,
+                                          .beyond_raw = 0x8000,
+                                          .has_code = true}}}};
   plan.output.layouts = {layout};
   const rig::Recording recording =
       rig::merge({rig::stream_a(ms(0), ms(35'000), rig::constant(0.1)),

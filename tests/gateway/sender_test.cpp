@@ -270,13 +270,13 @@ OutputLayout layout_on(can::BusIndex bus) {
   OutputLayout layout{.bus = bus,
                       .message = "FOREIGN",
                       .id = kLayoutId,
-                      .rate = {.name = "Rate",
-                               .codec = rate,
-                               .minimum = -327.67,
-                               .maximum = 327.67,
-                               .none_raw = 0x8000,
-                               .beyond_raw = 0x8000,
-                               .has_code = true}};
+                      .rates = {{.rate = {.name = "Rate",
+                                          .codec = rate,
+                                          .minimum = -327.67,
+                                          .maximum = 327.67,
+                                          .none_raw = 0x8000,
+                                          .beyond_raw = 0x8000,
+                                          .has_code = true}}}};
   layout.e2e.counter = AliveCounter{"Counter", counter, 15};
   return layout;
 }
@@ -321,7 +321,7 @@ TEST_F(SenderTest, LayoutsMayGoOutAlone) {
   OutputPlan plan;
   plan.vgyro_frames = false;
   plan.layouts = {layout_on(0)};
-  plan.layouts[0].rate.scale = 10.0;
+  plan.layouts[0].rates[0].rate.scale = 10.0;
   Sender alone{plan};
   {
     const Sender::Turn turn(alone, out, at_ms(1));

@@ -1116,6 +1116,111 @@ class UnitsCase:
         return f"valid rates {', '.join(said)}, as in the replay, {describe(run)}"
 
 
+class UnitsRestartCase(UnitsCase):
+    """Killed without warning after all axes have calibrated, and started again."""
+
+    name = "units_restart"
+    says = "two units, killed and started again with the state file: all axes go on where they were"
+
+    def prepare(self, folder):
+        orders = super().prepare(folder)
+        config = folder / "vgyro.toml"
+        text = config.read_text(encoding="utf-8")
+        config.write_text(text.replace("rate_dps = [0.0, 0.0, 0.0]", "latitude_deg = 50.0\nheading_deg = 30.0"), encoding="utf-8")
+        state, log = "{memory}/state.toml", ["play", str(folder / "played.log")]
+        orders["steps"] = [log, ["wait", 0.5], ["kill_and_restart", None], ["run", ["cp", state, str(folder / "kept.toml")]], log]
+        orders["command"] += ["--state", state]
+        return orders
+
+    def judge(self, folder, result):
+        run = read_run(folder, result, self.ids)
+        check_service(run)
+        since = result["restarts_us"][0]
+        run.inputs = [line for line in run.inputs if line.us >= since]
+        run.outputs = [line for line in run.outputs if line.us >= since]
+        kept = tomllib.loads((folder / "kept.toml").read_text(encoding="ascii"))
+        self.check_kept(kept)
+        require("took up the biases of" in run.said, f"taking up was not logged\n{run.said}")
+        replayed = run.replay("--state", str(folder / "kept.toml"))
+        oracle = verdicts.Oracle(SOURCE / "dbc/vgyro_axes.dbc")
+        for rate_id in self.ids[::3]:
+            verdicts.check_same_rates(run.of(rate_id), [line for line in replayed if int(line.name, 16) == rate_id])
+            invalid = [line for line in run.of(rate_id) if oracle.decode(line)["VG_Valid"] != 1.0]
+            require(run.of(rate_id) and not invalid, f"{len(invalid)} rates of {rate_id:#x} are not valid after the restart")
+        for can_id in self.ids:
+            verdicts.check_protection(run.of(can_id), can_id)
+        return f"all axes valid from the first pair, as in the replay with that file, heading kept, {describe(run)}"
+
+    def check_kept(self, kept):
+        require(set(kept["axis"]) == set("xyz") and "misalignment" in kept, f"{kept.keys()}")
+        # Six standard errors of the mean over two seconds, and the wire's step.
+        for axis in "xyz":
+            biases = kept["axis"][axis]["drift"]["bias_dps"]
+            # The second unit's mount turns its x to the left, so about x it reads less its own y.
+            second = 0.3 if axis == "x" else -0.3
+            require(np.allclose(biases, [0.4, second], rtol=0, atol=6 * self.noise_dps / 200 ** 0.5 + 0.01), f"{axis}: {biases}")
+        require(0.0 <= kept["heading"]["sigma_rad"] < 4.0, f"{kept['heading']}")
+
+
+class UnitsReloadCase(UnitsCase):
+    """SIGHUP, with the platform at rest: a bad configuration, another window, and then another output."""
+
+    name = "units_reload"
+    says = "two units, configuration read again: all axes' biases and counters go on; a bad one is refused"
+
+    def prepare(self, folder):
+        orders = super().prepare(folder)
+        config = folder / "vgyro.toml"
+        text = config.read_text(encoding="utf-8")
+        (folder / "bad.toml").write_text(text.replace('rate_y = "Y"', 'rate_y = "YY"', 1), encoding="utf-8")
+        (folder / "other.toml").write_text(text + "[corrector]\nwindow_s = 3.0\n", encoding="utf-8")
+        (folder / "more.toml").write_text(text + f"""\
+[[output.layout]]
+dbc = "{SOURCE}/dbc/profiles/sbg_ellipse.dbc"
+message = "SBG_ImuGyro"
+rate_x = "RateX"
+rate_y = "RateY"
+rate_z = "RateZ"
+rate_not_available = -32768
+[corrector]
+window_s = 3.0
+""", encoding="utf-8")
+        def take(name):
+            return ["run", ["cp", str(folder / name), str(config)]]
+        log, pause = ["play", str(folder / "played.log")], ["wait", 0.6]
+        orders["steps"] = [log, pause, take("bad.toml"), ["reload", None], take("other.toml"), ["reload", None], log, pause,
+                           take("more.toml"), ["reload", None], log]
+        return orders
+
+    def judge(self, folder, result):
+        run = read_run(folder, result, (*self.ids, 0x122))
+        check_service(run)
+        for text in ("its gyros are the same: nothing was interrupted", "in use, with what was learned",
+                     "the new configuration is refused; the old one goes on"):
+            require(run.said.count(text) == 1, f"{text}: {run.said.count(text)} times\n{run.said}")
+        require(re.search(r'vgyro\.toml:\d+: .*"YY"', run.said), f"no place\n{run.said}")
+        oracle = verdicts.Oracle(SOURCE / "dbc/vgyro_axes.dbc")
+        # One stream for receivers: every CRC right, every counter the next.
+        for can_id in self.ids:
+            verdicts.check_protection(run.of(can_id), can_id)
+        plays = np.array([line.us for line in run.inputs if line.name == "101"])
+        begins = np.concatenate([plays[:1], plays[1:][np.diff(plays) > 400_000]])
+        require(len(begins) == 3, f"{len(begins)} plays seen")
+        for axis, rate_id in enumerate(self.ids[::3]):
+            later = [line for line in run.of(rate_id) if line.us > begins[1]]
+            resting = [line for line in later if any(0 < line.us - begin < 1e6 * (self.still_s - 0.5) for begin in begins[1:])]
+            rates = [oracle.decode(line) for line in later]
+            require(all(signals["VG_Valid"] == 1.0 for signals in rates), f"a rate about {'xyz'[axis]} is not valid after a reload")
+            mean = np.mean([oracle.decode(line)["VG_Rate"] for line in resting])
+            # The bias of two seconds of rest, and the wire of the sensors.
+            require(abs(mean) < 6 * self.noise_dps / 400 ** 0.5 + 0.005, f"about {'xyz'[axis]} {mean:.4f} deg/s at rest")
+        layouts = run.of(0x122)
+        require(layouts and min(line.us for line in layouts) > begins[2], "the layout is not there after the last reload, or before")
+        wanted = sum(line.us > begins[2] for line in run.of(self.ids[0]))
+        require(abs(len(layouts) - wanted) <= 3, f"{len(layouts)} frames of the layout for {wanted} rates")
+        return f"{len(layouts)} frames of all axes in a layout, {describe(run)}"
+
+
 class CarCase:
     """Recorded traffic of a car: one gyro among many identifiers, the other and the reference on a bus
     of their own. At real time."""
@@ -1189,6 +1294,8 @@ def all_cases(recordings):
         InheritedCase(),
         ForeignLayoutsCase(),
         UnitsCase(),
+        UnitsRestartCase(),
+        UnitsReloadCase(),
         IdleCase(),
         CommandCase("no_can_interface", "an interface that is none of CAN: exit 1 and what to do",
                     [vgyrod, "--config", "{folder}/vgyro.toml"], 1,

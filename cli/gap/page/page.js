@@ -44,12 +44,13 @@ function table(head, rows) {
   return make("div", { class: "scroll" }, make("table", {},
     make("thead", {}, make("tr", {}, head.map((text) => cell("th", text)))),
     make("tbody", {}, rows.map((row) => make("tr", {}, row.map((part) =>
-      typeof part === "object" ? cell("td", part.number, true) : cell("td", part)))))));
+      typeof part === "object" && !(part instanceof Node) ? cell("td", part.number, true) : cell("td", part)))))));
 }
 
 const sentence = (text) => text.replace(/^what /, "What ").replace(/\.?$/, "."); // it may begin with a sensor's name
 const gyroName = (gyro) => (gyro ? data.gyros[gyro - 1] : "the reference");
-const effectName = (effect) => `${effect.kind}, gyro ${gyroName(effect.gyro)}`;
+const ownAxis = (part) => (part.axis ? `, its ${part.axis}` : ""); // of a whole unit
+const effectName = (effect) => `${effect.kind}, gyro ${gyroName(effect.gyro)}${ownAxis(effect)}`;
 const readings = (effect) => effect.ambiguous_with.map(effectName).join("; ");
 const stretch = (from, to) => `${number(from, 4)} to ${number(to, 4)} s`;
 
@@ -67,8 +68,7 @@ function gapRows() {
 }
 
 // Linear inside the floor's band, logarithmic beyond: both ends of the story stay visible.
-function gapScale(rows, left, right) {
-  const [low, high] = data.gap.band95;
+function gapScale(rows, left, right, [low, high] = data.gap.band95) {
   const half = Math.max(data.gap.floor - low, high - data.gap.floor, 1e-9);
   const squeeze = (value) => Math.asinh((value - data.gap.floor) / half);
   const all = rows.map((row) => squeeze(row.value)).concat([squeeze(low), squeeze(high)]);
@@ -115,6 +115,84 @@ function gapFigure() {
   svg.append(drawing("text", { x: (left + right) / 2, y: bottom + 38, "text-anchor": "middle", class: "soft" },
     "gap, nats per sample on samples that took no part; logarithmic beyond the band"));
   return make("figure", { id: "gap" }, make("figcaption", {}, "The gap, round by round"), svg);
+}
+
+// --- several axes -------------------------------------------------------------------------------
+
+const mark = (x, y, style, title) => {
+  const dot = drawing("circle", { cx: x, cy: y, r: 6, style });
+  dot.append(drawing("title", {}, title));
+  return dot;
+};
+
+// One row for each axis: from the gap before to the gap after, over the axis's own band.
+function axesFigure() {
+  const wide = 900, left = 120, right = 850, top = 46, step = 40;
+  const bottom = top + step * data.axes.length;
+  const svg = drawing("svg", { viewBox: `0 0 ${wide} ${bottom + 30}`, role: "img", "aria-label": "gap before and after, axis by axis" });
+  const ends = data.axes.map((axis) => axis.gap.band95);
+  const band = [Math.min(...ends.map((end) => end[0])), Math.max(...ends.map((end) => end[1]))];
+  const at = gapScale(data.axes.flatMap((axis) => [{ value: axis.gap.before }, { value: axis.gap.after }]), left, right, band);
+  for (const tick of gapTicks(at, left, right)) {
+    svg.append(drawing("line", { x1: tick.x, x2: tick.x, y1: top - 14, y2: bottom, style: "stroke: var(--line)" }));
+    svg.append(drawing("text", { x: tick.x, y: bottom + 16, "text-anchor": "middle", class: "soft" }, number(tick.value, 2)));
+  }
+  data.axes.forEach((axis, i) => {
+    const y = top + step * (i + 0.5);
+    const [low, high] = axis.gap.band95.map(at);
+    const before = at(axis.gap.before), after = at(axis.gap.after);
+    svg.append(drawing("rect", { x: low, y: y - 13, width: Math.max(high - low, 1), height: 26, style: "fill: var(--band)" }));
+    svg.append(drawing("text", { x: left - 24, y: y + 5, "text-anchor": "end" }, `axis ${axis.axis}`));
+    svg.append(drawing("line", { x1: before, x2: after, y1: y, y2: y, style: "stroke: var(--soft); stroke-width: 2" }));
+    svg.append(mark(before, y, "fill: var(--before)", `before: ${number(axis.gap.before, 4)}`));
+    svg.append(mark(after, y, "fill: var(--after)", `after: ${number(axis.gap.after, 4)}`));
+  });
+  svg.append(mark(left, 12, "fill: var(--before)", "before"), drawing("text", { x: left + 12, y: 16, class: "soft" }, "gap before"));
+  svg.append(mark(left + 110, 12, "fill: var(--after)", "after"), drawing("text", { x: left + 122, y: 16, class: "soft" }, "after"));
+  svg.append(drawing("rect", { x: left + 190, y: 4, width: 18, height: 16, style: "fill: var(--band)" }));
+  svg.append(drawing("text", { x: left + 214, y: 16, class: "soft" }, "as good as it gets; nats per sample"));
+  return make("figure", { id: "gap" }, svg);
+}
+
+const axisLink = (axis, text) => make("a", { href: axis.report || axis.file }, text || axis.axis);
+
+function axesOpening() {
+  const seconds = data.axes[0].recording.seconds;
+  const found = (axis) => axis.effects.map((effect) => effectName(effect) + (effect.applied ? "" : " (not applied)")).join("; ") || "–";
+  const rows = data.axes.map((axis) => [axisLink(axis), axis.verdict.replaceAll("_", " "), { number: number(axis.gap.before, 4) },
+    { number: number(axis.gap.after, 4) }, found(axis), axisLink(axis, "report")]);
+  rows.push(["all", data.verdict.replaceAll("_", " "), { number: number(data.gap.before, 4) }, { number: number(data.gap.after, 4) }, "", ""]);
+  return [
+    make("h1", {}, "Simulation and measurement, axis by axis"),
+    make("p", { class: "soft" }, `${data.log}: ${number(seconds, 5)} s. Model: ${data.model || "none"}. Configuration: ${data.config}. ` +
+      "Axes are the vehicle's; a gyro's own axis is named where an effect is of one."),
+    axesFigure(),
+    table(["axis", "verdict", "gap before", "after", "found", ""], rows),
+  ];
+}
+
+function axesEffects() {
+  const rows = data.axes.flatMap((axis) => axis.effects.map((effect) => [axis.axis, gyroName(effect.gyro) + ownAxis(effect), effect.kind,
+    { number: effect.value }, effect.applied ? "yes" : "no", readings(effect) || "–"]));
+  return rows.length === 0 ? [] : [make("h2", {}, "What was found"), table(["axis", "gyro", "effect", "value ± σ", "in model.toml", "may also be"], rows)];
+}
+
+function axesRemains() {
+  const rows = data.axes.flatMap((axis) => axis.unexplained.map((rest) => [axis.axis, gyroName(rest.gyro), rest.signature, rest.text, stretch(rest.from_s, rest.to_s)]));
+  const heading = make("h2", {}, "What remains");
+  if (rows.length === 0) return [heading, make("p", {}, "Nothing that stands out of what the final models' own simulations show.")];
+  return [heading, table(["axis", "gyro", "signature", "what is seen", "when"], rows)];
+}
+
+function axesNotes() {
+  return data.axes.flatMap((axis) => axis.notes.map((note) => make("p", { class: "soft" }, `Note on ${axis.axis}: ${note}.`)));
+}
+
+// Of one of several: the way to the others.
+function otherPages() {
+  if (!data.pages) return [];
+  const links = data.pages.map((page) => (page.axis === data.axis ? make("b", {}, page.axis) : axisLink(page)));
+  return [make("p", { class: "soft" }, make("a", { href: "report.html" }, "All axes"), ": ", links.flatMap((link) => [link, " "]))];
 }
 
 // --- plots --------------------------------------------------------------------------------------
@@ -281,7 +359,8 @@ function opening() {
   const { recording } = data;
   const samples = recording.samples.map((count, i) => `${count} of gyro ${data.gyros[i]}`).join(", ");
   return [
-    make("h1", {}, "Simulation and measurement"),
+    make("h1", {}, "Simulation and measurement" + (data.axis ? ` about ${data.axis}` : "")),
+    otherPages(),
     make("p", { class: "soft" }, `${data.log}: ${number(recording.seconds, 5)} s; samples: ${samples}; ` +
       `${recording.with_reference ? "with" : "without"} a reference; ${recording.held_out} held out. ` +
       `Model: ${data.model || "none"}. Configuration: ${data.config}.`),
@@ -363,8 +442,10 @@ function glossary() {
     make("dl", {}, GLOSSARY.map(([term, text]) => [make("dt", {}, term), make("dd", {}, text)]).flat())];
 }
 
-document.title = `vgyro gap: ${data.log}`;
-document.getElementById("page").append(...[opening(), rounds(), effects(), residuals(), remains(), untold(), glossary()].flat(2));
+document.title = `vgyro gap${data.axis ? ` about ${data.axis}` : ""}: ${data.log}`;
+const sections = data.axes ? [axesOpening(), axesEffects(), axesRemains(), axesNotes(), glossary()]
+  : [opening(), rounds(), effects(), residuals(), remains(), untold(), glossary()];
+document.getElementById("page").append(...sections.flat(2));
 plots.forEach(draw);
 window.addEventListener("beforeprint", fitPaper);
 window.addEventListener("afterprint", leavePaper);
