@@ -16,10 +16,11 @@ namespace vgyro::model {
 struct Shape {
   std::string_view name;  ///< in evidence files: "scale_factor", "warm_up:60", "g_sensitivity:x"
   Kind kind;
-  Parameters fixed;          ///< of size 0; of a low-pass with its cut-off
-  std::size_t size = 0;      ///< the parameter that the size is; of a low-pass none is
-  bool is_low_pass = false;  ///< its size is how much of it is there: 1 is the cut-off that it names
-  double unit = 1.0;         ///< a small size that matters; a size that is far below is nothing
+  Parameters fixed;      ///< of size 0; of a low-pass with its cut-off
+  std::size_t size = 0;  ///< the parameter that the size is; of a low-pass none is
+  bool is_low_pass =
+      false;          ///< its size is how much of it is there: 1 is the cut-off that it names
+  double unit = 1.0;  ///< a small size that matters; a size that is far below is nothing
 };
 
 /// In an order that only grows at its end.

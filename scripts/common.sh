@@ -10,7 +10,7 @@ TEST_PACKAGES=(libgtest-dev libbenchmark-dev clang-format git python3 python3-nu
 FUZZ_PACKAGES=(clang libclang-rt-14-dev)
 TIDY_PACKAGES=(clang-tidy)
 
-LAYERS=(base can canlog dbc model simulation fusion analysis gap gateway daemon cli)
+LAYERS=(base can canlog dbc model simulation fusion analysis gap fleet gateway daemon cli)
 
 # clang-tidy goes by the debug preset's commands: clang cannot read the precompiled headers of another compiler.
 configure_tidy() {

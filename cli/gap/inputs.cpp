@@ -21,6 +21,8 @@ GapPair pair_of(const gateway::Plan& plan, const GapRequest& request) {
                   fmt::format("{}", fmt::join(request.logs, ", ")),
                   {plan.gyros[0].name, plan.gyros[1].name},
                   axis_name(plan),
+                  {plan.gyros[0].type, plan.gyros[1].type},
+                  {plan.gyros[0].serial, plan.gyros[1].serial},
                   {plan.gyros[0].sensor_axis, plan.gyros[1].sensor_axis}};
   pair.flipped = {plan.gyros[0].flipped, plan.gyros[1].flipped};
   for (model::Effect& effect : pair.model.effects) {
