@@ -82,6 +82,7 @@ tl::expected<GapInputs, std::vector<Error>> load_gap_inputs(
   read.insert(read.end(), request.logs.begin(), request.logs.end());
   if (const auto free = check_outputs(read, outputs); !free) return failed(free.error());
   GapInputs inputs;
+  inputs.files = loaded->files;
   if (loaded->plan.model) inputs.model = *loaded->plan.model;
   for (const gateway::Plan& plan : *plans)
     inputs.pairs.push_back(pair_of(plan, request));
