@@ -253,7 +253,7 @@ class Judge {
         if (type_of(who[slot]) != column / kShapeCount) continue;
         const std::size_t c = slot * kShapeCount + column % kShapeCount;
         score_time += value_of(sums.score_time[c]);
-        time += value_of(sums.time[c]);
+        time += value_of(sums.information_time[c]);
         square += value_of(sums.time_square[c]);
         whole += value_of(sums.information[triangle(c, c)]);
         score += value_of(sums.score[c]);

@@ -69,7 +69,7 @@ GroupSums::GroupSums(std::size_t slot_count)
       score(columns()),
       heterogeneity(columns()),
       score_time(columns()),
-      time(columns()),
+      information_time(columns()),
       time_square(columns()),
       information(triangle(columns(), 0)) {}
 
@@ -88,7 +88,7 @@ void GroupSums::add(const DrivePlace& place, double t_years) {
     score[column] += whole_of(u);
     heterogeneity[column] += whole_of(std::min(kMost, u * u / own));
     score_time[column] += whole_of(u * t_years);
-    time[column] += whole_of(own * t_years);
+    information_time[column] += whole_of(own * t_years);
     time_square[column] += whole_of(own * t_years * t_years);
   }
 }
@@ -98,7 +98,7 @@ void GroupSums::add(const GroupSums& more) {
   add_each(score, more.score);
   add_each(heterogeneity, more.heterogeneity);
   add_each(score_time, more.score_time);
-  add_each(time, more.time);
+  add_each(information_time, more.information_time);
   add_each(time_square, more.time_square);
   add_each(information, more.information);
 }

@@ -22,14 +22,14 @@ namespace vgyro::fleet {
 struct GroupSums {
   explicit GroupSums(std::size_t slots = 1);
 
-  std::size_t slots;                 ///< 1 or 2
-  std::vector<Whole> count;          ///< of each column: drives that could show it
-  std::vector<Whole> score;          ///< Σ u
-  std::vector<Whole> heterogeneity;  ///< Σ u²/I, each shape alone
-  std::vector<Whole> score_time;     ///< Σ u·t
-  std::vector<Whole> time;           ///< Σ I·t
-  std::vector<Whole> time_square;    ///< Σ I·t²
-  std::vector<Whole> information;    ///< Σ I: lower triangle, row by row
+  std::size_t slots;                    ///< 1 or 2
+  std::vector<Whole> count;             ///< of each column: drives that could show it
+  std::vector<Whole> score;             ///< Σ u
+  std::vector<Whole> heterogeneity;     ///< Σ u²/I, each shape alone
+  std::vector<Whole> score_time;        ///< Σ u·t
+  std::vector<Whole> information_time;  ///< Σ I·t
+  std::vector<Whole> time_square;       ///< Σ I·t²
+  std::vector<Whole> information;       ///< Σ I: lower triangle, row by row
 
   [[nodiscard]] std::size_t columns() const { return slots * model::kShapeCount; }
   void add(const DrivePlace& place, double t_years);

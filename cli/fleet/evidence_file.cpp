@@ -3,11 +3,15 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <future>
+#include <thread>
+#include <variant>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "base/bounded_file.h"
 #include "base/file.h"
 #include "base/fnv1a.h"
 #include "base/printable.h"
@@ -23,8 +27,10 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr int kFormat = 1;
-// A merged file of a million drives is some hundred MB.
-constexpr std::size_t kBytesMax = std::size_t{4} << 30U;
+// Lines that are understood side by side: enough to keep threads busy, few enough to be little
+// memory.
+constexpr std::size_t kBatch = 1024;
+constexpr std::size_t kWorkersMost = 16;
 // Longer words are no names that a configuration lets through.
 constexpr std::size_t kWordMax = 200;
 constexpr int kDigits = 9;
@@ -302,8 +308,8 @@ fleet::Drive drive_of(const Plain& json, std::string_view line) {
 // The order in which a pool's sums stand in its text; once for both directions.
 template <class Sums, class Visit>
 void visit_group(Sums& sums, const Visit& visit) {
-  for (auto* list : {&sums.count, &sums.score, &sums.heterogeneity, &sums.score_time, &sums.time,
-                     &sums.time_square, &sums.information})
+  for (auto* list : {&sums.count, &sums.score, &sums.heterogeneity, &sums.score_time,
+                     &sums.information_time, &sums.time_square, &sums.information})
     for (auto& value : *list)
       visit(value);
 }
@@ -379,49 +385,95 @@ fleet::Pool pool_of(const Plain& json) {
   return pool;
 }
 
-Expected<std::size_t> add_line(std::string_view line, fleet::Pool& pool) {
-  const Plain json = Plain::parse(line);
-  if (json.at("format").get<int>() != kFormat)
-    throw Fault{fmt::format("its format is {}, and this version reads {}",
-                            json.at("format").get<int>(), kFormat)};
-  const auto what = json.at("evidence").get<std::string>();
-  if (what == "drive") {
-    const auto added = pool.add(drive_of(json, line));
-    if (!added) return tl::unexpected(added.error());
-    return *added ? 0 : 1;
+/// A line as it was understood.
+using Understood = std::variant<std::monostate, fleet::Drive, fleet::Pool, Fault>;
+
+Understood understood(const std::string& line) {
+  if (line.empty()) return {};
+  try {
+    const Plain json = Plain::parse(line);
+    if (json.at("format").get<int>() != kFormat)
+      return Fault{fmt::format("its format is {}, and this version reads {}",
+                               json.at("format").get<int>(), kFormat)};
+    const auto what = json.at("evidence").get<std::string>();
+    if (what == "drive") return drive_of(json, line);
+    if (what == "pool") return pool_of(json);
+    return Fault{"\"evidence\" is neither \"drive\" nor \"pool\""};
+  } catch (const Fault& fault) {
+    return fault;
+  } catch (const nlohmann::json::exception& error) {
+    return Fault{printable(error.what())};
   }
-  if (what != "pool") throw Fault{"\"evidence\" is neither \"drive\" nor \"pool\""};
-  if (const auto added = pool.add(pool_of(json)); !added) return tl::unexpected(added.error());
-  return 0;
+}
+
+// Lines of a batch are understood side by side, and added one after the other.
+std::vector<Understood> understood(const std::vector<std::string>& lines) {
+  std::vector<Understood> all(lines.size());
+  const std::size_t workers =
+      std::clamp<std::size_t>(std::thread::hardware_concurrency(), 1, kWorkersMost);
+  std::vector<std::future<void>> running;
+  for (std::size_t worker = 0; worker < workers; ++worker) {
+    const auto work = [&, worker] {
+      for (std::size_t i = worker; i < lines.size(); i += workers)
+        all[i] = understood(lines[i]);
+    };
+    const bool is_last = worker + 1 == workers || lines.size() <= worker + 1;
+    if (is_last) {
+      work();
+      break;
+    }
+    running.push_back(std::async(std::launch::async, work));
+  }
+  for (std::future<void>& one : running)
+    one.get();
+  return all;
+}
+
+Expected<bool> add(const Understood& line, fleet::Pool& pool) {
+  if (const auto* drive = std::get_if<fleet::Drive>(&line)) return pool.add(*drive);
+  if (const auto* more = std::get_if<fleet::Pool>(&line)) {
+    if (const auto added = pool.add(*more); !added) return tl::unexpected(added.error());
+  }
+  if (const auto* fault = std::get_if<Fault>(&line))
+    return fail("", "no evidence: " + fault->what,
+                "a file that vgyro gap --evidence or vgyro fleet wrote");
+  return true;
+}
+
+// The next lines, some MB at the most where none is longer.
+std::vector<std::string> next_lines(std::istream& file) {
+  std::vector<std::string> lines;
+  std::string line;
+  while (lines.size() < kBatch && std::getline(file, line))
+    lines.push_back(std::move(line));
+  return lines;
 }
 
 }  // namespace
 
 Expected<std::size_t> add_evidence(const std::string& path, fleet::Pool& pool) {
-  const auto text = read_regular_file(path, kBytesMax);
-  if (!text) return tl::unexpected(text.error());
+  std::error_code code;
+  if (!std::filesystem::is_regular_file(path, code))
+    return fail(path, code ? "cannot be read: " + code.message() : "is no file",
+                "a file that vgyro gap --evidence or vgyro fleet wrote");
+  std::ifstream file(path, std::ios::binary);
+  if (!file) return fail(path, "cannot be read: " + system_reason());
   std::size_t again = 0;
   unsigned number = 0;
-  std::string_view rest = *text;
-  while (!rest.empty()) {
-    const std::string_view line = rest.substr(0, rest.find('\n'));
-    rest.remove_prefix(std::min(rest.size(), line.size() + 1));
-    ++number;
-    if (line.empty()) continue;
-    constexpr const char* kRemedy = "a file that vgyro gap --evidence or vgyro fleet wrote";
-    try {
-      auto added = add_line(line, pool);
+  while (true) {
+    const std::vector<std::string> lines = next_lines(file);
+    if (lines.empty()) break;
+    for (const Understood& line : understood(lines)) {
+      ++number;
+      auto added = add(line, pool);
       if (!added) {
         added.error().where = at_line(path, number);
-        return added;
+        return tl::unexpected(added.error());
       }
-      again += *added;
-    } catch (const Fault& fault) {
-      return fail(at_line(path, number), "no evidence: " + fault.what, kRemedy);
-    } catch (const nlohmann::json::exception& error) {
-      return fail(at_line(path, number), "no evidence: " + printable(error.what()), kRemedy);
+      if (!*added) ++again;
     }
   }
+  if (file.bad()) return fail(path, "cannot be read: " + system_reason());
   if (number == 0) return fail(path, "holds nothing", "a file that vgyro gap --evidence wrote");
   return again;
 }

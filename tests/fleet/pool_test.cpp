@@ -21,7 +21,12 @@ std::vector<Drive> drives(std::size_t count) {
     drive.seconds = 300.1;
     drive.model = "none";
     for (std::size_t gyro = 0; gyro < 2; ++gyro) {
-      drive.gyros[gyro] = {{"t", gyro == 0 ? "a" : "b"}, true, normal(random), 1e-3, 1e-5 / 3.0};
+      DriveGyro& its = drive.gyros[gyro];
+      its.identity = {"t", gyro == 0 ? "a" : "b"};
+      its.has_bias = true;
+      its.bias_dps = normal(random);
+      its.white_dps_rthz = 1e-3;
+      its.walk_dps_rts = 1e-5 / 3.0;
       drive.places.push_back(
           {{gyro}, {0, 7}, {normal(random), 1e3 * normal(random)}, {1.0, 0.3, 1e6 / 3.0}});
     }
