@@ -124,5 +124,41 @@ class VgyroFleet(unittest.TestCase):
         self.assertIn("drive7.log", done.stderr)
 
 
+class WeakEffect(unittest.TestCase):
+    """Whole drives, through decoding, search and pooling: what no drive names, the pool does, and nothing else."""
+
+    def pooled(self, scale_error, drives=24):
+        with tempfile.TemporaryDirectory() as scratch:
+            folder = Path(scratch)
+            (folder / "logs").mkdir()
+            (folder / "bench.dbc").write_text(gap_test.DBC)
+            (folder / "vgyro.toml").write_text(gap_test.GYROS + gap_test.REFERENCE)
+            (folder / "model.toml").write_text(gap_test.MODEL)
+            for number in range(drives):
+                gap_test.SEED = 1000 + number
+                (folder / "logs" / f"drive{number}.log").write_text(gap_test.recording(scale_error=scale_error))
+            subprocess.run([TOOL, "--vgyro", VGYRO, "--config", "vgyro.toml", "--model", "model.toml", "--out", "out", "logs"],
+                           cwd=folder, capture_output=True, check=True)
+            alone = [json.loads(line) for line in (folder / "out" / "drives.json").read_text().splitlines()]
+            self.assertEqual(len(alone), drives)
+            self.assertFalse(any(gyro["named"] for drive in alone for gyro in drive["gyros"]))
+            for size in (len(json.dumps(drive)) for drive in alone):
+                self.assertLess(size, 50_000)
+            return json.loads((folder / "out" / "fleet" / "fleet.json").read_text())
+
+    def test_is_named_by_the_pool_alone(self):
+        weak = 1.4e-5  # of which a drive's standard error is 7e-6
+        found = self.pooled(weak)
+        self.assertEqual([(e["kind"], e["type"]) for e in found["effects"]], [("scale_factor", "right")])
+        low, high = found["effects"][0]["interval95"]
+        self.assertLess(low - 1e-6, weak)
+        self.assertGreater(high + 1e-6, weak)
+
+    def test_is_not_named_where_there_is_none(self):
+        found = self.pooled(0.0)
+        self.assertEqual(found["effects"], [])
+        self.assertFalse(any(unit["why"] for unit in found["units"]))
+
+
 if __name__ == "__main__":
     unittest.main(argv=[sys.argv[0], "-v", *sys.argv[1:]])
