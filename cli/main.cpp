@@ -302,7 +302,7 @@ CLI::App* add_gap(CLI::App& app, GapOptions& options) {
 
 CLI::App* add_fleet(CLI::App& app, FleetOptions& options) {
   CLI::App* command = app.add_subcommand(
-      "fleet", "Pool the evidence of many drives: what a type has, which unit is going bad");
+      "fleet", "Pool the evidence of many drives: what types have, which units go bad");
   command
       ->add_option("EVIDENCE", options.evidence,
                    "files of vgyro gap --evidence or of vgyro fleet; of a folder all *.json")
