@@ -305,7 +305,7 @@ CLI::App* add_fleet(CLI::App& app, FleetOptions& options) {
       "fleet", "Pool the evidence of many drives: what types have, which units go bad");
   command
       ->add_option("EVIDENCE", options.evidence,
-                   "files of vgyro gap --evidence or of vgyro fleet; of a folder all *.json")
+                   "files that vgyro gap, vgyro allan or vgyro fleet left;\nof a folder all *.json")
       ->required();
   command
       ->add_option("--out", options.out,

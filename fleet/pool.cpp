@@ -127,6 +127,7 @@ Expected<bool> Pool::add(const Drive& drive) {
   if (auto free = check_free(*this, drive.id); !free) return tl::unexpected(free.error());
   drives.insert(drive.id);
   models.insert(drive.model);
+  pairs.emplace(drive.gyros[0].identity.type, drive.gyros[1].identity.type);
   const double t_years = drive.began_s > 0.0 ? (drive.began_s - kTimeZero_s) / kYear_s : 0.0;
   for (const DriveGyro& gyro : drive.gyros)
     units[gyro.identity].add(sums_of(gyro, drive, t_years));
@@ -145,6 +146,7 @@ Expected<void> Pool::add(const Pool& more) {
   }
   drives.insert(more.drives.begin(), more.drives.end());
   models.insert(more.models.begin(), more.models.end());
+  pairs.insert(more.pairs.begin(), more.pairs.end());
   for (const auto& [identity, sums] : more.units)
     units[identity].add(sums);
   for (const auto& [who, sums] : more.groups)

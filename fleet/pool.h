@@ -10,6 +10,7 @@
 #include <map>
 #include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "base/error.h"
@@ -58,6 +59,7 @@ struct UnitSums {
 struct Pool {
   std::set<std::string> drives;
   std::set<std::string> models;  ///< fingerprints of model files that drives were judged with
+  std::set<std::pair<std::string, std::string>> pairs;  ///< types of gyros 1 and 2 of the vehicles
   std::map<Identity, UnitSums> units;
   std::map<std::vector<Identity>, GroupSums> groups;
 

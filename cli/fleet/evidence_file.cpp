@@ -374,6 +374,7 @@ fleet::Pool pool_of(const Plain& json) {
   fleet::Pool pool;
   pool.drives = json.at("drives").get<std::set<std::string>>();
   pool.models = json.at("models").get<std::set<std::string>>();
+  pool.pairs = json.at("pairs").get<std::set<std::pair<std::string, std::string>>>();
   for (const Plain& unit : json.at("units"))
     read_unit(unit, pool);
   for (const Plain& group : json.at("groups")) {

@@ -111,11 +111,6 @@ std::string file_word(std::string_view text) {
   return word;
 }
 
-/// In which place of a vehicle units of a type sit, and beside which.
-struct Places {
-  std::map<fleet::Identity, std::set<std::size_t>> of_unit;
-};
-
 // What is known of one gyro: its type's effects, or its own where it differs.
 std::vector<PooledEffect> effects_of(const fleet::TypeJudgement& type,
                                      const fleet::UnitJudgement* unit) {
@@ -155,37 +150,46 @@ Expected<std::string> with_gyro(Expected<std::string> text, const fleet::TypeJud
 class Models {
  public:
   Models(const fleet::Pool& pool, const fleet::Judgement& judgement)
-      : pool_(pool), judgement_(judgement) {
-    for (const auto& [who, sums] : pool.groups) {
-      if (who.size() == 2) pairs_.emplace(who[0].type, who[1].type);
-    }
-  }
+      : pool_(pool), judgement_(judgement) {}
 
   Expected<std::vector<ResultFile>> make() {
     for (const fleet::TypeJudgement& type : judgement_.types)
-      add(file_word(type.type), &type, nullptr, nullptr);
+      add_type(file_word(type.type), type, nullptr);
     for (const fleet::UnitJudgement& unit : judgement_.units) {
       if (unit.why.empty()) continue;
-      const fleet::TypeJudgement& type = type_of(unit.identity.type);
-      add(file_word(unit.identity.type) + "-" + file_word(unit.identity.unit), &type, &unit,
-          nullptr);
+      const auto& [type, name] = unit.identity;
+      add_type(file_word(type) + "-" + file_word(name), type_of(type), &unit);
     }
-    for (const auto& [first, second] : pairs_)
-      add(file_word(first) + "+" + file_word(second), &type_of(first), nullptr, &type_of(second));
+    for (const auto& [first, second] : pool_.pairs) {
+      auto text = with_gyro(std::string(), type_of(first), nullptr, 0);
+      keep(file_word(first) + "+" + file_word(second),
+           with_gyro(std::move(text), type_of(second), nullptr, 1));
+    }
     if (failed_) return tl::unexpected(*failed_);
     return std::move(files_);
   }
 
  private:
-  const fleet::TypeJudgement& type_of(const std::string& name) const {
+  [[nodiscard]] const fleet::TypeJudgement& type_of(const std::string& name) const {
     return *std::find_if(judgement_.types.begin(), judgement_.types.end(),
                          [&](const fleet::TypeJudgement& type) { return type.type == name; });
   }
 
-  void add(const std::string& name, const fleet::TypeJudgement* first,
-           const fleet::UnitJudgement* unit, const fleet::TypeJudgement* second) {
-    Expected<std::string> text = with_gyro(std::string(), *first, unit, 0);
-    if (second != nullptr) text = with_gyro(std::move(text), *second, nullptr, 1);
+  // In each place that its vehicles have it in.
+  void add_type(const std::string& name, const fleet::TypeJudgement& type,
+                const fleet::UnitJudgement* unit) {
+    const auto sits = [&](const auto& is_it) {
+      return std::any_of(pool_.pairs.begin(), pool_.pairs.end(), is_it);
+    };
+    Expected<std::string> text;
+    if (sits([&](const auto& pair) { return pair.first == type.type; }))
+      text = with_gyro(std::move(text), type, unit, 0);
+    if (sits([&](const auto& pair) { return pair.second == type.type; }))
+      text = with_gyro(std::move(text), type, unit, 1);
+    keep(name, std::move(text));
+  }
+
+  void keep(const std::string& name, Expected<std::string> text) {
     if (text && text->empty()) text = model::to_toml({});
     if (text) {
       files_.push_back({"models/" + name + ".toml", *std::move(text)});
@@ -196,7 +200,6 @@ class Models {
 
   const fleet::Pool& pool_;
   const fleet::Judgement& judgement_;
-  std::set<std::pair<std::string, std::string>> pairs_;
   std::vector<ResultFile> files_;
   std::optional<Error> failed_;
 };
