@@ -480,8 +480,9 @@ Expected<std::size_t> add_evidence(const std::string& path, fleet::Pool& pool) {
 }
 
 std::string pool_text(const fleet::Pool& pool) {
-  Json json{{"format", kFormat},     {"evidence", "pool"},     {"drives", pool.drives},
-            {"models", pool.models}, {"units", Json::array()}, {"groups", Json::array()}};
+  Json json{{"format", kFormat},      {"evidence", "pool"},  {"drives", pool.drives},
+            {"models", pool.models},  {"pairs", pool.pairs}, {"units", Json::array()},
+            {"groups", Json::array()}};
   for (const auto& [identity, sums] : pool.units)
     json["units"].push_back(unit_json(identity, sums));
   for (const auto& [who, sums] : pool.groups) {
