@@ -33,6 +33,7 @@ struct Options {
   AllanOptions allan;
   CompareOptions compare;
   GapOptions gap;
+  FleetOptions fleet;
   SimulateOptions simulate;
   StatusOptions status;
   WhichGateway recalibrate;
@@ -232,6 +233,8 @@ CLI::App* add_allan(CLI::App& app, AllanOptions& options) {
   command->add_option("--plot", options.plot,
                       "plot of the curves: .svg, .png or .pdf; one per axis for whole units,\n"
                       "allan-x.svg ... for allan.svg");
+  command->add_option("--evidence", options.evidence,
+                      "noise and biases, for vgyro fleet: one JSON line");
   add_axis(*command, options.axis);
   add_logs(*command, options.logs);
   command->footer(
@@ -313,6 +316,8 @@ CLI::App* add_gap(CLI::App& app, GapOptions& options) {
                    "kind=KIND, both with a comma between, or likeliest; may be repeated")
       ->allow_extra_args(false)
       ->check(wrong_acceptance);
+  command->add_option("--evidence", options.evidence,
+                      "what this recording says, for vgyro fleet: one JSON line");
   add_number(*command, "--time-limit", options.time_limit_s, {0.0, kTimeLimitMax_s},
              "stop after this many seconds and write what is certain; 0: no limit");
   add_number(*command, "--seed", options.seed, {}, "seed of the simulations");
@@ -321,6 +326,28 @@ CLI::App* add_gap(CLI::App& app, GapOptions& options) {
       "The folder is written whole or not at all; an earlier result in it is replaced.\n"
       "vgyro(1) says how to read the result.\n"
       "Example: vgyro gap --config vgyro.toml --measured drive.log.xz --out found");
+  return command;
+}
+
+CLI::App* add_fleet(CLI::App& app, FleetOptions& options) {
+  CLI::App* command = app.add_subcommand(
+      "fleet", "Pool the evidence of many drives: what types have, which units go bad");
+  command
+      ->add_option("EVIDENCE", options.evidence,
+                   "files that vgyro gap, vgyro allan or vgyro fleet left;\nof a folder all *.json")
+      ->required();
+  command
+      ->add_option("--out", options.out,
+                   "folder for report.html, fleet.json, evidence.json and models/")
+      ->required();
+  constexpr double kFalseMost = 0.5;
+  add_number(*command, "--false-names", options.false_names, {1e-9, kFalseMost},
+             "share of all names that may be false, on average");
+  command->add_flag("-q,--quiet", options.quiet, "no summary");
+  command->footer(
+      "evidence.json in the folder is all of it merged, and may be merged again.\n"
+      "What is computed, and what a name means, is in docs/fleet.md.\n"
+      "Example: vgyro fleet evidence/ --out fleet");
   return command;
 }
 
@@ -414,6 +441,7 @@ int run(int argc, char** argv) {
   CLI::App* allan = add_allan(app, options.allan);
   CLI::App* compare = add_compare(app, options.compare);
   CLI::App* gap = add_gap(app, options.gap);
+  CLI::App* fleet = add_fleet(app, options.fleet);
   CLI::App* simulate = add_simulate(app, options.simulate);
   CLI::App* status = add_status(app, options.status);
   CLI::App* recalibrate = add_recalibrate(app, options.recalibrate);
@@ -437,6 +465,7 @@ int run(int argc, char** argv) {
   if (allan->parsed()) return run_allan(options.allan);
   if (compare->parsed()) return run_compare(options.compare);
   if (gap->parsed()) return number_and_run(options.gap);
+  if (fleet->parsed()) return run_fleet(options.fleet);
   if (simulate->parsed()) return run_simulate(options.simulate);
   if (status->parsed()) return run_status(options.status);
   if (recalibrate->parsed()) return run_recalibrate(options.recalibrate);

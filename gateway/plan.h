@@ -134,6 +134,8 @@ struct Mount {
 
 struct GyroPlan {
   std::string name;
+  std::string type = {};    ///< of which make; empty: not told
+  std::string serial = {};  ///< which of that type; empty: not told
   std::string bus;
   std::string message;
   FrameMatch match;
