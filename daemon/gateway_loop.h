@@ -36,7 +36,7 @@ namespace vgyro::daemon {
 class GatewayLoop final : private gateway::FrameSink {
  public:
   /// `load` reads the configuration again, beside the loop. `keeper` is null where nothing is kept
-  /// across a restart, `metrics` where nobody wants them.
+  /// across a restart, `metrics` if they are not configured.
   GatewayLoop(gateway::Plan plan, LoadPlan load, StateKeeper* keeper, MetricsFile* metrics,
               Log& log);
   GatewayLoop(const GatewayLoop&) = delete;

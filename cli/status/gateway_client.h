@@ -18,7 +18,7 @@ class GatewayClient {
   /// To the system bus; an error when there is none.
   static Expected<GatewayClient> connect();
 
-  /// All that the gateway tells of itself. Names as on D-Bus, but as in "rate_dps"; NaN is null.
+  /// All that the gateway reports. Names as on D-Bus, but as in "rate_dps"; NaN is null.
   Expected<nlohmann::ordered_json> status();
 
   Expected<void> recalibrate() { return call("Recalibrate"); }
