@@ -24,14 +24,20 @@ TomlReader::TomlReader(const toml::table& table, std::string file, std::string t
                        std::vector<Error>& errors)
     : table_(table), file_(std::move(file)), title_(std::move(title)), errors_(errors) {}
 
+// Of several files that make one table (base/toml_merge.h) each node knows its own.
+std::string TomlReader::place(const toml::source_region& source) const {
+  return at_line(source.path ? *source.path : file_,
+                 std::max(1U, static_cast<unsigned>(source.begin.line)));
+}
+
 std::string TomlReader::where() const {
-  return at_line(file_, std::max(1U, static_cast<unsigned>(table_.source().begin.line)));
+  return place(table_.source());
 }
 
 std::string TomlReader::where(std::string_view key) const {
   const auto found = table_.find(key);
   if (found == table_.end()) return where();
-  return at_line(file_, static_cast<unsigned>(found->first.source().begin.line));
+  return place(found->first.source());
 }
 
 void TomlReader::complain(std::string where, std::string what, std::string remedy) {

@@ -59,6 +59,7 @@ class TomlReader {
   void finish();
 
  private:
+  [[nodiscard]] std::string place(const toml::source_region& source) const;
   const toml::node* node(std::string_view key, const char* wanted, toml::node_type type);
 
   const toml::table& table_;

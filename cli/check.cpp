@@ -253,6 +253,8 @@ void print_plan(const gateway::Plan& plan) {
   }
   say("\n");
   print_model(plan);
+  if (!plan.output.transmit)
+    say("  {:<14}the gateway sends none of what follows: transmit = false\n", "shadow mode");
   print_output(plan);
   for (const gateway::OutputLayout& layout : plan.output.layouts)
     print_layout(plan, layout);
@@ -266,7 +268,11 @@ int run_check(const CheckOptions& options) {
   for (const Error& warning : loaded->warnings)
     warn(warning);
   say("{}: good\n", options.config);
+  say("  {:<14}{}\n", "fingerprint", loaded->fingerprint);
   print_plan(loaded->plan);
+  if (!loaded->origins.empty()) say("  {:<14}as several files say them together\n", "values");
+  for (const TomlOrigin& origin : loaded->origins)
+    say("    {:<32}{:<24} {}\n", origin.key, origin.value, origin.where);
   return kDone;
 }
 

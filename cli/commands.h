@@ -65,9 +65,10 @@ int run_model_list();
 
 struct AllanOptions {
   std::string config;
-  std::string axis;  ///< "x", "y" or "z" of whole units; empty: all
-  std::string json;  ///< "-": standard output; empty: none
-  std::string plot;  ///< empty: none
+  std::string axis;      ///< "x", "y" or "z" of whole units; empty: all
+  std::string json;      ///< "-": standard output; empty: none
+  std::string plot;      ///< empty: none
+  std::string evidence;  ///< file for a fleet; empty: none
   std::vector<std::string> logs;
 };
 int run_allan(const AllanOptions& options);
@@ -90,11 +91,20 @@ struct GapOptions {
   std::string axis;                   ///< "x", "y" or "z" of whole units; empty: all
   std::string out;                    ///< folder
   std::vector<std::string> accept;    ///< "gyro=2", "kind=delay,gyro=1", "likeliest"
+  std::string evidence;               ///< file for a fleet; empty: none
   double time_limit_s = 0.0;          ///< 0: none
   std::uint64_t seed = 1;
   bool quiet = false;
 };
 int run_gap(const GapOptions& options);
+
+struct FleetOptions {
+  std::vector<std::string> evidence;  ///< files of drives or pools; a folder: all in it
+  std::string out;                    ///< folder
+  double false_names = 0.005;         ///< share of names that may be false
+  bool quiet = false;
+};
+int run_fleet(const FleetOptions& options);
 
 struct SimulateOptions {
   std::string config;
@@ -111,12 +121,19 @@ struct SimulateOptions {
 };
 int run_simulate(const SimulateOptions& options);
 
+/// Of several gateways on a host.
+struct WhichGateway {
+  std::string instance;  ///< empty: the one without a name
+  bool all = false;
+};
+
 struct StatusOptions {
+  WhichGateway which;
   bool json = false;
   bool watch = false;
   double interval_s = 1.0;  ///< of `watch`
 };
 int run_status(const StatusOptions& options);
-int run_recalibrate();
+int run_recalibrate(const WhichGateway& which);
 
 }  // namespace vgyro::cli

@@ -5,6 +5,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "base/instance_name.h"
 #include "base/printable.h"
 #include "base/spelling.h"
 #include "can/frame.h"
@@ -32,8 +33,10 @@ struct Options {
   AllanOptions allan;
   CompareOptions compare;
   GapOptions gap;
+  FleetOptions fleet;
   SimulateOptions simulate;
   StatusOptions status;
+  WhichGateway recalibrate;
   std::string method;
 };
 
@@ -230,6 +233,8 @@ CLI::App* add_allan(CLI::App& app, AllanOptions& options) {
   command->add_option("--plot", options.plot,
                       "plot of the curves: .svg, .png or .pdf; one per axis for whole units,\n"
                       "allan-x.svg ... for allan.svg");
+  command->add_option("--evidence", options.evidence,
+                      "noise and biases, for vgyro fleet: one JSON line");
   add_axis(*command, options.axis);
   add_logs(*command, options.logs);
   command->footer(
@@ -311,6 +316,8 @@ CLI::App* add_gap(CLI::App& app, GapOptions& options) {
                    "kind=KIND, both with a comma between, or likeliest; may be repeated")
       ->allow_extra_args(false)
       ->check(wrong_acceptance);
+  command->add_option("--evidence", options.evidence,
+                      "what this recording says, for vgyro fleet: one JSON line");
   add_number(*command, "--time-limit", options.time_limit_s, {0.0, kTimeLimitMax_s},
              "stop after this many seconds and write what is certain; 0: no limit");
   add_number(*command, "--seed", options.seed, {}, "seed of the simulations");
@@ -322,21 +329,56 @@ CLI::App* add_gap(CLI::App& app, GapOptions& options) {
   return command;
 }
 
+CLI::App* add_fleet(CLI::App& app, FleetOptions& options) {
+  CLI::App* command = app.add_subcommand(
+      "fleet", "Pool the evidence of many drives: what types have, which units go bad");
+  command
+      ->add_option("EVIDENCE", options.evidence,
+                   "files that vgyro gap, vgyro allan or vgyro fleet left;\nof a folder all *.json")
+      ->required();
+  command
+      ->add_option("--out", options.out,
+                   "folder for report.html, fleet.json, evidence.json and models/")
+      ->required();
+  constexpr double kFalseMost = 0.5;
+  add_number(*command, "--false-names", options.false_names, {1e-9, kFalseMost},
+             "share of all names that may be false, on average");
+  command->add_flag("-q,--quiet", options.quiet, "no summary");
+  command->footer(
+      "evidence.json in the folder is all of it merged, and may be merged again.\n"
+      "What is computed, and what a name means, is in docs/fleet.md.\n"
+      "Example: vgyro fleet evidence/ --out fleet");
+  return command;
+}
+
+CLI::Option* add_which(CLI::App& command, WhichGateway& which) {
+  CLI::Option* instance =
+      command.add_option("--instance", which.instance, "of several gateways: vgyrod@NAME")
+          ->type_name("NAME")
+          ->check([](const std::string& name) {
+            const auto good = vgyro::check_instance_name(name);
+            return good ? std::string() : good.error().message();
+          });
+  return command.add_flag("--all", which.all, "every gateway that is on D-Bus")->excludes(instance);
+}
+
 CLI::App* add_status(CLI::App& app, StatusOptions& options) {
   CLI::App* command =
       app.add_subcommand("status", "Show the running gateway's state, gyros and buses");
   CLI::Option* json = command->add_flag("--json", options.json, "the same as JSON");
   command->add_flag("-w,--watch", options.watch, "live view; into a pipe: one line per update")
-      ->excludes(json);
+      ->excludes(json)
+      ->excludes(add_which(*command, options.which));
   add_number(*command, "--interval", options.interval_s, {0.1, 3600.0},
              "seconds between updates with --watch");
   command->footer("Asks vgyrod over D-Bus; see vgyro(1).");
   return command;
 }
 
-CLI::App* add_recalibrate(CLI::App& app) {
+CLI::App* add_recalibrate(CLI::App& app, WhichGateway& which) {
   CLI::App* command = app.add_subcommand(
       "recalibrate", "Make the running gateway discard its biases and calibrate again");
+  add_which(*command, which);
   command->footer("For root only. Keep the platform at rest unless a reference is configured.");
   return command;
 }
@@ -399,9 +441,10 @@ int run(int argc, char** argv) {
   CLI::App* allan = add_allan(app, options.allan);
   CLI::App* compare = add_compare(app, options.compare);
   CLI::App* gap = add_gap(app, options.gap);
+  CLI::App* fleet = add_fleet(app, options.fleet);
   CLI::App* simulate = add_simulate(app, options.simulate);
   CLI::App* status = add_status(app, options.status);
-  CLI::App* recalibrate = add_recalibrate(app);
+  CLI::App* recalibrate = add_recalibrate(app, options.recalibrate);
   std::vector<std::string> words = words_of(argc, argv);
   if (const auto unknown = unknown_command(app, words)) {
     report(*unknown);
@@ -422,9 +465,10 @@ int run(int argc, char** argv) {
   if (allan->parsed()) return run_allan(options.allan);
   if (compare->parsed()) return run_compare(options.compare);
   if (gap->parsed()) return number_and_run(options.gap);
+  if (fleet->parsed()) return run_fleet(options.fleet);
   if (simulate->parsed()) return run_simulate(options.simulate);
   if (status->parsed()) return run_status(options.status);
-  if (recalibrate->parsed()) return run_recalibrate();
+  if (recalibrate->parsed()) return run_recalibrate(options.recalibrate);
   // Frames are the main result; they give way only to a summary or a table that wants the same
   // place.
   const bool output_given = replay->count("--output") > 0;

@@ -80,6 +80,7 @@ class Recorder {
     shift(recording_.reference_dps.t_s);
     shift(recording_.acceleration.t_s);
     recording_.seconds = newest_s_ - earliest_s_;
+    recording_.began_s = to_seconds(zero_.time_since_epoch()) + earliest_s_;
     return std::move(recording_);
   }
 

@@ -2,7 +2,7 @@
 find_program(SCDOC scdoc)
 if(SCDOC)
   set(pages "")
-  foreach(page vgyro.1 vgyro.toml.5 vgyrod.8)
+  foreach(page vgyro.1 vgyro-fleet.1 vgyro.toml.5 vgyrod.8)
     set(source "${PROJECT_SOURCE_DIR}/docs/man/${page}.scd")
     set(made "${CMAKE_BINARY_DIR}/man/${page}")
     add_custom_command(OUTPUT "${made}" DEPENDS "${source}" VERBATIM

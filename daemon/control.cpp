@@ -14,7 +14,7 @@
 namespace vgyro::daemon {
 namespace {
 
-constexpr const char* kName = "org.vgyro.Gateway1";
+constexpr const char* kInterfaceName = "org.vgyro.Gateway1";
 constexpr const char* kPath = "/org/vgyro/Gateway1";
 constexpr const char* kNothingToSave = "org.vgyro.Error.NothingToSave";
 
@@ -199,6 +199,7 @@ int append_counters(sd_bus_message* reply, const Snapshot& now) {
       {"frames_overflowed", sent.dropped_overflow},
       {"frames_refused", sent.dropped_failed},
       {"send_retries", sent.retries},
+      {"frames_shadowed", now.traffic.shadowed},
       {"log_lines_lost", now.log_lines_lost},
       {"service_messages_lost", now.service_messages_lost},
   };
@@ -247,6 +248,8 @@ struct Property {
 
 constexpr Property kProperties[] = {
     {"Version", [](sd_bus_message* m, const Snapshot&) { return append_text(m, VGYRO_VERSION); }},
+    {"Instance",
+     [](sd_bus_message* m, const Snapshot& now) { return append_text(m, now.instance); }},
     {"Method",
      [](sd_bus_message* m, const Snapshot& now) {
        return append_text(m, gateway::to_string(now.plan->corrector.method));
@@ -255,6 +258,8 @@ constexpr Property kProperties[] = {
      [](sd_bus_message* m, const Snapshot& now) { return append_number(m, now.uptime_s); }},
     {"ConfigRefused",
      [](sd_bus_message* m, const Snapshot& now) { return append_flag(m, now.config_refused); }},
+    {"Transmit", [](sd_bus_message* m,
+                    const Snapshot& now) { return append_flag(m, now.plan->output.transmit); }},
     {"State", [](sd_bus_message* m,
                  const Snapshot& now) { return append_text(m, to_string(now.status.state)); }},
     {"Quality", [](sd_bus_message* m,
@@ -311,9 +316,11 @@ constexpr Property kProperties[] = {
 const sd_bus_vtable Control::kInterface[] = {
     SD_BUS_VTABLE_START(0),
     SD_BUS_PROPERTY("Version", "s", on_get, 0, SD_BUS_VTABLE_PROPERTY_CONST),
+    SD_BUS_PROPERTY("Instance", "s", on_get, 0, SD_BUS_VTABLE_PROPERTY_CONST),
     SD_BUS_PROPERTY("Method", "s", on_get, 0, 0),
     SD_BUS_PROPERTY("UptimeS", "d", on_get, 0, 0),
     SD_BUS_PROPERTY("ConfigRefused", "b", on_get, 0, SD_BUS_VTABLE_PROPERTY_EMITS_CHANGE),
+    SD_BUS_PROPERTY("Transmit", "b", on_get, 0, SD_BUS_VTABLE_PROPERTY_EMITS_CHANGE),
     SD_BUS_PROPERTY("State", "s", on_get, 0, SD_BUS_VTABLE_PROPERTY_EMITS_CHANGE),
     SD_BUS_PROPERTY("Quality", "s", on_get, 0, SD_BUS_VTABLE_PROPERTY_EMITS_CHANGE),
     SD_BUS_PROPERTY("Restored", "s", on_get, 0, SD_BUS_VTABLE_PROPERTY_EMITS_CHANGE),
@@ -337,8 +344,8 @@ const sd_bus_vtable Control::kInterface[] = {
     SD_BUS_METHOD("SaveState", "", "", on_save_state, SD_BUS_VTABLE_UNPRIVILEGED),
     SD_BUS_VTABLE_END};
 
-Control::Control(sd_event* events, Gateway gateway, Log& log)
-    : events_(events), gateway_(std::move(gateway)), log_(log) {
+Control::Control(sd_event* events, Gateway gateway, std::string bus_name, Log& log)
+    : events_(events), gateway_(std::move(gateway)), bus_name_(std::move(bus_name)), log_(log) {
   connect();
 }
 
@@ -353,9 +360,10 @@ void Control::connect() {
   int result = sd_bus_open_system(&bus_);
   if (result >= 0) result = sd_bus_attach_event(bus_, events_, SD_EVENT_PRIORITY_NORMAL);
   if (result >= 0) {
-    result = sd_bus_add_object_vtable(bus_, nullptr, kPath, kName, kInterface, this);
+    result = sd_bus_add_object_vtable(bus_, nullptr, kPath, kInterfaceName, kInterface, this);
   }
-  if (result >= 0) result = sd_bus_request_name_async(bus_, nullptr, kName, 0, &on_name, this);
+  if (result >= 0)
+    result = sd_bus_request_name_async(bus_, nullptr, bus_name_.c_str(), 0, &on_name, this);
   if (result < 0) disconnect(-result);
 }
 
@@ -383,13 +391,13 @@ int Control::on_name(sd_bus_message* reply, void* self, sd_bus_error*) {
   }
   control.has_name_ = answer == kOwner || answer == kOwnerAlready;
   if (control.has_name_ && std::exchange(control.told_of_failure_, false)) {
-    control.log_.notice("on D-Bus as {}", kName);
+    control.log_.notice("on D-Bus as {}", control.bus_name_);
   }
   if (control.has_name_ || std::exchange(control.told_of_failure_, true)) return 0;
   control.log_.tell(Severity::kNotice, {.cause = "no_dbus"},
                     "the bus does not give the name {}: {}; trying on (org.vgyro.Gateway1.conf "
                     "belongs into /usr/share/dbus-1/system.d)",
-                    kName, why == nullptr ? "no reason given" : why);
+                    control.bus_name_, why == nullptr ? "no reason given" : why);
   return 0;
 }
 
@@ -400,7 +408,7 @@ void Control::second_passed() {
   // The name may be another daemon's that is about to end, or the policy may be changed.
   if (bus_ != nullptr && !has_name_ && wait_ == 0) {
     wait_ = kRetrySeconds;
-    sd_bus_request_name_async(bus_, nullptr, kName, 0, &on_name, this);
+    sd_bus_request_name_async(bus_, nullptr, bus_name_.c_str(), 0, &on_name, this);
   }
   if (has_name_) tell_changes();
 }
@@ -408,10 +416,11 @@ void Control::second_passed() {
 void Control::tell_changes() {
   std::uint64_t queued = 0;
   if (sd_bus_get_n_queued_write(bus_, &queued) < 0 || queued > kQueuedMost) return;
-  sd_bus_emit_properties_changed(
-      bus_, kPath, kName, "State", "Quality", "Restored", "Valid", "Disagree", "Contradiction",
-      "ContradictionText", "Ambiguous", "RatesTooFarApart", "Hypotheses", "RateDps", "SigmaDps",
-      "BiasSigmaDps", "CalibratedS", "ConfigRefused", "Gyros", "Buses", "Counters", nullptr);
+  sd_bus_emit_properties_changed(bus_, kPath, kInterfaceName, "State", "Quality", "Restored",
+                                 "Valid", "Disagree", "Contradiction", "ContradictionText",
+                                 "Ambiguous", "RatesTooFarApart", "Hypotheses", "RateDps",
+                                 "SigmaDps", "BiasSigmaDps", "CalibratedS", "ConfigRefused",
+                                 "Transmit", "Gyros", "Buses", "Counters", nullptr);
 }
 
 int Control::on_get(sd_bus*, const char*, const char*, const char* property, sd_bus_message* reply,

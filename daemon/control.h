@@ -1,9 +1,9 @@
 #pragma once
 
-// The gateway on D-Bus: org.vgyro.Gateway1 at /org/vgyro/Gateway1 of the system bus, with
-// properties to read and watch, and methods that the policy file gives to root alone. The gateway
-// runs without a bus too: it is tried again every few seconds, and nothing here waits for an
-// answer.
+// The gateway on D-Bus: org.vgyro.Gateway1, or org.vgyro.Gateway1.NAME of one of several, with the
+// interface org.vgyro.Gateway1 at /org/vgyro/Gateway1 of the system bus: properties to read and
+// watch, and methods that the policy file gives to root alone. The gateway runs without a bus too:
+// it is tried again every few seconds, and nothing here waits for an answer.
 
 #include <cstdint>
 #include <functional>
@@ -25,8 +25,8 @@ class Control {
     std::function<Expected<void>()> save_state;
   };
 
-  /// Serves its bus within `events`, which must outlive it.
-  Control(sd_event* events, Gateway gateway, Log& log);
+  /// Serves its bus within `events`, which must outlive it, under the name `bus_name`.
+  Control(sd_event* events, Gateway gateway, std::string bus_name, Log& log);
   Control(const Control&) = delete;
   Control& operator=(const Control&) = delete;
   ~Control();
@@ -53,6 +53,7 @@ class Control {
 
   sd_event* events_;
   Gateway gateway_;
+  std::string bus_name_;
   Log& log_;
   sd_bus* bus_ = nullptr;
   int wait_ = 0;  ///< seconds to the next attempt

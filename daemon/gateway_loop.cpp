@@ -13,6 +13,8 @@
 #include <unistd.h>
 #include <utility>
 
+#include "base/instance_name.h"
+
 namespace vgyro::daemon {
 namespace {
 
@@ -56,7 +58,7 @@ GatewayLoop::Setup::Setup(gateway::Plan the_plan, TurnClock& clock, Log& log)
       reporter(std::make_unique<Reporter>(std::array{plan.gyros[0].name, plan.gyros[1].name},
                                           plan.calibration.rest_s, log)),
       pipeline(plan),
-      outlets(plan.buses) {
+      outlets(plan.buses, plan.output.transmit) {
   buses.reserve(plan.buses.size());
   for (std::size_t i = 0; i < plan.buses.size(); ++i) {
     can::SocketOptions options;
@@ -66,14 +68,16 @@ GatewayLoop::Setup::Setup(gateway::Plan the_plan, TurnClock& clock, Log& log)
   }
 }
 
-GatewayLoop::GatewayLoop(gateway::Plan plan, LoadPlan load, StateKeeper* keeper,
-                         MetricsFile* metrics, Log& log)
+GatewayLoop::GatewayLoop(gateway::Plan plan, LoadPlan load, std::string instance,
+                         StateKeeper* keeper, MetricsFile* metrics, Log& log)
     : loader_(std::move(load)),
       keeper_(keeper),
       metrics_(metrics),
       log_(log),
       clock_(&read_clock<CLOCK_REALTIME>, &read_clock<CLOCK_MONOTONIC>),
-      setup_(std::make_unique<Setup>(std::move(plan), clock_, log)) {}
+      setup_(std::make_unique<Setup>(std::move(plan), clock_, log)) {
+  snapshot_.instance = std::move(instance);
+}
 
 GatewayLoop::~GatewayLoop() {
   if (epoll_fd_ >= 0) ::close(epoll_fd_);
@@ -84,6 +88,7 @@ Expected<void> GatewayLoop::start() {
   if (epoll_fd_ < 0) return fail("epoll", system_reason(errno));
   if (Expected<void> opened = open_buses(*setup_); !opened) return opened;
   if (Expected<void> polled = poll_buses(); !polled) return polled;
+  tell_of_shadow(setup_->plan.output);
   take_up_state();
   return start_events();
 }
@@ -191,7 +196,7 @@ Expected<void> GatewayLoop::run() {
                    Control::Gateway{.snapshot = [this]() -> const Snapshot& { return snapshot(); },
                                     .recalibrate = [this] { recalibration_wanted_ = true; },
                                     .save_state = [this] { return save_state(); }},
-                   log_);
+                   bus_name_of(snapshot_.instance), log_);
   if (Expected<void> armed = serve_events(false); !armed) return armed;
   notifier_.ready(status_line());
   set_alarm();
@@ -325,10 +330,10 @@ void GatewayLoop::put_on(can::BusIndex bus, const can::Frame& frame, TimePoint s
   const bool is_own = output.vgyro_frames && bus == output.bus && !frame.has(can::kExtended);
   const bool is_bias = is_own && (frame.id == output.bias_id || frame.id == output.model_id);
   if (!is_bias) patience_.rate_at(stamp);
-  can::TransmitQueue& queue = setup_->outlets[bus].queue;
-  if (!is_timely(stamp) || !queue.send_at_once(frame, setup_->buses[bus])) {
+  Outlets& outlets = setup_->outlets;
+  if (!is_timely(stamp) || !outlets.send_at_once(bus, frame, setup_->buses[bus])) {
     const Duration left = stamp + kAgeMost - clock_.wall();
-    queue.push(frame, clock_.steady() + std::min(patience_.value(), left));
+    outlets.push(bus, frame, clock_.steady() + std::min(patience_.value(), left));
   }
   has_spoken_ = true;
 }
@@ -375,6 +380,7 @@ Traffic GatewayLoop::traffic() const {
   for (const Bus& bus : setup_->buses)
     traffic.buses.push_back(bus.status());
   traffic.transmitted = setup_->outlets.counts();
+  traffic.shadowed = setup_->outlets.shadowed();
   return traffic;
 }
 
@@ -402,6 +408,7 @@ std::string GatewayLoop::status_line() {
 
 std::string GatewayLoop::full_status_line() {
   std::string line = setup_->reporter->second_passed(setup_->pipeline.status(), traffic());
+  if (!setup_->plan.output.transmit) line += "; shadow mode: nothing is sent";
   if (reload_refused_) line += "; the new configuration was refused";
   return line;
 }
@@ -552,7 +559,16 @@ Expected<void> GatewayLoop::replace_setup(gateway::Plan plan, bool keep) {
   snapshot_.plan = nullptr;
   spoken_ = setup_->pipeline.spoken();
   log_.notice("{}", how);
+  tell_of_shadow(setup_->plan.output);
   return poll_buses();
+}
+
+// Not before such a configuration is in use; then each time, so that nobody forgets it.
+void GatewayLoop::tell_of_shadow(const gateway::OutputPlan& output) {
+  if (output.transmit) return;
+  log_.tell(Severity::kWarning, {.cause = "shadow"},
+            "shadow mode: everything but sending is done, and no frame goes out; `[output] "
+            "transmit = true`, or no such line, and a reload end it");
 }
 
 // What the present pipeline has learned, as much of it as the next one can use; tells how much.

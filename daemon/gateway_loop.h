@@ -35,10 +35,11 @@ namespace vgyro::daemon {
 
 class GatewayLoop final : private gateway::FrameSink {
  public:
-  /// `load` reads the configuration again, beside the loop. `keeper` is null where nothing is kept
-  /// across a restart, `metrics` if they are not configured.
-  GatewayLoop(gateway::Plan plan, LoadPlan load, StateKeeper* keeper, MetricsFile* metrics,
-              Log& log);
+  /// `load` reads the configuration again, beside the loop. `instance` is the name of one of
+  /// several gateways, or empty. `keeper` is null where nothing is kept across a restart, `metrics`
+  /// if they are not configured.
+  GatewayLoop(gateway::Plan plan, LoadPlan load, std::string instance, StateKeeper* keeper,
+              MetricsFile* metrics, Log& log);
   GatewayLoop(const GatewayLoop&) = delete;
   GatewayLoop& operator=(const GatewayLoop&) = delete;
   ~GatewayLoop() override;
@@ -71,6 +72,7 @@ class GatewayLoop final : private gateway::FrameSink {
   static Expected<void> open_buses(Setup& setup);
   static Expected<void> check_output(const Setup& setup);
   static Expected<void> check_fd(const Bus& output, const std::string& wanted);
+  void tell_of_shadow(const gateway::OutputPlan& output);
   Expected<void> poll_buses();
   bool poll_bus(std::size_t index);
   [[nodiscard]] bool poll_readable(int fd, std::uint32_t tag) const;

@@ -10,6 +10,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "base/instance_name.h"
 #include "base/printable.h"
 #include "base/spelling.h"
 #include "daemon/gateway_loop.h"
@@ -33,6 +34,7 @@ struct Options {
   std::string state;
   bool forget = false;
   std::string metrics;
+  std::string instance;
 };
 
 // An unknown option comes first: it is often the reason why another one is missing.
@@ -54,12 +56,11 @@ std::string usage_text(const CLI::App& app, const CLI::ParseError& error) {
 }
 
 // systemd names the directory that it made for the service; of several the first.
-std::string default_state() {
-  const char* directories =
-      std::getenv("STATE_DIRECTORY");  // NOLINT(concurrency-mt-unsafe): at start
+std::string in_directory(const char* variable, const char* file) {
+  const char* directories = std::getenv(variable);  // NOLINT(concurrency-mt-unsafe): at start
   if (directories == nullptr || *directories == '\0') return {};
   const std::string_view all(directories);
-  return std::string(all.substr(0, all.find(':'))) + "/state.toml";
+  return std::string(all.substr(0, all.find(':'))) + '/' + file;
 }
 
 int run(const Options& options, vgyro::daemon::Log& log) {
@@ -81,8 +82,8 @@ int run(const Options& options, vgyro::daemon::Log& log) {
   }
   std::optional<vgyro::daemon::MetricsFile> metrics;
   if (!options.metrics.empty()) metrics.emplace(options.metrics, log);
-  vgyro::daemon::GatewayLoop loop(std::move(loaded->plan), load, keeper ? &*keeper : nullptr,
-                                  metrics ? &*metrics : nullptr, log);
+  vgyro::daemon::GatewayLoop loop(std::move(loaded->plan), load, options.instance,
+                                  keeper ? &*keeper : nullptr, metrics ? &*metrics : nullptr, log);
   if (const vgyro::Expected<void> started = loop.start(); !started) {
     log.error("{}", started.error().message());
     return kBadInput;
@@ -112,9 +113,10 @@ int main(int argc, char** argv) {
   Options options{.config = {},
                   .method = {},
                   .model = {},
-                  .state = default_state(),
+                  .state = in_directory("STATE_DIRECTORY", "state.toml"),
                   .forget = false,
-                  .metrics = {}};
+                  .metrics = in_directory("RUNTIME_DIRECTORY", "vgyrod.prom"),
+                  .instance = {}};
   app.add_option("--config", options.config, "The gateway's configuration (vgyro.toml)")
       ->required()
       ->type_name("FILE");
@@ -127,9 +129,18 @@ int main(int argc, char** argv) {
       ->type_name("FILE");
   app.add_flag("--forget", options.forget,
                "discard the state kept by --state, and calibrate again");
-  app.add_option("--metrics", options.metrics,
-                 "writes Prometheus metrics into this file every 5 seconds")
+  app.add_option(
+         "--metrics", options.metrics,
+         "writes Prometheus metrics into this file every 5 seconds; default: vgyrod.prom in "
+         "$RUNTIME_DIRECTORY")
       ->type_name("FILE");
+  app.add_option("--instance", options.instance,
+                 "which of several gateways on this host: its name on D-Bus and in the metrics")
+      ->type_name("NAME")
+      ->check([](const std::string& name) {
+        const auto good = vgyro::check_instance_name(name);
+        return good ? std::string() : good.error().message();
+      });
   app.set_version_flag("--version", "vgyrod " VGYRO_VERSION);
   app.footer(
       "`vgyro check FILE` explains a configuration before it is trusted.\n"

@@ -33,6 +33,10 @@ std::string escaped(std::string_view value) {
 
 class Text {
  public:
+  /// node_exporter puts the files of all gateways of a host together, so each needs a label.
+  explicit Text(std::string_view instance)
+      : common_(instance.empty() ? "" : fmt::format("gateway=\"{}\"", escaped(instance))) {}
+
   void family(std::string_view name, std::string_view type, std::string_view help) {
     name_ = name;
     fmt::format_to(std::back_inserter(text_), "# HELP {} {}\n# TYPE {} {}\n", name, help, name,
@@ -48,15 +52,18 @@ class Text {
  private:
   void line(const Labels& labels, const std::string& value) {
     text_ += name_;
-    char before = '{';
+    const bool labelled = !labels.empty() || !common_.empty();
+    if (labelled) text_ += '{' + common_;
+    std::string_view before = common_.empty() ? "" : ",";
     for (const auto& [key, content] : labels) {
       fmt::format_to(std::back_inserter(text_), "{}{}=\"{}\"", before, key, escaped(content));
-      before = ',';
+      before = ",";
     }
-    if (!labels.empty()) text_ += '}';
+    if (labelled) text_ += '}';
     fmt::format_to(std::back_inserter(text_), " {}\n", value);
   }
 
+  std::string common_;
   std::string_view name_;
   std::string text_;
 };
@@ -99,6 +106,8 @@ void add_rate(Text& text, const Snapshot& now) {
   text.sample({}, status.rates_too_far_apart);
   text.family("vgyro_uptime_seconds", "gauge", "Since the start of the process.");
   text.sample({}, now.uptime_s);
+  text.family("vgyro_transmit", "gauge", "1 while frames are sent, 0 in shadow mode.");
+  text.sample({}, now.plan->output.transmit);
   text.family("vgyro_config_refused", "gauge", "1 while a configuration is refused.");
   text.sample({}, now.config_refused);
 }
@@ -129,6 +138,9 @@ void add_counters(Text& text, const Snapshot& now) {
   text.sample({{"cause", "stale"}}, sent.dropped_stale);
   text.sample({{"cause", "overflow"}}, sent.dropped_overflow);
   text.sample({{"cause", "refused"}}, sent.dropped_failed);
+  text.family("vgyro_shadowed_frames_total", "counter",
+              "Frames that shadow mode kept from the buses.");
+  text.sample({}, now.traffic.shadowed);
   text.family("vgyro_log_lines_lost_total", "counter", "Lines lost because nothing reads the log.");
   text.sample({}, now.log_lines_lost);
   text.family("vgyro_service_messages_lost_total", "counter",
@@ -336,7 +348,7 @@ bool write_whole(int fd, std::string_view text) {
 }  // namespace
 
 std::string metrics_text(const Snapshot& now) {
-  Text text;
+  Text text(now.instance);
   add_rate(text, now);
   add_counters(text, now);
   add_layouts(text, now);

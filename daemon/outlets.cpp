@@ -17,12 +17,28 @@ void add(can::TransmitCounts& to, const can::TransmitCounts& counts) {
 
 }  // namespace
 
+bool Outlets::send_at_once(std::size_t bus, const can::Frame& frame,
+                           can::Transmitter& transmitter) {
+  if (transmit_) return outlets_[bus].queue.send_at_once(frame, transmitter);
+  ++shadowed_;
+  return true;
+}
+
+void Outlets::push(std::size_t bus, const can::Frame& frame, TimePoint send_by) {
+  if (transmit_) {
+    outlets_[bus].queue.push(frame, send_by);
+  } else {
+    ++shadowed_;
+  }
+}
+
 void Outlets::take_over(Outlets&& before) {
   gone_ = before.gone_;
+  shadowed_ = before.shadowed_;
   for (std::size_t i = 0; i < before.names_.size(); ++i) {
     Outlet& old = before.outlets_[i];
     const auto found = std::find(names_.begin(), names_.end(), before.names_[i]);
-    if (found != names_.end()) {
+    if (transmit_ && found != names_.end()) {
       Outlet& own = outlets_[static_cast<std::size_t>(found - names_.begin())];
       own = std::move(old);
       own.begin_anew();

@@ -417,12 +417,14 @@ std::string Reporter::biases(const gateway::Status& status) const {
 void Reporter::summarize(const gateway::Status& status, const Traffic& traffic) {
   const can::TransmitCounts& sent = traffic.transmitted;
   const std::string stretches = gateway::stretches_text(gateway::steady_stretches(status));
+  const std::string shadow =
+      traffic.shadowed > 0 ? fmt::format(", {} not sent in shadow mode", traffic.shadowed) : "";
   log_.notice(
       "stopped: {} frames in ({} lost by the kernel), {} pairs, {} virtual rates ({} valid), "
-      "{} frames out ({} stale, {} overflowed, {} refused, {} retries); {}{}bias {} deg/h",
+      "{} frames out ({} stale, {} overflowed, {} refused, {} retries){}; {}{}bias {} deg/h",
       traffic.received(), traffic.lost(), status.pairs, status.rates_out, status.rates_out_valid,
       sent.sent, sent.dropped_stale, sent.dropped_overflow, sent.dropped_failed, sent.retries,
-      stretches, stretches.empty() ? "" : "; ", biases(status));
+      shadow, stretches, stretches.empty() ? "" : "; ", biases(status));
 }
 
 }  // namespace vgyro::daemon

@@ -24,6 +24,7 @@ namespace vgyro::daemon {
 struct Traffic {
   std::vector<BusStatus> buses;
   can::TransmitCounts transmitted;
+  std::uint64_t shadowed = 0;  ///< frames that shadow mode kept from the buses
 
   [[nodiscard]] std::uint64_t received() const;
   [[nodiscard]] std::uint64_t lost() const;

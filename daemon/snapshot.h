@@ -14,6 +14,7 @@
 namespace vgyro::daemon {
 
 struct Snapshot {
+  std::string instance;                 ///< of several gateways on a host; empty: the only one
   const gateway::Plan* plan = nullptr;  ///< lives as long as the snapshot is the newest
   gateway::Status status;
   std::vector<gateway::Status> axes;       ///< of a platform of several, in the order of Plan::axes

@@ -43,6 +43,7 @@ struct Recording {
   AccelerationSeries acceleration;
   bool has_reference = false;     ///< configured
   bool has_acceleration = false;  ///< configured
+  double began_s = 0.0;           ///< of the first frame, since 1970; 0: not known
   double seconds = 0.0;           ///< from the first frame to the last
   double rest_s = 0.0;            ///< at least this long at rest in the beginning; 0: not known
   double rest_rate_dps = 0.0;     ///< the true rate at rest

@@ -10,6 +10,7 @@
 #include <string_view>
 #include <vector>
 
+#include "gap/drive_evidence.h"
 #include "model/effect.h"
 #include "model/file.h"
 
@@ -130,6 +131,7 @@ struct Result {
   bool with_reference = false;
   std::vector<std::string> notes;  ///< what a reader must know: masked samples, parts left out
   std::vector<std::string> open;   ///< what the time was too short for
+  std::optional<DriveEvidence> evidence;  ///< where it was asked for
 };
 
 /// `vgyro compare`: one model against one recording.

@@ -12,6 +12,7 @@
 #include "gap/search.h"
 #include "gap/study.h"
 #include "gap/timing.h"
+#include "gap/weigh.h"
 
 namespace vgyro::gap {
 
@@ -219,6 +220,12 @@ Expected<Result> find_gap(const std::vector<Recording>& recordings, const model:
   score(study, model.effects, search.first_starting(), settings.seed, result);
   note_soft_noise(study.recording(), result);
   result.verdict = verdict_of(result);
+
+  if (settings.with_evidence) {
+    std::vector<Found> all = search.starting();
+    all.insert(all.end(), found.begin(), found.end());
+    result.evidence = weigh(study, known_effects(model.effects, study.findings()), all);
+  }
 
   tell("drawing", kShareDrawing);
   describe_effects(study, given, result);

@@ -23,6 +23,7 @@ struct Settings {
   /// What is left of the time, 1 to 0; asked now and then. What is certain by then is the result,
   /// the rest is told as open. Nothing: there is no limit.
   std::function<double()> time_left = {};
+  bool with_evidence = false;  ///< fills Result::evidence
   /// Called now and then with what is being done and how far the whole is, 0 to 1.
   std::function<void(std::string_view what, double share)> progress;
 };

@@ -9,12 +9,13 @@
 
 #include <fmt/core.h>
 
-#include "base/bounded_file.h"
 #include "base/printable.h"
 #include "base/spelling.h"
+#include "base/toml_merge.h"
 #include "base/toml_reader.h"
 #include "fusion/polynomial.h"
 #include "gateway/axes_plan.h"
+#include "gateway/config_files.h"
 #include "gateway/e2e_config.h"
 #include "gateway/gyro_config.h"
 #include "gateway/input_conflicts.h"
@@ -26,9 +27,6 @@
 namespace vgyro::gateway {
 
 namespace {
-
-// A configuration takes some kB; what is so much larger is another file.
-constexpr std::size_t kConfigBytesMax = std::size_t{1} << 20U;
 
 struct Context {
   std::string file;
@@ -417,6 +415,7 @@ void read_output(TomlReader& root, Context& context) {
   plan.output.fd = reader.boolean("fd").value_or(false);
   plan.output.rate_is_shared = plan.output.fd && !plan.output.axes.empty();
   plan.output.vgyro_frames = reader.boolean("vgyro_frames").value_or(true);
+  plan.output.transmit = reader.boolean("transmit").value_or(true);
   if (bus.empty()) {
     reader.forgive({"layout"});
   } else {
@@ -453,16 +452,14 @@ std::string_view to_string(Method method) {
 }
 
 ConfigResult load_config(const std::string& path, const ConfigOverrides& overrides) {
-  const auto text = read_regular_file(path, kConfigBytesMax);
-  if (!text) return tl::unexpected(std::vector<Error>{text.error()});
-  const auto parsed = parse_toml(*text, path, "strings stand in quotes, tables in [brackets]");
-  if (!parsed) return tl::unexpected(std::vector<Error>{parsed.error()});
+  const Expected<ConfigText> read = read_config_files(path);
+  if (!read) return tl::unexpected(std::vector<Error>{read.error()});
   Context context{.file = path,
                   .folder = std::filesystem::path(path).parent_path().string(),
                   .errors = {},
                   .resolved = {}};
   Plan& plan = context.resolved.plan;
-  TomlReader root(*parsed, path, "the file", context.errors);
+  TomlReader root(read->table, path, "the file", context.errors);
   read_gyros(root, context);
   read_optional(root, "reference", context, [&](TomlReader& reader, SignalResolver& resolver) {
     read_reference(reader, resolver, plan);
@@ -483,8 +480,12 @@ ConfigResult load_config(const std::string& path, const ConfigOverrides& overrid
     warn_of_conflicts(root, plan, context.cache, context.bus_files, context.resolved.warnings);
   if (!context.errors.empty()) return tl::unexpected(std::move(context.errors));
   context.resolved.files = context.cache.paths();
-  context.resolved.files.push_back(path);
   if (plan.model) context.resolved.files.push_back(plan.model->file);
+  const std::string method(overrides.method ? to_string(*overrides.method) : "");
+  context.resolved.fingerprint = config_fingerprint(read->table, method, context.resolved.files);
+  context.resolved.files.insert(context.resolved.files.end(), read->files.begin(),
+                                read->files.end());
+  if (read->files.size() > 1) context.resolved.origins = toml_origins(read->table);
   return std::move(context.resolved);
 }
 

@@ -10,14 +10,19 @@
 #include <tl/expected.hpp>
 
 #include "base/error.h"
+#include "base/toml_merge.h"
 #include "gateway/plan.h"
 
 namespace vgyro::gateway {
 
 struct Resolved {
   Plan plan;
-  std::vector<std::string> files;  ///< what was read: the file itself, DBC files, the model file
-  std::vector<Error> warnings;     ///< usable, but the user should know
+  /// What was read: DBC files, the model file, the file itself and what lies over it.
+  std::vector<std::string> files;
+  std::string fingerprint;  ///< 16 hexadecimal digits: config_fingerprint()
+  /// Where each value was written; empty where there is only one file.
+  std::vector<TomlOrigin> origins;
+  std::vector<Error> warnings;  ///< usable, but the user should know
 };
 
 using ConfigResult = tl::expected<Resolved, std::vector<Error>>;
@@ -27,7 +32,8 @@ struct ConfigOverrides {
   std::optional<std::string> model = {};  ///< path, instead of [corrector] model
 };
 
-/// Reads the file; DBC paths inside are relative to it.
+/// Reads the file, and what lies over it (gateway/config_files.h); paths inside are relative to the
+/// file itself.
 ConfigResult load_config(const std::string& path, const ConfigOverrides& overrides = {});
 
 /// The methods of this build by name; nothing for any other word.

@@ -364,6 +364,23 @@ std::optional<GyroPlan> read_unit(TomlReader& reader, SignalResolver& resolver,
   return gyro;
 }
 
+// It stands in the names of files, in tables and in pages.
+constexpr std::size_t kIdentityMax = 64;
+
+// `type` or `serial`; empty where the key is not there, or after a complaint.
+std::string identity_of(TomlReader& reader, std::string_view key) {
+  std::string text = reader.text(key).value_or("");
+  const auto is_good = [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' ||
+           c == '_' || c == '.';
+  };
+  if (text.size() <= kIdentityMax && std::all_of(text.begin(), text.end(), is_good)) return text;
+  reader.complain(reader.where(key),
+                  fmt::format("the {} \"{}\" is no plain word", key, printable(text)),
+                  fmt::format("up to {} letters, digits, \"-\", \"_\" and \".\"", kIdentityMax));
+  return {};
+}
+
 }  // namespace
 
 std::optional<GyroPlan> read_gyro(const toml::table& table, std::size_t index,
@@ -384,8 +401,16 @@ std::optional<GyroPlan> read_gyro(const toml::table& table, std::size_t index,
     reader.complain(reader.where("mount"), "mount is of a gyro with one axis",
                     "rate_x, rate_y, rate_z instead of rate; one axis is turned by sign = -1");
   }
+  const std::string type = identity_of(reader, "type");
+  const std::string serial = identity_of(reader, "serial");
   reader.finish();
-  if (context.errors.size() > errors_before) return std::nullopt;
+  if (context.errors.size() > errors_before || !gyro) return std::nullopt;
+  gyro->type = type;
+  gyro->serial = serial;
+  for (GyroPlan& axis : gyro->axes) {
+    axis.type = type;
+    axis.serial = serial;
+  }
   return gyro;
 }
 

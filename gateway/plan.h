@@ -134,6 +134,8 @@ struct Mount {
 
 struct GyroPlan {
   std::string name;
+  std::string type = {};    ///< of which make; empty: not told
+  std::string serial = {};  ///< which of that type; empty: not told
   std::string bus;
   std::string message;
   FrameMatch match;
@@ -302,6 +304,7 @@ struct OutputPlan {
   std::uint32_t model_id = 0x612;
   bool fd = false;
   bool vgyro_frames = true;  ///< VG_Rate, VG_Bias and VG_Model
+  bool transmit = true;      ///< false: shadow mode, in which the live gateway sends nothing
   std::vector<OutputLayout> layouts = {};
   /// Of a platform of several axes: which; the identifiers are axis 0's, another's are kAxisIdStep
   /// higher for each. Empty: a single one.

@@ -6,11 +6,11 @@ BUILD_PACKAGES=(g++ cmake ninja-build pkg-config libeigen3-dev libfmt-dev libcli
 PACKAGE_PACKAGES=(debhelper scdoc)
 RUN_PACKAGES=(gnuplot-nox fonts-dejavu-core can-utils iproute2 util-linux xz-utils)
 TEST_PACKAGES=(libgtest-dev libbenchmark-dev clang-format git python3 python3-numpy python3-can
-  python3-canmatrix user-mode-linux kmod dbus lintian man-db systemd mmdebstrap uidmap genext2fs e2fsprogs)
+  python3-canmatrix python3-distributed user-mode-linux kmod dbus lintian man-db systemd mmdebstrap uidmap genext2fs e2fsprogs)
 FUZZ_PACKAGES=(clang libclang-rt-14-dev)
 TIDY_PACKAGES=(clang-tidy)
 
-LAYERS=(base can canlog dbc model simulation fusion analysis gap gateway daemon cli)
+LAYERS=(base can canlog dbc model simulation fusion analysis gap fleet gateway daemon cli)
 
 # clang-tidy goes by the debug preset's commands: clang cannot read the precompiled headers of another compiler.
 configure_tidy() {

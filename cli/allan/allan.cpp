@@ -1,3 +1,4 @@
+#include <cmath>
 #include <cstdio>
 
 #include <fmt/core.h>
@@ -10,13 +11,16 @@
 #include "cli/axis_choice.h"
 #include "cli/commands.h"
 #include "cli/exit_code.h"
+#include "cli/fleet/evidence_file.h"
 #include "cli/log_notes.h"
 #include "cli/output/errors.h"
 #include "cli/output/gnuplot.h"
 #include "cli/output/json_text.h"
+#include "cli/output/output_file.h"
 #include "cli/output/overwrite.h"
 #include "cli/output/terminal.h"
 #include "cli/pair_recording.h"
+#include "cli/recording.h"
 #include "gateway/config.h"
 
 namespace vgyro::cli {
@@ -98,6 +102,50 @@ Expected<void> write(const AllanOptions& options, const std::vector<AllanReport>
   return {};
 }
 
+gap::GyroEvidence noise_evidence(const analysis::SeriesNoise& noise) {
+  gap::GyroEvidence gyro;
+  gyro.samples = noise.interval_s > 0.0 ? std::round(noise.seconds / noise.interval_s) : 0.0;
+  if (!noise.fit) return gyro;
+  const auto log_variance = [](const analysis::Estimate& estimate) {
+    return estimate.resolved ? std::pow(estimate.sigma / estimate.value, 2) : 0.0;
+  };
+  const analysis::NoiseFit& fit = *noise.fit;
+  gyro.bias_dps = noise.mean_dps;
+  if (fit.white_dps_rthz.resolved) gyro.white_dps_rthz = fit.white_dps_rthz.value;
+  if (fit.walk_dps_rts.resolved) gyro.walk_dps_rts = fit.walk_dps_rts.value;
+  gyro.log_noise_covariance = {log_variance(fit.white_dps_rthz), 0.0,
+                               log_variance(fit.walk_dps_rts)};
+  return gyro;
+}
+
+// Noise and biases, and no shapes: nothing but rest is judged here. The first log is read
+// once more for its digest and its beginning.
+Expected<void> leave_evidence(const AllanOptions& options, const std::vector<AllanReport>& reports,
+                              const std::vector<gateway::Plan>& pairs,
+                              const std::vector<std::string>& files) {
+  std::string text;
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    const auto& gyros = pairs[i].gyros;
+    const auto recordings = read_recordings(options.logs.front(), {&pairs[i], 1}, "allan");
+    if (!recordings) return tl::unexpected(recordings.error());
+    GapSubject subject;
+    subject.gyros = {gyros[0].name, gyros[1].name};
+    subject.axis = axis_name(pairs[i]);
+    subject.types = {gyros[0].type, gyros[1].type};
+    subject.serials = {gyros[0].serial, gyros[1].serial};
+    subject.sensor_axis = {gyros[0].sensor_axis, gyros[1].sensor_axis};
+    gap::DriveEvidence evidence;
+    for (std::size_t k = 0; k < 2; ++k)
+      evidence.gyros[k] = noise_evidence(reports[i].noise.gyros[k]);
+    const std::array flipped{gyros[0].flipped, gyros[1].flipped};
+    text += drive_text({subject, *recordings, std::move(evidence), flipped, ""}, files, "");
+  }
+  auto file = OutputFile::open(options.evidence);
+  if (!file) return tl::unexpected(file.error());
+  file->write(text);
+  return file->close();
+}
+
 }  // namespace
 
 int run_allan(const AllanOptions& options) {
@@ -115,9 +163,14 @@ int run_allan(const AllanOptions& options) {
   const std::vector<std::string> pictures = pictures_of(options, *pairs);
   std::vector<std::string> outputs = pictures;
   outputs.push_back(options.json);
+  if (!options.evidence.empty()) outputs.push_back(options.evidence);
   if (const auto free = check_outputs(inputs, outputs); !free) return report(free.error());
   const auto reports = judge_all(options, *pairs);
   if (!reports) return report(reports.error());
+  if (!options.evidence.empty()) {
+    const auto left = leave_evidence(options, *reports, *pairs, loaded->files);
+    if (!left) return report(left.error());
+  }
   const auto written = write(options, *reports, pictures);
   return written ? kDone : report(written.error());
 }

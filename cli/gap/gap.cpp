@@ -13,6 +13,7 @@
 #include "base/file.h"
 #include "cli/commands.h"
 #include "cli/exit_code.h"
+#include "cli/fleet/evidence_file.h"
 #include "cli/gap/accept.h"
 #include "cli/gap/axes.h"
 #include "cli/gap/inputs.h"
@@ -20,6 +21,7 @@
 #include "cli/gap/report_page.h"
 #include "cli/output/errors.h"
 #include "cli/output/json_text.h"
+#include "cli/output/output_file.h"
 #include "cli/output/progress.h"
 #include "cli/output/result_folder.h"
 #include "cli/output/terminal.h"
@@ -167,6 +169,7 @@ class TimeBudget {
 Expected<gap::Settings> settings_with(const GapOptions& options, std::optional<TimeWindow> window,
                                       Progress& progress) {
   gap::Settings settings = settings_of(options.seed, progress);
+  settings.with_evidence = !options.evidence.empty();
   for (const std::string& word : options.accept) {
     const auto acceptance = acceptance_from(word);
     if (!acceptance) return tl::unexpected(acceptance.error());
@@ -290,6 +293,23 @@ std::string text_of(const std::vector<AxisResult>& axes) {
   return axes.size() > 1 ? text + axes_text(axes) : text;
 }
 
+// One line for each pair.
+Expected<void> leave_evidence(const GapOptions& options, const GapInputs& inputs,
+                              const std::vector<AxisResult>& axes) {
+  if (options.evidence.empty()) return {};
+  std::string text;
+  for (std::size_t i = 0; i < axes.size(); ++i) {
+    const GapPair& pair = inputs.pairs[i];
+    text += drive_text({pair.subject, pair.recordings, *axes[i].judged.evidence, pair.flipped,
+                        std::string(gap::verdict_name(axes[i].judged.verdict))},
+                       inputs.files, inputs.model.file);
+  }
+  auto file = OutputFile::open(options.evidence);
+  if (!file) return tl::unexpected(file.error());
+  file->write(text);
+  return file->close();
+}
+
 }  // namespace
 
 int run_gap(const GapOptions& options) {
@@ -299,6 +319,7 @@ int run_gap(const GapOptions& options) {
   std::vector<std::string> outputs;
   for (const std::string& name : result_names())
     outputs.push_back(std::filesystem::path(options.out) / name);
+  if (!options.evidence.empty()) outputs.push_back(options.evidence);
   auto inputs = load_gap_inputs({options.config, options.model, options.measured, options.axis},
                                 "gap", outputs);
   if (!inputs) return report(inputs.error());
@@ -306,6 +327,7 @@ int run_gap(const GapOptions& options) {
   if (!given_text) return report(given_text.error());
   const auto axes = work_through(*inputs, options, begin);
   if (!axes) return report(axes.error());
+  if (auto left = leave_evidence(options, *inputs, *axes); !left) return report(left.error());
   const auto written = write(options.out, *given_text, *axes);
   if (!written) return report(written.error());
   if (options.quiet) return kDone;

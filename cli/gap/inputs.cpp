@@ -21,6 +21,8 @@ GapPair pair_of(const gateway::Plan& plan, const GapRequest& request) {
                   fmt::format("{}", fmt::join(request.logs, ", ")),
                   {plan.gyros[0].name, plan.gyros[1].name},
                   axis_name(plan),
+                  {plan.gyros[0].type, plan.gyros[1].type},
+                  {plan.gyros[0].serial, plan.gyros[1].serial},
                   {plan.gyros[0].sensor_axis, plan.gyros[1].sensor_axis}};
   pair.flipped = {plan.gyros[0].flipped, plan.gyros[1].flipped};
   for (model::Effect& effect : pair.model.effects) {
@@ -80,6 +82,7 @@ tl::expected<GapInputs, std::vector<Error>> load_gap_inputs(
   read.insert(read.end(), request.logs.begin(), request.logs.end());
   if (const auto free = check_outputs(read, outputs); !free) return failed(free.error());
   GapInputs inputs;
+  inputs.files = loaded->files;
   if (loaded->plan.model) inputs.model = *loaded->plan.model;
   for (const gateway::Plan& plan : *plans)
     inputs.pairs.push_back(pair_of(plan, request));

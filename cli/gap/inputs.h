@@ -35,7 +35,8 @@ struct GapPair {
 };
 
 struct GapInputs {
-  model::Model model;          ///< the whole file; empty when there is none
+  std::vector<std::string> files;  ///< of the configuration: itself, DBC files, model
+  model::Model model;              ///< the whole file; empty when there is none
   std::vector<GapPair> pairs;  ///< one; of two whole units one for each axis, in the order x, y, z
 };
 

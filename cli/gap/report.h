@@ -23,6 +23,8 @@ struct GapSubject {
   /// Of a pair about one axis of whole units: "x", "y" or "z" of the vehicle; empty: of two single
   /// gyros.
   std::string axis = {};
+  std::array<std::string, 2> types = {};    ///< of the gyros; empty: the configuration says none
+  std::array<std::string, 2> serials = {};  ///< likewise
   std::array<std::size_t, 2> sensor_axis = {};  ///< which of the unit's own lies along it
 
   /// For the model file: nothing of two single gyros, or where the kind is all the unit's.

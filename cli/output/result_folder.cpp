@@ -113,6 +113,8 @@ Expected<void> write_result_folder(const std::string& folder, const std::vector<
   auto fresh = Temporary::beside(folder, path);
   if (!fresh) return tl::unexpected(fresh.error());
   for (const ResultFile& file : files) {
+    std::error_code ignored;
+    fs::create_directories((fresh->path() / file.name).parent_path(), ignored);
     if (auto done = write_file(fresh->path() / file.name, file.text); !done) return done;
   }
   std::error_code code;

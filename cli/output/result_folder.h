@@ -12,7 +12,7 @@
 namespace vgyro::cli {
 
 struct ResultFile {
-  std::string name;
+  std::string name;  ///< may be in a folder within: "models/a.toml"; names then hold that folder
   std::string text;
 };
 

@@ -1,19 +1,23 @@
 #include "cli/status/gateway_client.h"
 
+#include <algorithm>
 #include <cctype>
 #include <cmath>
 #include <cstdint>
+#include <cstdlib>
 #include <string>
 #include <string_view>
 #include <systemd/sd-bus.h>
 #include <utility>
+
+#include "base/instance_name.h"
 
 namespace vgyro::cli {
 namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr const char* kName = "org.vgyro.Gateway1";
+constexpr const char* kInterface = "org.vgyro.Gateway1";
 constexpr const char* kPath = "/org/vgyro/Gateway1";
 constexpr std::uint64_t kPatienceUsec = 5'000'000;
 constexpr int kDepthMost = 8;
@@ -130,21 +134,21 @@ struct Reply {
   }
 };
 
-tl::unexpected<Error> why(const Reply& reply, int result) {
+tl::unexpected<Error> why(const Reply& reply, int result, const std::string& unit) {
   if (sd_bus_error_has_names(&reply.error, SD_BUS_ERROR_SERVICE_UNKNOWN,
                              SD_BUS_ERROR_NAME_HAS_NO_OWNER, nullptr) != 0) {
-    return fail("vgyrod", "no gateway answers on D-Bus",
-                "`systemctl status vgyrod` says whether it runs, `journalctl -u vgyrod` what "
-                "troubles it");
+    return fail(unit, "no gateway answers on D-Bus",
+                "`systemctl status " + unit + "` says whether it runs, `journalctl -u " + unit +
+                    "` what troubles it");
   }
   if (sd_bus_error_has_name(&reply.error, SD_BUS_ERROR_ACCESS_DENIED) != 0) {
-    return fail("vgyrod", "only root may do this", "try it again with sudo");
+    return fail(unit, "only root may do this", "try it again with sudo");
   }
   if (result == -ETIMEDOUT || sd_bus_error_has_name(&reply.error, SD_BUS_ERROR_NO_REPLY) != 0) {
-    return fail("vgyrod", "does not answer", "`systemctl status vgyrod` shows why");
+    return fail(unit, "does not answer", "`systemctl status " + unit + "` shows why");
   }
-  if (reply.error.message != nullptr) return fail("vgyrod", reply.error.message);
-  return fail("vgyrod", system_reason(-result));
+  if (reply.error.message != nullptr) return fail(unit, reply.error.message);
+  return fail(unit, system_reason(-result));
 }
 
 }  // namespace
@@ -153,23 +157,41 @@ void GatewayClient::Close::operator()(sd_bus* bus) const {
   sd_bus_flush_close_unref(bus);
 }
 
-Expected<GatewayClient> GatewayClient::connect() {
+Expected<GatewayClient> GatewayClient::connect(std::string_view instance) {
   sd_bus* bus = nullptr;
   const int result = sd_bus_open_system(&bus);
   if (result < 0) {
     return fail("D-Bus", "there is no system bus: " + system_reason(-result),
                 "`apt install dbus` and `systemctl start dbus` make one");
   }
-  GatewayClient client(bus);
+  GatewayClient client(bus, instance);
   sd_bus_set_method_call_timeout(bus, kPatienceUsec);
   return client;
 }
 
+Expected<std::vector<std::string>> GatewayClient::instances() {
+  char** names = nullptr;
+  const int result = sd_bus_list_names(bus_.get(), &names, nullptr);
+  if (result < 0) return fail("D-Bus", "does not list its names: " + system_reason(-result));
+  std::vector<std::string> found;
+  const std::string prefix = std::string(kGatewayBusName) + '.';
+  for (char** name = names; *name != nullptr; ++name) {
+    const std::string_view whole(*name);
+    if (whole == kGatewayBusName) found.emplace_back();
+    if (whole.starts_with(prefix)) found.emplace_back(whole.substr(prefix.size()));
+    std::free(*name);
+  }
+  std::free(names);
+  std::sort(found.begin(), found.end());
+  return found;
+}
+
 Expected<nlohmann::ordered_json> GatewayClient::status() {
   Reply reply;
-  const int result = sd_bus_call_method(bus_.get(), kName, kPath, "org.freedesktop.DBus.Properties",
-                                        "GetAll", &reply.error, &reply.message, "s", kName);
-  if (result < 0) return why(reply, result);
+  const int result = sd_bus_call_method(bus_.get(), bus_name_of(instance_).c_str(), kPath,
+                                        "org.freedesktop.DBus.Properties", "GetAll", &reply.error,
+                                        &reply.message, "s", kInterface);
+  if (result < 0) return why(reply, result, unit_of(instance_));
   Json status = {{"format", 1}};
   const Json properties = Reader(reply.message).value();
   if (!properties.is_object()) return fail("vgyrod", "its answer cannot be read");
@@ -180,9 +202,9 @@ Expected<nlohmann::ordered_json> GatewayClient::status() {
 
 Expected<void> GatewayClient::call(const char* method) {
   Reply reply;
-  const int result =
-      sd_bus_call_method(bus_.get(), kName, kPath, kName, method, &reply.error, &reply.message, "");
-  if (result < 0) return why(reply, result);
+  const int result = sd_bus_call_method(bus_.get(), bus_name_of(instance_).c_str(), kPath,
+                                        kInterface, method, &reply.error, &reply.message, "");
+  if (result < 0) return why(reply, result, unit_of(instance_));
   return {};
 }
 

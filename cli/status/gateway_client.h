@@ -4,6 +4,9 @@
 // libsystemd.
 
 #include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
 
 #include <nlohmann/json.hpp>
 
@@ -15,8 +18,12 @@ namespace vgyro::cli {
 
 class GatewayClient {
  public:
-  /// To the system bus; an error when there is none.
-  static Expected<GatewayClient> connect();
+  /// To the system bus; an error when there is none. `instance`: of several gateways on the host.
+  static Expected<GatewayClient> connect(std::string_view instance = {});
+
+  /// The gateways that are on the bus, by the names of their instances, in their order; "" is the
+  /// one without a name, and the first.
+  Expected<std::vector<std::string>> instances();
 
   /// All that the gateway reports. Names as on D-Bus, but as in "rate_dps"; NaN is null.
   Expected<nlohmann::ordered_json> status();
@@ -28,9 +35,10 @@ class GatewayClient {
   struct Close {
     void operator()(sd_bus* bus) const;
   };
-  explicit GatewayClient(sd_bus* bus) : bus_(bus) {}
+  GatewayClient(sd_bus* bus, std::string_view instance) : instance_(instance), bus_(bus) {}
   Expected<void> call(const char* method);
 
+  std::string instance_;
   std::unique_ptr<sd_bus, Close> bus_;
 };
 

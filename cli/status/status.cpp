@@ -13,6 +13,8 @@
 
 #include <fmt/core.h>
 
+#include "base/instance_name.h"
+#include "base/printable.h"
 #include "cli/commands.h"
 #include "cli/exit_code.h"
 #include "cli/output/errors.h"
@@ -53,8 +55,8 @@ bool wants_colour() {
          std::getenv("NO_COLOR") == nullptr;  // NOLINT(concurrency-mt-unsafe): one thread
 }
 
-Expected<Json> ask() {
-  Expected<GatewayClient> client = GatewayClient::connect();
+Expected<Json> ask(const std::string& instance) {
+  Expected<GatewayClient> client = GatewayClient::connect(instance);
   if (!client) return tl::unexpected(client.error());
   return client->status();
 }
@@ -105,25 +107,61 @@ class Watch {
   std::deque<double> rates_;
 };
 
-int watch(double interval_s) {
+int watch(const StatusOptions& options) {
   struct sigaction action {};
   action.sa_handler = &on_interrupt;
   ::sigaction(SIGINT, &action, nullptr);
   ::sigaction(SIGTERM, &action, nullptr);
   Watch view;
   while (interrupted == 0) {
-    view.show(ask());
+    view.show(ask(options.which.instance));
     if (!flush_output()) return kDone;  // told at the end
-    sleep_s(interval_s);
+    sleep_s(options.interval_s);
   }
   return kDone;
+}
+
+/// The instances that are meant; an error where all are and there is none.
+Expected<std::vector<std::string>> chosen(const WhichGateway& which) {
+  if (!which.all) return std::vector{which.instance};
+  Expected<GatewayClient> client = GatewayClient::connect();
+  if (!client) return tl::unexpected(client.error());
+  Expected<std::vector<std::string>> found = client->instances();
+  if (found && found->empty()) {
+    return fail("vgyrod", "no gateway is on D-Bus",
+                "`systemctl list-units 'vgyrod*'` says which run");
+  }
+  return found;
+}
+
+// One that does not answer keeps none of the others from being shown.
+int show_all(const std::vector<std::string>& instances, bool json) {
+  int code = kDone;
+  Json gateways = Json::array();
+  for (const std::string& instance : instances) {
+    const Expected<Json> status = ask(instance);
+    if (!status) {
+      code = report(status.error());
+    } else if (json) {
+      gateways.push_back(*status);
+    } else {
+      const std::string title = printable(unit_of(instance));
+      draw(stdout, title + '\n' + status_table(*status, {wants_colour(), {}}) + '\n');
+    }
+  }
+  if (json) draw(stdout, Json{{"format", 1}, {"gateways", gateways}}.dump(2) + "\n");
+  return code;
 }
 
 }  // namespace
 
 int run_status(const StatusOptions& options) {
-  if (options.watch) return watch(options.interval_s);
-  const Expected<Json> status = ask();
+  if (options.watch) return watch(options);
+  if (options.which.all) {
+    const Expected<std::vector<std::string>> instances = chosen(options.which);
+    return instances ? show_all(*instances, options.json) : report(instances.error());
+  }
+  const Expected<Json> status = ask(options.which.instance);
   if (!status) return report(status.error());
   if (options.json) {
     draw(stdout, status->dump(2) + "\n");
@@ -133,12 +171,21 @@ int run_status(const StatusOptions& options) {
   return kDone;
 }
 
-int run_recalibrate() {
-  Expected<GatewayClient> client = GatewayClient::connect();
-  if (!client) return report(client.error());
-  if (const Expected<void> done = client->recalibrate(); !done) return report(done.error());
-  say("the gateway has forgotten its biases and calibrates; `vgyro status` shows how far it is\n");
-  return kDone;
+int run_recalibrate(const WhichGateway& which) {
+  const Expected<std::vector<std::string>> instances = chosen(which);
+  if (!instances) return report(instances.error());
+  int code = kDone;
+  for (const std::string& instance : *instances) {
+    Expected<GatewayClient> client = GatewayClient::connect(instance);
+    if (!client) return report(client.error());
+    if (const Expected<void> done = client->recalibrate(); !done) {
+      code = report(done.error());
+      continue;
+    }
+    const std::string who = instance.empty() ? "the gateway" : "the gateway " + instance;
+    say("{} has forgotten its biases and calibrates; `vgyro status` shows how far it is\n", who);
+  }
+  return code;
 }
 
 }  // namespace vgyro::cli

@@ -320,6 +320,9 @@ std::string head(const Json& status, const ViewOptions& options, const Paint& pa
   };
   remark(text_of(status, "restored") == "taken_up", Mood::kDoubtful,
          "on biases of an earlier run, which no stop has confirmed");
+  const Json transmit = at(status, "transmit");
+  remark(transmit.is_boolean() && !transmit.get<bool>(), Mood::kDoubtful,
+         "shadow mode: nothing is sent ([output] transmit = false)");
   const std::string contradiction = text_of(status, "contradiction_text");
   const bool contradicted = !contradiction.empty() && contradiction != kNothing;
   remark(contradicted, Mood::kBad,
@@ -416,6 +419,8 @@ std::string status_line(const Json& status) {
     text += fmt::format("; {} {}, bias {} deg/h", text_of(gyro, "name"), text_of(gyro, "health"),
                         number_text(number_of(gyro, "bias_dps") * kDegPerHour, "{:+.2f}"));
   }
+  const Json transmit = at(status, "transmit");
+  if (transmit.is_boolean() && !transmit.get<bool>()) text += "; shadow mode";
   return text;
 }
 

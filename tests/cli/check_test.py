@@ -33,6 +33,52 @@ class Check(bench.Bench):
                      "VG_Bias 611", "VG_Model 612", "classic CAN"):
             self.assertIn(part, text)
 
+    def test_says_that_shadow_mode_sends_nothing(self):
+        self.assertNotIn("shadow", self.good("check", "vgyro.toml").stdout.decode())
+        self.write("vgyro.toml", bench.CONFIG.replace("[output]", "[output]\ntransmit = false", 1))
+        text = self.good("check", "vgyro.toml").stdout.decode()
+        self.assertRegex(text, r"(?m)^  shadow mode +the gateway sends none of what follows: transmit = false$")
+        self.assertIn("[output] transmit must be true or false",
+                      self.check_replaced("transmit = false", 'transmit = "no"'))
+
+    def test_files_beside_it_go_over_it_in_the_order_of_their_names(self):
+        alone = self.good("check", "vgyro.toml").stdout.decode()
+        self.assertNotIn("as several files say", alone)
+        (self.folder / "vgyro.d").mkdir()
+        self.write("vgyro.d/20-car.toml", "[calibration]\nrest_s = 7\n[[gyro]]\n[[gyro]]\nmax_bias_dps = 0.25\n")
+        self.write("vgyro.d/10-fleet.toml", "[calibration]\nrest_s = 5\nrate_dps = 0.004\n")
+        for ignored in ("vgyro.d/30-note.txt", "vgyro.d/.40-swap.toml"):
+            self.write(ignored, "[calibration]\nrest_s = 9\n")
+        text = self.good("check", "vgyro.toml").stdout.decode()
+        self.assertIn("the first 7 s of rest, true rate 0.004 deg/s", text)
+        self.assertRegex(text, r"(?m)^    calibration\.rest_s +7\S* +vgyro\.d/20-car\.toml:2$")
+        self.assertRegex(text, r"(?m)^    calibration\.rate_dps +0\.004 +vgyro\.d/10-fleet\.toml:3$")
+        self.assertRegex(text, r"(?m)^    gyro\[1\]\.max_bias_dps +0\.25 +vgyro\.d/20-car\.toml:5$")
+        self.assertRegex(text, r"(?m)^    gyro\[0\]\.name +[\"']left[\"'] +vgyro\.toml:\d+$")
+        prints = [line.split()[1] for line in (alone + text).splitlines() if line.startswith("  fingerprint")]
+        self.assertEqual(len(set(prints)), 2)
+        # Who is wrong is named, and not the file that it lies over.
+        self.write("vgyro.d/20-car.toml", "\n[calibration]\nresst_s = 7\n")
+        self.assertIn('vgyro.d/20-car.toml:3: unknown key "resst_s" in [calibration]', self.bad("check", "vgyro.toml"))
+        self.write("vgyro.d/20-car.toml", "[calibration]\nrest_s = \n")
+        self.assertIn("vgyro.d/20-car.toml:2: ", self.bad("check", "vgyro.toml"))
+
+    def test_the_fingerprint_is_of_what_it_means(self):
+        def fingerprint():
+            text = self.good("check", "vgyro.toml").stdout.decode()
+            return next(line.split()[1] for line in text.splitlines() if line.startswith("  fingerprint"))
+        first = fingerprint()
+        self.assertRegex(first, r"^[0-9a-f]{16}$")
+        config = self.read("vgyro.toml")
+        self.write("vgyro.toml", "# A comment means nothing.\n\n" + config)
+        self.assertEqual(fingerprint(), first)
+        self.write("vgyro.toml", config.replace("rest_s = 1", "rest_s = 2"))
+        self.assertNotEqual(fingerprint(), first)
+        self.write("vgyro.toml", config)
+        dbc = next(self.folder.glob("*.dbc")).name
+        self.write(dbc, self.read(dbc) + "\n")
+        self.assertNotEqual(fingerprint(), first)
+
     def test_names_the_largest_bias(self):
         # It decides what a stop may teach.
         self.assertNotIn("at most", self.good("check", "vgyro.toml").stdout.decode().split("corrector")[0])

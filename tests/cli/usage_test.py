@@ -10,11 +10,12 @@ import bench
 COMMANDS = {
     "check": {"CONFIG", "--method", "--model"},
     "decode": {"--dbc", "--text", "LOG"},
-    "allan": {"--config", "--axis", "--json", "--plot", "LOG"},
+    "allan": {"--config", "--axis", "--evidence", "--json", "--plot", "LOG"},
     "replay": {"--config", "--method", "--model", "--state", "-o", "--output", "--json", "--csv", "--plot", "--map", "--digits", "-q", "--quiet",
                "LOG"},
     "compare": {"--config", "--model", "--measured", "--axis", "--json", "--seed", "-q", "--quiet"},
-    "gap": {"--config", "--model", "--measured", "--axis", "--out", "--accept", "--time-limit", "--seed", "-q", "--quiet"},
+    "gap": {"--config", "--model", "--measured", "--axis", "--out", "--accept", "--evidence", "--time-limit", "--seed", "-q", "--quiet"},
+    "fleet": {"EVIDENCE", "--out", "--false-names", "-q", "--quiet"},
     "convert": {"-o", "--output", "--digits", "-q", "--quiet", "LOG"},
 }
 

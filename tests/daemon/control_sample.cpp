@@ -8,6 +8,7 @@
 
 #include <fmt/core.h>
 
+#include "base/instance_name.h"
 #include "daemon/control.h"
 #include "daemon/metrics.h"
 #include "tests/gateway/rig.h"
@@ -80,6 +81,10 @@ struct SampleGateway {
     now.traffic.buses = {bus, {.name = "can1"}};
   }
 
+  void begin_shadow() {
+    plan.output.transmit = false;
+    now.traffic.shadowed = 99;
+  }
   Expected<void> save_state() {
     if (now.status.state == gateway::State::kRunning) return {};
     return fail({}, "nothing was learned yet that is worth keeping");
@@ -110,16 +115,18 @@ int on_second(sd_event_source* source, std::uint64_t, void* self) {
 
 int main(int argc, char** argv) {
   SampleGateway sample;
+  if (argc > 3) sample.now.instance = argv[3];
   sd_event* events = nullptr;
   if (sd_event_new(&events) < 0) return 1;
   daemon::Control control(events,
                           {.snapshot = [&]() -> const daemon::Snapshot& { return sample.now; },
                            .recalibrate = [&] { sample.recalibrate(); },
                            .save_state = [&] { return sample.save_state(); }},
-                          sample.log);
+                          bus_name_of(sample.now.instance), sample.log);
   sample.control = &control;
   std::optional<daemon::MetricsFile> metrics;
   if (argc > 1) sample.metrics = &metrics.emplace(argv[1], sample.log);
+  if (argc > 2 && std::string(argv[2]) == "shadow") sample.begin_shadow();
   sd_event_add_time_relative(events, nullptr, CLOCK_MONOTONIC, 1'000'000, 0, &on_second, &sample);
   return sd_event_loop(events) < 0 ? 1 : 0;
 }

@@ -130,10 +130,10 @@ class OnTheBus(Bench):
         members = {line.split()[0]: line.split()[1:3] for line in listed.stdout.splitlines() if line.startswith(".")}
         expected = {".Recalibrate": ["method", "-"], ".SaveState": ["method", "-"], ".Counters": ["property", "a{st}"],
                     ".Gyros": ["property", "aa{sv}"], ".Axes": ["property", "aa{sv}"], ".Buses": ["property", "aa{sv}"]}
-        expected |= {f".{name}": ["property", "s"] for name in ("Version", "Method", "State", "Quality", "Restored", "Contradiction",
+        expected |= {f".{name}": ["property", "s"] for name in ("Version", "Instance", "Method", "State", "Quality", "Restored", "Contradiction",
                                                                 "ContradictionText")}
         expected |= {f".{name}": ["property", "b"] for name in ("Valid", "Disagree", "Ambiguous", "RatesTooFarApart",
-                                                                "ConfigRefused")}
+                                                                "ConfigRefused", "Transmit")}
         expected |= {".Hypotheses": ["property", "a{sd}"]}
         expected |= {f".{name}": ["property", "d"] for name in ("RateDps", "SigmaDps", "BiasSigmaDps", "CalibratedS",
                                                                 "RestS", "UptimeS")}
@@ -242,6 +242,52 @@ class OnTheBus(Bench):
         self.assertEqual(status["hypotheses"], {"standing": 0.75, "turning": 0.25, "warming_up": 0.5})
         self.assertIs(status["ambiguous"], True)
         self.assertEqual([g["slope_dps_s"] for g in status["gyros"]], [1e-6, None])
+
+    def test_shadow_mode_is_said_wherever_one_looks(self):
+        self.assertIs(self.get("Transmit"), True)
+        self.assertNotIn("shadow", self.vgyro("status").stdout)
+        self.end(self.sample)
+        metrics = self.folder / "vgyro.prom"
+        self.start_sample(str(metrics), "shadow")
+        self.assertTrue(until(lambda: self.is_there() and metrics.exists()))
+        self.assertIs(self.get("Transmit"), False)
+        self.assertEqual(self.get("Counters")["frames_shadowed"], 99)
+        self.assertIn("shadow mode: nothing is sent ([output] transmit = false)\n", self.vgyro("status").stdout)
+        self.assertIs(json.loads(self.vgyro("status", "--json").stdout)["transmit"], False)
+        samples = parse_metrics(metrics.read_text())[1]
+        self.assertEqual((samples["vgyro_transmit", ()], samples["vgyro_shadowed_frames_total", ()]), (0, 99))
+
+    def test_instances_are_told_apart_and_asked_together(self):
+        front = self.folder / "front.prom"
+        self.start_sample(str(front), "loud", "front")
+        self.start_sample(str(self.folder / "rear.prom"), "shadow", "rear_2")
+        names = [NAME, f"{NAME}.front", f"{NAME}.rear_2"]
+        self.assertTrue(until(lambda: all(name in self.busctl("list", "--acquired").stdout for name in names)))
+        stranger = NOBODY if IS_ROOT else None
+        seen = json.loads(self.vgyro("status", "--instance", "rear_2", "--json", uid=stranger).stdout)
+        self.assertEqual((seen["instance"], seen["transmit"]), ("rear_2", False))
+        seen = json.loads(self.vgyro("status", "--all", "--json").stdout)
+        self.assertEqual([one["instance"] for one in seen["gateways"]], ["", "front", "rear_2"])
+        shown = self.vgyro("status", "--all").stdout
+        self.assertEqual([line for line in shown.splitlines() if line.startswith("vgyrod") and "," not in line],
+                         ["vgyrod", "vgyrod@front", "vgyrod@rear_2"])
+        refused = self.busctl("call", names[1], OBJECT, NAME, "Recalibrate", uid=stranger)
+        self.assertIn("denied", refused.stderr.lower())
+        if IS_ROOT:
+            self.assertEqual(self.vgyro("recalibrate", "--instance", "front").returncode, 0)
+            states = [one["state"] for one in json.loads(self.vgyro("status", "--all", "--json").stdout)["gateways"]]
+            self.assertEqual(states, ["running", "calibrating", "running"])
+            self.assertEqual(self.vgyro("recalibrate", "--all").stdout.count("has forgotten its biases"), 3)
+        # node_exporter reads all files as one: no two samples may be the same.
+        self.assertTrue(until(front.exists))
+        samples = parse_metrics(front.read_text())[1]
+        self.assertEqual({labels[:1] for _, labels in samples}, {(("gateway", "front"),)})
+        missing = self.vgyro("status", "--instance", "nobody")
+        self.assertEqual(missing.returncode, 1)
+        self.assertIn("`systemctl status vgyrod@nobody` says whether it runs", missing.stderr)
+        wrong = self.vgyro("status", "--instance", "a-b")
+        self.assertEqual(wrong.returncode, 2)
+        self.assertIn("is no name of an instance", wrong.stderr)
 
     def test_status_as_a_table(self):
         done = self.vgyro("status")

@@ -44,6 +44,39 @@ TEST(Outlets, QueuesGoOverByTheNameOfTheBus) {
   EXPECT_EQ(last.counts().dropped_stale, 2U);
 }
 
+TEST(Outlets, InShadowModeNoTransmitterIsEverAsked) {
+  Outlets shadow({"can0", "can1"}, false);
+  Open bus;
+  EXPECT_TRUE(shadow.send_at_once(0, {}, bus));
+  shadow.push(1, {}, kLater);
+  EXPECT_EQ(shadow[0].queue.size() + shadow[1].queue.size(), 0U);
+  EXPECT_FALSE(shadow.next_deadline());
+  for (std::size_t i = 0; i < shadow.size(); ++i)
+    shadow[i].queue.drain(time_from_ns(0), bus);
+  EXPECT_EQ(bus.taken, 0);
+  EXPECT_EQ(shadow.counts().sent, 0U);
+  EXPECT_EQ(shadow.shadowed(), 2U);
+}
+
+TEST(Outlets, WhatWaitsWhenShadowModeBeginsIsNotSent) {
+  Outlets before({"can0"});
+  Open bus;
+  ASSERT_TRUE(before.send_at_once(0, {}, bus));
+  before.push(0, {}, kLater);
+  Outlets shadow({"can0"}, false);
+  shadow.take_over(std::move(before));
+  EXPECT_EQ(shadow[0].queue.size(), 0U);
+  EXPECT_EQ(shadow.counts().sent, 1U);
+  EXPECT_EQ(shadow.counts().dropped_stale, 1U) << "nothing falls out of the books";
+  shadow.push(0, {}, kLater);
+  Outlets after({"can0"});
+  after.take_over(std::move(shadow));
+  EXPECT_EQ(after.shadowed(), 1U);
+  EXPECT_TRUE(after.send_at_once(0, {}, bus));
+  EXPECT_EQ(bus.taken, 2);
+  EXPECT_EQ(after.counts().sent, 2U);
+}
+
 TEST(Outlets, TheFirstDeadlineCounts) {
   Outlets outlets({"can0", "can1"});
   EXPECT_FALSE(outlets.next_deadline());

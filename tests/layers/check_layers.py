@@ -20,9 +20,10 @@ ARROWS = {
     "fusion": {"base", "model", "fusion"},
     "analysis": {"base", "analysis"},
     "gap": {"base", "model", "analysis", "gap"},
+    "fleet": {"base", "model", "fleet"},
     "gateway": {"base", "can", "dbc", "model", "fusion", "gateway"},
     "daemon": {"base", "can", "dbc", "gateway", "daemon"},
-    "cli": {"base", "can", "canlog", "dbc", "model", "simulation", "fusion", "analysis", "gap", "gateway", "cli"},
+    "cli": {"base", "can", "canlog", "dbc", "model", "simulation", "fusion", "analysis", "gap", "fleet", "gateway", "cli"},
 }
 
 # The gap workflow is as much as all other layers together, so it has arrows of its own: file → the files of its folder
@@ -32,7 +33,7 @@ GAP_DATA = GAP_BASE | {"noise", "signals", "observations", "unseen_motion"}
 GAP_REGRESSION = GAP_DATA | {"least_squares", "regression", "found"}
 GAP_STUDY = GAP_DATA | {"transport", "timing", "study"}
 GAP_ARROWS = {
-    "curve": {"median"}, "median": set(), "recording": set(), "result": set(), "least_squares": set(), "kinds": set(),
+    "curve": {"median"}, "median": set(), "recording": set(), "result": {"drive_evidence"}, "least_squares": set(), "kinds": set(),
     "wiener": {"curve", "median"},
     "unseen_motion": {"curve", "kinds", "noise"},
     "signals": {"curve", "median", "recording"},
@@ -60,8 +61,10 @@ GAP_ARROWS = {
     "describe": GAP_STUDY | {"views", "evidence"},
     "differences": GAP_STUDY | GAP_REGRESSION | {"scan", "views", "evidence"},
     "search": GAP_STUDY | GAP_REGRESSION | {"acceptance", "scan", "noise_search", "robust", "steadiness"},
+    "drive_evidence": set(),
+    "weigh": GAP_STUDY | GAP_REGRESSION | {"scan", "drive_evidence"},
     "leftover": GAP_STUDY | {"score", "search", "whiteness"},
-    "workflow": GAP_STUDY | {"acceptance", "describe", "differences", "figures", "identifiable", "leftover", "score", "search"},
+    "workflow": GAP_STUDY | {"acceptance", "describe", "differences", "figures", "identifiable", "leftover", "score", "search", "weigh"},
 }
 
 # What, as a pattern of an included header → the files that may include it.
@@ -70,7 +73,7 @@ SYSTEM_HEADERS = (
     # The other one speaks to the service manager.
     (r"sys/socket\.h|sys/un\.h", r"can/socket\.(h|cpp)|daemon/service\.cpp"),
     (r"systemd/.*", r"daemon/.*|cli/status/gateway_client\.cpp"),
-    (r"Eigen/.*|unsupported/Eigen/.*", r"(fusion|analysis|gap)/.*"),
+    (r"Eigen/.*|unsupported/Eigen/.*", r"(fusion|analysis|gap|fleet)/.*"),
     (r"iostream|istream|ostream|fstream|sstream|iomanip", r"(base|daemon|cli)/.*"),
 )
 

@@ -16,6 +16,7 @@ FOLDER = SOURCE / "build/package"
 EXPECTED = """\
 /etc/vgyro/vgyro.toml
 /lib/systemd/system/vgyrod.service
+/lib/systemd/system/vgyrod@.service
 /usr/bin/vgyro
 /usr/bin/vgyrod
 /usr/lib/sysusers.d/vgyro.conf

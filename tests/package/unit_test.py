@@ -11,20 +11,31 @@ from pathlib import Path
 SOURCE = Path(os.environ.get("VGYRO_SOURCE", Path(__file__).resolve().parents[2]))
 BIN = Path(os.environ.get("VGYRO_BIN", SOURCE / "build/release/bin"))
 UNIT = SOURCE / "systemd/vgyrod.service"
+TEMPLATE = SOURCE / "systemd/vgyrod@.service"
 # Lower is better. 0.5 of it is the network: the gateway would have no bus without.
 EXPOSURE_MOST = 1.3
 
 
 class Unit(unittest.TestCase):
     def test_systemd_finds_nothing_wrong(self):
-        with tempfile.TemporaryDirectory() as folder:
-            # It wants the program where the unit says; its pages are not installed.
-            copy = Path(folder) / UNIT.name
-            text = UNIT.read_text(encoding="utf-8").replace("/usr/bin/vgyrod", str(BIN / "vgyrod"))
-            copy.write_text(text.replace("Documentation=man:", "#"), encoding="utf-8")
-            done = subprocess.run(["systemd-analyze", "verify", "--recursive-errors=no", "--man=no", copy],
-                                  capture_output=True, text=True, check=False)
-        self.assertEqual((done.returncode, done.stderr), (0, ""))
+        for unit, name in ((UNIT, UNIT.name), (TEMPLATE, "vgyrod@front.service")):
+            with self.subTest(unit=unit.name), tempfile.TemporaryDirectory() as folder:
+                # It wants the program where the unit says; its pages are not installed.
+                copy = Path(folder) / name
+                text = unit.read_text(encoding="utf-8").replace("/usr/bin/vgyrod", str(BIN / "vgyrod"))
+                copy.write_text(text.replace("Documentation=man:", "#"), encoding="utf-8")
+                done = subprocess.run(["systemd-analyze", "verify", "--recursive-errors=no", "--man=no", copy],
+                                      capture_output=True, text=True, check=False)
+                self.assertEqual((done.returncode, done.stderr), (0, ""))
+
+    def test_an_instance_differs_from_the_service_only_in_what_is_its_own(self):
+        one, many = (unit.read_text(encoding="utf-8") for unit in (UNIT, TEMPLATE))
+        for own, common in (("/etc/vgyro/%i.", "/etc/vgyro/vgyro."), (", instance %i", ""), (" --instance %i", ""),
+                            ("/run/vgyro-%i/", "/run/vgyro/"), ("Directory=vgyro-%i", "Directory=vgyro"),
+                            ("vgyrod@%i", "vgyrod")):
+            self.assertIn(own, many)
+            many = many.replace(own, common)
+        self.assertEqual(many, one)
 
     def test_exposure_stays_low_and_no_capability_is_left(self):
         done = subprocess.run(["systemd-analyze", "security", "--offline=true", "--no-pager", UNIT],

@@ -620,6 +620,41 @@ class ErrorFramesCase:
         return describe(run)
 
 
+class ShadowCase:
+    """`[output] transmit = false`: everything but sending, until a reload ends it; and somebody has our identifier."""
+
+    name = "shadow"
+    says = "shadow mode: all is computed, nothing is sent; a stranger is seen all the same; a reload ends it"
+
+    def prepare(self, folder):
+        Twin().prepare(folder)
+        config = (folder / "vgyro.toml").read_text(encoding="utf-8")
+        # A key of [output], which is the last table.
+        (folder / "vgyro.toml").write_text(config + "transmit = false\n", encoding="utf-8")
+        (folder / "loud.toml").write_text(config, encoding="utf-8")
+        (folder / "stranger.log").write_text("(1700000000.000000) can0 610#0011223344556677\n", encoding="ascii")
+        return {"links": Twin().links(),
+                "steps": [["play", str(folder / "played.log")], ["play", str(folder / "stranger.log")], ["wait", 2.5],
+                          ["run", ["mv", str(folder / "loud.toml"), str(folder / "vgyro.toml")]], ["reload", None],
+                          ["wait", 1.0]],
+                "command": [str(BIN / "vgyrod"), "--config", str(folder / "vgyro.toml")]}
+
+    def judge(self, folder, result):
+        run = read_run(folder, result)
+        check_life(run)
+        require(len(result["reloads_us"]) == 1, f"{len(result['reloads_us'])} reloads")
+        before = [line for line in run.outputs if line.us < result["reloads_us"][0]]
+        require(len(before) == 1 and "0011223344556677" in before[0].text, f"{len(before)} frames in shadow mode")
+        require(len(run.outputs) > 5, "nothing is sent after the reload either")
+        require(run.said.count("shadow mode: everything but sending is done") == 1, run.said)
+        require("came from somebody else" in run.said, f"the stranger was not seen\n{run.said}")
+        counts = re.search(r"(\d+) virtual rates \((\d+) valid\), .* (\d+) not sent in shadow mode", run.said)
+        require(counts and int(counts[2]) > 500 and int(counts[3]) > int(counts[1]), run.said)
+        quiet = [text for _, text in result["notices"] if text.startswith("STATUS=running")]
+        require(any(text.endswith("; shadow mode: nothing is sent") for text in quiet), f"STATUS: {quiet}")
+        return f"{counts[3]} frames not sent, then {len(run.outputs) - 1} sent"
+
+
 class ReloadCase:
     """SIGHUP, three times: amid traffic, with a bad configuration, with another window and output."""
 
@@ -1285,6 +1320,7 @@ def all_cases(recordings):
         LateFdCase(),
         DeadBusCase(),
         ErrorFramesCase(),
+        ShadowCase(),
         ReloadCase(),
         SlowReloadCase(),
         ShortMemoryCase(),

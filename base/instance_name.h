@@ -1,0 +1,40 @@
+#pragma once
+
+// One of several gateways on a host: vgyrod@front.service is "front". Its name is part of a D-Bus
+// name, of paths and of a metric's label, so it holds only what all of them take.
+
+#include <algorithm>
+#include <cstddef>
+#include <string>
+#include <string_view>
+
+#include "base/error.h"
+
+namespace vgyro {
+
+/// Of D-Bus; an instance has its own name behind a dot.
+inline constexpr const char* kGatewayBusName = "org.vgyro.Gateway1";
+
+inline std::string bus_name_of(std::string_view instance) {
+  const std::string common = kGatewayBusName;
+  return instance.empty() ? common : common + '.' + std::string(instance);
+}
+
+/// Its systemd unit.
+inline std::string unit_of(std::string_view instance) {
+  return instance.empty() ? "vgyrod" : "vgyrod@" + std::string(instance);
+}
+
+/// Empty is the gateway that has no name.
+inline Expected<void> check_instance_name(std::string_view name) {
+  constexpr std::size_t kBytesMost = 32;  // of 255 that a bus name may have, and people should read
+  const auto is_letter = [](char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z'); };
+  const auto fits = [&](char c) { return is_letter(c) || (c >= '0' && c <= '9') || c == '_'; };
+  const bool good = name.empty() || (name.size() <= kBytesMost && is_letter(name.front()) &&
+                                     std::all_of(name.begin(), name.end(), fits));
+  if (good) return {};
+  return fail({}, "\"" + std::string(name) + "\" is no name of an instance",
+              "a letter, then letters, digits and _; at most 32 in all: vgyrod@front2");
+}
+
+}  // namespace vgyro

@@ -1,0 +1,437 @@
+#include "fleet/judge.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/core.h>
+
+#include "fleet/selection.h"
+#include "fleet/statistics.h"
+#include "fleet/system.h"
+#include "fleet/unit_measures.h"
+
+namespace vgyro::fleet {
+
+namespace {
+
+using model::kShapeCount;
+
+// A spread between units is named from so many units on, and where this share of them is off by
+// more than two standard errors; by chance it is 4.6 %.
+constexpr std::size_t kSpreadUnitsMin = 6;
+constexpr double kSpreadShare = 0.25;
+constexpr double kOff = 2.0;
+constexpr double kOffByChance = 0.0455;
+constexpr int kSpreadsMax = 6;
+// Fewer units do not tell how far units differ.
+constexpr std::size_t kApartUnitsMin = 5;
+// A unit with fewer drives is not called good.
+constexpr std::size_t kFewDrives = 3;
+
+double unit_of(std::size_t column) {
+  return model::shapes()[column % kShapeCount].unit;
+}
+
+// Upper tail of a binomial distribution.
+double binomial_tail(std::size_t successes, std::size_t trials, double share) {
+  const auto n = static_cast<double>(trials);
+  double sum = 0.0;
+  for (std::size_t i = successes; i <= trials; ++i) {
+    const auto k = static_cast<double>(i);
+    sum += std::exp(std::lgamma(n + 1.0) - std::lgamma(k + 1.0) - std::lgamma(n - k + 1.0) +
+                    k * std::log(share) + (n - k) * std::log1p(-share));
+  }
+  return std::min(1.0, sum);
+}
+
+class Judge {
+ public:
+  Judge(const Pool& pool, const Settings& settings) : pool_(pool), settings_(settings) {
+    for (const auto& [identity, sums] : pool.units)
+      types_.push_back(identity.type);
+    types_.erase(std::unique(types_.begin(), types_.end()), types_.end());
+    of_types_ = System(types_.size() * kShapeCount);
+    sizes_ = Eigen::VectorXd::Zero(of_types_.score.size());
+    // Every shape of every type and of every unit, and what else is asked of each unit.
+    tests_ = static_cast<double>(types_.size() * kShapeCount +
+                                 pool.units.size() * (kShapeCount + kUnitQuestions));
+  }
+
+  Judgement run() {
+    gather_types();
+    choice_ = choose(of_types_, {}, tests_, settings_.false_names);
+    fitted_ = choice_.columns;
+    fit();
+    add_spreads();
+    Judgement judgement;
+    judgement.tests = tests_;
+    judgement.false_names = settings_.false_names;
+    for (std::size_t type = 0; type < types_.size(); ++type)
+      judge_type(type, judgement);
+    return judgement;
+  }
+
+ private:
+  struct Unit {
+    Identity identity;
+    System system;  ///< what is left beside the type's sizes
+  };
+
+  [[nodiscard]] std::size_t type_of(const Identity& identity) const {
+    return static_cast<std::size_t>(std::lower_bound(types_.begin(), types_.end(), identity.type) -
+                                    types_.begin());
+  }
+
+  // Two of one type in a group share their type's columns.
+  void gather_types() {
+    Eigen::VectorXd squares = Eigen::VectorXd::Zero(of_types_.score.size());
+    Eigen::VectorXd freedom = squares;
+    for (const auto& [who, sums] : pool_.groups) {
+      const auto column = [&, &who_ref = who](std::size_t c) {
+        return static_cast<Eigen::Index>(type_of(who_ref[c / kShapeCount]) * kShapeCount +
+                                         c % kShapeCount);
+      };
+      for (std::size_t i = 0; i < sums.columns(); ++i) {
+        const Eigen::Index at = column(i);
+        of_types_.score[at] += value_of(sums.score[i]);
+        of_types_.drives[at] += static_cast<double>(sums.count[i]);
+        for (std::size_t k = 0; k <= i; ++k) {
+          const double information = value_of(sums.information[triangle(i, k)]);
+          of_types_.information(at, column(k)) += information;
+          if (i != k) of_types_.information(column(k), at) += information;
+        }
+        const double own = value_of(sums.information[triangle(i, i)]);
+        if (sums.count[i] < 2 || own <= 0.0) continue;
+        const double score = value_of(sums.score[i]);
+        squares[at] += value_of(sums.heterogeneity[i]) - score * score / own;
+        freedom[at] += static_cast<double>(sums.count[i]) - 1.0;
+      }
+    }
+    for (Eigen::Index i = 0; i < squares.size(); ++i)
+      if (freedom[i] > 0.0) of_types_.dispersion[i] = std::max(1.0, squares[i] / freedom[i]);
+  }
+
+  void fit() {
+    sizes_.setZero();
+    if (!fitted_.empty()) sizes_(fitted_) = of_types_.solve(fitted_);
+    gather_units();
+  }
+
+  // Of each unit, with its partners as their types are.
+  void gather_units() {
+    units_.clear();
+    for (const auto& [identity, sums] : pool_.units)
+      units_.push_back({identity, System(kShapeCount)});
+    for (const auto& [who, sums] : pool_.groups) {
+      for (std::size_t slot = 0; slot < who.size(); ++slot)
+        add_to_unit(who, sums, slot);
+    }
+  }
+
+  void add_to_unit(const std::vector<Identity>& who, const GroupSums& sums, std::size_t slot) {
+    const auto at = std::lower_bound(
+        units_.begin(), units_.end(), who[slot],
+        [](const Unit& unit, const Identity& identity) { return unit.identity < identity; });
+    System& system = at->system;
+    const std::size_t type = type_of(who[slot]);
+    for (std::size_t i = 0; i < kShapeCount; ++i) {
+      const std::size_t own = slot * kShapeCount + i;
+      const auto row = static_cast<Eigen::Index>(i);
+      double score = value_of(sums.score[own]);
+      for (std::size_t k = 0; k < sums.columns(); ++k) {
+        const double information =
+            value_of(sums.information[triangle(std::max(own, k), std::min(own, k))]);
+        const std::size_t partner = type_of(who[k / kShapeCount]);
+        score -= information *
+                 sizes_[static_cast<Eigen::Index>(partner * kShapeCount + k % kShapeCount)];
+        if (k / kShapeCount == slot)
+          system.information(row, static_cast<Eigen::Index>(k % kShapeCount)) += information;
+      }
+      system.score[row] += score;
+      system.drives[row] += static_cast<double>(sums.count[own]);
+      system.dispersion[row] =
+          of_types_.dispersion[static_cast<Eigen::Index>(type * kShapeCount + i)];
+    }
+  }
+
+  // What many units have, and each otherwise: a mean of nothing does not hide it.
+  void add_spreads() {
+    for (int round = 0; round < kSpreadsMax; ++round) {
+      std::size_t best = 0;
+      double best_p = threshold_of(1, tests_, settings_.false_names);
+      for (std::size_t column = 0; column < types_.size() * kShapeCount; ++column) {
+        if (std::find(fitted_.begin(), fitted_.end(), column) != fitted_.end()) continue;
+        const double p = spread_p(column);
+        if (p < best_p) std::tie(best, best_p) = std::pair(column, p);
+      }
+      if (best_p == threshold_of(1, tests_, settings_.false_names)) return;
+      fitted_.push_back(best);
+      spreads_.push_back(best);
+      spread_p_.push_back(best_p);
+      fit();
+    }
+  }
+
+  [[nodiscard]] double spread_p(std::size_t column) const {
+    std::size_t off = 0;
+    std::size_t all = 0;
+    const std::vector<std::size_t> own = own_fitted(column / kShapeCount);
+    for (const Unit& unit : units_) {
+      if (type_of(unit.identity) != column / kShapeCount) continue;
+      const Left left = unit.system.beside(own)[column % kShapeCount];
+      if (left.information <= 0.0) continue;
+      const double doubt = unit.system.doubt(column % kShapeCount);
+      ++all;
+      if (left.gain() > kOff * kOff * doubt) ++off;
+    }
+    if (all < kSpreadUnitsMin || static_cast<double>(off) < kSpreadShare * static_cast<double>(all))
+      return 1.0;
+    return binomial_tail(off, all, kOffByChance);
+  }
+
+  [[nodiscard]] std::vector<std::size_t> own_fitted(std::size_t type) const {
+    std::vector<std::size_t> own;
+    for (const std::size_t column : fitted_)
+      if (column / kShapeCount == type) own.push_back(column % kShapeCount);
+    return own;
+  }
+
+  /// A unit's size of one of its type's shapes.
+  struct UnitSize {
+    std::size_t unit;
+    Estimate estimate;
+  };
+  [[nodiscard]] std::vector<UnitSize> unit_sizes(std::size_t column) const {
+    const std::size_t type = column / kShapeCount;
+    const std::size_t shape = column % kShapeCount;
+    std::vector<std::size_t> others = own_fitted(type);
+    others.erase(std::find(others.begin(), others.end(), shape));
+    std::vector<UnitSize> sizes;
+    for (std::size_t u = 0; u < units_.size(); ++u) {
+      if (type_of(units_[u].identity) != type) continue;
+      const Left left = units_[u].system.beside(others)[shape];
+      if (left.information <= 0.0) continue;
+      const double sigma = std::sqrt(units_[u].system.doubt(shape) / left.information);
+      sizes.push_back({u, {left.size() + sizes_[static_cast<Eigen::Index>(column)], sigma}});
+    }
+    return sizes;
+  }
+
+  [[nodiscard]] PooledEffect pooled(std::size_t column, const std::vector<UnitSize>& sizes) const {
+    std::vector<Estimate> estimates;
+    for (const UnitSize& one : sizes)
+      estimates.push_back(one.estimate);
+    const RandomEffects random = random_effects(estimates);
+    const auto place = std::find(fitted_.begin(), fitted_.end(), column) - fitted_.begin();
+    const double variance = of_types_.covariance(fitted_)(place, place) * of_types_.doubt(column);
+    const double unit = unit_of(column);
+    PooledEffect effect;
+    effect.whose.type = types_[column / kShapeCount];
+    effect.shape = column % kShapeCount;
+    const bool mixed = sizes.size() > 1 && random.between > 0.0;
+    effect.size = unit * (mixed ? random.mean : sizes_[static_cast<Eigen::Index>(column)]);
+    effect.sigma = unit * std::max(std::sqrt(variance), sizes.size() > 1 ? random.sigma : 0.0);
+    RandomEffects width = random;
+    width.sigma = effect.sigma;
+    effect.half_width95 = width.half_width95();
+    effect.between_units = unit * random.between;
+    effect.between_sigma = unit * random.between_sigma;
+    effect.units = sizes.size();
+    effect.drives = static_cast<std::size_t>(of_types_.drives[static_cast<Eigen::Index>(column)]);
+    set_trend(column, effect);
+    return effect;
+  }
+
+  void set_trend(std::size_t column, PooledEffect& effect) const {
+    double score_time = 0.0;
+    double time = 0.0;
+    double square = 0.0;
+    double whole = 0.0;
+    double score = 0.0;
+    for (const auto& [who, sums] : pool_.groups) {
+      for (std::size_t slot = 0; slot < who.size(); ++slot) {
+        if (type_of(who[slot]) != column / kShapeCount) continue;
+        const std::size_t c = slot * kShapeCount + column % kShapeCount;
+        score_time += value_of(sums.score_time[c]);
+        time += value_of(sums.information_time[c]);
+        square += value_of(sums.time_square[c]);
+        whole += value_of(sums.information[triangle(c, c)]);
+        score += value_of(sums.score[c]);
+      }
+    }
+    if (whole <= 0.0) return;
+    const double about_mean = square - time * time / whole;
+    // A tenth of a year, on average, at the least.
+    constexpr double kSpanSquareMin = 0.01;
+    if (about_mean <= kSpanSquareMin * whole) return;
+    effect.per_year = unit_of(column) * (score_time - score * time / whole) / about_mean;
+    effect.per_year_sigma = unit_of(column) * std::sqrt(of_types_.doubt(column) / about_mean);
+  }
+
+  void judge_type(std::size_t type, Judgement& judgement) {
+    TypeJudgement own;
+    own.type = types_[type];
+    std::vector<UnitJudgement> units;
+    std::vector<std::size_t> places;
+    for (std::size_t u = 0; u < units_.size(); ++u) {
+      if (type_of(units_[u].identity) != type) continue;
+      const UnitSums& sums = pool_.units.at(units_[u].identity);
+      units.push_back(unit_judgement(units_[u].identity, sums));
+      places.push_back(u);
+      own.drives += units.back().drives;
+    }
+    own.units = units.size();
+    judge_measures(pool_, threshold_of(1, tests_, settings_.false_names), units, own);
+    for (const std::size_t column : fitted_)
+      if (column / kShapeCount == type) judge_effect(column, places, units, own);
+    for (std::size_t i = 0; i < units.size(); ++i)
+      judge_own(units_[places[i]], units[i]);
+    for (UnitJudgement& unit : units) {
+      if (unit.status == Status::kAsItsType && unit.drives < kFewDrives)
+        unit.status = Status::kFewDrives;
+      judgement.units.push_back(std::move(unit));
+    }
+    judgement.types.push_back(std::move(own));
+  }
+
+  void judge_effect(std::size_t column, const std::vector<std::size_t>& places,
+                    std::vector<UnitJudgement>& units, TypeJudgement& own) const {
+    const std::vector<UnitSize> sizes = unit_sizes(column);
+    PooledEffect effect = pooled(column, sizes);
+    const bool is_spread = std::find(spreads_.begin(), spreads_.end(), column) != spreads_.end();
+    effect.varies = is_spread || (sizes.size() > 1 && std::abs(effect.size) < effect.half_width95);
+    const auto chosen = std::find(choice_.columns.begin(), choice_.columns.end(), column);
+    if (chosen != choice_.columns.end()) {
+      const auto at = static_cast<std::size_t>(chosen - choice_.columns.begin());
+      effect.statistic = choice_.z[at];
+      effect.p_value = normal_tail(effect.statistic);
+      for (const std::size_t other : choice_.ambiguous_with[at])
+        effect.ambiguous_with.emplace_back(types_[other / kShapeCount], other % kShapeCount);
+    } else {
+      const auto at = std::find(spreads_.begin(), spreads_.end(), column) - spreads_.begin();
+      effect.p_value = spread_p_[static_cast<std::size_t>(at)];
+    }
+    judge_apart(column, sizes, places, units);
+    // A single unit that stands apart pulls the mean, and is told by itself.
+    const bool is_one_units = effect.varies && !is_spread && effect.between_units <= 0.0;
+    if (!is_one_units && !(effect.varies && !is_spread && count_apart(column, units) > 0))
+      own.effects.push_back(std::move(effect));
+  }
+
+  [[nodiscard]] static std::size_t count_apart(std::size_t column,
+                                               const std::vector<UnitJudgement>& units) {
+    return static_cast<std::size_t>(
+        std::count_if(units.begin(), units.end(), [&](const UnitJudgement& unit) {
+          return std::any_of(unit.effects.begin(), unit.effects.end(), [&](const PooledEffect& e) {
+            return e.shape == column % kShapeCount;
+          });
+        }));
+  }
+
+  // Each against all others of its type, and the spread that they have without it.
+  void judge_apart(std::size_t column, const std::vector<UnitSize>& sizes,
+                   const std::vector<std::size_t>& places,
+                   std::vector<UnitJudgement>& units) const {
+    if (sizes.size() < kApartUnitsMin) return;
+    for (const UnitSize& one : sizes) {
+      std::vector<Estimate> others;
+      for (const UnitSize& other : sizes)
+        if (other.unit != one.unit) others.push_back(other.estimate);
+      const RandomEffects type = random_effects(others);
+      const double off = one.estimate.value - type.mean;
+      const double sigma = std::sqrt(one.estimate.sigma * one.estimate.sigma +
+                                     type.between * type.between + type.sigma * type.sigma);
+      const double p =
+          type.between > 0.0 ? student_tail(off / sigma, type.freedom) : normal_tail(off / sigma);
+      if (p > threshold_of(1, tests_, settings_.false_names)) continue;
+      const auto at = std::find(places.begin(), places.end(), one.unit) - places.begin();
+      tell_apart(column % kShapeCount, one.estimate, off / sigma, p, type.mean,
+                 units[static_cast<std::size_t>(at)]);
+    }
+  }
+
+  static void tell_apart(std::size_t shape, const Estimate& size, double z, double p, double mean,
+                         UnitJudgement& unit) {
+    const model::Shape& its = model::shapes()[shape];
+    PooledEffect effect;
+    effect.whose = unit.identity;
+    effect.shape = shape;
+    effect.size = its.unit * size.value;
+    effect.sigma = its.unit * size.sigma;
+    effect.half_width95 = RandomEffects{0.0, effect.sigma}.half_width95();
+    effect.statistic = z;
+    effect.p_value = p;
+    effect.drives = unit.drives;
+    effect.units = 1;
+    unit.status = Status::kApart;
+    unit.why.push_back(
+        fmt::format("{}: {:.3g} ± {:.1g}; its type has {:.3g}, {:.0f} standard errors away",
+                    its.name, effect.size, effect.sigma, its.unit * mean, std::abs(z)));
+    unit.effects.push_back(std::move(effect));
+  }
+
+  // What its type has nothing of. Beside what it has, of its own size.
+  void judge_own(const Unit& unit, UnitJudgement& told) const {
+    const std::size_t type = type_of(unit.identity);
+    // Of the only unit it is the type's.
+    if (std::count_if(units_.begin(), units_.end(),
+                      [&](const Unit& other) { return type_of(other.identity) == type; }) < 2)
+      return;
+    const Choice own = choose(unit.system, own_fitted(type), tests_, settings_.false_names);
+    const Eigen::VectorXd sizes = unit.system.solve(joined(own_fitted(type), own.columns));
+    const Eigen::Index first = sizes.size() - static_cast<Eigen::Index>(own.columns.size());
+    for (std::size_t i = 0; i < own.columns.size(); ++i) {
+      const double size = sizes[first + static_cast<Eigen::Index>(i)];
+      tell_apart(own.columns[i], {size, std::abs(size / own.z[i])}, own.z[i], normal_tail(own.z[i]),
+                 0.0, told);
+      for (const std::size_t other : own.ambiguous_with[i])
+        told.effects.back().ambiguous_with.emplace_back(types_[type], other);
+    }
+  }
+
+  static std::vector<std::size_t> joined(std::vector<std::size_t> first,
+                                         const std::vector<std::size_t>& second) {
+    first.insert(first.end(), second.begin(), second.end());
+    return first;
+  }
+
+  const Pool& pool_;
+  Settings settings_;
+  std::vector<std::string> types_;
+  System of_types_;
+  Eigen::VectorXd sizes_;  ///< of the types' columns; 0 where not fitted
+  Choice choice_;
+  std::vector<std::size_t> fitted_;
+  std::vector<std::size_t> spreads_;
+  std::vector<double> spread_p_;
+  std::vector<Unit> units_;
+  double tests_ = 0.0;
+};
+
+}  // namespace
+
+std::string_view status_name(Status status) {
+  switch (status) {
+    case Status::kAsItsType:
+      return "as_its_type";
+    case Status::kFewDrives:
+      return "few_drives";
+    case Status::kNoisy:
+      return "noisy";
+    case Status::kWandering:
+      return "wandering";
+    case Status::kTrend:
+      return "trend";
+    case Status::kLossy:
+      return "lossy";
+    case Status::kApart:
+      break;
+  }
+  return "apart";
+}
+
+Judgement judge(const Pool& pool, const Settings& settings) {
+  return Judge(pool, settings).run();
+}
+
+}  // namespace vgyro::fleet

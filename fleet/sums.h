@@ -1,0 +1,68 @@
+#pragma once
+
+// Sums that come out the same to the last bit in any order and any grouping: each value becomes a
+// whole number of fixed steps once, and whole numbers add exactly.
+
+#include <cmath>
+#include <cstdint>
+
+namespace vgyro::fleet {
+
+__extension__ typedef __int128 Whole;  // NOLINT(modernize-use-using): the extension needs it
+
+/// 2^-20: of values in units in which 1 matters.
+inline constexpr double kStepsPerUnit = 1048576.0;
+/// A million million of these fit, and are far beyond what any drive says.
+inline constexpr double kValueMost = 1e18;
+
+/// Precondition: |value| ≤ kValueMost.
+inline Whole whole_of(double value) {
+  return static_cast<Whole>(std::nearbyint(value * kStepsPerUnit));
+}
+inline double value_of(Whole sum) {
+  return static_cast<double>(sum) / kStepsPerUnit;
+}
+
+/// Of a quantity x that is told at times t: means, scatter, and the line through it.
+struct Moments {
+  Whole count = 0;
+  Whole x = 0;
+  Whole xx = 0;
+  Whole t = 0;
+  Whole tt = 0;
+  Whole xt = 0;
+
+  void add(double value, double t_years) {
+    count += 1;
+    x += whole_of(value);
+    xx += whole_of(value * value);
+    t += whole_of(t_years);
+    tt += whole_of(t_years * t_years);
+    xt += whole_of(value * t_years);
+  }
+  void add(const Moments& more) {
+    count += more.count;
+    x += more.x;
+    xx += more.xx;
+    t += more.t;
+    tt += more.tt;
+    xt += more.xt;
+  }
+  [[nodiscard]] double n() const { return static_cast<double>(count); }
+  [[nodiscard]] double mean() const { return value_of(x) / n(); }
+  /// Of single values; 0 of fewer than two.
+  [[nodiscard]] double variance() const {
+    if (count < 2) return 0.0;
+    const double square = value_of(xx) - mean() * value_of(x);
+    return square > 0.0 ? square / (n() - 1.0) : 0.0;
+  }
+  [[nodiscard]] double time_square() const {
+    return value_of(tt) - value_of(t) * value_of(t) / n();
+  }
+  /// Per year; 0 where all were told at one time.
+  [[nodiscard]] double slope() const;
+  /// 1σ of the slope by what scatters about the line.
+  [[nodiscard]] double slope_sigma() const;
+};
+
+}  // namespace vgyro::fleet

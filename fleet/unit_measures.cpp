@@ -1,0 +1,163 @@
+#include "fleet/unit_measures.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/core.h>
+
+#include "fleet/statistics.h"
+
+namespace vgyro::fleet {
+
+namespace {
+
+// Fewer units of a type do not tell what is usual.
+constexpr std::size_t kUnitsMin = 5;
+// The median's distance from the middle → σ of a normal distribution.
+constexpr double kMadToSigma = 1.4826;
+// What is nearer to its type than this factor is no fault, however sure.
+constexpr double kNoiseFactor = 1.5;
+constexpr double kWanderFactor = 2.0;
+constexpr double kLostMore = 0.01;
+// Units are never more alike than this, of a logarithm and of a share of frames.
+constexpr double kAlikeLog = 0.03;
+constexpr double kAlikeShare = 1e-3;
+// Of the scatter of the bias, and of its trend.
+constexpr double kScatterDrivesMin = 4.0;
+constexpr double kTrendDrivesMin = 6.0;
+
+const Moments& measure(const UnitSums& sums, Measure which) {
+  return sums.measures[static_cast<std::size_t>(which)];
+}
+
+/// One question, asked of all units.
+struct Question {
+  std::vector<std::size_t> unit;
+  std::vector<Estimate> estimate;
+};
+
+// Means of a measure, with the scatter that drives of the middle unit have.
+Question means_of(const Pool& pool, Measure which, const std::vector<UnitJudgement>& units) {
+  Question question;
+  std::vector<double> variances;
+  for (std::size_t i = 0; i < units.size(); ++i) {
+    const Moments& moments = measure(pool.units.at(units[i].identity), which);
+    if (moments.count == 0) continue;
+    question.unit.push_back(i);
+    question.estimate.push_back({moments.mean(), 1.0 / std::sqrt(moments.n())});
+    if (moments.count > 1) variances.push_back(moments.variance());
+  }
+  const double scatter = std::sqrt(median(variances));
+  for (Estimate& one : question.estimate)
+    one.sigma *= scatter;
+  return question;
+}
+
+Question scatters_of(const Pool& pool, const std::vector<UnitJudgement>& units) {
+  Question question;
+  for (std::size_t i = 0; i < units.size(); ++i) {
+    const Moments& moments = measure(pool.units.at(units[i].identity), Measure::kBias);
+    if (moments.n() < kScatterDrivesMin || moments.variance() <= 0.0) continue;
+    question.unit.push_back(i);
+    question.estimate.push_back(
+        {0.5 * std::log(moments.variance()), 1.0 / std::sqrt(2.0 * (moments.n() - 1.0))});
+  }
+  return question;
+}
+
+// Calls `tell` for each unit that is above its type by `least` and beyond chance.
+template <class Tell>
+void ask(const Question& question, double alike, double least, double threshold, const Tell& tell) {
+  if (question.unit.size() < kUnitsMin) return;
+  std::vector<double> values;
+  std::vector<double> variances;
+  for (const Estimate& one : question.estimate) {
+    values.push_back(one.value);
+    variances.push_back(one.sigma * one.sigma);
+  }
+  const double middle = median(values);
+  for (double& value : values)
+    value = std::abs(value - middle);
+  const double spread = std::pow(kMadToSigma * median(values), 2) - median(variances);
+  const double between = std::max(spread, alike * alike);
+  for (std::size_t i = 0; i < question.unit.size(); ++i) {
+    const Estimate& one = question.estimate[i];
+    const double off = one.value - middle;
+    const double t = off / std::sqrt(between + one.sigma * one.sigma);
+    const double p = 0.5 * student_tail(t, static_cast<double>(question.unit.size()) - 1.0);
+    if (off > least && p < threshold) tell(question.unit[i], off);
+  }
+}
+
+void set_status(UnitJudgement& unit, Status status, std::string why) {
+  if (unit.status == Status::kAsItsType) unit.status = status;
+  unit.why.push_back(std::move(why));
+}
+
+void judge_trend(const Moments& bias, double threshold, UnitJudgement& unit) {
+  if (bias.n() < kTrendDrivesMin || bias.slope_sigma() <= 0.0) return;
+  const double t = bias.slope() / bias.slope_sigma();
+  if (student_tail(t, bias.n() - 2.0) >= threshold) return;
+  set_status(unit, Status::kTrend,
+             fmt::format("its bias moves by {:.3g} ± {:.1g} deg/s a year",
+                         bias.slope() * kBiasUnit_dps, bias.slope_sigma() * kBiasUnit_dps));
+}
+
+double middle_of(const std::vector<UnitJudgement>& units, double UnitJudgement::*value) {
+  std::vector<double> values;
+  for (const UnitJudgement& unit : units)
+    if (unit.*value > 0.0) values.push_back(unit.*value);
+  return median(values);
+}
+
+}  // namespace
+
+UnitJudgement unit_judgement(const Identity& identity, const UnitSums& sums) {
+  UnitJudgement unit;
+  unit.identity = identity;
+  unit.drives = static_cast<std::size_t>(sums.drives);
+  const auto middle = [&](Measure which) {
+    const Moments& moments = measure(sums, which);
+    return moments.count > 0 ? std::exp(moments.mean()) : 0.0;
+  };
+  unit.white_dps_rthz = middle(Measure::kLogWhite);
+  unit.walk_dps_rts = middle(Measure::kLogWalk);
+  const Moments& bias = measure(sums, Measure::kBias);
+  if (bias.count > 0) unit.bias_dps = bias.mean() * kBiasUnit_dps;
+  unit.bias_scatter_dps = std::sqrt(bias.variance()) * kBiasUnit_dps;
+  return unit;
+}
+
+void judge_measures(const Pool& pool, double threshold, std::vector<UnitJudgement>& units,
+                    TypeJudgement& type) {
+  type.white_dps_rthz = middle_of(units, &UnitJudgement::white_dps_rthz);
+  type.walk_dps_rts = middle_of(units, &UnitJudgement::walk_dps_rts);
+  ask(means_of(pool, Measure::kLogWhite, units), kAlikeLog, std::log(kNoiseFactor), threshold,
+      [&](std::size_t i, double off) {
+        set_status(units[i], Status::kNoisy,
+                   fmt::format("its white noise is {:.2g} times its type's", std::exp(off)));
+      });
+  ask(means_of(pool, Measure::kLogWalk, units), kAlikeLog, std::log(kWanderFactor), threshold,
+      [&](std::size_t i, double off) {
+        set_status(units[i], Status::kWandering,
+                   fmt::format("within a drive its bias wanders {:.2g} times as far as its type's",
+                               std::exp(off)));
+      });
+  ask(scatters_of(pool, units), kAlikeLog, std::log(kWanderFactor), threshold,
+      [&](std::size_t i, double off) {
+        set_status(units[i], Status::kWandering,
+                   fmt::format("from drive to drive its bias scatters {:.2g} times as far as its "
+                               "type's",
+                               std::exp(off)));
+      });
+  ask(means_of(pool, Measure::kLost, units), kAlikeShare, kLostMore, threshold,
+      [&](std::size_t i, double off) {
+        set_status(
+            units[i], Status::kLossy,
+            fmt::format("{:.2g} % more of its frames are lost than of its type's", 100.0 * off));
+      });
+  for (UnitJudgement& unit : units)
+    judge_trend(measure(pool.units.at(unit.identity), Measure::kBias), threshold, unit);
+}
+
+}  // namespace vgyro::fleet

@@ -1,0 +1,167 @@
+#!/usr/bin/python3
+"""`vgyro fleet` against fleets whose truth is known: what is named, how sure, which unit stands apart, and that merging in
+any order and grouping gives the same bytes."""
+
+import json
+import os
+import random
+import subprocess
+import sys
+import tempfile
+import tomllib
+import unittest
+from pathlib import Path
+
+import numpy as np
+
+import made_fleet
+from made_fleet import SHAPES, Unit
+
+VGYRO = Path(os.environ["VGYRO_BIN"]) / "vgyro"
+SEED = 20261130
+FLEETS = int(os.environ.get("VGYRO_FLEETS", "40"))
+
+
+class FleetBench(unittest.TestCase):
+    def setUp(self):
+        self.scratch = tempfile.TemporaryDirectory()
+        self.folder = Path(self.scratch.name)
+        self.addCleanup(self.scratch.cleanup)
+
+    def run_fleet(self, *files, out="out", good=True):
+        done = subprocess.run([VGYRO, "fleet", *files, "--out", out, "-q"], cwd=self.folder, capture_output=True, text=True,
+                              check=False)
+        self.assertEqual(done.returncode, 0 if good else 1, done.stderr)
+        return done
+
+    def fleet(self, lines, out="out"):
+        (self.folder / "drives.json").write_text("".join(lines))
+        self.run_fleet("drives.json", out=out)
+        return json.loads((self.folder / out / "fleet.json").read_text())
+
+
+def plain_pairs(rng, count, **first):
+    return [(Unit(rng, "alpha", f"a{i}", **first), Unit(rng, "beta", f"b{i}")) for i in range(count)]
+
+
+class Truth(FleetBench):
+    def test_names_what_no_drive_can_name(self):
+        """|t| = 2 in each of 60 drives, of one kind after the other: right kind and type, and the size inside."""
+        kinds = [name for name in SHAPES if not name.startswith("bandwidth")]
+        right = inside = false = 0
+        for number in range(FLEETS):
+            rng = np.random.default_rng([SEED, 1, number])
+            shape = kinds[number % len(kinds)]
+            vehicles = (1, 6, 20, 60)[number % 4]
+            # What a drive's own error is beside all other shapes, which its information alone does not say.
+            spread = np.mean([np.sqrt(1.0 / np.linalg.inv(np.linalg.inv(made_fleet.information(rng)))[i, i])
+                              for i in [made_fleet.NAMES.index(shape)] for _ in range(20)])
+            size = 2.0 * spread * (-1.0) ** number
+            found = self.fleet(made_fleet.lines(rng, plain_pairs(rng, vehicles, effects={shape: size}), 60), f"out{number}")
+            kind = shape.split(":")[0]
+            named = [effect for effect in found["effects"] if (effect["kind"], effect["type"]) == (kind, "alpha")]
+            false += len(found["effects"]) - len(named) + sum(unit["why"] != "" for unit in found["units"])
+            right += len(named) == 1
+            inside += len(named) == 1 and named[0]["interval95"][0] <= size <= named[0]["interval95"][1]
+            if len(named) != 1 or len(found["effects"]) > 1:
+                print(f"fleet {number} of {vehicles} vehicles, {shape}: {[e['kind'] for e in found['effects']]}")
+        print(f"seed {SEED}: of {FLEETS} fleets {right} named, {inside} inside the interval, {false} other names")
+        self.assertGreaterEqual(right, 0.95 * FLEETS)
+        self.assertGreaterEqual(inside, 0.85 * FLEETS)
+        self.assertLessEqual(false, 0.05 * FLEETS)
+
+    def test_names_nothing_in_clean_fleets(self):
+        false = 0
+        for number in range(FLEETS):
+            rng = np.random.default_rng([SEED, 2, number])
+            found = self.fleet(made_fleet.lines(rng, plain_pairs(rng, 10), 60), f"out{number}")
+            names = found["effects"] + [unit for unit in found["units"] if unit["why"]]
+            false += bool(names)
+            if names:
+                print(f"fleet {number}: {names}")
+        print(f"seed {SEED}: false names in {false} of {FLEETS} clean fleets")
+        self.assertEqual(false, 0)
+
+    def test_finds_the_bad_units_among_fifty(self):
+        for number in range(4):
+            rng = np.random.default_rng([SEED, 3, number])
+            pairs = plain_pairs(rng, 50)
+            pairs[7] = (Unit(rng, "alpha", "loud", noise=3.0), pairs[7][1])
+            pairs[21] = (pairs[21][0], Unit(rng, "beta", "wanders", wander=8.0))
+            pairs[33] = (Unit(rng, "alpha", "skewed", effects={"scale_factor": 4e-4}), pairs[33][1])
+            found = self.fleet(made_fleet.lines(rng, pairs, 500), f"out{number}")
+            status = {unit["unit"]: unit["status"] for unit in found["units"] if unit["why"]}
+            self.assertEqual(status, {"loud": "noisy", "wanders": "wandering", "skewed": "apart"})
+
+    def test_says_how_far_units_differ(self):
+        rng = np.random.default_rng([SEED, 4])
+        effects = {"scale_factor": 5e-4}
+        pairs = [(Unit(rng, "alpha", f"a{i}", effects=effects, spread={"scale_factor": 2e-4}), Unit(rng, "beta", f"b{i}"))
+                 for i in range(40)]
+        found = self.fleet(made_fleet.lines(rng, pairs, 400))
+        effect = next(e for e in found["effects"] if e["kind"] == "scale_factor")
+        true = np.mean([pair[0].sizes[made_fleet.NAMES.index("scale_factor")] for pair in pairs])
+        self.assertLess(abs(effect["parameters"]["error"] - true), 4 * effect["sigma"]["error"])
+        self.assertLess(abs(effect["between_units"] - 2e-4), 4 * effect["between_units_sigma"])
+        self.assertLess(effect["between_units_sigma"], 1e-4)
+
+    def test_model_files_are_such_as_the_daemon_takes(self):
+        rng = np.random.default_rng([SEED, 5])
+        self.fleet(made_fleet.lines(rng, plain_pairs(rng, 6, effects={"scale_factor": 5e-4}), 60))
+        models = self.folder / "out" / "models"
+        model = tomllib.loads((models / "alpha.toml").read_text())
+        self.assertEqual(model["format"], 1)
+        error = next(effect["error"] for effect in model["effect"] if effect["kind"] == "scale_factor")
+        self.assertLess(abs(error - 5e-4), 5e-5)
+        self.assertIn("white_noise", {effect["kind"] for effect in model["effect"]})
+
+
+class Merging(FleetBench):
+    def test_gives_the_same_bytes_in_any_order_and_grouping(self):
+        rng = np.random.default_rng([SEED, 6])
+        lines = made_fleet.lines(rng, plain_pairs(rng, 5, effects={"delay": 4e-5}), 40)
+        self.fleet(lines)
+        whole = (self.folder / "out" / "evidence.json").read_bytes()
+        shuffle = random.Random(SEED)
+        for turn in range(3):
+            mixed = list(lines)
+            shuffle.shuffle(mixed)
+            cut = shuffle.randrange(1, 39)
+            for name, part in (("first", mixed[:cut]), ("second", mixed[cut:])):
+                (self.folder / f"{name}{turn}.json").write_text("".join(part))
+                self.run_fleet(f"{name}{turn}.json", out=name + str(turn))
+            merged = [f"second{turn}/evidence.json", f"first{turn}/evidence.json"]
+            self.run_fleet(*merged, out=f"merged{turn}")
+            for file in ("evidence.json", "fleet.json", "report.html"):
+                self.assertEqual((self.folder / f"merged{turn}" / file).read_bytes(),
+                                 (self.folder / "out" / file).read_bytes())
+        self.assertEqual((self.folder / "merged0" / "evidence.json").read_bytes(), whole)
+
+    def test_counts_no_drive_twice(self):
+        rng = np.random.default_rng([SEED, 7])
+        lines = made_fleet.lines(rng, plain_pairs(rng, 2), 6)
+        once = self.fleet(lines)
+        self.assertEqual(self.fleet(lines + lines[:3], "again"), once)
+        done = self.run_fleet("out/evidence.json", "again/evidence.json", out="both", good=False)
+        self.assertIn("is in two merged files", done.stderr)
+        other = json.loads(lines[0])
+        other["seconds"] = 299.0
+        (self.folder / "other.json").write_text(lines[0] + json.dumps(other) + "\n")
+        self.assertIn("judged twice", self.run_fleet("other.json", out="other", good=False).stderr)
+
+    def test_tells_what_is_wrong_with_a_file(self):
+        rng = np.random.default_rng([SEED, 8])
+        good = made_fleet.lines(rng, plain_pairs(rng, 1), 1)[0]
+        for bad, words in (("", "holds nothing"), ("{}", "no evidence"), (good[:500], "no evidence"), ("[1, 2]", "no evidence"),
+                           (good.replace('"correlation": "', '"correlation": "AAAA'), "correlation"),
+                           (good.replace('"format": 1', '"format": 7'), "format"),
+                           (good.replace('"white_dps_rthz": ', '"white_dps_rthz": -'), "white_dps_rthz")):
+            (self.folder / "bad.json").write_text(bad)
+            done = self.run_fleet("bad.json", out="bad", good=False)
+            self.assertIn(words, done.stderr)
+            self.assertIn("bad.json", done.stderr)
+            self.assertFalse((self.folder / "bad").exists())
+
+
+if __name__ == "__main__":
+    unittest.main(argv=[sys.argv[0], "-v", *sys.argv[1:]])

@@ -1,0 +1,75 @@
+"""Evidence files of fleets whose truth is known, drawn from statistics: no drive is simulated, and nothing of the product
+is used. A drive has an information matrix of its own, scores that scatter by it about what the true sizes make of it, and
+noise and bias as a unit of its type has them."""
+
+import base64
+import json
+
+import numpy as np
+
+# Shapes with a size of which one standard error of a drive is.
+SHAPES = {"bias_ramp": 2e-6, "warm_up:15": 5e-3, "warm_up:60": 8e-3, "temperature_bias": 2e-3, "temperature_rate_bias": 0.02,
+          "scale_factor": 5e-5, "scale_factor_asymmetry": 8e-5, "scale_factor_quadratic": 3e-6, "scale_factor_cubic": 4e-8,
+          "g_sensitivity:x": 2e-3, "g_sensitivity:y": 2e-3, "g_sensitivity:z": 4e-3, "vibration_rectification": 0.5,
+          "delay": 2e-5, "bandwidth:6": 0.02, "bandwidth:15": 0.05, "clock_skew": 3.0}
+NAMES = list(SHAPES)
+SIGMA = np.array([SHAPES[name] for name in NAMES])
+YEAR_S = 365.25 * 86400.0
+
+
+def information(rng):
+    """Of one drive: shapes that resemble each other, and more or less motion."""
+    count = len(NAMES)
+    factors = 0.6 * rng.standard_normal((count, 4))
+    # A scale factor and its cousins, a delay and low-passes, what is slow: families.
+    for family in ((5, 6, 7, 8), (13, 14, 15, 16), (0, 1, 2, 3, 4)):
+        factors[list(family)] += 0.9 * rng.standard_normal(4)
+    covariance = factors @ factors.T + np.eye(count)
+    root = np.sqrt(np.diag(covariance))
+    correlation = covariance / np.outer(root, root)
+    size = SIGMA * np.exp(0.3 * rng.standard_normal(count))
+    return correlation / np.outer(size, size)
+
+
+def place(rng, gyro, sizes):
+    matrix = information(rng)
+    score = matrix @ sizes + np.linalg.cholesky(matrix) @ rng.standard_normal(len(NAMES))
+    own = np.diag(matrix)
+    correlation = matrix / np.sqrt(np.outer(own, own))
+    packed = np.round(32767.0 * correlation[np.tril_indices(len(NAMES), -1)]).astype("<i2")
+    return {"gyros": [gyro], "gyro": [gyro] * len(NAMES), "shapes": NAMES, "score": score.tolist(),
+            "information": own.tolist(), "correlation": base64.b64encode(packed.tobytes()).decode(), "beside": []}
+
+
+class Unit:
+    """What one gyro has of its own. `effects`: shape → size in parameter units, beside its type's."""
+
+    def __init__(self, rng, gyro_type, serial, noise=1.0, wander=1.0, effects=None, spread=None):
+        self.type, self.serial, self.wander = gyro_type, serial, wander
+        self.white = 1e-3 * noise * np.exp(0.08 * rng.standard_normal())
+        self.walk = 1e-5 * np.exp(0.1 * rng.standard_normal())
+        self.bias = 0.05 * rng.standard_normal()
+        self.sizes = np.zeros(len(NAMES))
+        for name, size in (effects or {}).items():
+            self.sizes[NAMES.index(name)] += size
+        for name, sigma in (spread or {}).items():
+            self.sizes[NAMES.index(name)] += sigma * rng.standard_normal()
+
+    def gyro(self, rng, number):
+        return {"name": "ab"[number - 1], "type": self.type, "unit": self.serial, "samples": 30000, "lost_share": 0.0,
+                "masked_share": 0.0, "bias_dps": self.bias + 2e-3 * self.wander * rng.standard_normal(), "bias_sigma_dps": 1e-4,
+                "white_dps_rthz": self.white * np.exp(0.01 * rng.standard_normal()),
+                "walk_dps_rts": self.walk * np.exp(0.4 * rng.standard_normal()), "log_noise_covariance": [1e-4, 0.0, 0.16],
+                "temperature_c": [20.0, 25.0, 31.0], "named": []}
+
+
+def drive(rng, number, pair):
+    return {"format": 1, "evidence": "drive", "vgyro": "0", "recording": f"{number:016x}",
+            "began_s": 1.7e9 + YEAR_S * rng.random(), "seconds": 300.0, "config": "c", "model": "none", "verdict": "no_gap",
+            "gyros": [unit.gyro(rng, i + 1) for i, unit in enumerate(pair)],
+            "places": [place(rng, i + 1, unit.sizes) for i, unit in enumerate(pair)]}
+
+
+def lines(rng, pairs, drives):
+    """Drives one after the other over the vehicles, each a line."""
+    return [json.dumps(drive(rng, number, pairs[number % len(pairs)])) + "\n" for number in range(drives)]
