@@ -2,7 +2,7 @@
 
 // Could the bits of a stretch of bytes be one quantity that moves as a rate of rotation does:
 // often, in small steps, to and fro? And do its bytes belong together: where a higher part goes up
-// by one, the lower part must begin anew. Bytes of two quantities do not know of each other.
+// by one, the lower part must restart. Bytes of two quantities are independent.
 
 #include <cstddef>
 #include <cstdint>
@@ -23,7 +23,7 @@ FieldFigures field_figures(const std::vector<double>& values);
 /// To and fro, in steps that are small against the range, and never across nearly all of it.
 bool moves_as_a_rate(const FieldFigures& figures);
 
-/// Do the lowest `bits` of these numbers begin anew where the rest changes? Nothing follows
+/// Do the lowest `bits` of these numbers restart where the rest changes? Nothing follows
 /// (false) where the rest never changes.
 bool carries_into(const std::vector<std::int64_t>& raw, unsigned bits);
 

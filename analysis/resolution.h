@@ -28,7 +28,7 @@ class StepFinder {
 /// Standard deviation of single samples around the mean of a second, drift left out.
 double sample_scatter_dps(const Series& series);
 
-/// Below this share of the step a sample's own noise can no longer be told from its rounding.
+/// Below this share of the step a sample's own noise cannot be separated from its rounding.
 inline constexpr double kHiddenShare = 0.5;
 
 /// Whether the step hides the noise of these samples at rest.

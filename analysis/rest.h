@@ -5,8 +5,8 @@
 // of the two rates varies like half their difference, in motion far more. So rest is judged by both
 // gyros, by steadiness alone, and against what the gyros' own noise is: no quiet second of a hover
 // passes. A rest is known again by what the gyros read in the last one, not in the first, because
-// drift moves on. A steady turn cannot be told from two equal biases, so a common rate beyond
-// kTurning_dps counts as turning.
+// drift moves on. A steady turn cannot be distinguished from two equal biases, so a common rate
+// beyond kTurning_dps counts as turning.
 
 #include <array>
 #include <cstddef>
@@ -64,7 +64,7 @@ class RestFinder {
 
   /// Whole blocks, without what is at the edge of a motion. To be called once.
   std::vector<RestPart> find();
-  /// Those that hold enough pairs to tell; of find().
+  /// Those with enough pairs for a result; of find().
   [[nodiscard]] const std::vector<RestBlock>& blocks() const { return blocks_; }
   [[nodiscard]] double block_s() const { return block_s_; }
 

@@ -1,7 +1,7 @@
 #pragma once
 
-// A gyro's samples on an even grid: what Allan deviation and spectrum are defined on. Stamps tell
-// which grid place a sample takes, so jitter below half an interval changes nothing. Short holes
+// A gyro's samples on an even grid: what Allan deviation and spectrum are defined on. Stamps give
+// the grid place of a sample, so jitter below half an interval changes nothing. Short holes
 // are bridged by the mean of their neighbours, a longer gap ends one part and begins the next.
 // Nothing is interpolated across a gap.
 

@@ -1,7 +1,6 @@
 #pragma once
 
-// Degrees are what people, frames and files speak of; radians what sines and angles are reckoned
-// in.
+// People, frames and files use degrees; sines and angles are computed in radians.
 
 #include <numbers>
 

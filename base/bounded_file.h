@@ -1,8 +1,8 @@
 #pragma once
 
-// Whole files that somebody else wrote, read without trust: only regular files, for a pipe or a
-// device may keep its reader waiting for ever, and only up to a bound that the caller has a reason
-// for. Knows nothing of what is in them.
+// Whole files from untrusted sources: only regular files, because a pipe or a device may keep its
+// reader waiting for ever, and only up to a bound that the caller gives. Does not interpret the
+// contents.
 
 #include <cstddef>
 #include <string>

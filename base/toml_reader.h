@@ -52,7 +52,7 @@ class TomlReader {
   [[nodiscard]] std::string where() const;
   void complain(std::string where, std::string what, std::string remedy = {});
 
-  /// These keys are known, but after other trouble nobody reads them.
+  /// These keys are known, but are not read after another error.
   void forgive(std::initializer_list<std::string_view> keys);
 
   /// Complains of keys that were not asked for: of the first ten, and how many more there are.

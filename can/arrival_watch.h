@@ -3,7 +3,7 @@
 // Is a kernel's stamp the time at which its frame arrived? Where a sender asks for a launch time
 // (SO_TXTIME), a virtual link, and some drivers, hand that time to every reader as the stamp, on
 // whatever clock the sender chose. A frame that is read now came after its queue was last seen
-// empty, so an honest stamp lies between then and now, on the wall clock as it goes now or, where
+// empty, so a correct stamp lies between then and now, on the wall clock as it goes now or, where
 // it was set meanwhile, as it went then. Pure: reads no clock.
 
 #include "base/time.h"
@@ -19,7 +19,7 @@ class ArrivalWatch {
 
   struct Clocks {
     TimePoint wall;    ///< the clock of the stamps, which may be set
-    TimePoint steady;  ///< one that nobody sets
+    TimePoint steady;  ///< cannot be set
   };
 
   /// With an empty queue.

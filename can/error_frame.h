@@ -1,7 +1,7 @@
 #pragma once
 
-// What a CAN controller tells of itself: error frames as Linux puts them beside the bus's own, into
-// a state and counters. Pure; that the numbers are the kernel's is checked where the socket is.
+// A CAN controller's error reports: Linux's error frames → a state and counters.
+// Pure; can/socket.cpp checks that the numbers are the kernel's.
 
 #include <array>
 #include <cstdint>
@@ -48,8 +48,8 @@ enum class ErrorCause : std::uint8_t {
   kRestarted,        ///< and came back
   kErrorPassive,     ///< it may no longer disturb others: next to bus-off
   kErrorWarning,     ///< one of its error counters has reached 96
-  kLostArbitration,  ///< told only by controllers that send once
-  kNotAcknowledged,  ///< nobody else is on the bus
+  kLostArbitration,  ///< reported only by controllers that send once
+  kNotAcknowledged,  ///< no other node is on the bus
   kOverflow,         ///< of the controller's own buffers
   kSendTimeout,      ///< the driver gave a frame up
   kTransceiver       ///< wires or transceiver
@@ -61,7 +61,7 @@ class ControllerWatch {
  public:
   /// Anything but an error frame is no news.
   void note(const Frame& frame);
-  /// The link came up anew: what was so before is over.
+  /// The link came up again: the earlier state no longer holds.
   void forget_state() { state_ = ControllerState::kActive; }
 
   [[nodiscard]] ControllerState state() const { return state_; }

@@ -1,6 +1,6 @@
 #pragma once
 
-// One raw SocketCAN socket on one interface; with socket.cpp the only place that knows linux/can.
+// One raw SocketCAN socket on one interface; with socket.cpp the only place that uses linux/can.
 // The kernel filters for exactly the wanted identifiers, and frames come in batches with the
 // kernel's stamps; error frames (can/error_frame.h) come among them. Never blocks and never
 // allocates once open. Other programs on the host keep seeing what it sends; it does not see its
@@ -53,7 +53,7 @@ enum class ReceiveStatus : std::uint8_t {
   kMore,        ///< the batch was full: ask again
   kDrained,     ///< nothing is left for now
   kLinkDown,    ///< once for each time that it went down; the socket goes on when it is up again
-  kDeviceGone,  ///< told once; the socket is dead, open a new one
+  kDeviceGone,  ///< returned once; the socket is dead, open a new one
   kFailed       ///< see last_errno()
 };
 
@@ -66,7 +66,7 @@ class Socket final : public Transmitter {
  public:
   static constexpr std::size_t kBatchFrames = 64;
 
-  /// Without filters the socket only writes. FD frames are heard wherever the link carries them,
+  /// Without filters the socket only writes. FD frames are received wherever the link carries them,
   /// now or later. A link that is down when it is bound is no event of receive(): look() says so.
   static Expected<Socket> open(const std::string& interface, std::span<const Filter> filters,
                                const SocketOptions& options = {});
@@ -78,12 +78,13 @@ class Socket final : public Transmitter {
   SendResult send(const Frame& frame) override;
 
   [[nodiscard]] int fd() const { return fd_; }
-  /// Asks the kernel, in two or three calls. The socket is bound to an index, and hears and sends
-  /// there whatever the interface is called by then: a name that means another one is a removal.
+  /// Asks the kernel, in two or three calls. The socket is bound to an index, and receives and
+  /// sends there whatever the interface is called by then: a name that means another one is a
+  /// removal.
   [[nodiscard]] LinkState look() const;
   /// What the interface that the socket was bound to is called; empty where it is no longer here.
   [[nodiscard]] std::string name_now() const;
-  /// Received frames that the kernel dropped because the buffer was full, as far as it has told.
+  /// Received frames that the kernel dropped because the buffer was full, as far as reported.
   [[nodiscard]] std::uint64_t drops() const { return drops_; }
   [[nodiscard]] int receive_buffer_bytes() const { return receive_buffer_bytes_; }
   /// Of the last call that returned kFailed.

@@ -1,7 +1,7 @@
 #pragma once
 
 // What becomes of a frame that is handed to the kernel, and who does the handing over. The transmit
-// policy knows only this; the socket implements it, tests fake it.
+// policy uses only this; the socket implements it, tests fake it.
 
 #include <cstdint>
 

@@ -2,7 +2,7 @@
 
 // Vector's ASC: text that CANoe, CANalyzer, CANape and many loggers write. Classic, FD, remote and
 // error frames; other events are passed over. Stamps count from the date in the file's head, which
-// is local time, or from zero where there is none. docs/log-format.md tells the details.
+// is local time, or from zero where there is none. docs/log-format.md has the details.
 
 #include <memory>
 #include <string_view>

@@ -14,7 +14,7 @@ namespace vgyro::canlog {
 
 namespace {
 
-constexpr const char* kTooShort = "the object is too short for what it is to hold";
+constexpr const char* kTooShort = "the object is shorter than its contents";
 constexpr const char* kTooManyBuses = "more than 64 different channels";
 
 // None where there is no date, or one that cannot be.
@@ -184,7 +184,7 @@ bool BlfReader::find_object() {
       return true;
     }
     if (near.size() < kNear) return false;
-    if (!lost_) counts_.add_malformed("behind it stands what is no object");
+    if (!lost_) counts_.add_malformed("followed by data that are not an object");
     lost_ = true;
     resume_at_mark();
   }

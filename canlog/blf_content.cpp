@@ -63,7 +63,7 @@ bool BlfContent::find_object() {
   ended_ = bytes_->peek(1).empty();
   if (ended_ && skipped < blf::kPaddingOf) return false;
   skipped_bytes_ += skipped;
-  if (!lost_) torn_ = "between containers stands what is no object";
+  if (!lost_) torn_ = "data between containers are not an object";
   lost_ = true;
   return false;
 }

@@ -15,7 +15,7 @@ namespace vgyro::canlog {
 
 class BlfContent {
  public:
-  /// A container that holds more is damaged, or made to fill somebody's time. Vector's tools and
+  /// A container that holds more is damaged or malicious. Vector's tools and
   /// python-can fill them with 128 KiB.
   static constexpr std::uint64_t kContainerBytesMax = 256ULL << 20U;
 
@@ -56,7 +56,7 @@ class BlfContent {
   Place place_ = Place::kBetween;
   std::uint64_t left_ = 0;      ///< bytes of the object in the file
   std::uint64_t produced_ = 0;  ///< of the container
-  const char* torn_ = nullptr;  ///< not told yet
+  const char* torn_ = nullptr;  ///< not reported yet
   bool lost_ = false;           ///< since then no object was found
   bool ended_ = false;
   bool cut_off_ = false;

@@ -2,7 +2,7 @@
 
 // The text of can-utils' candump log, "(SECONDS.FRACTION) IFNAME FRAME[ R| T]", both ways: classic,
 // remote, raw DLC, error, FD and XL frames. A line that is none of these is counted with its cause
-// and line number, and never stops the reading. What the forms mean is told in docs/log-format.md.
+// and line number, and never stops the reading. docs/log-format.md explains the forms.
 
 #include <array>
 #include <cstdint>

@@ -16,11 +16,12 @@ namespace vgyro::canlog {
 /// one of `begins` and `has_line` is set.
 struct Form {
   std::string_view name;  ///< for people; empty where the form is only refused
-  /// Of a binary form. Called with every longer beginning of the log until somebody says true;
+  /// Of a binary form. Called with every longer beginning of the log until one returns true;
   /// false while there are too few bytes.
   bool (*begins)(std::string_view head);
-  /// Of a text form: whether a line (without its end, without a byte-order mark) is its own beyond
-  /// doubt. It is asked about every line of the head, the first form that says true has it.
+  /// Of a text form: whether a line (without its end, without a byte-order mark) is certainly of
+  /// this form. It is called for every line of the head; the first form to return true gets the
+  /// log.
   bool (*has_line)(std::string_view line);
   /// `bytes` begin at the log's first byte. Text forms read them through LogSource; a form that has
   /// to jump about wraps them in seekable().

@@ -12,7 +12,7 @@ const char* set_length(unsigned bytes, can::Frame& frame);
 /// A DLC code, 0 to 15: of FD the length it stands for, of a classic frame above 8 a raw DLC.
 const char* set_dlc(unsigned dlc, can::Frame& frame);
 
-/// What a log says that tells no more of an error frame than that there was one: as asc2log has it.
+/// An error frame of a log that gives no details, in the form that asc2log writes.
 void set_error_frame(can::Frame& frame);
 
 /// The smallest length code, 0 to 15, whose length holds the bytes (at most 64).

@@ -48,7 +48,7 @@ class LineReader : public LogReader {
   static Parsed head() { return {Verdict::kHead, ""}; }
   static Parsed other() { return {Verdict::kOther, ""}; }
   static Parsed malformed(const char* why) { return {Verdict::kMalformed, why}; }
-  /// The record's bus by name; false when there are too many, which malformed(kTooManyBuses) tells.
+  /// The record's bus by name; false when there are too many: malformed(kTooManyBuses).
   bool set_bus(std::string_view name, LogRecord& record);
   /// By the channel's number, from 1 on (canlog/writer.h).
   bool set_channel(unsigned channel, LogRecord& record);

@@ -2,7 +2,7 @@
 
 // ASAM MDF 4 with bus logging (.mf4): what CANedge loggers, asammdf and python-can write. Its
 // groups of records are merged by stamp. Files whose writer was killed, or that wait to be
-// finalised, are read as far as they go. docs/log-format.md tells what is not read.
+// finalised, are read as far as they go. docs/log-format.md lists what is not read.
 
 #include <array>
 #include <deque>
@@ -47,7 +47,7 @@ class MdfGroup {
   };
   /// Payloads of one channel group, in the order of the log.
   struct Payloads {
-    static constexpr std::size_t kKept = 256;  ///< of those that nobody has asked for yet
+    static constexpr std::size_t kKept = 256;  ///< of those not requested yet
     std::uint64_t end = 0;                     ///< offset of the one to come
     std::vector<Payload> kept;
     std::size_t last = 0;
@@ -123,7 +123,7 @@ class MdfReader final : public BinaryReader {
   bool next(LogRecord& record) override;
   [[nodiscard]] std::uint64_t bytes_read() const override { return file_->bytes().bytes_read(); }
   [[nodiscard]] std::uint64_t bytes_total() const override { return file_->bytes().bytes_total(); }
-  void before_wait(std::function<void()> /*callback*/) override {}  // a file keeps nobody waiting
+  void before_wait(std::function<void()> /*callback*/) override {}  // a file has no waiting reader
 
  private:
   struct Stream {

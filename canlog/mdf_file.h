@@ -41,7 +41,7 @@ class MdfFile {
   /// Fewer bytes only where the file ends.
   Expected<std::size_t> read(std::uint64_t at, char* to, std::size_t size);
 
-  /// The writer has not come to complete what it knows at the end only.
+  /// The writer has not completed the entries that are written at the end.
   [[nodiscard]] bool is_unfinished() const { return unfinished_ != 0; }
   /// Counts of records are not there, or wrong.
   [[nodiscard]] bool lacks_counts() const { return (unfinished_ & 1U) != 0; }

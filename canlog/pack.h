@@ -9,7 +9,7 @@
 
 namespace vgyro::canlog {
 
-/// A sink that wants to hear when nothing more comes.
+/// A sink that is called at the end of the data.
 class PackingSink : public ByteSink {
  public:
   void rewrite(std::uint64_t /*offset*/, std::string_view /*bytes*/) final {}

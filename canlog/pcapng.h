@@ -49,7 +49,7 @@ class PcapngReader final : public PacketReader {
   std::endian order_ = std::endian::little;
   std::vector<Described> interfaces_;
   bool has_several_ = false;  ///< interfaces, in some section
-  // dumpcap is a fifth of a second late; whoever reads a live capture waits as long.
+  // dumpcap is a fifth of a second late; the reader of a live capture waits as long.
   static constexpr std::int64_t kLateMax_ns = 1'000'000'000;
   StampOrder by_stamp_{kLateMax_ns};  ///< used then
   bool ended_ = false;

@@ -27,7 +27,7 @@ class LogReader {
   /// False at the end of the log, or where it can be read no further: see error().
   virtual bool next(LogRecord& record) = 0;
   /// Some records at once, for who reads millions: 1 to room.size() of them, never waiting for more
-  /// once there is one; 0 where next() is false. A record that is_xl is only told of.
+  /// once there is one; 0 where next() is false. A record that is_xl is only reported.
   virtual std::size_t next_batch(std::span<LogRecord> room) { return next(room.front()) ? 1 : 0; }
 
   [[nodiscard]] virtual const LogCounts& counts() const = 0;
@@ -43,7 +43,7 @@ class LogReader {
   /// Called before bytes are fetched, which may wait for a live source: the moment to flush output.
   virtual void before_wait(std::function<void()> callback) = 0;
 
-  /// The frame of the record read last, where that is_xl; null for forms that know no such frames.
+  /// The frame of the record read last, where that is_xl; null for forms without such frames.
   [[nodiscard]] virtual const XlFrame* xl_frame() const { return nullptr; }
 };
 

@@ -1,6 +1,6 @@
 #pragma once
 
-// Records → a log of some form. A writer knows no files: its bytes go into a sink.
+// Records → a log of some form. A writer has no files: its bytes go into a sink.
 
 #include <cstdint>
 #include <memory>

@@ -25,7 +25,7 @@ struct InitOptions {
   std::string output = "vgyro.toml";  ///< "-": standard output
   bool force = false;                 ///< replaces a file that is there
   std::vector<std::uint32_t> ids{};   ///< identifiers to look at; empty: all
-  double turned_deg = 0.0;            ///< in the whole log, positive to the left; 0: not told
+  double turned_deg = 0.0;            ///< in the whole log, positive to the left; 0: not given
 };
 int run_init(const InitOptions& options);
 
@@ -49,7 +49,7 @@ struct ReplayOptions {
   std::optional<gateway::Method> method;
   std::optional<std::string> model;  ///< path, instead of the configured one
   std::string state;                 ///< file of biases to start with; empty: none
-  std::string output;                ///< "-": standard output; empty: nowhere
+  std::string output;                ///< "-": standard output; empty: none
   std::string json;                  ///< "-": standard output; empty: none
   std::string csv;                   ///< "-": standard output; empty: none
   std::string plot;                  ///< empty: none
@@ -66,7 +66,7 @@ int run_model_list();
 struct AllanOptions {
   std::string config;
   std::string axis;      ///< "x", "y" or "z" of whole units; empty: all
-  std::string json;      ///< "-": standard output; empty: nowhere
+  std::string json;      ///< "-": standard output; empty: none
   std::string plot;      ///< empty: none
   std::string evidence;  ///< file for a fleet; empty: none
   std::vector<std::string> logs;
@@ -78,7 +78,7 @@ struct CompareOptions {
   std::string model;
   std::vector<std::string> measured;  ///< logs, each a recording of its own
   std::string axis;                   ///< "x", "y" or "z" of whole units; empty: all
-  std::string json;                   ///< "-": standard output; empty: nowhere
+  std::string json;                   ///< "-": standard output; empty: none
   std::uint64_t seed = 1;
   bool quiet = false;
 };

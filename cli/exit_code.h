@@ -5,7 +5,7 @@
 namespace vgyro::cli {
 
 inline constexpr int kDone = 0;
-inline constexpr int kBadInput = 1;  ///< told on stderr
+inline constexpr int kBadInput = 1;  ///< reported on stderr
 inline constexpr int kWrongUsage = 2;
 
 }  // namespace vgyro::cli

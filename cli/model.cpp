@@ -13,19 +13,19 @@ namespace {
 std::string_view heading(model::Nature nature) {
   switch (nature) {
     case model::Nature::kOffset:
-      return "added to the reading; the gateway takes it back";
+      return "added to the reading; the gateway subtracts it";
     case model::Nature::kResponse:
-      return "added in dependence on the rate; the gateway takes it back";
+      return "depends on the rate; the gateway corrects it";
     case model::Nature::kLag:
-      return "the reading comes late; the gateway dates it back";
+      return "the reading is late; the gateway corrects its time";
     case model::Nature::kClip:
-      return "the finished reading is changed; what is lost is lost";
+      return "the finished reading is changed; the gateway cannot restore it";
     case model::Nature::kNoise:
       return "noise; the gateway weights the gyros by it";
     case model::Nature::kDisturbance:
       break;
   }
-  return "frames or stamps go wrong; known to the simulator";
+  return "frames or stamps go wrong; only the simulator produces it";
 }
 
 void print_kind(const model::KindInfo& kind) {

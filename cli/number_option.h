@@ -1,8 +1,8 @@
 #pragma once
 
 // Options that are numbers: one way to read them for all commands. A number is finite, in its range
-// and the whole of its word, whole numbers are decimal; everything else is wrong usage, told with
-// the option, the word and the range. Known to main() alone, as CLI11 is.
+// and the whole of its word, whole numbers are decimal; everything else is wrong usage, reported
+// with the option, the word and the range. Known to main() alone, as CLI11 is.
 
 #include <charconv>
 #include <cmath>

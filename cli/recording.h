@@ -1,6 +1,6 @@
 #pragma once
 
-// A log → what the gap workflow knows of it: every usable frame of the gyros, raw rates with their
+// A log → the gap workflow's input: every usable frame of the gyros, raw rates with their
 // own stamps, and what else the configuration names. Through the gateway's decoding; the model file
 // is not applied. Stamps that are garbage are refused as the live path refuses them. Memory: 28
 // bytes a gyro frame.

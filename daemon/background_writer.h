@@ -26,7 +26,7 @@ class BackgroundWriter {
 
   void put(std::string text);
 
-  /// What became of the newest text that was written; told once.
+  /// The result of the newest text that was written; returned once.
   std::optional<Expected<void>> take_result();
 
   /// Returns when the last text is written. Nothing may be put afterwards.

@@ -37,21 +37,21 @@ class Bus final : public can::Transmitter {
       can::SocketOptions options, TurnClock& clock, Log& log);
 
   /// Binds a new socket, filters included. An interface that is not there yet is no error: it is
-  /// told once, and is_open() stays false. What has its name and cannot be used is an error.
+  /// reported once, and is_open() stays false. An unusable device of that name is an error.
   Expected<void> open();
 
   /// Poll reported something: read again when peek() runs dry, but not without end.
   void begin_reading() { reads_left_ = kReadsPerCycle; }
 
   /// The oldest frame not yet taken; its frame is null when there is none for now. Error frames,
-  /// and what somebody else sends with our identifiers, are kept here.
+  /// and foreign frames with our identifiers, are kept here.
   Arrival peek();
   void take() {
     ++next_;
     ++received_;
   }
 
-  /// So many came at once: nobody had looked for a while.
+  /// Many came at once: the socket was not read for a while.
   [[nodiscard]] bool is_behind() const { return batch_.frames.size() > kFewFrames; }
 
   /// Nothing is left in the kernel as far as is known.

@@ -21,7 +21,7 @@ struct BusStatus {
   std::uint64_t downs = 0;      ///< times that the link went down, or the interface away while up
   std::uint64_t reopened = 0;   ///< times that the interface was bound again
   std::uint64_t restamped = 0;  ///< frames whose stamp was no time of arrival
-  std::uint64_t foreign = 0;    ///< frames with our identifiers that somebody else sent
+  std::uint64_t foreign = 0;    ///< frames with our identifiers from another sender
   bool contested = false;       ///< there was one lately
 };
 

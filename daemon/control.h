@@ -31,8 +31,8 @@ class Control {
   Control& operator=(const Control&) = delete;
   ~Control();
 
-  /// To be called about once a second: looks for a bus where there is none, tells of changes. Not
-  /// more often is anything told.
+  /// To be called about once a second: looks for a bus where there is none, and reports changes,
+  /// at most this often.
   void second_passed();
 
  private:

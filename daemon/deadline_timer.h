@@ -11,7 +11,7 @@
 
 namespace vgyro::daemon {
 
-/// When the timer goes off, told by both kinds of deadlines' clocks. Pure.
+/// When the timer goes off, from the deadlines of both clocks. Pure.
 class Alarm {
  public:
   // Not at once: a deadline that somehow stays in the past must not turn into a busy loop.

@@ -19,7 +19,7 @@ class FileLock {
   ~FileLock();
 
   enum class Outcome { kTaken, kHeld, kImpossible };
-  /// Never waits. kHeld: by somebody else, holder() says who; kImpossible: no lock can be made
+  /// Never waits. kHeld: by another process, holder() says which; kImpossible: no lock can be made
   /// there.
   Outcome take();
 

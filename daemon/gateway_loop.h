@@ -37,7 +37,7 @@ class GatewayLoop final : private gateway::FrameSink {
  public:
   /// `load` reads the configuration again, beside the loop. `instance` is the name of one of
   /// several gateways, or empty. `keeper` is null where nothing is kept across a restart, `metrics`
-  /// where nobody wants them.
+  /// if they are not configured.
   GatewayLoop(gateway::Plan plan, LoadPlan load, std::string instance, StateKeeper* keeper,
               MetricsFile* metrics, Log& log);
   GatewayLoop(const GatewayLoop&) = delete;

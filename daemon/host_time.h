@@ -13,8 +13,8 @@ namespace vgyro::daemon {
 
 /// The host's clocks as one turn of the loop sees them: each is read when it is first asked for,
 /// and then stands still. Most turns ask for none: under User Mode Linux, and wherever the kernel
-/// has no quick way, reading one costs as much as reading a frame. Begun anew within a turn by a
-/// bus that has to know whether a stamp lies in the future.
+/// has no quick way, reading one costs as much as reading a frame. Restarted within a turn by a
+/// bus that checks whether a stamp is in the future.
 class TurnClock {
  public:
   using Read = TimePoint (*)();
@@ -29,7 +29,7 @@ class TurnClock {
     if (!wall_) wall_ = read_wall_();
     return *wall_;
   }
-  /// One that nobody sets.
+  /// A clock that cannot be set.
   TimePoint steady() {
     if (!steady_) steady_ = read_steady_();
     return *steady_;
@@ -42,9 +42,9 @@ class TurnClock {
   std::optional<TimePoint> steady_;
 };
 
-/// The stamps' clock, without its backward steps: nobody would notice a silence until it had caught
-/// up. Where samples come, the pipeline takes a step out of their stamps; then it is forgotten
-/// here.
+/// The stamps' clock, without its backward steps: otherwise a silence would go unnoticed until the
+/// clock had caught up. Where samples come, the pipeline takes a step out of their stamps; then it
+/// is forgotten here.
 class ForwardTime {
  public:
   TimePoint update(TimePoint wall, TimePoint steady) {

@@ -1,8 +1,8 @@
 #pragma once
 
-// Notices who else sends our identifiers: a second gateway on the bus, or the vehicle itself.
-// Receivers would take its frames for ours. What this process sends its sockets do not hear; what a
-// socket of it sent that was closed since (at a reload, or by a run before) may still come back.
+// Detects other senders of our identifiers: a second gateway on the bus, or the vehicle itself.
+// Receivers would take its frames for ours. The sockets do not receive this process's own frames;
+// frames of a socket closed since (at a reload, or in an earlier run) may still return.
 // Clock-free: the caller says when a second has passed.
 
 #include <algorithm>
@@ -30,7 +30,7 @@ class IdentifierWatch {
   /// A socket was opened: echoes of an earlier one may come.
   void opened() { echoes_left_ = kEchoSeconds; }
 
-  /// Has it one of our identifiers? Then it is no input. `local`: somebody on this host sent it.
+  /// Has it one of our identifiers? Then it is no input. `local`: sent by this host.
   bool takes(const can::Frame& frame, bool local) {
     if (frame.has(can::kRemote) || frame.has(can::kError)) return false;
     const gateway::FrameId id{frame.id, frame.has(can::kExtended)};
@@ -46,7 +46,7 @@ class IdentifierWatch {
     contested_left_ = std::max(0, contested_left_ - 1);
   }
 
-  /// Frames that somebody else sent, so far.
+  /// Frames from other senders, so far.
   [[nodiscard]] std::uint64_t count() const { return count_; }
   [[nodiscard]] bool is_contested() const { return contested_left_ > 0; }
 

@@ -1,7 +1,7 @@
 #pragma once
 
-// How many lines of one kind may go to the log: some at once, what is beyond is counted and told
-// with the minute. Clock-free: the caller says when a second has passed.
+// How many lines of one kind may go to the log: some at once, the others are counted and reported
+// once a minute. Clock-free: the caller says when a second has passed.
 
 #include <cstdint>
 

@@ -1,8 +1,8 @@
 #pragma once
 
-// Lines on their way to somebody who may not take them: put() never waits. A thread of its own
-// writes them in their order. What does not fit, or cannot be written, is counted, and the count is
-// said in its place as soon as lines are taken again. Knows nothing of where they go.
+// Lines for a receiver that may not read: put() never waits. A thread of its own
+// writes them in their order. Lines that do not fit, or cannot be written, are counted, and the
+// count is written in their place as soon as lines are read again. Independent of the receiver.
 
 #include <chrono>
 #include <condition_variable>

@@ -58,7 +58,7 @@ class Log {
   /// Waits until all lines are written; false when that takes too long.
   bool flush(std::chrono::milliseconds patience) { return lines_.flush(patience); }
 
-  /// Lines that nobody took, since the start.
+  /// Lines lost since the start.
   [[nodiscard]] std::uint64_t lost() const { return lines_.lost(); }
 
  private:

@@ -82,7 +82,7 @@ void add_rate(Text& text, const Snapshot& now) {
   text.family("vgyro_rate_sigma_degrees_per_second", "gauge", "Its standard deviation.");
   text.sample({}, status.sigma_dps);
   text.family("vgyro_bias_sigma_degrees_per_second", "gauge",
-              "Standard deviation of the drift that is taken off the rate.");
+              "Standard deviation of the drift that is subtracted from the rate.");
   text.sample({}, status.bias_sigma_dps);
   text.family("vgyro_gyros_disagree", "gauge", "1 while the gyros contradict each other.");
   text.sample({}, status.disagree);

@@ -1,7 +1,8 @@
 #pragma once
 
 // The gateway in numbers for Prometheus: a text file that node_exporter's textfile collector reads.
-// Written whole or not at all, in a thread of its own; a file that cannot be written is told once.
+// Written whole or not at all, in a thread of its own; a file that cannot be written is reported
+// once.
 
 #include <string>
 
@@ -31,7 +32,7 @@ class MetricsFile {
   std::string new_path_;
   Log& log_;
   int second_ = 0;
-  bool failed_ = false;  ///< and told
+  bool failed_ = false;  ///< and reported
   BackgroundWriter writer_;
 };
 

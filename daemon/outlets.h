@@ -21,7 +21,7 @@ struct Outlet {
   can::TransmitQueue queue;
   bool polls_writable = false;
 
-  /// A new socket, of which poll knows nothing yet.
+  /// A new socket, not yet registered with poll.
   void begin_anew() {
     polls_writable = false;
     queue.on_writable();

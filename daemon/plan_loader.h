@@ -1,8 +1,8 @@
 #pragma once
 
 // Reads the configuration beside the loop: a file may be large, its disk slow or away, and the
-// rates wait for nothing. A descriptor that the loop polls tells when there is a result. Whatever
-// goes wrong, memory that runs short included, is a result too: a refusal. What hangs is left
+// rates wait for nothing. A descriptor that the loop polls signals a result. Any
+// error, lack of memory included, is a result too: a refusal. A thread that hangs is left
 // behind.
 
 #include <functional>

@@ -174,7 +174,7 @@ void Reporter::contradiction_changed(const gateway::Status& status) {
   disagree_ = status.disagree;  // it is of one piece with this
   if (!health_lines_.take()) return;
   if (contradiction_ == fusion::Contradiction::kNone) {
-    log_.notice("the gyros move together again as two of one platform do");
+    log_.notice("the gyros move together again, as on one platform");
     return;
   }
   log_.tell(Severity::kError, {.cause = gateway::to_string(contradiction_)}, "{}; {}",
@@ -200,7 +200,7 @@ void Reporter::ambiguity_changed(const gateway::Status& status) {
               gateway::ambiguity_text(status.probability, names_));
   } else {
     const std::string seems = gateway::hypotheses_text(status.probability, names_);
-    log_.notice("what the gyros show is clear again{}{}", seems.empty() ? "" : ": ", seems);
+    log_.notice("one explanation of the rates remains{}{}", seems.empty() ? "" : ": ", seems);
   }
 }
 

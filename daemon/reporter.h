@@ -70,7 +70,7 @@ class Reporter {
  private:
   static constexpr std::uint64_t kRepeatSeconds = 60;
 
-  /// A counter of troubles, and how much of it has been told.
+  /// A counter of troubles, and how much of it has been reported.
   struct Told {
     std::uint64_t count = 0;
     std::uint64_t second = 0;
@@ -88,7 +88,7 @@ class Reporter {
     Told foreign;
   };
 
-  /// What has been told of one axis.
+  /// What has been reported of one axis.
   struct AxisTold {
     gateway::State state = gateway::State::kWaiting;
     std::array<std::optional<gateway::Fault>, 2> faults;

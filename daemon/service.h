@@ -1,8 +1,8 @@
 #pragma once
 
-// What systemd is told, and whether it may be told that the gateway is alive. Without a service
+// The messages to systemd, and whether the watchdog may be fed. Without a service
 // manager all of this does nothing. Unlike sd_notify() it never waits: a manager that does not read
-// must not stop the rates. What is not taken is counted; what systemd must know comes again.
+// must not stop the rates. Messages not accepted are counted; required ones are repeated.
 
 #include <cstdint>
 #include <deque>
@@ -16,7 +16,7 @@ class Notifier {
  public:
   /// Speaks to the socket that $NOTIFY_SOCKET names.
   Notifier();
-  /// To this one: a path, or a name that begins with '@'. Empty: to nobody.
+  /// To this one: a path, or a name that begins with '@'. Empty: no receiver.
   explicit Notifier(const std::string& address);
   Notifier(const Notifier&) = delete;
   Notifier& operator=(const Notifier&) = delete;
@@ -42,11 +42,11 @@ class Notifier {
 
   int fd_ = -1;
   std::string address_;
-  std::deque<std::string> owed_;  ///< must be told, and was not taken so far
+  std::deque<std::string> owed_;  ///< required, not accepted so far
   std::uint64_t failures_ = 0;
 };
 
-/// WATCHDOG_USEC of this process; 0 where nobody watches.
+/// WATCHDOG_USEC of this process; 0 without a watchdog.
 std::uint64_t watchdog_usec();
 
 /// Decides whether the watchdog is fed. A loop that turns is not enough: whatever its state, the

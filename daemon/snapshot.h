@@ -23,7 +23,7 @@ struct Snapshot {
   std::array<double, 2> slope_sigma_dps_s{};  ///< of the slope; NaN where it is not known
   Traffic traffic;
   double uptime_s = 0.0;
-  std::uint64_t log_lines_lost = 0;         ///< nobody took them
+  std::uint64_t log_lines_lost = 0;         ///< not read
   std::uint64_t service_messages_lost = 0;  ///< the service manager did not take them at once
   bool config_refused = false;              ///< by the last reload
 };

@@ -1,8 +1,8 @@
 #pragma once
 
-// Keeps what the pipeline knows of its gyros in a file: taken up at the start, written when
-// something new was learned, at most once a minute, and at the end. A disk may take its time, so a
-// thread of its own writes; only finish() waits. Trouble with the file is told, and never fatal.
+// Keeps the pipeline's learned state in a file: restored at the start, written when
+// something new was learned, at most once a minute, and at the end. A disk may be slow, so a
+// thread of its own writes; only finish() waits. File errors are reported, and never fatal.
 
 #include <optional>
 #include <string>
@@ -23,7 +23,7 @@ class StateKeeper {
 
   StateKeeper(std::string path, Log& log);
 
-  /// Before anything else: nobody else writes this file from now on. Error when somebody does.
+  /// Call first: no other process writes this file from now on. Error when one does.
   Expected<void> lock();
 
   /// What an earlier run left, when it is whole and of these gyros. What is not is set aside.
@@ -48,7 +48,7 @@ class StateKeeper {
   Log& log_;
   int seconds_left_ = 0;
   std::string latest_;   ///< given to the thread, or written
-  bool failed_ = false;  ///< and told
+  bool failed_ = false;  ///< and reported
   BackgroundWriter writer_;
 };
 

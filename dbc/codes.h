@@ -30,7 +30,7 @@ struct Codes {
 
 /// What the rules keep of a signal that measures. J1939: of unsigned numbers from 8 bits on all
 /// whose top eight bits are 0xFB or more; its shorter fields are states, whose meaning only labels
-/// tell, and it has no signed numbers. NMEA 2000: the topmost values, signed or not: three from 8
+/// give, and it has no signed numbers. NMEA 2000: the topmost values, signed or not: three from 8
 /// bits on, two where at least 15 is reached, one where at least 2 is.
 Codes codes_of(const Signal& signal, CodeRules rules);
 

@@ -27,7 +27,7 @@ class Diagnostics {
   static constexpr std::size_t kShownMax = 100;
 
   void add(unsigned line, std::string what);
-  /// In the order of lines; the last one tells how many are not among them.
+  /// In the order of lines; the last one counts the omitted ones.
   [[nodiscard]] std::vector<Diagnostic> take();
 
  private:

@@ -1,7 +1,7 @@
 #pragma once
 
 // What a DBC file says, as values: messages, signals, units, labels. Built by dbc/parser.h;
-// knows nothing of frames on a bus.
+// is independent of frames on a bus.
 
 #include <cstdint>
 #include <optional>
@@ -47,7 +47,7 @@ struct Signal {
   bool is_multiplexor = false;
   std::optional<MultiplexCondition> condition;
   std::vector<ValueLabel> labels;
-  std::optional<double> start_raw;  ///< GenSigStartValue: the raw value before anybody knows better
+  std::optional<double> start_raw;  ///< GenSigStartValue: the raw value before the first frame
   unsigned line = 0;
 
   [[nodiscard]] const std::string* label(std::int64_t raw) const;

@@ -3,7 +3,7 @@
 // End-to-end protection of frames: the check value that a sender puts into its frames, for what the
 // gateway sends and for what it reads. AUTOSAR profiles 1 and 11 (variants A, B, C), 2 and 22, and
 // 5, and two that cars of before use. Source: AUTOSAR Foundation, "E2E Protocol Specification";
-// SAE J1850. Whether a frame is new is its counter's to tell, which the receiver watches.
+// SAE J1850. Whether a frame is new follows from its counter, which the receiver checks.
 
 #include <array>
 #include <cstddef>

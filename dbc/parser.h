@@ -13,8 +13,8 @@ namespace vgyro::dbc {
 /// `path` is used in messages only.
 Database parse(std::string_view text, std::string path);
 
-/// The networks of a whole car take a megabyte or two; a larger file costs memory and tells of a
-/// mistake.
+/// The networks of a whole car take a megabyte or two; a larger file costs memory and is probably
+/// a mistake.
 inline constexpr std::size_t kFileBytesMax = std::size_t{16} << 20U;
 
 /// Error when the file cannot be read or holds no message at all.

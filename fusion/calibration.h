@@ -69,7 +69,7 @@ class Calibrator {
   /// where one is larger than `max_bias_dps` says (infinite: nothing is said), nor where both are
   /// large and the same: that is a platform that turns steadily.
   [[nodiscard]] bool plausible(const std::array<double, 2>& max_bias_dps) const;
-  /// The result is not believed: begin again with the next pair.
+  /// The result is rejected: begin again with the next pair.
   void reject();
 
   /// Somebody else saw that the platform moves, and stood still until `still_until_s`, a block ago

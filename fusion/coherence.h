@@ -1,9 +1,9 @@
 #pragma once
 
 // Do the two gyros feel the same rotation? Judged from how their block means change: a gyro that
-// stays where it was while the other one moves is blind to rotation, whatever noise it makes; two
-// that both move, but not alike, are not on one platform, or one is not what it is taken for. Both
-// are probabilities, built up block by block and taken back the same way; a drift or a step of one
+// stays constant while the other one moves is blind to rotation, whatever its noise; two
+// that both move, but not alike, are not on one platform, or one is configured wrongly. Both
+// are probabilities that grow and fall block by block; a drift or a step of one
 // gyro changes too few blocks to look like either.
 
 #include <array>
@@ -19,7 +19,7 @@ class Coherence {
   /// set the two apart.
   void judge(const std::array<double, 2>& mean_dps, double from_s, double to_s,
              const Symmetric& density, double skew_allowance_dps);
-  /// What came before says nothing of what follows.
+  /// Earlier blocks are not compared with later ones.
   void break_off() { count_ = 0; }
   void clear() { *this = {}; }
 
@@ -27,14 +27,14 @@ class Coherence {
   [[nodiscard]] double blind(std::size_t gyro) const;
   /// The gyros move, and not alike.
   [[nodiscard]] bool contradict() const { return contradiction_ > 0.0; }
-  /// Something speaks for one of these: what the difference shows now is no drift.
+  /// There is evidence for one of these: the present difference is not drift.
   [[nodiscard]] bool suspects() const {
     return contradict() || blind_[0] > kSuspicion || blind_[1] > kSuspicion;
   }
 
  private:
   static constexpr std::size_t kBack = 2;
-  static constexpr double kSuspicion = 5.0;  ///< about what one block tells
+  static constexpr double kSuspicion = 5.0;  ///< about the evidence of one block
   struct Mean {
     std::array<double, 2> rate_dps{};
     double length_s = 0.0;

@@ -1,10 +1,10 @@
 #pragma once
 
-// Takes off one gyro's readings what the model file knows of it: model/equation.h backwards.
+// Corrects one gyro's readings for the effects in the model file: model/equation.h inverted.
 // Offsets are subtracted; the response is inverted: the result is the rate at which model and
 // reading agree. An effect whose input is not known adds nothing, which is the same as an input at
-// its reference. Noise, clipping and lost frames cannot be taken back; `delay` is a matter of time,
-// not of rates, and only told here.
+// its reference. Noise, clipping and lost frames cannot be corrected; `delay` changes times,
+// not rates, and is only reported here.
 
 #include <span>
 

@@ -1,11 +1,11 @@
 #pragma once
 
-// How far wrong the rate may be because of what the model file takes off one gyro: the effects' σ,
-// and whole effects whose reading is open. A corrector follows what a gyro's bias is off by, so a
-// doubt counts from what it was when the biases were last learned: a wrong constant is harmless, a
-// wrong temperature coefficient is as far as the temperature has changed since, a wrong scale
-// factor counts in turns. Lags are none of this: their doubt is of the rate's slope, and the
-// corrector's to know (GyroParameters).
+// The uncertainty of the rate from the model file's corrections of one gyro: the effects' σ,
+// and whole ambiguous effects. A corrector learns a constant bias error, so an
+// uncertainty counts from its value when the biases were last learned: a wrong constant is
+// harmless, a wrong temperature coefficient is as far as the temperature has changed since, a wrong
+// scale factor counts in turns. Lags are not included: their uncertainty is proportional to the
+// rate's slope, and the corrector handles it (GyroParameters).
 
 #include <span>
 #include <vector>

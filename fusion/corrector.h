@@ -2,7 +2,7 @@
 
 // The seam between the pipeline and a correction method: aligned pairs in, virtual rate out.
 // Times are seconds on one monotone axis, rates deg/s. After construction nothing is allocated.
-// A method knows no frames, no stamps and no states; the pipeline decides when it is asked.
+// A method has no frames, stamps or states; the pipeline decides when it is called.
 
 #include <array>
 #include <cstdint>
@@ -27,7 +27,7 @@ struct VirtualRate {
   double rate_dps = 0.0;
   double sigma_dps = 0.0;                 ///< NaN where the method makes no statement
   std::array<double, 2> corrected_dps{};  ///< each gyro less its own drift
-  bool usable = true;  ///< false: what it rests on is contradicted, and nothing else is there
+  bool usable = true;                     ///< false: its only source is contradicted
 };
 
 struct Drift {
@@ -46,11 +46,11 @@ struct WindowCounts {
 /// What a wheel-speed signal says of the vehicle.
 enum class Wheels : std::uint8_t { kUnknown, kStanding, kRolling };
 
-/// What may be the case, each with its probability.
+/// The hypotheses, each with its probability.
 enum class Hypothesis : std::uint8_t {
   kStanding,      ///< in a steady stretch: the platform stands
   kTurning,       ///< in a steady stretch: it turns at a constant rate
-  kGyro1Stepped,  ///< its bias has jumped, and nothing has settled it yet
+  kGyro1Stepped,  ///< its bias has jumped, and this is not settled yet
   kGyro2Stepped,
   kGyro1Blind,  ///< it feels no rotation
   kGyro2Blind,
@@ -73,15 +73,15 @@ struct Condition {
   bool stopped = false;         ///< standing still: the common drift is being learned
   bool moves = false;           ///< about this axis, as far as it sees itself
   bool steady = false;          ///< in a steady stretch: probability says what it is
-  bool ambiguous = false;       ///< two readings of the data are likely, and far apart
+  bool ambiguous = false;       ///< two hypotheses are likely, and far apart
   std::array<bool, 2> blind{};  ///< this gyro feels no rotation, as it seems
   std::array<double, kHypotheses> probability{};
   bool disagree = false;            ///< the gyros contradict each other; which is wrong is open
   std::array<bool, 2> noisy{};      ///< the noise of this gyro is far above what it was
   std::uint64_t stops = 0;          ///< stops learned from
   std::uint64_t stops_refused = 0;  ///< steady, but a turn was likelier
-  std::uint64_t stops_open = 0;     ///< steady stretches that ended with both readings likely
-  std::uint64_t restarts = 0;       ///< times that the estimate was not finite and began anew
+  std::uint64_t stops_open = 0;     ///< steady stretches that ended with both hypotheses likely
+  std::uint64_t restarts = 0;       ///< times that the estimate was not finite and was restarted
   std::uint64_t disagreements = 0;  ///< times that `disagree` began
 };
 
@@ -92,11 +92,11 @@ class Corrector {
   [[nodiscard]] virtual bool needs_calibration() const = 0;
   /// The pairs of the initial calibration, with their true rate, before start().
   virtual void calibrate(const RatePair& /*pair*/, double /*true_rate_dps*/) {}
-  /// The platform moved: what calibrate() was given so far is worthless.
+  /// The platform moved: discards the pairs given to calibrate() so far.
   virtual void restart_calibration() {}
   /// Must be called once before update() where needs_calibration().
   virtual void start(const Calibration& calibration) = 0;
-  /// Instead of a calibration: what was known `age_s` seconds before `t_s`. False when this method
+  /// Instead of a calibration: the memory of `age_s` seconds before `t_s`. False when this method
   /// keeps no memory, or the memory cannot be right; then nothing has changed.
   virtual bool resume(const DriftMemory& /*memory*/, double /*age_s*/, double /*t_s*/) {
     return false;
@@ -106,7 +106,7 @@ class Corrector {
   virtual VirtualRate update(const RatePair& pair) = 0;
   /// One gyro alone: the rate of the other one is not used.
   virtual VirtualRate update_alone(std::size_t gyro, const RatePair& pair) = 0;
-  /// What the wheels say from now on.
+  /// The state of the wheels from now on.
   virtual void set_wheels(Wheels /*wheels*/) {}
   /// The gyros' temperatures from now on, degC; NaN where they are not known.
   virtual void set_temperature(const std::array<double, 2>& /*temperature_c*/) {}
@@ -123,20 +123,20 @@ class Corrector {
   /// The true rate at a stop from now on, where there is one at all.
   virtual void set_stop_rate(double /*rate_dps*/) {}
 
-  /// What of the rate is either gyro's: they add up to 1.
+  /// The weight of each gyro in the rate: they add up to 1.
   [[nodiscard]] virtual std::array<double, 2> shares() const { return {0.5, 0.5}; }
   [[nodiscard]] virtual Drift drift(double t_s) const = 0;
   [[nodiscard]] virtual WindowCounts windows() const = 0;
   [[nodiscard]] virtual Condition condition() const { return {}; }
   /// Another number means that condition() may have changed; it does so some times a second.
   [[nodiscard]] virtual std::uint64_t condition_edition() const { return 0; }
-  /// To be kept across a restart; nothing before there is anything to keep.
+  /// To be kept across a restart; empty before anything is learned.
   [[nodiscard]] virtual std::optional<DriftMemory> memory(double /*t_s*/) const {
     return std::nullopt;
   }
 };
 
-/// ½(y₁ + y₂) as it comes: the rival that every method must beat.
+/// ½(y₁ + y₂), uncorrected: the baseline that every method must beat.
 std::unique_ptr<Corrector> make_mean_corrector();
 
 /// The paper's mutual calibration. order 0…kOrderMax, window_s > 0.
@@ -149,7 +149,7 @@ struct OptimalSettings {
   std::array<GyroParameters, 2> gyros;
 };
 
-/// Weights from the gyros' noise, drift shared out by a Kalman filter over windows, stops:
+/// Weights from the gyros' noise, drift divided by a Kalman filter over windows, stops:
 /// docs/optimal.md.
 std::unique_ptr<Corrector> make_optimal_corrector(const OptimalSettings& settings);
 

@@ -1,14 +1,14 @@
 #pragma once
 
-// What is known of the drifts when neither their size nor their kind is: one filter for each kind
-// of drift and each pair of values that K₁ and K₂ may have, weighed by how well it foretold the
+// Estimates the drifts when neither their size nor their kind is known: one filter for each kind
+// of drift and each pair of values of K₁ and K₂, weighted by how well it predicted the
 // data (Magill's adaptive estimator). The kinds: a walk alone; a gyro that warms up; slopes that
 // come and go, in each gyro by itself or in both alike. Where the model gives K there is one filter
-// a kind. The spread between the filters is part of the covariance, so doubt of K is doubt of the
-// bias.
+// a kind. The spread between the filters is part of the covariance, so uncertainty of K is
+// uncertainty of the bias.
 //
-// A scale-factor difference is shared out in proportion to N·K: the gyro that is quieter and drifts
-// less is the one that is believed, but a vague K does not decide all.
+// A scale-factor difference is divided in proportion to N·K: the gyro that is quieter and drifts
+// less gets the smaller share, but an uncertain K does not decide alone.
 
 #include <array>
 #include <vector>
@@ -25,7 +25,7 @@ struct DriftEstimate {
   DriftFilter::Covariance covariance = DriftFilter::Covariance::Zero();
   std::array<double, 2> growth{};  ///< of the biases' variances, (deg/s)²/s
   std::array<double, 2> scale{};   ///< share of each gyro in the scale-factor difference
-  /// Of both gyros' scale factors, as far as their difference tells: variances and covariance.
+  /// Of both gyros' scale factors, as far as their difference shows: variances and covariance.
   Symmetric scale_covariance{};
   /// Which gyro is likely the cause where the two differ about a turn: (N·K)² over the sum.
   std::array<double, 2> blame{};
@@ -55,7 +55,7 @@ class EstimateMixer {
 
 class DriftBank {
  public:
-  /// Prior doubt of the two gyros' scale-factor difference and time skew.
+  /// Prior σ of the two gyros' scale-factor difference and time skew.
   static constexpr double kScaleSigma = 0.01;
   static constexpr double kSkewSigma_s = 0.02;
   /// Evidence for one K fades: sensors age and environments change.

@@ -23,7 +23,7 @@ struct SlopeModel {
   std::array<double, 2> steady_dps_s{};  ///< σ in the long run
   double tau_s = 1.0;
   double correlation = 0.0;  ///< of the two gyros' changes of slope
-  /// Part of a slope by which it may be otherwise in the long run: the one that is steep changes.
+  /// Part of a slope by which it may change in the long run: a steep slope changes more.
   double relative = 0.0;
 
   [[nodiscard]] bool any() const {
@@ -40,7 +40,7 @@ struct DriftModel {
   std::array<std::size_t, 2> gauss_markov_count{};
 };
 
-/// What measurements speak of: both gyros' whole drifts at their present temperatures (deg/s), s
+/// The measured quantities: both gyros' whole drifts at their present temperatures (deg/s), s
 /// (relative) and τ (s):
 ///   y₁ − y₂ = B₁ − B₂ + s·Ω + τ·dΩ/dt
 enum Observable : int { kBias1 = 0, kBias2 = 1, kScale = 2, kSkew = 3, kObservables = 4 };
@@ -80,7 +80,7 @@ class DriftFilter {
   /// A window of length_s with a measurement. Returns the log likelihood of its values, up to
   /// ½·log 2π a row.
   double update(double length_s, const DriftMeasurement& measurement);
-  /// More doubt of both drifts: symmetric 2×2, as variances and covariance.
+  /// Additional uncertainty of both drifts: symmetric 2×2, variances and covariance.
   void widen(double variance_1, double covariance_12, double variance_2);
   /// One gyro's drift has jumped.
   void shift(std::size_t gyro, double by_dps, double variance);

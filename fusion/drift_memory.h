@@ -1,7 +1,7 @@
 #pragma once
 
-// What a corrector knows of two gyros, so that a restart need not calibrate again. Plain numbers:
-// whoever keeps it decides on the form. Rates deg/s.
+// A corrector's memory of two gyros, so that a restart need not calibrate again. Plain numbers:
+// the caller decides on the form. Rates deg/s.
 
 #include <array>
 #include <cstddef>

@@ -1,9 +1,9 @@
 #pragma once
 
 // The small rotation θ between two units of gyros: unit 2 reads Ω + Ω × θ. Learned from the
-// difference of the units while they turn, together with what else turning shows in it: a scale
+// difference of the units while they turn, together with the other effects of turning: a scale
 // factor difference of each axis and a time skew. Cells of a tenth of a second make segments of
-// some seconds; within a segment biases are constants and drop out. Each segment tells its own
+// some seconds; within a segment biases are constants and drop out. Each segment estimates its
 // noise. docs/optimal.md derives it. Rates in deg/s, θ in rad; nothing is allocated, and a platform
 // of two axes has a third that does not turn.
 
@@ -33,14 +33,14 @@ class Misalignment {
 
   Misalignment();
 
-  /// About which axes both units tell the rate.
+  /// The axes about which both units measure the rate.
   using Both = std::array<bool, kPlatformAxes>;
 
-  /// One instant, as the units read it, biases and all; t_s grows. About an axis that not both of
-  /// them tell both rates are what is known of it, or 0.
+  /// One instant, as the units read it, biases included; t_s grows. About an axis that only one of
+  /// them measures, both rates are the best known one, or 0.
   void add(double t_s, const AxisRates& first_dps, const AxisRates& second_dps,
            const Both& both = {true, true, true});
-  /// What comes next is not joined to what came before.
+  /// The next sample does not continue the present segment.
   void break_off();
 
   /// What unit 2 reads too much about `axis` while the platform turns at `rate_dps` …
@@ -50,7 +50,7 @@ class Misalignment {
 
   [[nodiscard]] std::array<double, 3> angle_rad() const;
   [[nodiscard]] std::array<double, 3> sigma_rad() const;
-  /// Segments that have told something.
+  /// Segments that were used.
   [[nodiscard]] std::size_t segments() const { return segments_used_; }
 
   [[nodiscard]] MisalignmentMemory memory() const;
@@ -73,7 +73,7 @@ class Misalignment {
   void grow(double length_s);
   /// Row of `axis` in a cell.
   [[nodiscard]] State regressor(std::size_t axis, std::size_t cell) const;
-  /// False where it tells nothing.
+  /// False where it has no information.
   bool add_axis(std::size_t axis, Square& information, State& right) const;
   [[nodiscard]] double noise_variance(std::size_t axis) const;
   void learn(Square information, State right);

@@ -2,8 +2,8 @@
 
 // The white noise of two gyros: N at the time scale of cells (what drift and heading feel), and the
 // variance of single samples (what σ of a published rate is made of). Known from the model file,
-// or measured where the true rate is known; between such times only a rise is followed, from what
-// the two gyros do not have in common.
+// or measured where the true rate is known; otherwise only a rise is followed, from the noise that
+// the two gyros do not share.
 
 #include <array>
 
@@ -25,20 +25,20 @@ class NoiseTracker {
   /// A block whose true rate is constant: its cells differ by noise alone. With `moving` only what
   /// the gyros do not share counts as noise.
   void measure(const CellBlock& block, bool moving);
-  /// Does the block scatter as its gyros usually do? People who get in and engines that run are no
-  /// noise, even where a stop is a stop.
+  /// Does the block scatter as its gyros usually do? Boarding passengers and running engines are
+  /// not noise, even at a true stop.
   [[nodiscard]] bool usual(const CellBlock& block) const;
-  /// Has one of the gyros sent a value or two that are no measurement? Somewhere in the block the
-  /// difference scatters within a cell as neither noise nor motion lets it. `more` is variance of a
-  /// sample's difference besides, (deg/s)².
+  /// Has one of the gyros sent a value or two that are no measurement? In some cell of the block
+  /// the difference scatters more than noise and motion allow. `more` is additional variance of a
+  /// sample's difference, (deg/s)².
   [[nodiscard]] bool spiked(const CellBlock& block, double more) const;
-  /// A block of which nothing is known.
+  /// A block whose true rate is unknown.
   void watch(const CellBlock& block);
-  /// The present rise was none, or is of no use any more.
+  /// Forgets the present rise.
   void forget_rise();
   /// The smallest step that a gyro's values have shown.
   void set_resolution(std::size_t gyro, double step_dps) { step_dps_[gyro] = step_dps; }
-  /// By how much a gyro's mean is off where its values stand between two steps, (deg/s)²: noise
+  /// The rounding variance of a gyro's mean, (deg/s)²: noise
   /// that is small against the step does not average it out.
   [[nodiscard]] double rounding_variance(std::size_t gyro) const;
   /// Make density() and sample_variance() of what was measured.

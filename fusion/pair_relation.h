@@ -70,7 +70,7 @@ class PairRelation {
     newest_s_ = t_s;
   }
 
-  /// One of them is found to be sick: what it said shortly before is no news of the pair.
+  /// One of them is found faulty: its last samples are no evidence about the pair.
   void break_off() {
     samples_ = 0;
     sum_ = square_ = step_square_ = step_most_ = {};
@@ -89,7 +89,7 @@ class PairRelation {
 
  private:
   static constexpr double kCell_s = 0.1;
-  /// Behind a hole longer than this, and than four cells, everything begins anew but the evidence.
+  /// After a gap longer than this, and than four cells, everything but the evidence restarts.
   static constexpr double kGap_s = 0.5;
   static constexpr std::size_t kBlock = 10;      ///< cells of a block
   static constexpr std::size_t kLongBlock = 20;  ///< … of one that is compared over all lags
@@ -129,12 +129,12 @@ class PairRelation {
   struct AtLag {
     double now = 0.0;          ///< share that a healthy slope leaves of the newest
     double left = 0.0;         ///< Σ of that share
-    double blocks = 0.0;       ///< those that speak for this lag, against all healthy ones
+    double blocks = 0.0;       ///< those that support this lag, against all healthy ones
     double any_left = 0.0;     ///< Σ of the share that the slope leaves which fits best
     double strong_left = 0.0;  ///< as `left`, of blocks in which both have moved far
     double both = 0.0;         ///< Σ of the products
   };
-  /// Slopes of blocks that speak for one contradiction.
+  /// Slopes of blocks that support one contradiction.
   struct Slopes {
     double own = 0.0;
     double both = 0.0;

@@ -1,10 +1,10 @@
 #pragma once
 
-// Several readings of the same data, carried side by side until something decides between them:
-// when both gyros are steady the platform stands, or it turns steadily and both have kept their
-// drifts; when their difference jumps, one gyro has stepped, or the other one. Each reading is a
-// bank of drift filters of its own, weighed by what it foretold and by how common such things are.
-// What goes out is the mixture: its mean, and the spread between the readings as part of its σ.
+// Several hypotheses about the same data, kept side by side until the data decide between them:
+// when both gyros are steady, the platform stands, or it turns steadily and both have kept their
+// drifts; when their difference jumps, one gyro has stepped, or the other one. Each hypothesis is a
+// bank of drift filters of its own, weighted by its predictions and its prior.
+// The output is the mixture: its mean, and the spread between the hypotheses as part of its σ.
 // docs/optimal.md derives the weights. No clock, no samples; nothing is allocated after start.
 
 #include <array>
@@ -31,16 +31,16 @@ struct SteadyWindow {
 
 class Readings {
  public:
-  /// Carried on; of more the least likely are given up.
+  /// Kept; of more, the least likely are dropped.
   static constexpr std::size_t kKept = 4;
-  /// A reading that weighs less is gone.
+  /// A hypothesis with less weight is dropped.
   static constexpr double kGone = 1e-6;
-  /// What is worth telling.
+  /// Least probability that is reported.
   static constexpr double kWorthTelling = 0.05;
   static constexpr std::size_t kNoGyro = 2;
   /// How steady turns are: perfectly, as a ship's, as a car's.
   static constexpr std::size_t kTurnKinds = 3;
-  /// Every reading may become three, and one that was given up may come back.
+  /// Every hypothesis may become three, and the kept bank may return as one more.
   static constexpr std::size_t kSlots = 3 * (kKept + 1);
 
   explicit Readings(const std::array<GyroParameters, 2>& gyros);
@@ -49,31 +49,31 @@ class Readings {
   void begin(const std::array<double, 2>& white_dps_rthz, const std::array<double, 2>& bias_dps,
              const Symmetric& covariance);
   void resume(const DriftMemory& memory, double age_s);
-  /// The likeliest reading as it stands, to go back to.
+  /// Keeps the likeliest hypothesis at present, for a return.
   void copy_likeliest(DriftBank& bank) const { bank = slots_[likeliest()].bank; }
-  /// Back to it; `gone_s` have passed since, of which nothing is known.
+  /// Returns to it; nothing is learned from the `gone_s` since.
   void go_back(const DriftBank& bank, double gone_s);
-  /// One reading more: nothing of what came in the last `gone_s` was either gyro's drift.
+  /// One more hypothesis: no change in the last `gone_s` was either gyro's drift.
   void add_back(const DriftBank& bank, double gone_s);
   void save(DriftMemory& memory) const { slots_[likeliest()].bank.save(memory); }
 
   void predict(double length_s);
-  /// Both gyros' difference, or what is surely known; weighs the readings by it.
+  /// Both gyros' difference, or a certain measurement; weighs the hypotheses by it.
   void learn(double length_s, const DriftMeasurement& measurement);
-  /// A window of a run of steady ones. The first one splits every reading in two.
+  /// A window of a steady run. The first one splits every hypothesis in two.
   void learn_steady(const SteadyWindow& window);
   /// The run of steady windows has ended.
   void end_steady();
   /// The difference y₁ − y₂ has jumped by so much: gyro 1 has stepped with probability
   /// `first_share`, or gyro 2.
   void split_step(double away_dps, double variance, double first_share);
-  /// A window of the difference contradicts what is foretold by `away_dps`: noise, turns that
-  /// nothing explains, or a step of one gyro. `doubted` is the measurement as it is believed in the
+  /// A window of the difference deviates from its prediction by `away_dps`: noise, unexplained
+  /// turns, or a step of one gyro. `doubted` is the measurement with the noise of the
   /// first case.
   void learn_maybe_step(double length_s, const DriftMeasurement& measurement,
                         const DriftMeasurement& doubted, double away_dps, double variance,
                         double first_share);
-  /// This gyro has fallen out: what contradicted the other one was likely its own.
+  /// This gyro has fallen out: the contradiction was likely its own fault.
   void suspect(std::size_t gyro);
   void set_temperature(const std::array<double, 2>& temperature_c);
   void observe_at(const std::array<double, 2>& temperature_c);
@@ -83,9 +83,9 @@ class Readings {
   [[nodiscard]] double standing() const;
   /// The same that it turns steadily.
   [[nodiscard]] double turning() const;
-  /// Probability that this gyro has made a step that nothing has settled yet.
+  /// Probability that this gyro has made a step that is not settled yet.
   [[nodiscard]] double stepped(std::size_t gyro) const;
-  /// Two readings are likely, and further apart than each is wide.
+  /// Two hypotheses are likely, and further apart than their σ.
   [[nodiscard]] bool ambiguous() const;
   /// No filter of one window: how many filters a window costs.
   [[nodiscard]] bool few() const { return slots_[0].bank.few() && count_ == 1; }

@@ -1,11 +1,11 @@
 #pragma once
 
-// One gyro's raw values in order → is this a measurement at all? Tells values that stand still
+// One gyro's raw values in order → is this a measurement at all? Finds values that stand still
 // where the sensor never did, values at the end of its range, and zeros of a dead band. It learns
 // from the sensor itself how long values repeat and how its noise compares with its steps; a coarse
-// sensor that repeats at rest is believed until the other gyro moves, one that has never changed is
-// not believed before it moves with the other. O(1) a sample, no allocation, and nothing depends on
-// what time it is.
+// sensor that repeats at rest is accepted until the other gyro moves; one that has never changed is
+// accepted only after it moves with the other. O(1) a sample, no allocation, and no judgement
+// depends on the time of day.
 // Judges one sample at a time: how long a finding lasts is for others to decide.
 
 #include <array>
@@ -56,7 +56,7 @@ class Movement {
   [[nodiscard]] std::optional<Level> behind(TimePoint t) const;
   /// Is a step of this size from one sample to the next beyond its noise of late?
   [[nodiscard]] bool is_leap(double step_dps) const;
-  /// So far: whoever has looked at the last one need not look again.
+  /// So far: an unchanged count means that there is no new one.
   [[nodiscard]] std::uint64_t blocks() const { return closed_; }
 
  private:
@@ -90,7 +90,7 @@ class Movement {
 /// may carry far finer steps than the sensor makes.
 class ValueStep {
  public:
-  /// Coarser than any sensor worth the name: what counts until values tell.
+  /// Coarser than any usable sensor: the step until values show a smaller one.
   static constexpr double kUnknown_dps = 0.5;
 
   explicit ValueStep(double lattice_dps) : lattice_dps_(lattice_dps), dps_(worked_out_dps()) {}

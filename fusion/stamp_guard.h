@@ -1,10 +1,10 @@
 #pragma once
 
 // Raw stamps in, monotone time out. Stamps come from a clock that may be set, and from frames that
-// may be garbage: one stamp far off its neighbours is refused; three in a row that agree with each
-// other are believed, or four of a slow stream at its own pace. Set back by more than the reorder
-// limit, or ahead by more than ten years, the common offset takes it up, so that time as the
-// estimation sees it never runs backwards. One guard serves all streams of a host.
+// may be garbage: one stamp far from its neighbours is refused; three in a row that agree with each
+// other are accepted, or four of a slow stream at its own pace. If the clock is set back by more
+// than the reorder limit, or ahead by more than ten years, the common offset compensates it, so the
+// estimation's time never runs backwards. One guard serves all streams of a host.
 
 #include <array>
 #include <cstdint>

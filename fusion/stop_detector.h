@@ -2,8 +2,8 @@
 
 // Is the platform steady: standing, or turning at a constant rate? Judged block by block (about
 // half a second) from how the gyros' cells scatter and whether their means stay where they were,
-// and from the wheels where there are any. Which of the two it is, is for others to weigh
-// (readings.h): this says only that nothing changes, and how much the wheels and time speak for a
+// and from the wheels where there are any. readings.h weighs which of the two it
+// is: this finds only that nothing changes, and how strongly wheels and time indicate a
 // turn.
 
 #include <array>
@@ -19,7 +19,7 @@ struct BlockLevel {
   double cells = 0.0;
   std::array<double, 2> excess_dps{};       ///< each gyro's mean less the true rate at a stop
   std::array<double, 2> excess_variance{};  ///< from the sensors' noise
-  std::array<double, 2> bias_dps{};         ///< what is known of the drifts
+  std::array<double, 2> bias_dps{};         ///< estimated drifts
   std::array<double, 2> weight{};           ///< in the virtual rate
   double doubt_variance = 0.0;              ///< of the weighted drift
   double cell_variance = 0.0;               ///< of the virtual rate's cells about their mean
@@ -31,7 +31,7 @@ class StopDetector {
   static constexpr double kRun_s = 2.5;   ///< steady for this long
   static constexpr int kRunBlocks = 4;    ///< and so many blocks
   static constexpr double kSteady = 3.5;  ///< standard deviations, from block to block
-  /// Standing on its wheels a vehicle may sway by this much, rms.
+  /// A standing vehicle may sway by this much, rms.
   static constexpr double kSway_dps = 0.05;
 
   enum class Steadiness : std::uint8_t {
@@ -42,7 +42,7 @@ class StopDetector {
 
   /// `moves_elsewhere`: about another axis the platform moves.
   Steadiness judge(const BlockLevel& block, Wheels wheels, bool moves_elsewhere = false);
-  /// Whatever other axes and wheels say, this axis moved in the last block.
+  /// This axis moved in the last block, independent of other axes and wheels.
   [[nodiscard]] bool moves() const { return moves_; }
   void reset() { end_run(); }
 
@@ -56,7 +56,7 @@ class StopDetector {
   [[nodiscard]] double log_turning_gain(Wheels wheels, double length_s) const;
   /// Since the last run the platform has moved on: it turned, rolled, or moved for long.
   [[nodiscard]] bool moved_on() const { return moved_on_; }
-  /// A run has been made use of.
+  /// A run has been used.
   void stay() {
     moved_on_ = false;
     turned_deg_ = 0.0;

@@ -1,7 +1,7 @@
 #pragma once
 
-// Which gyros are in use: those that were heard within their time-out and are not set aside; and
-// whether they come in pairs or one speaks alone. Owns their health, which says who is set aside.
+// Which gyros are in use: those with a frame within their time-out that are not set aside; and
+// whether they form pairs or one is used alone. Owns their health, which sets gyros aside.
 // Sends nothing and estimates nothing. Times are on the axis of fusion::StampGuard.
 
 #include <array>
@@ -26,10 +26,10 @@ class Attendance {
   static constexpr int kTimeOutIntervals = 10;
   static constexpr Duration kTimeOutMin = std::chrono::milliseconds(100);
   static constexpr Duration kTimeOutMax = std::chrono::seconds(1);
-  /// But nobody is missed before he has failed to come twice.
+  /// But no gyro is missing before two samples have failed to come.
   static constexpr int kTimeOutIntervalsMin = 3;
 
-  /// Aligner and guard, which know the gyros' paces, must live as long.
+  /// Aligner and guard, which hold the gyros' intervals, must live as long.
   Attendance(const Plan& plan, const fusion::Aligner& aligner, const fusion::StampGuard& guard);
 
   [[nodiscard]] bool in_use(std::size_t gyro) const { return in_use_[gyro]; }
@@ -38,26 +38,26 @@ class Attendance {
   [[nodiscard]] bool pairing() const { return pairing_; }
 
   [[nodiscard]] double step_dps(std::size_t gyro) const { return health_[gyro].step_dps(); }
-  /// VB_Health, but for the gyros' opinion of each other.
+  /// VB_Health, without the bit for disagreement.
   [[nodiscard]] std::uint8_t health_bits() const;
 
   /// A rate that the frame says is one. Nothing when it may be used, else the cause why not.
   /// `can_go_alone`: the other gyro, where it is in use, carries on without this one.
   std::optional<Reject> judge(std::size_t gyro, TimePoint t, double rate_dps, bool can_go_alone);
-  /// A frame that holds no rate, for this cause, with a stamp that can be believed.
+  /// A frame without a rate, for this cause, with an accepted stamp.
   void judge_refused(std::size_t gyro, TimePoint t, Reject cause) {
     health_[gyro].refuse(t, cause);
   }
-  /// The corrector's opinion.
+  /// The corrector's result.
   void set_opinion(TimePoint t, const fusion::Condition& condition);
 
-  /// Nobody is in use, and no pair has come yet: from now on a gyro waits for the other one.
+  /// No gyro is in use, and no pair has come yet: from now on a gyro waits for the other one.
   void begin_waiting(TimePoint t) { waiting_since_ = t; }
   /// A sample that may be used.
   void hear(std::size_t gyro, TimePoint t);
   /// A frame of `t` that may not be used. True when its gyro is set aside with it.
   bool hear_refused(std::size_t gyro, TimePoint t);
-  /// A sample that another axis of the unit spoils: turned into the vehicle's axes it is none. True
+  /// A sample that another axis of the unit makes unusable in the vehicle's axes. True
   /// when this gyro goes out of use with it: at once, or after the third in a row.
   bool go_without(std::size_t gyro, bool at_once);
   /// Its own sensor's values, or what its frames say of it, are not to be used for now.
@@ -66,14 +66,14 @@ class Attendance {
   bool hear_pair();
   /// A rate of this gyro alone goes out.
   void hear_alone(std::size_t gyro) { alone_ = gyro; }
-  /// Shall this gyro speak alone? Only when the other one has really gone, not while pairs are
+  /// Shall this gyro be used alone? Only when the other one is really missing, not while pairs are
   /// about to start. `paired`: there have been pairs.
   [[nodiscard]] bool may_speak_alone(std::size_t gyro, TimePoint t, bool paired) const;
 
-  /// Takes note of who is silent for too long at `t`.
+  /// Marks the gyros that are silent for too long at `t`.
   struct Silence {
     std::array<bool, 2> fell_silent{};
-    TimePoint next = TimePoint::max();  ///< when somebody will be, at the earliest
+    TimePoint next = TimePoint::max();  ///< when a gyro will be, at the earliest
   };
   Silence look_for_silence(TimePoint t);
 
@@ -96,7 +96,7 @@ class Attendance {
   std::array<TimePoint, 2> last_heard_{};  ///< newest frame, even of a gyro that is set aside
   TimePoint waiting_since_;
   bool pairing_ = false;
-  std::size_t alone_ = kNobody;  ///< gyro that speaks alone
+  std::size_t alone_ = kNobody;  ///< gyro that is used alone
 };
 
 }  // namespace vgyro::gateway

@@ -1,8 +1,8 @@
 #pragma once
 
-// From two whole units to a pair of gyros about each axis of the vehicle: which sensor axis tells
-// which, what the mounts leave out, identifiers, true rates at rest and the model's effects of each
-// pair. Fills Plan::axes.
+// From two whole units to a pair of gyros about each axis of the vehicle: which sensor axis
+// measures which, what the mounts leave out, identifiers, true rates at rest and the model's
+// effects of each pair. Fills Plan::axes.
 
 #include <cstddef>
 #include <numbers>
@@ -17,16 +17,16 @@ namespace vgyro::gateway {
 /// A sensor axis with less than this share in a vehicle's axis is not missed there: 1.1 deg.
 inline constexpr double kShareMissed = 0.02;
 
-/// Sets OutputPlan::axes: those that both units tell; complains where they tell different ones.
-/// Precondition: both gyros are resolved. Of single gyros there are none.
+/// Sets OutputPlan::axes: those that both units measure; an error where they measure different
+/// ones. Precondition: both gyros are resolved. Of single gyros there are none.
 void find_axes(TomlReader& root, Plan& plan);
 
 /// The true rate of each axis while the platform rests: of the latitude and, about x and y, of the
-/// heading; `rate_dps` of the configuration goes before. What nobody told is in
+/// heading; `rate_dps` of the configuration goes before. The unknown part is in
 /// CalibrationPlan::doubt_dps. Precondition: all of the configuration is read.
 void build_axes(Plan& plan, std::vector<Error>& errors);
 
-/// Says where `gyro` reads the rate about the unit's own axis `from`: nowhere, where that stands in
+/// Sets where `gyro` reads the rate about the unit's own axis `from`: not at all if it is in
 /// another message.
 void name_other_axis(const GyroPlan& unit, std::size_t from, GyroPlan& gyro);
 

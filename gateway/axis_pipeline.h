@@ -72,7 +72,7 @@ class AxisPipeline {
   /// What is not a gyro's: reference, accelerometer, speed; and time.
   void receive_besides(std::uint8_t roles, const can::Frame& frame, TimePoint stamp);
 
-  /// A reading that may be used, less what the model file knows of it, in the sensor's own axis.
+  /// A usable reading, less the known effects, in the sensor's own axis.
   struct Reading {
     TimePoint t;
     double raw_dps = 0.0;
@@ -80,8 +80,8 @@ class AxisPipeline {
   };
   /// False where the frame gives none; that is dealt with then.
   bool admit(std::size_t gyro, const can::Frame& frame, TimePoint stamp, Reading& reading);
-  /// Of an axis that cannot be told, because another one of its unit is not: for that is sick, or
-  /// what it said last is too old.
+  /// No rate about this axis, because another axis of its unit is missing: that one is faulty, or
+  /// its last reading is too old.
   void go_without(std::size_t gyro, TimePoint t, bool other_is_sick);
   /// The reading, turned into the vehicle's axes. False where it comes too late to be used.
   bool offer(std::size_t gyro, const Reading& reading, double rate_dps);
@@ -90,7 +90,7 @@ class AxisPipeline {
   void take_pair(const fusion::AlignedPair& pair);
   /// Another axis's calibration was ended by motion at `t`.
   void end_calibration(TimePoint t, TimePoint still_until);
-  /// A reading that was offered is heard: first what is due, then …
+  /// An offered reading arrives: first what is due, then …
   void arrive(std::size_t gyro, TimePoint t);
   /// … the pairs that came of it, and this, where none does because the other gyro is not there.
   void speak_alone(std::size_t gyro, TimePoint t, double rate_dps);
@@ -120,7 +120,7 @@ class AxisPipeline {
   [[nodiscard]] bool pairing() const { return attendance_.pairing(); }
   /// Its own sensor axis may not be used for now.
   [[nodiscard]] bool set_aside(std::size_t gyro) const { return attendance_.set_aside(gyro); }
-  /// Between its samples; 0 while nobody knows.
+  /// Between its samples; 0 while unknown.
   [[nodiscard]] Duration interval(std::size_t gyro) const {
     return aligner_.chosen() ? attendance_.usual_interval(gyro) : guard_.interval(gyro);
   }
@@ -179,9 +179,9 @@ class AxisPipeline {
   Status status_;
 
   TimePoint newest_;                  ///< newest instant given to the output
-  TimePoint deadline_{};              ///< nothing is due before; may lie too early, never too late
-  TimePoint reached_{};               ///< newest time that was believed
-  TimePoint suspect_{};               ///< stamp far ahead that nobody has confirmed yet
+  TimePoint deadline_{};              ///< nothing is due before; may be too early, never too late
+  TimePoint reached_{};               ///< newest accepted time
+  TimePoint suspect_{};               ///< stamp far ahead, not confirmed yet
   std::array<double, 2> bias_dps_{};  ///< for bias_dps()
   double bias_sigma_dps_;             ///< for bias_sigma_dps()
   std::uint64_t bias_windows_ = 0;    ///< when that was asked for last

@@ -1,8 +1,8 @@
 #pragma once
 
-// What the corrector thinks of its data, in words for people: the same ones in `vgyro status`, in
+// The corrector's findings in words for people: the same ones in `vgyro status`, in
 // the journal and in the summary of a replay. Plain values in, sentences out; an empty text where
-// there is nothing to tell. Colours, lines and limits on how often are the caller's.
+// there is nothing to report. The caller adds colours, line breaks and rate limits.
 
 #include <array>
 #include <cstdint>
@@ -15,7 +15,7 @@ namespace vgyro::gateway {
 using GyroNames = std::array<std::string, 2>;
 using Probabilities = std::array<double, fusion::kHypotheses>;
 
-/// What is less likely is not told.
+/// Less likely hypotheses are not reported.
 inline constexpr double kWorthTelling = 0.05;
 
 /// Stretches in which both gyros were steady. Every one of them was learned from or refused; `open`
@@ -36,7 +36,7 @@ std::string stretches_advice(const SteadyStretches& stretches);
 std::string hypotheses_text(const Probabilities& probability, const GyroNames& names);
 /// "warming up 80 %, random walk 20 %".
 std::string drift_kind_text(const Probabilities& probability);
-/// Two readings are likely: what they are, and what becomes of σ.
+/// Two hypotheses are likely: which ones, and the effect on σ.
 std::string ambiguity_text(const Probabilities& probability, const GyroNames& names);
 
 /// "left +3.12 ± 0.41, right -1.00 ± 0.65 deg/h an hour"; NaN is not known.
@@ -53,7 +53,7 @@ std::string contradiction_advice();
 /// "its counter always goes from 14 back to 0: counter_max = 14?"; empty where it does not.
 std::string counter_text(const GyroStatus& gyro);
 std::string rates_too_far_apart_text();
-/// Of the estimate: a fault of our own.
+/// The estimate was restarted: a fault of vgyro.
 std::string restarts_text(std::uint64_t restarts);
 
 }  // namespace vgyro::gateway

@@ -1,7 +1,7 @@
 #pragma once
 
-// Does a frame prove that it is whole, from its sender and new? Its check value and its alive
-// counter, where the configuration names them. Of one message; what nobody named is not asked.
+// Is a frame complete, from its sender and new? By its check value and its alive
+// counter, where the configuration names them. For one message; the rest is not checked.
 
 #include <cstdint>
 #include <optional>

@@ -13,7 +13,7 @@ namespace vgyro::gateway {
 /// is left out.
 E2ePlan read_e2e(TomlReader& reader, SignalResolver& resolver, const dbc::Signal& main);
 
-/// After other trouble nobody reads these keys.
+/// These keys are not read after another error.
 void forgive_e2e(TomlReader& reader);
 
 }  // namespace vgyro::gateway

@@ -2,8 +2,8 @@
 
 // From aligned pairs to virtual rates: first the calibration, at rest or against the reference, or
 // biases of an earlier run in its place; then the corrector. Owns all that was learned and what of
-// it is worth keeping. Knows no frame and no time-out: who is in use is the pipeline's to know, and
-// `both_in_use` says it. Times are on the axis of fusion::StampGuard; nothing is allocated after
+// it is worth keeping. Has no frames and no time-outs: the pipeline decides which gyros are in use,
+// and passes `both_in_use`. Times are on the axis of fusion::StampGuard; nothing is allocated after
 // construction.
 
 #include <array>
@@ -32,7 +32,7 @@ std::unique_ptr<fusion::Corrector> make_corrector(const Plan& plan);
 
 class Estimator {
  public:
-  /// The age of saved biases when the clock cannot tell it: it stands before their stamp.
+  /// The age of saved biases when the clock cannot give it, because it is before their stamp.
   static constexpr double kUnknownAge_s = 30 * 86400.0;
 
   /// The plan must live as long.
@@ -46,11 +46,11 @@ class Estimator {
   [[gnu::cold, gnu::noinline]] void begin(TimePoint t, TimePoint stamp);
   [[nodiscard]] bool begun() const { return begun_; }
   [[nodiscard]] bool calibrated() const { return calibrated_; }
-  /// Can a rate of one gyro alone be believed? Not of one that was never compared with the other,
-  /// whatever the method.
+  /// May the rate of one gyro alone be used? Not if it was never compared with the other,
+  /// with any method.
   [[nodiscard]] bool knows_gyros() const { return calibrated_ && begun_; }
 
-  /// What the corrector weighs besides the rates, from now on: wheels, vibration, temperatures …
+  /// The corrector's other inputs from now on: wheels, vibration, temperatures …
   void hear(const Surroundings& surroundings, TimePoint t);
   /// … and the smallest step that this gyro's values have shown, deg/s.
   void set_resolution(std::size_t gyro, double step_dps);

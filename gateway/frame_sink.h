@@ -13,7 +13,7 @@ class FrameSink {
   virtual ~FrameSink() = default;
   /// The stamp is that of the input frame (or of the time-out) that caused the output.
   virtual void put(const can::Frame& frame, TimePoint stamp) = 0;
-  /// For another bus than the output's own. A sink that knows only one puts all there.
+  /// For another bus than the output's own. A sink with only one puts all there.
   virtual void put_on(can::BusIndex /*bus*/, const can::Frame& frame, TimePoint stamp) {
     put(frame, stamp);
   }

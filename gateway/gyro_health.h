@@ -1,8 +1,8 @@
 #pragma once
 
-// May this gyro be used? Gathers what its frames and its values say of its health, sets it aside at
-// once when they say no, and takes it back when it has been well for a while: longer each time that
-// it relapses. Keeps the books of faults. Whether it speaks at all is Attendance's to know.
+// May this gyro be used? Gathers the evidence of its frames and values, sets it aside at
+// once at a fault, and uses it again when it has been good for a while: longer each time that
+// the fault returns. Counts faults. Attendance decides whether the gyro is silent.
 
 #include <array>
 #include <cstdint>
@@ -24,15 +24,15 @@ class GyroHealth {
   /// other carries on, so that a zero of the dead band need not be used.
   std::optional<Reject> judge(TimePoint t, double rate_dps, const GyroHealth* other,
                               bool can_spare);
-  /// A frame that holds no rate, for this cause, with a stamp that can be believed.
+  /// A frame without a rate, for this cause, with an accepted stamp.
   void refuse(TimePoint t, Reject cause);
-  /// It timed out: silent is all that is known of it.
+  /// It timed out: it is silent.
   void fall_silent(TimePoint t);
-  /// The corrector's opinion: far noisier than it was, or without feeling for rotation. Such a gyro
-  /// stays in use, with the weight it deserves.
+  /// The corrector's result: far noisier than before, or blind to rotation. Such a gyro
+  /// stays in use, with a smaller weight.
   void set_opinion(TimePoint t, bool noisy, bool blind);
 
-  /// Is the cause one that tells of the sensor, not of somebody else's frame?
+  /// Is the cause evidence about the sensor, not about a foreign frame?
   static bool tells_of_sensor(Reject cause);
 
   [[nodiscard]] bool set_aside() const { return fault_.has_value(); }
@@ -45,7 +45,7 @@ class GyroHealth {
   /// How close two different values of late have been; 0.5 deg/s, or the frame's own step if that
   /// is larger, until any two differed. What lies within one step is not known.
   [[nodiscard]] double step_dps() const { return watch_.step_dps(); }
-  /// Has it ever said two different values? One that has not may be dead.
+  /// Has it ever sent two different values? One that has not may be dead.
   [[nodiscard]] bool ever_changed() const { return watch_.ever_changed(); }
   [[nodiscard]] const std::array<FaultRecord, kFaultCount>& records() const { return records_; }
 

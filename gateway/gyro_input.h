@@ -1,7 +1,7 @@
 #pragma once
 
-// One gyro's frames → rates in deg/s, or the cause why a frame cannot be used. Checks what the
-// frame itself tells: check value, length, alive counter, `valid` comparison, finite and in range.
+// One gyro's frames → rates in deg/s, or the cause why a frame cannot be used. Checks the
+// frame itself: check value, length, alive counter, `valid` comparison, finite and in range.
 // Stamps are judged elsewhere.
 
 #include <array>
@@ -16,7 +16,7 @@
 
 namespace vgyro::gateway {
 
-/// What a gyro's message tells besides the rate, perhaps on a page of its own: of the newest frame
+/// Another quantity in a gyro's message, perhaps on a page of its own: of the newest frame
 /// that carried it.
 class Beside {
  public:
@@ -50,14 +50,14 @@ class GyroInput {
     return result;
   }
 
-  /// What the counter tells begins anew.
+  /// The check of the counter restarts.
   void fall_silent() { e2e_.fall_silent(); }
 
   /// As the newest frame that was used carried it.
   [[nodiscard]] std::uint32_t counter() const { return e2e_.counter(); }
   [[nodiscard]] std::optional<std::uint32_t> early_turn() const { return e2e_.early_turn(); }
 
-  /// Of the newest frame that was used or told nothing else; NaN when there is none.
+  /// Of the newest frame that was used or held nothing else; NaN when there is none.
   [[nodiscard]] double temperature_c() const { return temperature_.value(); }
   [[nodiscard]] double supply_v() const { return supply_voltage_.value(); }
   /// About x, y and z.

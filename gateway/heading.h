@@ -1,9 +1,9 @@
 #pragma once
 
 // Where the vehicle's x axis points, and with it how much of the Earth's rate stands about x and y:
-// as configured while the platform calibrates, from then on by the virtual rate about z. Its doubt
-// grows with that rate's σ, with the angle turned, and with every second in which nobody told how
-// the platform turns. Reads no clock, allocates nothing.
+// as configured while the platform calibrates, from then on by the virtual rate about z. Its σ
+// grows with that rate's σ, with the angle turned, and with every second without a known
+// rate. Reads no clock, allocates nothing.
 
 #include <cstddef>
 #include <optional>
@@ -24,7 +24,7 @@ class Heading {
   /// Beyond this nothing is known of it: a uniform distribution has less.
   static constexpr double kSigmaMost_rad = 4.0;
 
-  /// Configured, or not to be told: then it answers nothing.
+  /// Configured, or not: then there is no heading.
   explicit Heading(const CalibrationPlan& calibration);
 
   /// The rate about z at `t`, with its σ and the σ of its bias; nothing where it is not valid, or

@@ -21,7 +21,7 @@ class Inheritance {
 
   /// From the setup that is given up.
   void keep(SavedState before);
-  /// They are in use again, or nobody wants them.
+  /// They are in use again, or not needed.
   void forget();
 
   /// What is worth keeping across a restart or for the next setup: the old biases, or what is known

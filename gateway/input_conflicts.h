@@ -20,8 +20,8 @@ inline constexpr std::uint32_t kSourceMask = 0xFF;
 /// Can one frame be of both?
 bool may_share_frames(const FrameMatch& a, const FrameMatch& b);
 
-/// Complains of inputs besides the gyros that cannot be told apart from another one. Signals of one
-/// message may serve several inputs.
+/// An error for inputs besides the gyros that cannot be distinguished from another one. Signals of
+/// one message may serve several inputs.
 void check_apart(TomlReader& root, const Plan& plan);
 
 /// A bus and the path of a DBC file that describes it.

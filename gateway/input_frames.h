@@ -1,7 +1,7 @@
 #pragma once
 
 // The frames that the gateway reads, made from values: the other direction of gyro_input.h. What a
-// signal cannot carry becomes the nearest that it can; bits that nobody asked for are 0.
+// signal cannot carry becomes the nearest that it can; unused bits are 0.
 
 #include <cstdint>
 #include <optional>

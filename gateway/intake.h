@@ -1,10 +1,10 @@
 #pragma once
 
 // Frames of one stream in, accepted values with their time out, or the cause why a frame cannot be
-// used. Owns the order of the questions: is the frame whole and new (E2E), does it hold a value,
-// can its stamp be believed. The live pipeline and the readers of recordings ask here, so that both
-// refuse the same. Keeps no books and knows nothing of the pipeline's states; the guard is the
-// host's and is only lent.
+// used. Owns the order of the checks: is the frame complete and new (E2E), does it hold a value,
+// is its stamp plausible. The live pipeline and the readers of recordings use it, so that both
+// refuse the same. Counts nothing and does not use the pipeline's states; the guard belongs to the
+// caller.
 
 #include <algorithm>
 #include <array>
@@ -32,8 +32,8 @@ inline constexpr std::size_t kSpeedStream = 4;
 struct StampResult {
   bool judged = false;           ///< false: the frame was not worth asking for
   std::optional<Reject> reject;  ///< kStampRepeated or kStampJump
-  bool clock_step = false;       ///< believed, and what came before is of the time before the step
-  TimePoint t;  ///< monotone; of a stamp that is believed, and of one that is repeated
+  bool clock_step = false;       ///< accepted, and earlier times are of before the step
+  TimePoint t;  ///< monotone; of a stamp that is accepted, and of one that is repeated
 
   [[nodiscard]] bool believed() const { return judged && !reject; }
 };
@@ -50,8 +50,8 @@ inline void judge_stamp(std::size_t stream, TimePoint stamp, fusion::StampGuard&
   result.clock_step = verdict == Verdict::kClockStep;
 }
 
-/// Whose stamps are judged besides those of values: nobody's, or those of frames that are their
-/// sender's own and say that the sensor is sick (GyroHealth wants their time).
+/// Whose stamps are judged in addition to those of values: none, or those of authentic frames that
+/// report a sensor fault (GyroHealth needs their time).
 enum class Timed : std::uint8_t { kValues, kSickToo };
 [[nodiscard]] bool is_timed(Reject reject, Timed timed);
 
@@ -104,7 +104,7 @@ class Intake {
   }
 
   [[nodiscard]] const Input& input() const { return input_; }
-  /// What an alive counter tells begins anew.
+  /// The check of the alive counter restarts.
   void fall_silent() { input_.fall_silent(); }
 
  private:

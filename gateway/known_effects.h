@@ -1,7 +1,7 @@
 #pragma once
 
-// What the model file knows of both gyros, taken off their readings; and what that needs to be
-// told. Without a model file every reading stays as it is.
+// Corrects the readings of both gyros for the effects in the model file; and says which inputs
+// they need. Without a model file every reading stays unchanged.
 
 #include <array>
 #include <cstddef>

@@ -13,7 +13,7 @@
 
 namespace vgyro::gateway {
 
-/// An element of the matrix may be so far off: numbers that somebody rounded to two digits.
+/// Tolerance of an element of the matrix: numbers rounded to two digits.
 inline constexpr double kMountRounding = 0.01;
 
 /// Nothing where the key is not there, or after a complaint.

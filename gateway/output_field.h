@@ -1,7 +1,7 @@
 #pragma once
 
-// A signal of somebody else's message → what it can say: the range of its values, which of its bit
-// patterns stand for "not available", and what it says while nobody fills it.
+// A signal of a foreign message → what it can carry: the range of its values, which of its bit
+// patterns mean "not available", and its value while unused.
 
 #include <cstdint>
 #include <optional>
@@ -29,7 +29,7 @@ struct RawValue {
 /// "Not available", where the file labels a value so or the rules keep one.
 std::optional<RawValue> not_available(const dbc::Signal& signal, dbc::CodeRules rules);
 
-/// What a signal says that nobody fills: not available, or the file's start value, or 0.
+/// The value of an unused signal: not available, or the file's start value, or 0.
 RawValue resting_value(const dbc::Signal& signal, dbc::CodeRules rules);
 
 }  // namespace vgyro::gateway

@@ -1,7 +1,7 @@
 #pragma once
 
-// The virtual rate as a frame of a foreign layout: the gateway takes the place of a sensor that
-// somebody already listens to. Every frame holds what the sensor's DBC file says: the rate to the
+// The virtual rate as a frame of a foreign layout: the gateway replaces a sensor that
+// receivers already use. Every frame holds what the sensor's DBC file defines: the rate to the
 // nearest step, or those about several axes, σ rounded up, validity, alive counter, check value. A
 // rate that is not valid, or beyond what its signal can carry, or whose σ is and would be
 // understated, goes out as the layout's "not available" or invalid; where the layout has no way to
@@ -57,8 +57,8 @@ class LayoutEncoder {
 };
 
 /// All layouts of a platform. One of a single rate goes out with that; one of several once all axes
-/// that speak have a new one, and never with one of another motion: an axis that has long said
-/// nothing is "not available" in it.
+/// in use have a new one, and never with rates of another motion: an axis that has long been
+/// silent is "not available" in it.
 class LayoutSet {
  public:
   /// Rates further apart than this are of different motion.

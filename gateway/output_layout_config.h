@@ -2,7 +2,7 @@
 
 // [[output.layout]]: a message of any DBC file that the virtual rate goes out in, resolved as far
 // as it can be before there is a rate: which bits, which range, what stands for "not available",
-// and what all the bits say that nobody fills. Complaints carry file and line, as gateway/config.
+// and the value of all unused bits. Errors carry file and line, as in gateway/config.
 
 #include "base/toml_reader.h"
 #include "gateway/gyro_config.h"

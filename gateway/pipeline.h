@@ -53,7 +53,7 @@ class Pipeline {
 
   [[nodiscard]] const Status& status() const;
   /// Of a platform of several axes how many there are, in the order of Plan::axes, and what the
-  /// pipeline knows of each; of two single gyros there are none.
+  /// pipeline has of each; of two single gyros there are none.
   [[nodiscard]] std::size_t axis_count() const;
   [[nodiscard]] const Status& axis_status(std::size_t place) const;
 

@@ -36,7 +36,7 @@ struct FrameMatch {
   /// PGN.
   std::vector<std::uint32_t> others = {};
 
-  /// Does a frame of this identifier carry the message? Of its bus the caller knows.
+  /// Does a frame of this identifier carry the message? The caller checks the bus.
   [[nodiscard]] bool carries(std::uint32_t frame_id, bool frame_extended) const;
 
   friend bool operator==(const FrameMatch&, const FrameMatch&) = default;
@@ -161,7 +161,7 @@ struct GyroPlan {
   friend bool operator==(const GyroPlan&, const GyroPlan&) = default;
 };
 
-/// What a gyro's message may tell besides its rate.
+/// The quantities that a gyro's message may hold besides its rate.
 inline constexpr std::array kOtherAxes{&GyroPlan::rate_x, &GyroPlan::rate_y, &GyroPlan::rate_z};
 inline constexpr std::array kBesides{&GyroPlan::temperature, &GyroPlan::supply_voltage,
                                      &GyroPlan::rate_x, &GyroPlan::rate_y, &GyroPlan::rate_z};
@@ -172,7 +172,7 @@ struct ReferencePlan {
   FrameMatch match;
   Quantity rate;  ///< of a platform of several axes: the last of those below
   E2ePlan e2e = {};
-  /// Of a platform of several axes: the rates about the vehicle's that it tells.
+  /// Of a platform of several axes: the rates about the vehicle's that it measures.
   std::array<std::optional<Quantity>, kAxes> axes = {};
 
   friend bool operator==(const ReferencePlan&, const ReferencePlan&) = default;
@@ -203,8 +203,8 @@ struct CalibrationPlan {
   double rate_dps = 0.0;        ///< true rate along the axis while calibrating at rest
   bool from_reference = false;  ///< calibrate against [reference] instead
   std::optional<double> stop_rate_dps = 0.0;  ///< true rate at a stop, where it is known
-  double doubt_dps = 0.0;  ///< 1σ of rate_dps that stays in every rate: the Earth's, of a heading
-                           ///< that nobody told
+  double doubt_dps = 0.0;  ///< 1σ of rate_dps that stays in every rate: the Earth's, of an unknown
+                           ///< heading
   /// As configured, for all axes of a platform: [calibration] rate_dps, latitude_deg, heading_deg.
   std::vector<double> axis_rate_dps = {};
   std::optional<double> latitude_deg = {};
@@ -218,7 +218,7 @@ struct CorrectorPlan {
   Method method = Method::kOptimal;
   double window_s = 10.0;
   int order = 1;                                ///< of `mutual`
-  std::array<fusion::GyroParameters, 2> gyros;  ///< what the model file knows of the noise
+  std::array<fusion::GyroParameters, 2> gyros;  ///< noise from the model file
 
   friend bool operator==(const CorrectorPlan&, const CorrectorPlan&) = default;
 };
@@ -253,7 +253,7 @@ struct OutputFlag {
   friend bool operator==(const OutputFlag&, const OutputFlag&) = default;
 };
 
-/// A signal that nobody fills, for people: "AccX", "0xFFFF, not available".
+/// A signal without a value, for people: "AccX", "0xFFFF, not available".
 struct RestingSignal {
   std::string name;
   std::string says = {};

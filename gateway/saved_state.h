@@ -1,9 +1,9 @@
 #pragma once
 
-// What the pipeline knows of its gyros, to be kept across a restart, and its form as text: TOML
-// that people can read, with a checksum over every byte of it. Reading believes nothing: a text
-// that is cut, changed, or holds a number that cannot be is refused. Where the text is kept is the
-// driver's business.
+// The pipeline's learned state of its gyros, to be kept across a restart, and its form as text:
+// TOML that people can read, with a checksum over every byte of it. Reading trusts nothing: a text
+// that is cut, changed, or holds an impossible number is refused. The driver keeps the
+// text.
 
 #include <array>
 #include <optional>
@@ -27,7 +27,7 @@ inline constexpr std::size_t kSavedStateBytesMax = 16U << 10U;
 struct SavedState {
   fusion::DriftMemory drift;
   TimePoint rate_stamp;  ///< of the last rate, on the clock of the frames
-  std::array<std::optional<double>, 2> temperature_c;  ///< of the gyros, where they tell it
+  std::array<std::optional<double>, 2> temperature_c;  ///< of the gyros, if they send it
   std::array<std::string, 2> devices;                  ///< device_of() the gyros
   double rest_rate_dps = 0.0;                          ///< what the biases were learned against
   fusion::PairVerdict pair;  ///< a contradiction, which only motion can take back

@@ -1,9 +1,9 @@
 #pragma once
 
 // What leaves the gateway: VG_Rate, and the rate in every foreign layout, whenever there is one,
-// VG_Bias with VG_Model on a grid of the bus's time and whenever somebody wants them. Owns the
-// frames with their counters, the grid, and the count of what went out. Knows no estimation: it is
-// told what the frames are to say, and times on the axis of fusion::StampGuard. Reads no clock,
+// VG_Bias with VG_Model on a grid of the bus's time and on request. Owns the
+// frames with their counters, the grid, and the count of sent frames. Contains no estimation: it
+// gets the frames' values, and times on the axis of fusion::StampGuard. Reads no clock,
 // allocates nothing.
 
 #include <cstddef>
@@ -63,13 +63,13 @@ class Sender {
   /// Precondition of both: a Turn. A rate that the frame cannot carry goes out as invalid: false
   /// then, and where it was not valid before.
   bool send_rate(const RateOutput& output);
-  /// At once, whatever the grid says.
+  /// At once, independent of the grid.
   void send_bias(const BiasOutput& bias, const ModelOutput& model);
 
   /// A sample says that time is `t`. Is a point of the grid reached? Then it is used up: send.
   bool reach_grid(TimePoint t);
   /// As above, of a timer: only where samples should have driven the grid and did not.
-  /// `sample_interval` is that of the slower stream, 0 where nobody knows: its samples, however
+  /// `sample_interval` is that of the slower stream, 0 if unknown: its samples, however
   /// slow, keep their right to drive the grid.
   bool miss_grid(TimePoint t, Duration sample_interval);
   /// When miss_grid() is true, at the earliest.

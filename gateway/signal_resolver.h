@@ -1,7 +1,7 @@
 #pragma once
 
 // Names in a configuration → bits in frames: finds message and signal in the DBC file, turns the
-// unit into the product's own, and decides which values can be believed. Complaints go to the
+// unit into the product's own, and decides which values can be used. Errors go to the
 // reader's list, with the line of the key that was wrong.
 
 #include <map>

@@ -1,6 +1,6 @@
 #pragma once
 
-// What the pipeline knows of itself: state, biases, and a counter for every cause by which a frame
+// The state of the pipeline: state, biases, and a counter for every cause for which a frame
 // was not used. Read by the daemon's STATUS line, the replay's summary and the tests.
 
 #include <array>
@@ -17,7 +17,7 @@ namespace vgyro::gateway {
 /// VG_State on the wire; the transition table is in ARCHITECTURE.md.
 enum class State : std::uint8_t {
   kWaiting = 0,      ///< no pair yet; or not calibrated, and a gyro is not in use
-  kCalibrating = 1,  ///< both heard, initial calibration not complete
+  kCalibrating = 1,  ///< both in use, initial calibration not complete
   kRunning = 2,      ///< both gyros in use
   kDegraded = 3,     ///< one gyro in use, the other timed out or was set aside
   kLost = 4,         ///< calibrated, but no gyro is in use
@@ -31,7 +31,7 @@ enum class Quality : std::uint8_t {
   kUnusable = 0,
   kOneGyro = 4,
   kDisagree = 6,              ///< both in use, but they contradict each other
-  kAmbiguous = 7,             ///< what they show can be read in two ways, and σ spans both
+  kAmbiguous = 7,             ///< two hypotheses are likely, and σ covers both
   kCalibrationUncertain = 8,  ///< the platform moved while it should have rested
   kRestored = 12,             ///< biases of an earlier run, not confirmed yet
   kTwoGyros = 15
@@ -57,16 +57,16 @@ enum class Reject : std::uint8_t {
   kDeadBand,         ///< 0 of a sensor with a dead band, while the other gyro carries on
   kRecovering,       ///< good again, but not for long enough after a fault
   kNoMeasurement,    ///< J1939's or NMEA 2000's code for "error", "not available" and the like
-  kOtherAxis         ///< of a unit that is turned: an axis that is mixed into this one is not told
+  kOtherAxis         ///< of a unit that is turned: an axis with a share in this one is missing
 };
 inline constexpr std::size_t kRejectCount = 18;
 std::string_view to_string(Reject reject);
 
-/// What became of the biases that an earlier run had saved.
+/// The use of the biases that an earlier run had saved.
 enum class Restored : std::uint8_t {
   kNothing,   ///< there was nothing to take up
   kOffered,   ///< waits for the first pair
-  kRefused,   ///< the corrector would not have it: calibrates
+  kRefused,   ///< the corrector refused it: calibrates
   kTakenUp,   ///< in use instead of a calibration, VG_Quality says `restored`
   kConfirmed  ///< in use, and a stop has been learned from since
 };
@@ -108,13 +108,13 @@ struct GyroStatus {
   std::array<std::uint64_t, kRejectCount> rejected{};
   std::uint64_t unpaired = 0;  ///< samples that found no partner: the other gyro had a gap
   bool heard = false;          ///< in use: a sample that may be used arrived within the time-out
-  std::optional<Fault> fault;  ///< at present; never kSilent, which `heard` tells
+  std::optional<Fault> fault;  ///< at present; never kSilent, which `heard` shows
   std::array<FaultRecord, kFaultCount> faults{};
   double last_rate_dps = 0.0;
   double bias_dps = 0.0;       ///< NaN until calibrated, and for `mean`, which has none
   double temperature_c = 0.0;  ///< NaN when there is none
   double supply_v = 0.0;       ///< NaN when there is none
-  /// Inputs of the model (model::Need) not heard yet: their effects are not taken back so far.
+  /// Inputs of the model (model::Need) not received yet: their effects are not corrected yet.
   std::uint8_t waits_for = 0;
 };
 
@@ -168,13 +168,13 @@ struct Status {
   std::uint64_t contradictions = 0;      ///< times that this was found not to be so
   std::uint64_t stops = 0;               ///< stops learned from
   std::uint64_t stops_refused = 0;       ///< steady, but a turn was likelier
-  std::uint64_t stops_open = 0;          ///< steady, and it could not be told which
-  bool ambiguous = false;                ///< two readings of the data are likely, and far apart
-  /// Of what may be the case, by fusion::Hypothesis.
+  std::uint64_t stops_open = 0;          ///< steady, and which of the two is open
+  bool ambiguous = false;                ///< two hypotheses are likely, and far apart
+  /// Of the hypotheses, by fusion::Hypothesis.
   std::array<double, fusion::kHypotheses> probability{};
-  std::uint64_t estimate_restarts = 0;  ///< times that the estimate was lost and began anew
+  std::uint64_t estimate_restarts = 0;  ///< times that the estimate was lost and restarted
 
-  /// Of a platform of several axes: the rotation between its units, and what has told it.
+  /// Of a platform of several axes: the rotation between its units, and its evidence.
   std::uint64_t misalignment_segments = 0;
   std::array<double, 3> misalignment_deg{};
   std::array<double, 3> misalignment_sigma_deg{};

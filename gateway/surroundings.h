@@ -1,8 +1,8 @@
 #pragma once
 
-// What the gyros' errors depend on besides the rate, gathered from the frames that tell it:
-// temperatures, supply voltages, acceleration, the angle turned so far, and time since the first
-// frame. Also what the wheels do. Values that were never heard are unknown; acceleration,
+// The quantities that the gyros' errors depend on besides the rate, from the frames that carry
+// them: temperatures, supply voltages, acceleration, the angle turned so far, and time since the
+// first frame. Also the wheels' state. Values that were never received are unknown; acceleration,
 // temperature and voltage that fall silent are held, because gravity, heat and supply go on, speed
 // is not.
 
@@ -41,14 +41,14 @@ class Surroundings {
   void begin(TimePoint t) {
     if (!begun_) set_zero(t);
   }
-  /// A sample was accepted: its time is believed.
+  /// A sample was accepted: its time is valid.
   void reach(TimePoint t) {
     const bool goes_on = begun_ && t >= zero_ && t >= newest_ && span(newest_, t) <= kLeap;
     if (!goes_on) return leap(t);
     newest_ = t;
   }
 
-  /// What the gyro itself tells of its surroundings, as far as it is in `needs` (model::Need).
+  /// The gyro's own temperature, voltage and other axes, as far as in `needs` (model::Need).
   void hear_gyro(std::size_t gyro, TimePoint t, const GyroInput& input, std::uint8_t needs);
   /// NaN is passed over.
   void add_temperature(std::size_t gyro, TimePoint t, double temperature_c);
@@ -72,7 +72,7 @@ class Surroundings {
   }
   /// Variance of the specific force's magnitude; NaN where there is no accelerometer.
   [[nodiscard]] double vibration_g2() const;
-  /// Of the inputs in `needs` (model::Need) those that were never heard.
+  /// The inputs in `needs` (model::Need) that were never received.
   [[nodiscard]] std::uint8_t missing(std::size_t gyro, std::uint8_t needs) const;
 
  private:

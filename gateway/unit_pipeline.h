@@ -27,7 +27,7 @@
 
 namespace vgyro::gateway {
 
-/// One FD frame of all axes: gathers the rates of one instant, and knows when they are all there.
+/// One FD frame of all axes: gathers the rates of one instant until they are complete.
 class SharedRates final : public RateCollector {
  public:
   explicit SharedRates(const OutputPlan& plan) : encoder_(plan) {}

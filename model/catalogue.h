@@ -30,7 +30,7 @@ enum class Nature : std::uint8_t {
   kDisturbance,  ///< frames or stamps go wrong
 };
 
-/// What an equation needs to know of the surroundings; a bit mask.
+/// The inputs that an equation needs; a bit mask.
 enum Need : std::uint8_t {
   kNeedsNothing = 0,
   kNeedsTemperature = 1U << 0U,
@@ -40,8 +40,8 @@ enum Need : std::uint8_t {
 };
 inline constexpr std::size_t kNeedCount = 4;
 
-/// Of a table that says something of each need: one row for each bit, in their order. To be
-/// asserted where it stands, so that a new need does not compile before all who must know it do.
+/// For a table with one row for each need, in the order of the bits. To be
+/// asserted beside the table, so that a new need does not compile until every table has it.
 template <typename Rows>
 constexpr bool answers_each_need(const Rows& rows) {
   if (std::size(rows) != kNeedCount) return false;
@@ -91,7 +91,7 @@ std::vector<std::string> kind_names();
 /// Null where it has none.
 const Parameter* size_parameter(Kind kind);
 
-/// Within `parameter.minimum` and `parameter.maximum`, for a sum of value and doubt.
+/// Within `parameter.minimum` and `parameter.maximum`, for a sum of value and σ.
 double within_limits(const Parameter& parameter, double value);
 
 /// What an offset or a response adds to the reading, deg/s; `rate_dps` is the late rate. 0 where it

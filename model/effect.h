@@ -64,7 +64,7 @@ struct Effect {
   Kind kind = Kind::kBias;
   Parameters parameters{};
   unsigned line = 0;       ///< of its table in the model file; 0 when it comes from elsewhere
-  Parameters sigma{};      ///< 1σ of each parameter; 0: nothing is said of its doubt
+  Parameters sigma{};      ///< 1σ of each parameter; 0: not stated
   bool ambiguous = false;  ///< another reading is as good: the whole effect may not be this gyro's
   /// Of a unit of several axes: of this one of its sensor's (0 … 2); nothing: of each of them.
   std::optional<std::size_t> of_axis = {};
@@ -90,7 +90,7 @@ struct Surroundings {
   std::array<double, 3> acceleration_g{kUnknown, kUnknown, kUnknown};
   double vibration_g2 = kUnknown;  ///< variance of |a| over the last second
   double supply_v = kUnknown;      ///< at the gyro
-  /// About x, y and z of the same unit, as it tells them: as late as what it reads itself.
+  /// About x, y and z of the same unit, as it sends them: as late as its own reading.
   std::array<double, 3> other_rate_dps{kUnknown, kUnknown, kUnknown};
   double angle_rad = 0.0;  ///< ∫Ω dt, up to whole turns
 };

@@ -20,7 +20,7 @@
 
 namespace vgyro::model {
 
-/// Of lags and clock_skew: with them the gyro feels, or tells, another instant than its stamp says.
+/// True of lags and clock_skew: with them the reading is of another instant than its stamp.
 bool moves_in_time(Kind kind);
 
 /// Ω'' / w² + 2·damping·Ω' / w + Ω = input, w = 2π·cutoff.
@@ -37,7 +37,7 @@ class Equation {
  public:
   /// A gyro that reads the rate.
   Equation() = default;
-  /// `effects` of one gyro, of any kind; those that are not told of above are passed over. Of one
+  /// `effects` of one gyro, of any kind; those outside the equation are ignored. Of one
   /// kind they act in the order given.
   explicit Equation(std::span<const Effect> effects);
 
@@ -61,8 +61,8 @@ class Equation {
   /// Whether anything moves it in time.
   [[nodiscard]] bool is_late() const { return is_late_; }
 
-  /// Ω' at this true time. `low_passed(t_s)` is the rate behind all low-passes, for
-  /// which whoever knows the rate over time has means of its own.
+  /// Ω' at this true time. `low_passed(t_s)` is the rate behind all low-passes;
+  /// the caller computes it from the rate over time.
   template <std::invocable<double> LowPassed>
   [[nodiscard]] double late_rate_dps(LowPassed&& low_passed, double true_s) const {
     return std::forward<LowPassed>(low_passed)(felt_at_s(true_s));

@@ -1,8 +1,8 @@
 #pragma once
 
 // An effect as a gyro has it whose axis points the other way: what reads −Ω with the effect reads Ω
-// with its mirror image. Of a sensor that is mounted upside down the model file tells in the
-// sensor's own sign, and the pair of gyros is told of in the vehicle's.
+// with its mirror image. For a sensor that is mounted upside down the model file uses the
+// sensor's own sign, and the pair of gyros uses the vehicle's.
 
 #include "model/effect.h"
 

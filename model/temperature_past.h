@@ -1,10 +1,11 @@
 #pragma once
 
-// What of the temperatures that a gyro went through still acts: enough to tell, for any play, where
-// a follower with that play stands. The follower begins at the first temperature, stays where it is
-// while the temperature is within the play to both sides of it, and is dragged along beyond that.
+// The part of a gyro's temperature history that still acts: enough to compute, for any play, the
+// position of a follower with that play. The follower begins at the first temperature, stays where
+// it is while the temperature is within the play to both sides of it, and is dragged along beyond
+// that.
 //
-// Of all temperatures only the extremes count that no larger swing has wiped out. They are kept as
+// Of all temperatures only the extremes count that no larger swing has erased. They are kept as
 // the follower's position over the play, which bends at each of them. A fixed number of bends is
 // kept; of more, the one that matters least goes. Adding allocates nothing.
 

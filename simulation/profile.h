@@ -31,8 +31,8 @@ struct Profile {
   [[nodiscard]] bool has_acceleration() const;
 };
 
-/// The motion as a gyro about one axis of a turned sensor feels it. `rate` is, of the rates about
-/// the vehicle's x, y and z, what makes up its own; `others` likewise of the three axes of its
+/// The motion as a gyro about one axis of a turned sensor feels it. `rate` holds the shares of the
+/// rates about the vehicle's x, y and z in its own; `others` holds those for the three axes of its
 /// unit. An axis that the profile does not have is 0.
 Profile turned(const Profile& profile, const std::array<double, 3>& rate,
                const std::array<std::array<double, 3>, 3>& others);

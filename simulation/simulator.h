@@ -27,7 +27,7 @@ struct Settings {
   std::array<Timing, 2> gyros{};
   Timing reference{};
   Timing accelerometer{};
-  /// Every frame is late by |N(0, jitter_s)|, besides the model's timestamp_jitter.
+  /// Every frame is late by |N(0, jitter_s)|, in addition to the model's timestamp_jitter.
   double jitter_s = 0.0;
   std::uint64_t seed = 1;
 };

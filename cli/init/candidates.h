@@ -22,7 +22,7 @@ struct Found {
 };
 
 /// The very identifier goes before J1939's PGN from the same sender, that before any sender; a
-/// message of the first file that knows it.
+/// message of the first file that describes it.
 std::vector<Found> find_messages(const Traffic& traffic,
                                  const std::vector<dbc::Database>& databases);
 

@@ -1,8 +1,8 @@
 #pragma once
 
 // Messages that no DBC file describes, described by trial: which fields could be rates, what their
-// scales may be, and the DBC file that says so. A log cannot tell a scale: only a gyro whose scale
-// is known, or a turn by a known angle can.
+// scales may be, and the DBC file that says so. A log does not show a scale: only a gyro whose
+// scale is known, or a turn by a known angle does.
 
 #include <memory>
 #include <optional>
@@ -30,7 +30,7 @@ void add_guessed(std::vector<Candidate>& candidates, const Guess& guess);
 /// in the log's first three seconds, which must be a rest. Nothing where samples are missing.
 std::optional<double> turned_angle(const analysis::StampedSignal& series);
 
-/// What the proposal needs besides, where one of the pair is guessed. Not moved.
+/// The proposal's further needs, where one of the pair is guessed. Not moved.
 struct Described {
   dbc::Database database;  ///< the guessed ones of the pair, with scales, counters, checks
   std::vector<std::string> remarks;  ///< how sure that is, for the configuration

@@ -155,7 +155,7 @@ Expected<void> write_all(const InitOptions& options, Material& all) {
     }
     if (auto good = check_new(path, options.force); !good) return good;
     if (auto written = write(path, all.described->text); !written) return written;
-    tell("{} describes what was found by trial.\n", path);
+    tell("{} describes the fields found by trial.\n", path);
   }
   const Circumstances circumstances =
       find_circumstances(all.messages, all.candidates, all.choice, all.traffic.begin_s());

@@ -25,7 +25,7 @@ class GatewayClient {
   /// one without a name, and the first.
   Expected<std::vector<std::string>> instances();
 
-  /// All that the gateway tells of itself. Names as on D-Bus, but as in "rate_dps"; NaN is null.
+  /// All that the gateway reports. Names as on D-Bus, but as in "rate_dps"; NaN is null.
   Expected<nlohmann::ordered_json> status();
 
   Expected<void> recalibrate() { return call("Recalibrate"); }

@@ -14,7 +14,7 @@ class ModelList(bench.Bench):
         text = self.good("model", "list").stdout.decode()
         for kind in ("scale_factor ", "angle_harmonic ", "gauss_markov ", "timestamp_jitter "):
             self.assertIn("\n  " + kind, text)
-        for part in ("reference_c", "25 unless given", '"x", "y" or "z"', "0.001 to 1e+09 s", "0, or 1e-12 to 100 deg/s", "takes it back"):
+        for part in ("reference_c", "25 unless given", '"x", "y" or "z"', "0.001 to 1e+09 s", "0, or 1e-12 to 100 deg/s", "the gateway subtracts it"):
             self.assertIn(part, text)
 
     def test_says_of_every_kind_what_shows_it_and_names_only_kinds_it_may_be_taken_for(self):

@@ -157,7 +157,7 @@ TEST_F(ReporterTest, TellsOnceThatTheDataCanBeReadInTwoWaysAndOnceThatTheyNoLong
   status.state = State::kWaiting;
   said = said_during(look);
   EXPECT_EQ(count_of("\n", said), 1U) << said;
-  EXPECT_EQ(count_of("what the gyros show is clear again: standing 99 %\n", said), 1U) << said;
+  EXPECT_EQ(count_of("one explanation of the rates remains: standing 99 %\n", said), 1U) << said;
   second();
   EXPECT_EQ(last_line.find("ambiguous"), std::string::npos) << last_line;
 }

@@ -26,8 +26,8 @@ TEST(ConditionText, CountsSteadyStretchesByWhatBecameOfThem) {
   EXPECT_EQ(stretches_text({.learned = 7, .refused = 1}),
             "8 steady stretches: 7 stops learned, 1 refused: turning together");
   EXPECT_EQ(stretches_text({.refused = 2, .open = 1}),
-            "2 steady stretches: 2 refused: turning together; 1 of these left open: standing or "
-            "turning could not be told apart");
+            "2 steady stretches: 2 refused: turning together; 1 of these left open: stop "
+            "and turn could not be distinguished");
 }
 
 TEST(ConditionText, SaysWhatToLookAtOnlyWhereMostStretchesTaughtLittle) {
