@@ -6,7 +6,7 @@ BUILD_PACKAGES=(g++ cmake ninja-build pkg-config libeigen3-dev libfmt-dev libcli
 PACKAGE_PACKAGES=(debhelper scdoc)
 RUN_PACKAGES=(gnuplot-nox fonts-dejavu-core can-utils iproute2 util-linux xz-utils)
 TEST_PACKAGES=(libgtest-dev libbenchmark-dev clang-format git python3 python3-numpy python3-can
-  python3-canmatrix python3-distributed user-mode-linux kmod dbus lintian man-db systemd mmdebstrap uidmap genext2fs e2fsprogs)
+  python3-yaml python3-canmatrix python3-distributed user-mode-linux kmod dbus lintian man-db systemd mmdebstrap uidmap genext2fs e2fsprogs)
 FUZZ_PACKAGES=(clang libclang-rt-14-dev)
 TIDY_PACKAGES=(clang-tidy)
 

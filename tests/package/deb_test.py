@@ -31,6 +31,8 @@ EXPECTED = """\
 /usr/share/man/man1/vgyro.1.gz
 /usr/share/man/man5/vgyro.toml.5.gz
 /usr/share/man/man8/vgyrod.8.gz
+/usr/share/vgyro/monitoring/vgyro-dashboard.json
+/usr/share/vgyro/monitoring/vgyro.rules.yml
 /usr/share/vgyro/vgyro.dbc
 /usr/share/vgyro/vgyro_axes.dbc
 /usr/share/vgyro/vgyro_axes_fd.dbc
