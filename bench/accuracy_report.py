@@ -230,6 +230,9 @@ POINTS = {
     "given": ("optimal, parameters given", 7, 0.8, "#103060", -0.16),
 }
 
+BOUND_LINE = "lc rgb '#404040' lw 1.5"
+LIMIT_LINE = "lc rgb '#404040' dt 3"
+
 PREAMBLE = """\
 set terminal svg size 1200,900 dynamic font 'DejaVu Sans,13' background 'white'
 set logscale y
@@ -251,7 +254,7 @@ def panel_lines(title, cells):
     tics = ", ".join("'%s' %d" % (name.replace("temperature", "temp."), i) for i, name in enumerate(scenarios))
     yield f'set title "{title}" offset 0,-0.5'
     yield f"set xtics ({tics})\nset xrange [-0.6:{len(cells) - 0.4}]"
-    plots = ["1 with lines lc rgb '#404040' lw 1.5 notitle", f"{LIMITS['estimated']} with lines lc rgb '#404040' dt 3 notitle"]
+    plots = [f"1 with lines {BOUND_LINE} notitle", f"{LIMITS['estimated']} with lines {LIMIT_LINE} notitle"]
     for name, (_, kind, size, colour, aside) in POINTS.items():
         rows = []
         for i, (_, summary) in enumerate(cells):
@@ -276,11 +279,12 @@ def key_lines():
     """The legend, once, below the panels."""
     yield "unset title\nunset border\nunset tics\nunset logscale\nset yrange [0:1]\nset xrange [0:1]"
     yield "set lmargin at screen 0\nset rmargin at screen 1\nset bmargin at screen 0\nset tmargin at screen 0.09"
-    yield "set key at screen 0.5,0.055 center center maxrows 2 width 2 samplen 1"
-    yield "plot " + ", ".join(
-        f"NaN with points pt {kind} ps {size} lw 1.5 lc rgb '{colour}' title '{title}'"
-        for title, kind, size, colour, _ in reversed(POINTS.values())
-    )
+    yield "set key at screen 0.5,0.05 center center maxrows 3 width 2 samplen 2"
+    marks = [f"NaN with points pt {kind} ps {size} lw 1.5 lc rgb '{colour}' title '{title}'"
+             for title, kind, size, colour, _ in reversed(POINTS.values())]
+    marks.append(f"NaN with lines {BOUND_LINE} title 'the bound'")
+    marks.append(f"NaN with lines {LIMIT_LINE} title 'limit with estimated parameters'")
+    yield "plot " + ", ".join(marks)
 
 
 def draw(summaries, path):

@@ -95,6 +95,7 @@ struct GapOptions {
   double time_limit_s = 0.0;          ///< 0: none
   std::uint64_t seed = 1;
   bool quiet = false;
+  std::string command;  ///< the whole command line, for the report
 };
 int run_gap(const GapOptions& options);
 

@@ -12,6 +12,7 @@
 #include "cli/commands.h"
 #include "cli/exit_code.h"
 #include "cli/gap/accept.h"
+#include "cli/gap/provenance.h"
 #include "cli/gyro_names.h"
 #include "cli/number_option.h"
 #include "cli/output/errors.h"
@@ -450,6 +451,7 @@ int run(int argc, char** argv) {
     report(*unknown);
     return kWrongUsage;
   }
+  options.gap.command = command_text(words);
   if (const auto answered = parse_words(app, std::move(words))) return *answered;
   const auto method = vgyro::gateway::method_from(options.method);
   options.check.method = method;

@@ -310,6 +310,21 @@ Expected<void> leave_evidence(const GapOptions& options, const GapInputs& inputs
   return file->close();
 }
 
+// After the work: a sum of a long recording takes a moment, and a failed run needs none.
+void tell_provenance(const GapOptions& options, const GapInputs& inputs,
+                     std::vector<AxisResult>& axes) {
+  Provenance provenance{options.command, {}};
+  for (const std::string& file : inputs.files)
+    provenance.files.push_back(input_file(file));
+  const std::vector<gap::Recording>& recordings = inputs.pairs.front().recordings;
+  for (std::size_t i = 0; i < options.measured.size(); ++i) {
+    provenance.files.push_back(input_file(options.measured[i]));
+    provenance.files.back().began = began_text(recordings[i].began_s);
+  }
+  for (AxisResult& axis : axes)
+    axis.subject.provenance = provenance;
+}
+
 }  // namespace
 
 int run_gap(const GapOptions& options) {
@@ -325,9 +340,10 @@ int run_gap(const GapOptions& options) {
   if (!inputs) return report(inputs.error());
   const auto given_text = model_text(inputs->model);
   if (!given_text) return report(given_text.error());
-  const auto axes = work_through(*inputs, options, begin);
+  auto axes = work_through(*inputs, options, begin);
   if (!axes) return report(axes.error());
   if (auto left = leave_evidence(options, *inputs, *axes); !left) return report(left.error());
+  tell_provenance(options, *inputs, *axes);
   const auto written = write(options.out, *given_text, *axes);
   if (!written) return report(written.error());
   if (options.quiet) return kDone;

@@ -10,6 +10,7 @@
 
 #include <nlohmann/json_fwd.hpp>
 
+#include "cli/gap/provenance.h"
 #include "gap/result.h"
 
 namespace vgyro::cli {
@@ -26,6 +27,7 @@ struct GapSubject {
   std::array<std::string, 2> types = {};    ///< of the gyros; empty: the configuration says none
   std::array<std::string, 2> serials = {};  ///< likewise
   std::array<std::size_t, 2> sensor_axis = {};  ///< which of the unit's own lies along it
+  Provenance provenance = {};                   ///< for the page alone
 
   /// For the model file: nothing of two single gyros, or where the kind is all the unit's.
   [[nodiscard]] std::optional<std::size_t> axis_of(model::Kind kind, std::size_t gyro) const;

@@ -51,6 +51,7 @@ void add_subject(Json& json, const GapSubject& subject) {
   json["log"] = subject.log;
   json["model"] = subject.model;
   json["gyros"] = subject.gyros;
+  json["provenance"] = provenance_json(subject.provenance);
 }
 
 Json page_data(const GapSubject& subject, const gap::Result& result,

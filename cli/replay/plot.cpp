@@ -69,6 +69,24 @@ std::string tint(unsigned colour) {
   return fmt::format("#{:06x}", mixed);
 }
 
+// A legend of long names would take three rows, and its panel has room for two. Both ends of a
+// name stay: names of one platform often begin alike.
+std::string legend_name(const std::string& name) {
+  constexpr std::size_t kMost = 20;
+  constexpr std::size_t kEnd = 10;
+  if (name.size() <= kMost) return "gyro " + name;
+  const auto inside = [&](std::size_t at) {  // a character of several bytes
+    return (static_cast<unsigned char>(name[at]) & 0xC0U) == 0x80U;
+  };
+  std::size_t head = kEnd - 1;
+  while (head > 0 && inside(head))
+    --head;
+  std::size_t tail = name.size() - kEnd;
+  while (tail < name.size() && inside(tail))
+    ++tail;
+  return "gyro " + name.substr(0, head) + "…" + name.substr(std::min(tail, name.size()));
+}
+
 // Two significant digits of the smaller one.
 std::string degrees(double value_deg) {
   const double size = std::abs(value_deg);
@@ -341,7 +359,7 @@ ReplayPlot::Panel ReplayPlot::heading_panel(const PlotTexts& texts) const {
   }
   for (std::size_t i = 0; i < 2; ++i) {
     put(text, "$rates u 1:{} w l lw 1.5 lc rgb '{}' t {}, ", 10 + i, kColours[i],
-        gnuplot_text("gyro " + texts.gyro_names[i]));
+        gnuplot_text(legend_name(texts.gyro_names[i])));
   }
   put(text, "$rates u 1:12 w l lw 1.5 dt 2 lc rgb '{}' t 'mean'", kMeanColour);
   if (valid_begun_)
@@ -351,8 +369,8 @@ ReplayPlot::Panel ReplayPlot::heading_panel(const PlotTexts& texts) const {
 
 // The ends stand in the legend: they are what one takes away.
 ReplayPlot::Panel ReplayPlot::off_panel(const PlotTexts& texts) const {
-  const std::array<std::string, 3> names{"gyro " + texts.gyro_names[0],
-                                         "gyro " + texts.gyro_names[1], "mean"};
+  const std::array<std::string, 3> names{legend_name(texts.gyro_names[0]),
+                                         legend_name(texts.gyro_names[1]), "mean"};
   std::string text = "plot ";
   const bool sigma = has([](const Bucket& b) -> const Mean& { return b.heading_sigma; });
   if (sigma) {
@@ -372,7 +390,7 @@ ReplayPlot::Panel ReplayPlot::rate_panel(const PlotTexts& texts) const {
   std::string text = "plot ";
   for (std::size_t i = 0; i < 2; ++i) {
     put(text, "$rates u 1:{} w l lc rgb '{}' t {}, ", 2 + i, kColours[i],
-        gnuplot_text("gyro " + texts.gyro_names[i]));
+        gnuplot_text(legend_name(texts.gyro_names[i])));
   }
   put(text, "$rates u 1:4 w l lc rgb '{}' t 'mean'", kMeanColour);
   if (valid_begun_)
@@ -411,8 +429,11 @@ std::string ReplayPlot::drift_range(std::size_t gyro) const {
 
 ReplayPlot::Panel ReplayPlot::drift_panel(const PlotTexts& texts, std::size_t gyro) const {
   std::string text = drift_range(gyro);
-  put(text, "plot $rates u 1:{} w p pt 7 ps 0.25 lc rgb '{}' t {}, ", 6 + gyro, kColours[gyro],
-      gnuplot_text("gyro less the virtual gyro"));
+  // The points are small, for there are many; the legend's is large enough to be seen.
+  put(text,
+      "plot $rates u 1:{} w p pt 7 ps 0.25 lc rgb '{}' notitle, "
+      "NaN w p pt 7 ps 0.8 lc rgb '{}' t 'gyro less the virtual gyro', ",
+      6 + gyro, kColours[gyro], kColours[gyro]);
   const bool sigma = gyro == 0
                          ? has([](const Bucket& b) -> const Mean& { return b.bias_sigma[0]; })
                          : has([](const Bucket& b) -> const Mean& { return b.bias_sigma[1]; });
@@ -437,7 +458,7 @@ ReplayPlot::Panel ReplayPlot::temperature_panel(const PlotTexts& texts) const {
   for (std::size_t i = 0; i < 2; ++i) {
     if (!told[i]) continue;
     put(text, "{}$rates u 1:{} w l lw 1.5 lc rgb '{}' t {}", i == 1 && told[0] ? ", " : "", 17 + i,
-        kColours[i], gnuplot_text("gyro " + texts.gyro_names[i]));
+        kColours[i], gnuplot_text(legend_name(texts.gyro_names[i])));
   }
   return {130, "Temperature, °C", text + '\n'};
 }
@@ -539,7 +560,8 @@ std::string ReplayPlot::script(const std::string& path, const PlotTexts& texts) 
       put(text, "set format x '%g'\nset xlabel 'time, {}'\n", time_unit().name);
     put(text,
         "set label 2 {} at screen {:.6f},{:.6f} left noenhanced font ',12'\n"
-        "set key at screen {:.6f},{:.6f} left bottom horizontal Left reverse noenhanced maxrows 1\n"
+        "set key at screen {:.6f},{:.6f} left bottom horizontal Left reverse noenhanced samplen 3 "
+        "maxrows 1\n"
         "set tmargin at screen {:.6f}\nset bmargin at screen {:.6f}\n{}unset label 1\n",
         gnuplot_text(panel.caption), static_cast<double>(kLeft) / kWidth,
         from_top(above - (panel.legend ? kHeading : kHeading - (kLegend - kNoLegend))),

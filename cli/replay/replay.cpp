@@ -221,6 +221,7 @@ class Replay {
     summary_.slope_sigma_dps_s = summary_.slope_dps_s;
     summary_.bias_sigma_dps = summary_.slope_dps_s;
     const std::optional<gateway::SavedState> known = pipeline_.memory();
+    if (known) keep_axes_sigma(*known);
     for (std::size_t i = 0; known && i < 2; ++i) {
       // Of several axes the first one's stands there; a summary of all has no drift.
       if (pipeline_.axis_count() == 0)
@@ -245,6 +246,17 @@ class Replay {
     }
     for (std::size_t place = 0; place < count; ++place)
       pipeline_.observe(&axis_totals_[place], place);
+  }
+
+  // An axis that is not calibrated has none.
+  void keep_axes_sigma(const gateway::SavedState& known) {
+    for (const gateway::SavedState& saved : known.axes) {
+      for (AxisSummary& axis : summary_.axes) {
+        if (axis.name != gateway::kAxisNames[saved.axis]) continue;
+        axis.bias_sigma_dps = {std::sqrt(saved.drift.bias_covariance[0]),
+                               std::sqrt(saved.drift.bias_covariance[2])};
+      }
+    }
   }
 
   void run_records(const std::string& name, canlog::LogReader& reader) {

@@ -488,9 +488,11 @@ void put_axes(fmt::memory_buffer& text, const ReplaySummary& summary, const gate
       fmt::format_to(to, ", mean {:+.6f} deg/s", mean_of(axis.rate_sum_dps, axis.rates));
     for (std::size_t i = 0; i < 2; ++i) {
       if (!std::isfinite(status.gyros[i].bias_dps)) continue;
-      fmt::format_to(to, ", drift of {} {:+.6f}", plan.gyros[i].name, status.gyros[i].bias_dps);
+      fmt::format_to(to, "\n  drift of {} now {}", plan.gyros[i].name,
+                     drift_text(status.gyros[i].bias_dps, axis.bias_sigma_dps[i]));
     }
-    fmt::format_to(to, ", {} stops", status.stops);
+    if (const std::string stops = stops_text(gateway::steady_stretches(status)); !stops.empty())
+      fmt::format_to(to, "\n  {}", stops);
     for (std::size_t i = 0; i < 2; ++i)
       put_faults(text, status.gyros[i], summary.first_s);
   }

@@ -70,6 +70,7 @@ struct AxisSummary {
   gateway::Status status;
   double rate_sum_dps = 0.0;  ///< over the valid virtual rates
   std::uint64_t rates = 0;
+  std::array<double, 2> bias_sigma_dps{};  ///< of the biases, at the end; 0 where it is not known
 };
 
 struct ReplaySummary {

@@ -2,8 +2,10 @@
 """`vgyro gap` and `vgyro compare` from the outside: the files and fields that other programs rely on, and what bad input
 gets. Whether the right effects are found is the blind test's business."""
 
+import hashlib
 import json
 import os
+import re
 import resource
 import signal
 import struct
@@ -126,6 +128,11 @@ def recording(seconds=90.0, hz=50.0, rest=True, gyros=(1, 2), reference_until=1e
 
 
 LOG = recording()
+
+
+def page_data(page):
+    """What a report page draws."""
+    return json.loads(re.search(r'<script type="application/json" id="data">(.*?)</script>', page.decode(), re.DOTALL).group(1))
 
 
 class GapBench(bench.Bench):
@@ -260,8 +267,15 @@ class Gap(GapBench):
         self.assertEqual(sorted(second), sorted(first))
         for name in ("gap.json", "model.toml"):
             self.assertEqual(second[name], first[name], name)
-        # The page names the files that it was made from, as they were given.
-        self.assertEqual(second["report.html"].replace(str(self.folder).encode() + b"/", b""), first["report.html"])
+        # The page names the files that it was made from, as they were given, and the command.
+        pages = [page_data(files["report.html"]) for files in (first, second)]
+        for page in pages:
+            origin = page.pop("provenance")
+            for file in origin["files"][1:]:  # the configuration is another one by now
+                self.assertEqual(file["sha256"], hashlib.sha256((self.folder / file["path"]).read_bytes()).hexdigest(), file)
+            self.assertTrue(origin["command"].startswith("vgyro gap "), origin)
+            self.assertRegex(origin["files"][-1]["began"], r"^\d{4}-\d\d-\d\d \d\d:\d\d:\d\d UTC$|^no date: the stamps begin at ")
+        self.assertEqual(json.loads(json.dumps(pages[1]).replace(str(self.folder) + "/", "")), pages[0])
 
     def test_keeps_a_folder_that_holds_anything_else(self):
         (self.folder / "out").mkdir()

@@ -15,7 +15,11 @@ inline constexpr const char* kHostile =
     "</script><img src=x onerror=\"console.error('in')\">&amp; {{data}}";
 
 inline GapSubject made_up_subject() {
-  return {"vgyro.toml", "", kHostile, {kHostile, "b"}};
+  GapSubject subject{"vgyro.toml", "", kHostile, {kHostile, "b"}};
+  const std::string sum = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad";
+  subject.provenance = {"vgyro gap --config vgyro.toml --measured '" + std::string(kHostile) + "'",
+                        {{"vgyro.toml", sum, {}}, {kHostile, sum, "2026-05-04 08:00:12 UTC"}}};
+  return subject;
 }
 
 // A slow wave, and a band or bars of the given σ.

@@ -185,6 +185,12 @@ class Page(unittest.TestCase):
         self.assertLess(said.start(), text.index("nat"), "degrees come first")
         self.assertIn("−421.2 ± 3.1 ppm", text)
 
+    def test_says_where_it_comes_from(self):
+        text = self.look()["text"]
+        for part in ("Where this comes from", "vgyro gap --config vgyro.toml --measured '" + HOSTILE, "2026-05-04 08:00:12 UTC",
+                     "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad"):
+            self.assertIn(part, text)
+
     def test_prints_on_four_pages(self):
         if not CHROMIUM:
             self.skipTest("chromium is not installed")

@@ -39,12 +39,21 @@ function colour(name) {
   return getComputedStyle(document.documentElement).getPropertyValue("--" + name).trim();
 }
 
+// A name of the catalogue breaks after its "_", never inside a word.
+const breakable = (name) => name.split(/(?<=_)/).flatMap((part, i) => (i > 0 ? [make("wbr"), part] : [part]));
+const kindCell = (kind) => ({ kind: breakable(kind) });
+
+// A cell is a text, a node, { number } or { kind }.
+function tableCell(part, label) {
+  const named = { "data-label": label };
+  if (typeof part !== "object" || part instanceof Node) return make("td", label ? named : {}, part);
+  return "kind" in part ? make("td", { class: "kind", ...named }, part.kind) : make("td", { class: "number", ...named }, part.number);
+}
+
 function table(head, rows) {
-  const cell = (tag, content, numeric, label) => make(tag, { ...(numeric ? { class: "number" } : {}), ...(label ? { "data-label": label } : {}) }, content);
   return make("div", { class: "scroll" }, make("table", {},
-    make("thead", {}, make("tr", {}, head.map((text) => cell("th", text)))),
-    make("tbody", {}, rows.map((row) => make("tr", {}, row.map((part, i) =>
-      typeof part === "object" && !(part instanceof Node) ? cell("td", part.number, true, head[i]) : cell("td", part, false, head[i])))))));
+    make("thead", {}, make("tr", {}, head.map((text) => make("th", {}, text)))),
+    make("tbody", {}, rows.map((row) => make("tr", {}, row.map((part, i) => tableCell(part, head[i])))))));
 }
 
 const sentence = (text) => text.replace(/^what /, "What ").replace(/\.?$/, "."); // it may begin with a sensor's name
@@ -214,7 +223,7 @@ function axesOpening() {
 }
 
 function axesEffects() {
-  const rows = data.axes.flatMap((axis) => axis.effects.map((effect) => [axis.axis, gyroName(effect.gyro) + ownAxis(effect), effect.kind,
+  const rows = data.axes.flatMap((axis) => axis.effects.map((effect) => [axis.axis, gyroName(effect.gyro) + ownAxis(effect), kindCell(effect.kind),
     { number: valueOf(effect) }, effect.applied ? "yes" : "no", readings(effect) || "–"]));
   return rows.length === 0 ? [] : [make("h2", {}, "What was found"), table(["axis", "gyro", "effect", "value ± σ", "in model.toml", "may also be"], rows)];
 }
@@ -419,7 +428,7 @@ function rounds() {
   if (data.effects.length === 0) return [];
   const rows = data.effects.map((effect, i) => [
     { number: String(i + 1) }, { number: number(effect.gap_before, 4) }, { number: number(effect.gap_after, 4) },
-    gyroName(effect.gyro), effect.kind, { number: valueOf(effect) }, { number: effect.p_value > 0 ? number(effect.p_value, 2) : "≈ 0" }, effect.applied ? "yes" : "no", readings(effect) || "–"]);
+    gyroName(effect.gyro), kindCell(effect.kind), { number: valueOf(effect) }, { number: effect.p_value > 0 ? number(effect.p_value, 2) : "≈ 0" }, effect.applied ? "yes" : "no", readings(effect) || "–"]);
   return [make("h2", {}, "What was found"),
     table(["round", "gap before", "after", "gyro", "effect", "value ± σ", "p", "in model.toml", "may also be"], rows)];
 }
@@ -470,6 +479,14 @@ function untold() {
     table(["gyro: effect", "why", "what would tell"], data.not_told.map((line) => [line.who, line.why, line.experiment || "–"]))];
 }
 
+function provenance() {
+  const { version, command, files } = data.provenance;
+  const sum = (file) => make("span", { class: "sum" }, file.sha256 || "no regular file");
+  return [make("h2", {}, "Where this comes from"),
+    make("p", {}, `vgyro ${version}: `, make("code", {}, command)),
+    table(["file", "SHA-256", "first stamp"], files.map((file) => [file.path, sum(file), file.began || "–"]))];
+}
+
 const GLOSSARY = [
   ["Gap, nats per sample", "How much less likely the recording is under the model than it should be: the negative log-likelihood of a sample, less what " +
     "simulations of the final model score. At a gap of 0.1 every sample is, on the average, e^0.1 = 1.1 times less likely than it could be. Counted on samples that took no part in naming or fitting."],
@@ -487,8 +504,8 @@ function glossary() {
 }
 
 document.title = `vgyro gap${data.axis ? ` about ${data.axis}` : ""}: ${data.log}`;
-const sections = data.axes ? [axesOpening(), axesEffects(), axesRemains(), axesNotes(), glossary()]
-  : [opening(), rounds(), effects(), residuals(), remains(), untold(), glossary()];
+const sections = data.axes ? [axesOpening(), axesEffects(), axesRemains(), axesNotes(), provenance(), glossary()]
+  : [opening(), rounds(), effects(), residuals(), remains(), untold(), provenance(), glossary()];
 document.getElementById("page").append(...sections.flat(2));
 plots.forEach(draw);
 let wasNarrow = document.documentElement.clientWidth < NARROW_PX;
