@@ -253,7 +253,7 @@ class Picture(Axes):
         self.assertFalse((self.folder / "drift.svg").exists())
         pictures = [self.read(f"drift-{axis}.svg") for axis in AXES]
         for axis, picture in zip(AXES, pictures):
-            self.assertIn(f"in.log about {axis}: optimal", picture)
+            self.assertIn(f"in.log about {axis}, method optimal", picture)
             self.assertIn("virtual gyro", picture)
         self.assertEqual(len(set(pictures)), 3)
 
