@@ -343,18 +343,17 @@ Drive Observations::whole() const {
 
 // What a gyro feels less the true rate, at each sample that holds it: what delay, low-passes and
 // clock skew make of the motion.
-Eigen::VectorXd Observations::lateness_dps(std::size_t gyro, const Effects& moving, By by) const {
+Eigen::VectorXd Observations::lateness_dps(std::size_t gyro, const Effects& moving) const {
   if (moving.empty()) return Eigen::VectorXd::Zero(size());
   const auto found =
-      std::find_if(remembered_.begin(), remembered_.end(), [&](const Remembered& one) {
-        return one.gyro == gyro && one.by == by && one.moving == moving;
-      });
+      std::find_if(remembered_.begin(), remembered_.end(),
+                   [&](const Remembered& one) { return one.gyro == gyro && one.moving == moving; });
   if (found != remembered_.end()) return found->values;
   Eigen::VectorXd lateness = Eigen::VectorXd::Zero(size());
   for (const Drive& drive : is_one() ? std::vector<Drive>{whole()} : drives) {
     const Prediction prediction(moving, *drive.signals[gyro]);
     const SampledCurve& other_dps = drive.signals[gyro]->other_reading_dps;
-    const bool by_other = by == By::kReadings && !prediction.passes_low() && !other_dps.empty();
+    const bool by_other = !prediction.passes_low() && !other_dps.empty();
     for (std::size_t place = drive.first; place < drive.first + drive.count; ++place) {
       if (share_of(channel[place], gyro) == 0.0) continue;
       const double at_s = t_s[place] - drive.from_s;
@@ -363,7 +362,7 @@ Eigen::VectorXd Observations::lateness_dps(std::size_t gyro, const Effects& movi
                    : prediction.late_dps(at_s) - rate[gyro][place].value;
     }
   }
-  Remembered one{gyro, by, moving, lateness};
+  Remembered one{gyro, moving, lateness};
   if (remembered_.size() < kRemembered) {
     remembered_.push_back(std::move(one));
   } else {
@@ -386,14 +385,10 @@ void Observations::add(std::size_t gyro, const Effects& added, const Eigen::Vect
 }
 
 Eigen::VectorXd Observations::contribution(std::size_t gyro, const Effects& effects) const {
-  return contribution(gyro, effects, By::kReadings);
-}
-
-Eigen::VectorXd Observations::contribution(std::size_t gyro, const Effects& effects, By by) const {
   Eigen::VectorXd sum = Eigen::VectorXd::Zero(size());
   if (!holds[gyro]) return sum;
   const Effects moving = only(effects, gyro, is_moving);
-  const Eigen::VectorXd lateness = lateness_dps(gyro, moving, by);
+  const Eigen::VectorXd lateness = lateness_dps(gyro, moving);
   if (!moving.empty()) {
     for (Eigen::Index i = 0; i < size(); ++i)
       sum[i] = share_of(channel[static_cast<std::size_t>(i)], gyro) * lateness[i];
@@ -403,22 +398,21 @@ Eigen::VectorXd Observations::contribution(std::size_t gyro, const Effects& effe
   return sum;
 }
 
-Eigen::VectorXd Observations::late_with(const Effects& others, const Effect& effect, By by) const {
+Eigen::VectorXd Observations::late_with(const Effects& others, const Effect& effect) const {
   Effects with = late_part(others, effect.gyro);
   with.push_back(effect);
-  return contribution(effect.gyro, with, by);
+  return contribution(effect.gyro, with);
 }
 
 // An offset or a response sees what is late already; what is late moves what responds to it.
 Eigen::VectorXd Observations::contribution_beside(const Effects& others,
                                                   const Effect& effect) const {
   if (is_moving(effect))
-    return late_with(others, effect, By::kReadings) -
-           contribution(effect.gyro, late_part(others, effect.gyro));
+    return late_with(others, effect) - contribution(effect.gyro, late_part(others, effect.gyro));
   Eigen::VectorXd sum = Eigen::VectorXd::Zero(size());
   if (holds[effect.gyro])
-    add(effect.gyro, {effect},
-        lateness_dps(effect.gyro, only(others, effect.gyro, is_moving), By::kReadings), sum);
+    add(effect.gyro, {effect}, lateness_dps(effect.gyro, only(others, effect.gyro, is_moving)),
+        sum);
   return sum;
 }
 
@@ -434,8 +428,7 @@ Eigen::VectorXd Observations::derivative(const Effects& others, const Effect& ef
   above.parameters[free.parameter] += step;
   below.parameters[free.parameter] -= step;
   const auto at = [&](const Effect& moved) {
-    return is_moving(moved) ? late_with(others, moved, By::kMotion)
-                            : contribution_beside(others, moved);
+    return is_moving(moved) ? late_with(others, moved) : contribution_beside(others, moved);
   };
   return (at(above) - at(below)) / (2.0 * step);
 }

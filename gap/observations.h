@@ -107,21 +107,14 @@ class Observations {
 
  private:
   [[nodiscard]] Drive whole() const;
-  /// By what lateness is reckoned where the other gyro tells the motion: by its readings as they
-  /// are, whose noise is late with them; or by the motion in them, which is how a fit should move:
-  /// by the slopes of the noise its steps would be far too small.
-  enum class By { kReadings, kMotion };
-  [[nodiscard]] Eigen::VectorXd lateness_dps(std::size_t gyro, const Effects& moving, By by) const;
-  [[nodiscard]] Eigen::VectorXd contribution(std::size_t gyro, const Effects& effects, By by) const;
-  [[nodiscard]] Eigen::VectorXd late_with(const Effects& others, const model::Effect& effect,
-                                          By by) const;
+  [[nodiscard]] Eigen::VectorXd lateness_dps(std::size_t gyro, const Effects& moving) const;
+  [[nodiscard]] Eigen::VectorXd late_with(const Effects& others, const model::Effect& effect) const;
   void add(std::size_t gyro, const Effects& added, const Eigen::VectorXd& lateness,
            Eigen::VectorXd& sum) const;
 
   /// The last answers of lateness_dps, which are dear and asked for again and again.
   struct Remembered {
     std::size_t gyro = 0;
-    By by = By::kReadings;
     Effects moving;
     Eigen::VectorXd values;
   };
