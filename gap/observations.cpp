@@ -172,8 +172,8 @@ void set_surroundings(Observations& data, std::size_t gyro) {
   for (std::size_t i = 0; i < n; ++i) {
     data.rate[gyro][i] = signals.motion.rate(data.t_s[i]);
     data.surroundings[gyro][i] = signals.at(data.t_s[i]);
-    if (!signals.other_reading_dps.empty())
-      data.rate_by_other_dps[gyro].push_back(signals.other_reading_dps.value_at(data.t_s[i]));
+    if (!signals.motion_by_other.curve().empty())
+      data.rate_by_other_dps[gyro].push_back(signals.motion_by_other.curve().value_at(data.t_s[i]));
   }
   data.excitation[gyro] = excitation_of(data, gyro);
 }
@@ -352,14 +352,12 @@ Eigen::VectorXd Observations::lateness_dps(std::size_t gyro, const Effects& movi
   Eigen::VectorXd lateness = Eigen::VectorXd::Zero(size());
   for (const Drive& drive : is_one() ? std::vector<Drive>{whole()} : drives) {
     const Prediction prediction(moving, *drive.signals[gyro]);
-    const SampledCurve& other_dps = drive.signals[gyro]->other_reading_dps;
-    const bool by_other = !prediction.passes_low() && !other_dps.empty();
+    const bool by_other = &prediction.on_time() == &drive.signals[gyro]->motion_by_other;
     for (std::size_t place = drive.first; place < drive.first + drive.count; ++place) {
       if (share_of(channel[place], gyro) == 0.0) continue;
-      const double at_s = t_s[place] - drive.from_s;
       lateness[static_cast<Eigen::Index>(place)] =
-          by_other ? prediction.late_dps(at_s, other_dps) - rate_by_other_dps[gyro][place]
-                   : prediction.late_dps(at_s) - rate[gyro][place].value;
+          prediction.late_dps(t_s[place] - drive.from_s) -
+          (by_other ? rate_by_other_dps[gyro][place] : rate[gyro][place].value);
     }
   }
   Remembered one{gyro, moving, lateness};

@@ -59,9 +59,6 @@ constexpr double kLineShare = 0.05;
 constexpr double kHeldOutShare = 1.0 / 3.0;
 constexpr double kProofSigmas = 2.5;
 constexpr double kProofShare = 0.8;
-// Names that did not prove themselves, one after the other: beyond that what is there is not in the
-// catalogue, and only resembles one thing after another.
-constexpr std::size_t kBarredMax = 3;
 // A starting model's noise is known at best to a hundredth, and is written with as many digits.
 constexpr double kStartingNoiseDoubt = 0.01;
 // Shares of a timing effect's statistic that interpolation leaves behind.
@@ -388,7 +385,7 @@ void Search::look(std::size_t place, Round& round) {
   const Regression& regression = regressions_[place];
   const Fit null = regression.fit(terms(place), noise_);
   keep_noise(place, null.noise);
-  std::vector<Score> scores = without_barred(scan(place).scores(null, null.noise));
+  std::vector<Score> scores = scan(place).scores(null, null.noise);
   for (const Score& one : scores) {
     if (is_timing(one.effect)) round.timing.push_back(one);
   }
@@ -399,58 +396,32 @@ void Search::look(std::size_t place, Round& round) {
   // Where the noise has not grown the model's would show the same.
   if (grown || knows_no_noise(place)) {
     const PairNoise modelled = this->modelled(null.noise);
-    const std::vector<Score> more = without_barred(scan(place).scores(null, modelled));
+    const std::vector<Score> more = scan(place).scores(null, modelled);
     for (Found& one : refitted(place, null, modelled, more, kRefitsMax))
       found.push_back(std::move(one));
   }
   for (Found& one : found) {
-    if (!is_plausible(one.effect) || is_barred(one.effect)) continue;
+    if (!is_plausible(one.effect)) continue;
     if (grown) one.needed = kStatisticMinAgainstNoise;
     round.candidates.push_back(std::move(one));
   }
 }
 
-bool Search::is_barred(const Effect& effect) const {
-  return std::any_of(barred_.begin(), barred_.end(),
-                     [&](const Reading& one) { return same_reading(one, reading_of(effect)); });
-}
-
-std::vector<Score> Search::without_barred(std::vector<Score> scores) const {
-  scores.erase(std::remove_if(scores.begin(), scores.end(),
-                              [&](const Score& one) { return is_barred(one.effect); }),
-               scores.end());
-  return scores;
-}
-
-// The likeliest that proves itself. What does not is left out until another name is found, beside
-// which it may.
 bool Search::add_round() {
-  barred_.clear();
-  while (barred_.size() < kBarredMax) {
-    Round round;
-    for (std::size_t place = 0; place < regressions_.size(); ++place) {
-      if (!is_over(kLeftToCheck)) look(place, round);
-    }
-    // The best of some of the proposals may be none of all of them.
-    if (is_over(kLeftToCheck)) {
-      leave_open("whether there are further effects");
-      return false;
-    }
-    const auto best = likeliest(round.candidates);
-    if (best == round.candidates.end() || best->margin() < 0.0) return false;
-    const bool judged = is_timing(best->effect) && !study_->recording().has_reference;
-    Found taken = judged ? judge_timing(*best, round.timing) : *best;
-    barred_.push_back(reading_of(taken.effect));
-    if (judged && !is_barred(best->effect)) barred_.push_back(reading_of(best->effect));
-    if (taken.margin() < 0.0 || is_left_of_timing(taken)) continue;
-    if (add(std::move(taken))) return true;
+  Round round;
+  for (std::size_t place = 0; place < regressions_.size(); ++place) {
+    if (!is_over(kLeftToCheck)) look(place, round);
   }
-  return false;
-}
-
-// False, and all as before, when it does not prove itself.
-bool Search::add(Found taken) {
-  const std::vector<Found> before = found_;
+  // The best of some of the proposals may be none of all of them.
+  if (is_over(kLeftToCheck)) {
+    leave_open("whether there are further effects");
+    return false;
+  }
+  const auto best = likeliest(round.candidates);
+  if (best == round.candidates.end() || best->margin() < 0.0) return false;
+  const bool judged = is_timing(best->effect) && !study_->recording().has_reference;
+  Found taken = judged ? judge_timing(*best, round.timing) : *best;
+  if (taken.margin() < 0.0 || is_left_of_timing(taken)) return false;
   if (taken.companion) {
     found_.push_back(taken);
     found_.back().effect = *taken.companion;
@@ -461,12 +432,7 @@ bool Search::add(Found taken) {
   const bool is_step = row(found_.back().effect.kind).finder == Finder::kStep;
   settle();
   if (is_step) place_again();
-  const std::size_t last = found_.size() - 1;
-  if (found_.size() > before.size() + 1 || (keeps_its_size(last) && is_proven(last))) return true;
-  doubtful_.push_back(found_.back());
-  found_ = before;
-  settle();
-  return false;
+  return true;
 }
 
 // Of what goes with the temperature the zero is no gyro's own: where a line, or a line and a
@@ -685,24 +651,20 @@ void Search::delete_backward() {
   }
 }
 
-bool Search::keeps_its_size(std::size_t index) const {
-  const Found& one = found_[index];
-  if (!row(one.effect.kind).keeps_size) return true;
-  const std::size_t place = place_of(one.effect);
-  const Effects all = terms(place);
-  const auto at =
-      static_cast<std::size_t>(std::find(all.begin(), all.end(), one.effect) - all.begin());
-  return !change_over_time(regressions_[place], all, at, noise_).is_beyond_chance(one.statistic);
-}
-
 // What is in the catalogue keeps its size throughout; what only resembles it does not.
 void Search::reject_unsteady() {
   std::vector<bool> wrong = pieces_of_something_else(found_);
   for (std::size_t i = 0; i < found_.size(); ++i) {
     const Found& one = found_[i];
     if (is_over(kLeftToScore)) found_[i].unchecked = true;
-    if (wrong[i] || !one.is_name() || found_[i].unchecked) continue;
-    wrong[i] = !keeps_its_size(i);
+    if (wrong[i] || !one.is_name() || found_[i].unchecked || !row(one.effect.kind).keeps_size)
+      continue;
+    const std::size_t place = place_of(one.effect);
+    const Effects all = terms(place);
+    const auto index =
+        static_cast<std::size_t>(std::find(all.begin(), all.end(), one.effect) - all.begin());
+    wrong[i] =
+        change_over_time(regressions_[place], all, index, noise_).is_beyond_chance(one.statistic);
   }
   if (std::none_of(wrong.begin(), wrong.end(), [](bool one) { return one; })) return;
   std::vector<Found> kept;
@@ -738,17 +700,14 @@ bool Search::is_sure_by_residual(std::size_t index) {
 
 // A name foretells samples that had no part in it: of what the fit gains a third, for they are a
 // quarter of all. One that does not, within what chance does to such a gain, is none.
-bool Search::is_proven(std::size_t index) {
-  const double expected = found_[index].statistic * kHeldOutShare;
-  const double chance = 2.0 * kProofSigmas * std::sqrt(std::max(0.0, expected));
-  const double needed = std::max(0.0, expected - std::max(chance, kProofShare * expected));
-  return is_sure_by_residual(index) && held_out_gain(index) >= needed;
-}
-
 void Search::reject_unproven() {
   bool any = false;
   for (std::size_t i = 0; i < found_.size();) {
-    if (!found_[i].is_name() || is_noise(found_[i]) || is_proven(i)) {
+    const double expected = found_[i].statistic * kHeldOutShare;
+    const double chance = 2.0 * kProofSigmas * std::sqrt(std::max(0.0, expected));
+    const double needed = std::max(0.0, expected - std::max(chance, kProofShare * expected));
+    if (!found_[i].is_name() || is_noise(found_[i]) ||
+        (is_sure_by_residual(i) && held_out_gain(i) >= needed)) {
       ++i;
       continue;
     }
@@ -759,18 +718,6 @@ void Search::reject_unproven() {
     i = 0;
   }
   if (any) replace_round();
-}
-
-// What was left out when it was tried, and is in nothing that was found since.
-void Search::keep_doubtful() {
-  for (const Found& one : doubtful_) {
-    const auto is_it = [&](const Found& other) {
-      return same_reading(reading_of(other.effect), reading_of(one.effect));
-    };
-    if (std::none_of(found_.begin(), found_.end(), is_it) &&
-        std::none_of(rejected_.begin(), rejected_.end(), is_it) && is_barred(one.effect))
-      rejected_.push_back(one);
-  }
 }
 
 void Search::noise_rounds() {
@@ -859,7 +806,6 @@ void Search::run() {
     if (!add_round()) break;
     if (found().size() > 1) replace_round();
   }
-  keep_doubtful();
   tell("weighing rivals", kShareRivals);
   check();
   tell("fitting the noise", kShareNoise);

@@ -85,12 +85,6 @@ class Search {
   void look_at_temperature(std::size_t place, const Fit& null, const PairNoise& start,
                            std::vector<Found>& found) const;
   bool add_round();
-  bool add(Found taken);
-  [[nodiscard]] bool is_barred(const model::Effect& effect) const;
-  [[nodiscard]] std::vector<Score> without_barred(std::vector<Score> scores) const;
-  [[nodiscard]] bool keeps_its_size(std::size_t index) const;
-  bool is_proven(std::size_t index);
-  void keep_doubtful();
   void free_reference();
   void drop_lone_references();
   [[nodiscard]] bool is_left_of_timing(const Found& one) const;
@@ -121,8 +115,6 @@ class Search {
   Effects known_;
   std::vector<Found> found_;
   std::vector<Found> rejected_;
-  std::vector<Reading> barred_;          ///< that a round has tried
-  std::vector<Found> doubtful_;          ///< that did not prove themselves when they were tried
   std::array<bool, 2> unknown_noise_{};  ///< the model says nothing of it
   Effects starting_noise_;               ///< of such gyros, once it is fitted
   Effects first_starting_;

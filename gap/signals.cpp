@@ -390,11 +390,8 @@ Prediction::Prediction(std::span<const model::Effect> effects, const Signals& si
 }
 
 double Prediction::late_dps(double t_s) const {
-  return late_dps(t_s, (low_passed_ ? *low_passed_ : on_time()).curve());
-}
-
-double Prediction::late_dps(double t_s, const SampledCurve& felt_dps) const {
-  return equation_.late_rate_dps([&](double felt_at_s) { return felt_dps.value_at(felt_at_s); },
+  const SampledCurve& felt = (low_passed_ ? *low_passed_ : on_time()).curve();
+  return equation_.late_rate_dps([&](double felt_at_s) { return felt.value_at(felt_at_s); },
                                  equation_.true_time_s(t_s));
 }
 

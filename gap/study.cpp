@@ -512,13 +512,8 @@ void Study::learn_motion_of_pair(const Effects& effects, bool anew) {
   std::vector<double> rate_dps;
   for (int round = 0; round < kMotionRounds; ++round) {
     std::array<std::vector<double>, 2> told;
-    for (std::size_t gyro = 0; gyro < 2; ++gyro) {
+    for (std::size_t gyro = 0; gyro < 2; ++gyro)
       told[gyro] = beside[gyro].taken_off(readings[gyro], *signals[gyro]);
-      // The rate is set to the known one at rest: a drift would be an edge there, which looks late.
-      // What a coarse gyro reads at rest is not what it reads too much elsewhere.
-      if (!is_coarse(gyro))
-        take_off_drift_at_rest(facts_->rest, t_s, recording().rest_rate_dps, told[gyro]);
-    }
     std::vector<double> next_dps(t_s.size());
     for (std::size_t i = 0; i < t_s.size(); ++i)
       next_dps[i] = weight[0] * told[0][i] + weight[1] * told[1][i];
@@ -529,11 +524,7 @@ void Study::learn_motion_of_pair(const Effects& effects, bool anew) {
     }
     const bool settled = round > 0 && greatest_change(next_dps, rate_dps) < same_dps;
     rate_dps = std::move(next_dps);
-    if (!settled && round + 1 < kMotionRounds) continue;
-    // As motion_of() left them: at rest they stand on the known rate.
-    for (std::size_t gyro = 0; gyro < 2; ++gyro)
-      signals[gyro]->other_reading_dps = band_limited(SampledCurve(t_s, told[1 - gyro]));
-    break;
+    if (settled) break;
   }
 }
 

@@ -27,8 +27,6 @@ constexpr double kWindowSquare = 0.375;
 constexpr std::size_t kReach = 10;
 constexpr double kAbove = 1.5;
 constexpr double kLine = 20.0;
-// Samples between which a cubic loses nothing of what lies below half the sampling rate.
-constexpr std::size_t kFiner = 4;
 // Of a step: an instant of the even grid is a sample's.
 constexpr double kSameInstant = 2e-4;
 
@@ -54,7 +52,9 @@ struct Line {
   double middle = 0.0;
   double slope = 0.0;
 
-  [[nodiscard]] double at(double i) const { return middle + slope * (i - 0.5 * (kStretch - 1.0)); }
+  [[nodiscard]] double at(std::size_t i) const {
+    return middle + slope * (static_cast<double>(i) - 0.5 * (kStretch - 1.0));
+  }
 };
 
 Line line_through(const double* value) {
@@ -69,15 +69,6 @@ Line line_through(const double* value) {
   }
   line.slope = products / squares;
   return line;
-}
-
-// Of so many samples, the first of which stands `first` sampling intervals behind its beginning.
-std::vector<double> hann(std::size_t samples, double first) {
-  std::vector<double> window(samples);
-  for (std::size_t i = 0; i < samples; ++i)
-    window[i] = 0.5 - 0.5 * std::cos(2.0 * std::numbers::pi * (static_cast<double>(i) + first) /
-                                     static_cast<double>(samples));
-  return window;
 }
 
 // Frequencies weighed by how far they stand above the noise.
@@ -102,9 +93,9 @@ void weigh(std::vector<std::complex<double>>& spectrum, double white_power) {
   }
 }
 
-// What is done with the spectrum of each stretch; `finer`: samples out for each one in.
-template <class Weigh>
-SampledCurve filtered(const SampledCurve& curve, std::size_t finer, const Weigh& weigh_spectrum) {
+}  // namespace
+
+SampledCurve without_noise(const SampledCurve& curve, double noise_variance) {
   if (curve.empty()) return curve;
   const double step_s = curve.interval_s();
   const auto n = static_cast<std::size_t>((curve.to_s() - curve.from_s()) / step_s) + 1;
@@ -112,48 +103,27 @@ SampledCurve filtered(const SampledCurve& curve, std::size_t finer, const Weigh&
   for (std::size_t i = 0; i < n; ++i)
     t_s[i] = curve.from_s() + step_s * static_cast<double>(i);
   const std::vector<double> value = on_grid(curve, t_s);
-  // Behind the transform as before it, at the instants of the samples and at those between them.
-  const std::vector<double> window = hann(kStretch * finer, 0.5 * static_cast<double>(finer));
+  std::vector<double> window(kStretch);
+  for (std::size_t i = 0; i < kStretch; ++i)
+    window[i] = 0.5 - 0.5 * std::cos(2.0 * std::numbers::pi * (static_cast<double>(i) + 0.5) /
+                                     static_cast<double>(kStretch));
+  const double white_power = noise_variance * kWindowSquare * kStretch;
   Eigen::FFT<double> transform;
   transform.SetFlag(Eigen::FFT<double>::HalfSpectrum);
-  std::vector<double> sum(value.size() * finer, 0.0);
+  std::vector<double> sum(value.size(), 0.0);
   std::vector<double> part(kStretch);
-  std::vector<double> out(kStretch * finer);
   std::vector<std::complex<double>> spectrum;
   for (std::size_t from = 0; from + kStretch <= value.size(); from += kHop) {
     const Line line = line_through(&value[from]);
     for (std::size_t i = 0; i < kStretch; ++i)
-      part[i] = window[i * finer] * (value[from + i] - line.at(static_cast<double>(i)));
+      part[i] = window[i] * (value[from + i] - line.at(i));
     transform.fwd(spectrum, part);
-    weigh_spectrum(spectrum);
-    spectrum.resize(kStretch * finer / 2 + 1);
-    transform.inv(out, spectrum, static_cast<Eigen::Index>(kStretch * finer));
-    for (std::size_t i = 0; i < out.size(); ++i) {
-      const double at = static_cast<double>(i) / static_cast<double>(finer);
-      const double back = out[i] * static_cast<double>(finer) + window[i] * line.at(at);
-      sum[from * finer + i] += window[i] * back / kWindows;
-    }
+    weigh(spectrum, white_power);
+    transform.inv(part, spectrum, static_cast<Eigen::Index>(kStretch));
+    for (std::size_t i = 0; i < kStretch; ++i)
+      sum[from + i] += window[i] * (part[i] + window[i] * line.at(i)) / kWindows;
   }
-  const std::size_t last = (n - 1) * finer + 1;
-  std::vector<double> fine_s(last);
-  for (std::size_t i = 0; i < last; ++i)
-    fine_s[i] = curve.from_s() + step_s / static_cast<double>(finer) * static_cast<double>(i);
-  return {fine_s, std::span(sum).subspan(kStretch * finer, last)};
-}
-
-}  // namespace
-
-SampledCurve without_noise(const SampledCurve& curve, double noise_variance) {
-  const double white_power = noise_variance * kWindowSquare * kStretch;
-  return filtered(
-      curve, 1, [&](std::vector<std::complex<double>>& spectrum) { weigh(spectrum, white_power); });
-}
-
-SampledCurve band_limited(const SampledCurve& curve) {
-  return filtered(curve, kFiner, [](std::vector<std::complex<double>>& spectrum) {
-    // What lies on half the sampling rate has no phase, and none between the samples.
-    spectrum.back() = 0.0;
-  });
+  return {t_s, std::span(sum).subspan(kStretch, n)};
 }
 
 }  // namespace vgyro::gap

@@ -9,8 +9,4 @@ namespace vgyro::gap {
 /// that of one sample where nothing moves. Even steps of the median interval; phases are kept.
 SampledCurve without_noise(const SampledCurve& curve, double noise_variance);
 
-/// The curve at four times the rate, with all that it holds below half its own: what is read from
-/// it between two samples scatters as the samples do.
-SampledCurve band_limited(const SampledCurve& curve);
-
 }  // namespace vgyro::gap
