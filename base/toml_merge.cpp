@@ -30,6 +30,14 @@ void put(toml::table& into, const toml::key& key, toml::node& value) {
   value.visit([&](auto& concrete) { into.insert(key, std::move(concrete)); });
 }
 
+// As people would write it: the library writes a double with all 17 digits.
+std::string text_of(const toml::node& node) {
+  if (const auto* number = node.as_floating_point()) return fmt::format("{}", number->get());
+  std::ostringstream text;
+  node.visit([&](const auto& concrete) { text << concrete; });
+  return text.str();
+}
+
 void add_origins(const toml::table& table, const std::string& prefix,
                  std::vector<TomlOrigin>& origins) {
   for (const auto& [key, node] : table) {
@@ -41,12 +49,10 @@ void add_origins(const toml::table& table, const std::string& prefix,
       for (std::size_t i = 0; i < list.size(); ++i)
         add_origins(*list[i].as_table(), fmt::format("{}[{}].", name, i), origins);
     } else {
-      std::ostringstream value;
-      node.visit([&](const auto& concrete) { value << concrete; });
       const toml::source_region& source = key.source();
       const std::string file = source.path ? *source.path : std::string();
       origins.push_back(
-          {name, value.str(), at_line(file, static_cast<unsigned>(source.begin.line))});
+          {name, text_of(node), at_line(file, static_cast<unsigned>(source.begin.line))});
     }
   }
 }

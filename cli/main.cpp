@@ -347,7 +347,7 @@ CLI::App* add_fleet(CLI::App& app, FleetOptions& options) {
   command->add_flag("-q,--quiet", options.quiet, "no summary");
   command->footer(
       "evidence.json in the folder is all of it merged, and may be merged again.\n"
-      "What is computed, and what a name means, is in docs/fleet.md.\n"
+      "What is computed, and what a name means, is in vgyro(1).\n"
       "Example: vgyro fleet evidence/ --out fleet");
   return command;
 }

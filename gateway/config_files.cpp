@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <filesystem>
 #include <lzma.h>
-#include <sstream>
 #include <string_view>
 #include <system_error>
 #include <utility>

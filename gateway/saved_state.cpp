@@ -341,7 +341,7 @@ namespace {
 
 constexpr const char* kHead =
     "# Biases of two gyros, kept by vgyrod so that a restart need not calibrate again.\n"
-    "# Without this file the gateway calibrates again. A file changed by hand is refused.\n";
+    "# Without this file the gateway calibrates anew. A file changed by hand is refused.\n";
 
 std::string pair_text(const SavedState& state) {
   std::string text = fmt::format("rate_stamp_ns = {}\nrest_rate_dps = {}\n",

@@ -87,7 +87,7 @@ TEST_F(ResultFolderTest, RefusesAFileAndAnEmptyName) {
 
 TEST_F(ResultFolderTest, LeavesNothingWhenAFileCannotBeWritten) {
   // Half a result would be taken for a whole one.
-  ASSERT_FALSE(write_result_folder(at("out"), {{"a.json", "{}"}, {"no/such/folder", "x"}}));
+  ASSERT_FALSE(write_result_folder(at("out"), {{"a.json", "{}"}, {"a.json/below", "x"}}));
   EXPECT_EQ(entries(), 0);
 }
 

@@ -195,7 +195,8 @@ TEST(LineQueue, SaysBeforeTheNextLineHowManyCouldNotBeWritten) {
     ASSERT_TRUE(lines.flush(kPatience));
   }
   EXPECT_EQ(lines.lost(), 3U);
-  EXPECT_EQ(messages(), (Fields{"3 lines of this log are missing here: nothing read the log", "four"}));
+  EXPECT_EQ(messages(),
+            (Fields{"3 lines of this log are missing here: nothing read the log", "four"}));
 }
 
 TEST(LineQueue, SaysWhereLinesAreMissing) {
