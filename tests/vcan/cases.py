@@ -647,7 +647,7 @@ class ShadowCase:
         require(len(before) == 1 and "0011223344556677" in before[0].text, f"{len(before)} frames in shadow mode")
         require(len(run.outputs) > 5, "nothing is sent after the reload either")
         require(run.said.count("shadow mode: everything but sending is done") == 1, run.said)
-        require("came from somebody else" in run.said, f"the stranger was not seen\n{run.said}")
+        require("came from another sender" in run.said, f"the stranger was not seen\n{run.said}")
         counts = re.search(r"(\d+) virtual rates \((\d+) valid\), .* (\d+) not sent in shadow mode", run.said)
         require(counts and int(counts[2]) > 500 and int(counts[3]) > int(counts[1]), run.said)
         quiet = [text for _, text in result["notices"] if text.startswith("STATUS=running")]
