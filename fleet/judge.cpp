@@ -32,18 +32,6 @@ double unit_of(std::size_t column) {
   return model::shapes()[column % kShapeCount].unit;
 }
 
-// Upper tail of a binomial distribution.
-double binomial_tail(std::size_t successes, std::size_t trials, double share) {
-  const auto n = static_cast<double>(trials);
-  double sum = 0.0;
-  for (std::size_t i = successes; i <= trials; ++i) {
-    const auto k = static_cast<double>(i);
-    sum += std::exp(std::lgamma(n + 1.0) - std::lgamma(k + 1.0) - std::lgamma(n - k + 1.0) +
-                    k * std::log(share) + (n - k) * std::log1p(-share));
-  }
-  return std::min(1.0, sum);
-}
-
 class Judge {
  public:
   Judge(const Pool& pool, const Settings& settings) : pool_(pool), settings_(settings) {

@@ -5,70 +5,11 @@
 #include <numbers>
 #include <numeric>
 
+#include <unsupported/Eigen/SpecialFunctions>
+
 namespace vgyro::fleet {
 
 namespace {
-
-// Of continued fractions: as good as doubles are.
-constexpr int kTermsMax = 500;
-constexpr double kSame = 1e-15;
-constexpr double kTiny = 1e-300;
-
-// Lentz's method, for the incomplete beta function.
-double beta_fraction(double a, double b, double x) {
-  const auto safe = [](double v) { return std::abs(v) < kTiny ? kTiny : v; };
-  double c = 1.0;
-  double d = 1.0 / safe(1.0 - (a + b) * x / (a + 1.0));
-  double result = d;
-  for (int m = 1; m < kTermsMax; ++m) {
-    for (const bool even : {true, false}) {
-      const double term = even ? m * (b - m) * x / ((a + 2.0 * m - 1.0) * (a + 2.0 * m))
-                               : -(a + m) * (a + b + m) * x / ((a + 2.0 * m) * (a + 2.0 * m + 1.0));
-      d = 1.0 / safe(1.0 + term * d);
-      c = safe(1.0 + term / c);
-      result *= c * d;
-      if (!even && std::abs(c * d - 1.0) < kSame) return result;
-    }
-  }
-  return result;
-}
-
-double incomplete_beta(double a, double b, double x) {
-  if (x <= 0.0) return 0.0;
-  if (x >= 1.0) return 1.0;
-  const double front = std::exp(std::lgamma(a + b) - std::lgamma(a) - std::lgamma(b) +
-                                a * std::log(x) + b * std::log1p(-x));
-  if (x < (a + 1.0) / (a + b + 2.0)) return front * beta_fraction(a, b, x) / a;
-  return 1.0 - front * beta_fraction(b, a, 1.0 - x) / b;
-}
-
-// Regularised upper incomplete gamma function.
-double gamma_tail(double a, double x) {
-  if (x <= 0.0) return 1.0;
-  const double front = std::exp(a * std::log(x) - x - std::lgamma(a));
-  if (x < a + 1.0) {
-    double term = 1.0 / a;
-    double sum = term;
-    for (int n = 1; n < kTermsMax && term > sum * kSame; ++n) {
-      term *= x / (a + n);
-      sum += term;
-    }
-    return std::max(0.0, 1.0 - front * sum);
-  }
-  double b = x + 1.0 - a;
-  double c = 1.0 / kTiny;
-  double d = 1.0 / b;
-  double result = d;
-  for (int n = 1; n < kTermsMax; ++n) {
-    const double term = -n * (n - a);
-    b += 2.0;
-    d = 1.0 / (term * d + b);
-    c = b + term / c;
-    result *= c * d;
-    if (std::abs(c * d - 1.0) < kSame) break;
-  }
-  return front * result;
-}
 
 double harmonic_number(double n) {
   // Exact to a millionth from 10 on, and never less.
@@ -83,7 +24,7 @@ double normal_tail(double z) {
 }
 
 double student_tail(double t, double freedom) {
-  return incomplete_beta(0.5 * freedom, 0.5, freedom / (freedom + t * t));
+  return Eigen::numext::betainc(0.5 * freedom, 0.5, freedom / (freedom + t * t));
 }
 
 double student_quantile(double tail, double freedom) {
@@ -100,7 +41,13 @@ double student_quantile(double tail, double freedom) {
 }
 
 double chi_square_tail(double value, double freedom) {
-  return gamma_tail(0.5 * freedom, 0.5 * value);
+  return Eigen::numext::igammac(0.5 * freedom, 0.5 * value);
+}
+
+double binomial_tail(std::size_t successes, std::size_t trials, double share) {
+  if (successes == 0) return 1.0;
+  const auto k = static_cast<double>(successes);
+  return Eigen::numext::betainc(k, static_cast<double>(trials) - k + 1.0, share);
 }
 
 double threshold_of(std::size_t rank, double tests, double rate) {

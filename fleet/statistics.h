@@ -15,6 +15,8 @@ double student_tail(double t, double freedom);
 double student_quantile(double tail, double freedom);
 /// Upper tail of χ².
 double chi_square_tail(double value, double freedom);
+/// Of a binomial distribution: so many successes or more.
+double binomial_tail(std::size_t successes, std::size_t trials, double share);
 
 /// Benjamini–Yekutieli: which of these p-values are names where at most this share of all names is
 /// false on average, however the tests depend on each other. `tests`: how many were made, of which

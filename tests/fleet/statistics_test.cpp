@@ -17,6 +17,9 @@ TEST(Statistics, TailsAreThoseOfTheTables) {
   EXPECT_NEAR(chi_square_tail(3.841459, 1.0), 0.05, 1e-7);
   EXPECT_NEAR(chi_square_tail(18.30704, 10.0), 0.05, 1e-7);
   EXPECT_NEAR(chi_square_tail(2.0, 2.0), std::exp(-1.0), 1e-12);
+  EXPECT_NEAR(binomial_tail(2, 3, 0.5), 0.5, 1e-12);
+  EXPECT_NEAR(binomial_tail(4, 4, 0.0455), std::pow(0.0455, 4), 1e-18);
+  EXPECT_EQ(binomial_tail(0, 4, 0.0455), 1.0);
 }
 
 TEST(Statistics, NamesAsBenjaminiAndYekutieliDo) {
