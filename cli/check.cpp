@@ -1,6 +1,7 @@
 #include <fmt/core.h>
 
 #include "base/printable.h"
+#include "base/toml_merge.h"
 #include "cli/commands.h"
 #include "cli/exit_code.h"
 #include "cli/output/errors.h"
@@ -260,19 +261,24 @@ void print_plan(const gateway::Plan& plan) {
     print_layout(plan, layout);
 }
 
+void print_origins(const toml::table& table) {
+  say("  {:<14}as several files say them together\n", "values");
+  for (const TomlOrigin& origin : toml_origins(table))
+    say("    {:<32}{:<24} {}\n", origin.key, origin.value, origin.where);
+}
+
 }  // namespace
 
 int run_check(const CheckOptions& options) {
-  const auto loaded = gateway::load_config(options.config, {options.method, options.model});
+  const gateway::ConfigOverrides overrides{options.method, options.model};
+  const auto loaded = gateway::load_config(options.config, overrides);
   if (!loaded) return report(loaded.error());
   for (const Error& warning : loaded->warnings)
     warn(warning);
   say("{}: good\n", options.config);
-  say("  {:<14}{}\n", "fingerprint", loaded->fingerprint);
+  say("  {:<14}{}\n", "fingerprint", gateway::fingerprint_of(*loaded, overrides));
   print_plan(loaded->plan);
-  if (!loaded->origins.empty()) say("  {:<14}as several files say them together\n", "values");
-  for (const TomlOrigin& origin : loaded->origins)
-    say("    {:<32}{:<24} {}\n", origin.key, origin.value, origin.where);
+  if (loaded->text.files.size() > 1) print_origins(loaded->text.table);
   return kDone;
 }
 

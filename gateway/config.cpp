@@ -11,7 +11,6 @@
 
 #include "base/printable.h"
 #include "base/spelling.h"
-#include "base/toml_merge.h"
 #include "base/toml_reader.h"
 #include "fusion/polynomial.h"
 #include "gateway/axes_plan.h"
@@ -452,7 +451,7 @@ std::string_view to_string(Method method) {
 }
 
 ConfigResult load_config(const std::string& path, const ConfigOverrides& overrides) {
-  const Expected<ConfigText> read = read_config_files(path);
+  Expected<ConfigText> read = read_config_files(path);
   if (!read) return tl::unexpected(std::vector<Error>{read.error()});
   Context context{.file = path,
                   .folder = std::filesystem::path(path).parent_path().string(),
@@ -481,12 +480,16 @@ ConfigResult load_config(const std::string& path, const ConfigOverrides& overrid
   if (!context.errors.empty()) return tl::unexpected(std::move(context.errors));
   context.resolved.files = context.cache.paths();
   if (plan.model) context.resolved.files.push_back(plan.model->file);
-  const std::string method(overrides.method ? to_string(*overrides.method) : "");
-  context.resolved.fingerprint = config_fingerprint(read->table, method, context.resolved.files);
   context.resolved.files.insert(context.resolved.files.end(), read->files.begin(),
                                 read->files.end());
-  if (read->files.size() > 1) context.resolved.origins = toml_origins(read->table);
+  context.resolved.text = std::move(*read);
   return std::move(context.resolved);
+}
+
+std::string fingerprint_of(const Resolved& loaded, const ConfigOverrides& overrides) {
+  const std::string method(overrides.method ? to_string(*overrides.method) : "");
+  const std::size_t named = loaded.files.size() - loaded.text.files.size();
+  return config_fingerprint(loaded.text.table, method, std::span(loaded.files).first(named));
 }
 
 }  // namespace vgyro::gateway

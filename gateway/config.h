@@ -10,7 +10,7 @@
 #include <tl/expected.hpp>
 
 #include "base/error.h"
-#include "base/toml_merge.h"
+#include "gateway/config_files.h"
 #include "gateway/plan.h"
 
 namespace vgyro::gateway {
@@ -19,9 +19,7 @@ struct Resolved {
   Plan plan;
   /// What was read: DBC files, the model file, the file itself and what lies over it.
   std::vector<std::string> files;
-  std::string fingerprint;  ///< 16 hexadecimal digits: config_fingerprint()
-  /// Where each value was written; empty where there is only one file.
-  std::vector<TomlOrigin> origins;
+  ConfigText text;              ///< its values, as the last files of `files` say them together
   std::vector<Error> warnings;  ///< usable, but the user should know
 };
 
@@ -35,6 +33,9 @@ struct ConfigOverrides {
 /// Reads the file, and what lies over it (gateway/config_files.h); paths inside are relative to the
 /// file itself.
 ConfigResult load_config(const std::string& path, const ConfigOverrides& overrides = {});
+
+/// config_fingerprint() of what was loaded, by the same overrides. Reads DBC and model files again.
+std::string fingerprint_of(const Resolved& loaded, const ConfigOverrides& overrides);
 
 /// The methods of this build by name; nothing for any other word.
 std::optional<Method> method_from(std::string_view name);

@@ -74,7 +74,7 @@ Expected<ConfigText> read_config_files(const std::string& path) {
 }
 
 std::string config_fingerprint(const toml::table& table, const std::string& overrides,
-                               const std::vector<std::string>& named_files) {
+                               std::span<const std::string> named_files) {
   std::uint64_t crc = 0;
   for (const TomlOrigin& origin : toml_origins(table))
     crc = add(crc, origin.key + '=' + origin.value + '\n');

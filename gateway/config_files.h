@@ -4,6 +4,7 @@
 // vgyro.toml that is vgyro.d/*.toml, in the order of their names; a later file goes over an earlier
 // one (base/toml_merge.h). Knows nothing of what the keys mean.
 
+#include <span>
 #include <string>
 #include <vector>
 
@@ -23,6 +24,6 @@ Expected<ConfigText> read_config_files(const std::string& path);
 /// wherever they were written and without comments, what the command line says instead, and the
 /// bytes of the files that it names. The same on every machine; finds no forger.
 std::string config_fingerprint(const toml::table& table, const std::string& overrides,
-                               const std::vector<std::string>& named_files);
+                               std::span<const std::string> named_files);
 
 }  // namespace vgyro::gateway
