@@ -60,6 +60,16 @@ std::optional<std::string> nearest_name(std::string_view name,
   return best;
 }
 
+std::optional<UnknownOption> unknown_option(const std::vector<std::string>& left_over,
+                                            const std::vector<std::string>& known) {
+  for (const std::string& word : left_over) {
+    if (word.size() < 2 || word.front() != '-') continue;
+    const std::string name = word.substr(0, word.find('='));
+    return UnknownOption{name, nearest_name(name, known)};
+  }
+  return std::nullopt;
+}
+
 std::string suggest_name(std::string_view name, const std::vector<std::string>& candidates) {
   if (candidates.empty()) return {};
   if (const auto near = nearest_name(name, candidates)) {

@@ -19,6 +19,15 @@ std::size_t edit_distance(std::string_view a, std::string_view b);
 std::optional<std::string> nearest_name(std::string_view name,
                                         const std::vector<std::string>& candidates);
 
+/// An option that no command line may have.
+struct UnknownOption {
+  std::string name;                 ///< as it was typed, without a value behind "="
+  std::optional<std::string> near;  ///< what it most likely meant
+};
+/// The first of the words that were left over which looks like an option. `known`: with dashes.
+std::optional<UnknownOption> unknown_option(const std::vector<std::string>& left_over,
+                                            const std::vector<std::string>& known);
+
 /// `did you mean "X"?`, or `one of: A, B, C` when nothing is near; empty without candidates.
 std::string suggest_name(std::string_view name, const std::vector<std::string>& candidates);
 

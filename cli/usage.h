@@ -41,12 +41,9 @@ inline std::vector<std::string> options_of(const CLI::App& app) {
 inline Error usage_error(const CLI::App& app, const CLI::ParseError& error) {
   const std::string command = command_text(app);
   const std::string help = fmt::format("`{} --help` lists what it takes", command);
-  for (const std::string& word : app.remaining(true)) {
-    if (word.size() < 2 || word.front() != '-') continue;
-    const std::string option = word.substr(0, word.find('='));
-    const auto near = nearest_name(option, options_of(app));
-    return {command, fmt::format("there is no option {}", printable(option)),
-            near ? fmt::format("did you mean {}?", *near) : help};
+  if (const auto unknown = unknown_option(app.remaining(true), options_of(app))) {
+    return {command, fmt::format("there is no option {}", printable(unknown->name)),
+            unknown->near ? fmt::format("did you mean {}?", *unknown->near) : help};
   }
   if (app.get_subcommands().empty()) {
     return {command, "no command is given", "`vgyro --help` lists the commands"};

@@ -40,17 +40,14 @@ struct Options {
 // An unknown option comes first: it is often the reason why another one is missing.
 std::string usage_text(const CLI::App& app, const CLI::ParseError& error) {
   const std::string help = "; see `vgyrod --help`";
-  for (const std::string& word : app.remaining()) {
-    if (word.size() < 2 || word.front() != '-') continue;
-    const std::string option = word.substr(0, word.find('='));
-    std::vector<std::string> names;
-    for (const CLI::Option* known : app.get_options()) {
-      for (const std::string& name : known->get_lnames())
-        names.push_back("--" + name);
-    }
-    const auto near = vgyro::nearest_name(option, names);
-    return "vgyrod: there is no option " + vgyro::printable(option) +
-           (near ? "; did you mean " + *near + "?" : help);
+  std::vector<std::string> known;
+  for (const CLI::Option* option : app.get_options()) {
+    for (const std::string& name : option->get_lnames())
+      known.push_back("--" + name);
+  }
+  if (const auto unknown = vgyro::unknown_option(app.remaining(), known)) {
+    return "vgyrod: there is no option " + vgyro::printable(unknown->name) +
+           (unknown->near ? "; did you mean " + *unknown->near + "?" : help);
   }
   return "vgyrod: " + vgyro::printable(error.what()) + help;
 }

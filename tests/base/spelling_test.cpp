@@ -100,5 +100,17 @@ TEST(SuggestName, ListsAtMostTwelveNames) {
   EXPECT_EQ(suggest_name("zzzzzz", names), "one of: N, N, N, N, N, N, N, N, N, N, N, N, …");
 }
 
+TEST(Spelling, NamesTheFirstUnknownOption) {
+  const std::vector<std::string> known{"--plot", "--output"};
+  EXPECT_FALSE(unknown_option({"drive.log", "-"}, known));
+  const auto typed = unknown_option({"drive.log", "--plto=a.svg", "--outptu"}, known);
+  ASSERT_TRUE(typed);
+  EXPECT_EQ(typed->name, "--plto");
+  EXPECT_EQ(typed->near, "--plot");
+  const auto strange = unknown_option({"--bananas"}, known);
+  ASSERT_TRUE(strange);
+  EXPECT_FALSE(strange->near);
+}
+
 }  // namespace
 }  // namespace vgyro
