@@ -9,7 +9,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "base/sha256.h"
+#include "cli/gap/sha256.h"
 
 namespace vgyro::cli {
 

@@ -1,8 +1,8 @@
-#include "base/sha256.h"
+#include "cli/gap/sha256.h"
 
 #include <gtest/gtest.h>
 
-namespace vgyro {
+namespace vgyro::cli {
 namespace {
 
 std::string sum_of(std::string_view text) {
@@ -39,4 +39,4 @@ TEST(Sha256, OfAFileThatIsNotThereIsAnError) {
 }
 
 }  // namespace
-}  // namespace vgyro
+}  // namespace vgyro::cli
