@@ -49,60 +49,6 @@ def is_tilt(effect):
 
 
 class Gap(Axes):
-    def test_the_tilt_between_two_units_is_named_about_every_axis_it_shows_on(self):
-        self.record(340.0, 1, TILTED)
-        found = self.gap("--accept", "gyro=2")
-        self.assertEqual([axis["axis"] for axis in found["axes"]], list(AXES))
-        named = {(one["axis"], one["parameters"]["from"]): one for one in found["effects"] if is_tilt(one)}
-        # Roll and pitch feel the yaw, which is ten times as quick as they are.
-        for pair in (("x", "z"), ("y", "z")):
-            one = named[pair]
-            truth = TILTED[AXES.index(pair[0]), AXES.index(pair[1])]
-            self.assertLess(abs(one["parameters"]["coefficient"] - truth) / one["sigma"]["coefficient"], 4.0, one)
-            self.assertLess(one["sigma"]["coefficient"], 2e-4)
-            self.assertTrue(one["applied"])
-        for axis in found["axes"]:
-            self.assertLess(axis["gap"]["after"], max(1.5 * axis["gap"]["band95"][1], 0.2 * axis["gap"]["before"]), axis["axis"])
-        # What is found about an axis is all that is found of it alone.
-        self.assertEqual(found["effects"], [effect for axis in found["axes"] for effect in axis["effects"]])
-        self.assertEqual(sorted(path.name for path in (self.folder / "found").iterdir()),
-                         ["gap.json", "model.toml", "report-x.html", "report-y.html", "report-z.html", "report.html"])
-        self.pages()
-        # The model file is whole: with it the three axes have no gap.
-        closed = self.compare(model="found/model.toml")
-        for axis, before in zip(closed["axes"], found["axes"]):
-            self.assertLess(axis["gap"]["value"], max(1.5 * axis["gap"]["band95"][1], 0.2 * before["gap"]["before"]))
-
-    def pages(self):
-        text = self.read("found/report.html")
-        data = json.loads(re.search(r'<script type="application/json" id="data">(.*?)</script>', text, re.DOTALL).group(1))
-        self.assertEqual([axis["report"] for axis in data["axes"]], [f"report-{axis}.html" for axis in AXES])
-        for axis in AXES:
-            page = self.read(f"found/report-{axis}.html")
-            own = json.loads(re.search(r'<script type="application/json" id="data">(.*?)</script>', page, re.DOTALL).group(1))
-            self.assertEqual(own["axis"], axis)
-            self.assertEqual([other["file"] for other in own["pages"]], [f"report-{other}.html" for other in AXES])
-
-    def test_a_unit_upside_down_is_told_in_its_own_axes_and_signs(self):
-        """And the gateway takes it back from there: the two agree to what is left of the tilt."""
-        # The sensor feels the vehicle's rate turned back, and is tilted besides.
-        felt = MOUNT.T @ TILTED
-        drive = self.record(340.0, 2, felt, more_b=MOUNT_TEXT)
-        own = felt @ MOUNT  # of the unit's own axes
-        found = self.gap("--accept", "gyro=2")
-        self.assertLess(abs(found["gap"]["after"]), 0.2 * found["gap"]["before"])
-        tilts = [one for one in found["effects"] if is_tilt(one)]
-        # The vehicle's x is the unit's y, and the other way round.
-        self.assertGreaterEqual({(one["axis"], one["parameters"]["from"]) for one in tilts}, {("x", "z"), ("y", "z")})
-        for one in tilts:
-            truth = own[AXES.index(one["axis"]), AXES.index(one["parameters"]["from"])]
-            self.assertLess(abs(one["parameters"]["coefficient"] - truth) / one["sigma"]["coefficient"], 4.0, one)
-        self.good("replay", "--config", "u.toml", "--model", "found/model.toml", "-q", "-o", "out.log", "--json", "out.json",
-                  "--csv", "out.csv", "in.log")
-        left_deg = np.abs(json.loads(self.read("out.json"))["misalignment"]["angle_deg"])
-        self.assertLess(np.max(left_deg[:2]), 0.05)
-        self.assertEqual(drive.seconds, 340.0)
-
     def test_biases_that_nobody_gave_are_told_in_the_units_own_signs(self):
         self.record(150.0, 3, MOUNT.T, more_b=MOUNT_TEXT)
         found = self.gap(model=self.empty_model())
@@ -115,19 +61,6 @@ class Gap(Axes):
     def empty_model(self):
         self.write("empty.toml", "format = 1\n")
         return "empty.toml"
-
-    def test_what_is_the_whole_units_is_named_once(self):
-        """40 ms of delay: found about the axis that moves most, and known to the others."""
-        self.record(300.0, 4, lag_s=0.04)
-        found = self.gap("--accept", "gyro=2")
-        delays = [one for one in found["effects"] if one["kind"] == "delay" and one["applied"]]
-        self.assertEqual(len(delays), 1, found["effects"])
-        self.assertNotIn("axis", delays[0])
-        self.assertAlmostEqual(delays[0]["parameters"]["seconds"], 0.04, delta=0.001)
-        self.assertIn(delays[0], found["axes"][2]["effects"])
-        for axis in found["axes"][:2]:
-            self.assertIn("delay of gyro right, found about z, is known here", axis["notes"])
-        self.good("check", "--model", "found/model.toml", "u.toml")
 
     def test_one_axis_alone_is_what_it_is_among_all(self):
         self.record(150.0, 5, TILTED)
