@@ -8,7 +8,7 @@ import unittest
 
 import numpy as np
 
-from axes_test import Axes, MOUNT, MOUNT_TEXT, is_tilt
+from axes_test import Axes, MOUNT, MOUNT_TEXT, Table, is_tilt
 from units_test import AXES, TILTED
 
 
@@ -79,6 +79,32 @@ class Found(Axes):
         for axis in found["axes"][:2]:
             self.assertIn("delay of gyro right, found about z, is known here", axis["notes"])
         self.good("check", "--model", "found/model.toml", "u.toml")
+
+    def test_one_axis_writes_the_result_of_one_pair(self):
+        self.record(120.0, 6, TILTED)
+        self.gap()
+        found = self.gap("--axis", "x")  # replaces the result of all
+        self.assertEqual(found["axis"], "x")
+        self.assertNotIn("axes", found)
+        self.assertEqual(sorted(path.name for path in (self.folder / "found").iterdir()), ["gap.json", "model.toml", "report.html"])
+        first = [(self.folder / "found" / name).read_bytes() for name in ("gap.json", "model.toml", "report.html")]
+        self.gap("--axis", "x")
+        self.assertEqual(first, [(self.folder / "found" / name).read_bytes() for name in ("gap.json", "model.toml", "report.html")])
+
+
+class FoundByTable(Table):
+    def test_with_a_reference_of_all_axes_it_is_told_which_unit_is_tilted(self):
+        self.with_table(240.0, 11)
+        found = self.gap()
+        for axis in found["axes"]:
+            self.assertTrue(axis["recording"]["with_reference"], axis["axis"])
+        named = {(one["axis"], one["parameters"]["from"]): one for one in found["effects"] if is_tilt(one)}
+        for pair in (("x", "z"), ("y", "z")):
+            one = named[pair]
+            self.assertTrue(one["applied"])
+            self.assertEqual(one["ambiguous_with"], [])
+            truth = TILTED[AXES.index(pair[0]), AXES.index(pair[1])]
+            self.assertLess(abs(one["parameters"]["coefficient"] - truth) / one["sigma"]["coefficient"], 4.0, one)
 
 
 if __name__ == "__main__":
