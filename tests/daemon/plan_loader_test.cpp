@@ -3,6 +3,7 @@
 #include "daemon/plan_loader.h"
 
 #include <condition_variable>
+#include <filesystem>
 #include <fstream>
 #include <mutex>
 #include <new>
@@ -146,6 +147,56 @@ TEST(PlanLoader, APipeInsteadOfADbcFileIsRefused) {
   ASSERT_FALSE(result);
   EXPECT_NE(result.error().front().message().find("a.dbc: is a pipe"), std::string::npos)
       << result.error().front().message();
+}
+
+/// Two gyros, 16 bits from bit 0 each.
+void put_configuration(const Scratch& scratch) {
+  std::string dbc = "VERSION \"\"\nBU_: A\n";
+  std::string text = "[output]\nbus = \"can0\"\n[calibration]\nrest_s = 5\n";
+  for (const std::string name : {"LEFT", "RIGHT"}) {
+    dbc += std::string("BO_ ") + (name == "LEFT" ? "257" : "258") + " " + name +
+           ": 8 A\n SG_ Rate : 0|16@1- (0.01,0) [-300|300] \"deg/s\" A\n";
+    text += "[[gyro]]\nname = \"" + name + "\"\nbus = \"can0\"\ndbc = \"a.dbc\"\nmessage = \"" +
+            name + "\"\nrate = \"Rate\"\n";
+  }
+  scratch.put("a.dbc", dbc);
+  scratch.put("vgyro.toml", text);
+}
+
+// The folder is read anew with each load: overlays come, go wrong and go away.
+TEST(PlanLoader, AReloadTakesWhatLiesOverTheConfiguration) {
+  Scratch scratch;
+  put_configuration(scratch);
+  PlanLoader loader([path = scratch.path("vgyro.toml")] { return gateway::load_config(path); });
+  ASSERT_TRUE(loader.open());
+  const auto reloaded = [&] {
+    loader.ask();
+    return result_of(loader);
+  };
+  const gateway::ConfigResult alone = reloaded();
+  ASSERT_TRUE(alone) << alone.error().front().message();
+  EXPECT_EQ(alone->plan.calibration.rest_s, 5.0);
+
+  std::filesystem::create_directory(scratch.path("vgyro.d"));
+  scratch.put("vgyro.d/10-fleet.toml", "[calibration]\nrest_s = 6\n");
+  scratch.put("vgyro.d/20-car.toml", "[calibration]\nrest_s = 7\n[output]\ntransmit = false\n");
+  const gateway::ConfigResult overlaid = reloaded();
+  ASSERT_TRUE(overlaid) << overlaid.error().front().message();
+  EXPECT_EQ(overlaid->plan.calibration.rest_s, 7.0);
+  EXPECT_FALSE(overlaid->plan.output.transmit);
+  EXPECT_NE(overlaid->fingerprint, alone->fingerprint);
+
+  scratch.put("vgyro.d/20-car.toml", "[calibration]\nresst_s = 7\n");
+  const gateway::ConfigResult broken = reloaded();
+  ASSERT_FALSE(broken);
+  EXPECT_EQ(broken.error().front().where, at_line(scratch.path("vgyro.d/20-car.toml"), 2));
+
+  std::filesystem::remove_all(scratch.path("vgyro.d"));
+  const gateway::ConfigResult again = reloaded();
+  ASSERT_TRUE(again) << again.error().front().message();
+  EXPECT_EQ(again->plan.calibration.rest_s, 5.0);
+  EXPECT_TRUE(again->plan.output.transmit);
+  EXPECT_EQ(again->fingerprint, alone->fingerprint);
 }
 
 }  // namespace
