@@ -254,6 +254,8 @@ constexpr Property kProperties[] = {
      [](sd_bus_message* m, const Snapshot& now) {
        return append_text(m, gateway::to_string(now.plan->corrector.method));
      }},
+    {"Fingerprint",
+     [](sd_bus_message* m, const Snapshot& now) { return append_text(m, now.fingerprint); }},
     {"UptimeS",
      [](sd_bus_message* m, const Snapshot& now) { return append_number(m, now.uptime_s); }},
     {"ConfigRefused",
@@ -299,6 +301,8 @@ constexpr Property kProperties[] = {
      [](sd_bus_message* m, const Snapshot& now) {
        return append_number(m, now.status.bias_sigma_dps);
      }},
+    {"LastStopAgeS",
+     [](sd_bus_message* m, const Snapshot& now) { return append_number(m, now.last_stop_age_s); }},
     {"CalibratedS", [](sd_bus_message* m,
                        const Snapshot& now) { return append_number(m, now.status.calibrated_s); }},
     {"RestS", [](sd_bus_message* m,
@@ -318,6 +322,7 @@ const sd_bus_vtable Control::kInterface[] = {
     SD_BUS_PROPERTY("Version", "s", on_get, 0, SD_BUS_VTABLE_PROPERTY_CONST),
     SD_BUS_PROPERTY("Instance", "s", on_get, 0, SD_BUS_VTABLE_PROPERTY_CONST),
     SD_BUS_PROPERTY("Method", "s", on_get, 0, 0),
+    SD_BUS_PROPERTY("Fingerprint", "s", on_get, 0, SD_BUS_VTABLE_PROPERTY_EMITS_CHANGE),
     SD_BUS_PROPERTY("UptimeS", "d", on_get, 0, 0),
     SD_BUS_PROPERTY("ConfigRefused", "b", on_get, 0, SD_BUS_VTABLE_PROPERTY_EMITS_CHANGE),
     SD_BUS_PROPERTY("Transmit", "b", on_get, 0, SD_BUS_VTABLE_PROPERTY_EMITS_CHANGE),
@@ -334,6 +339,7 @@ const sd_bus_vtable Control::kInterface[] = {
     SD_BUS_PROPERTY("RateDps", "d", on_get, 0, SD_BUS_VTABLE_PROPERTY_EMITS_CHANGE),
     SD_BUS_PROPERTY("SigmaDps", "d", on_get, 0, SD_BUS_VTABLE_PROPERTY_EMITS_CHANGE),
     SD_BUS_PROPERTY("BiasSigmaDps", "d", on_get, 0, SD_BUS_VTABLE_PROPERTY_EMITS_CHANGE),
+    SD_BUS_PROPERTY("LastStopAgeS", "d", on_get, 0, SD_BUS_VTABLE_PROPERTY_EMITS_CHANGE),
     SD_BUS_PROPERTY("CalibratedS", "d", on_get, 0, SD_BUS_VTABLE_PROPERTY_EMITS_CHANGE),
     SD_BUS_PROPERTY("RestS", "d", on_get, 0, 0),
     SD_BUS_PROPERTY("Gyros", "aa{sv}", on_get, 0, SD_BUS_VTABLE_PROPERTY_EMITS_CHANGE),
@@ -416,11 +422,11 @@ void Control::second_passed() {
 void Control::tell_changes() {
   std::uint64_t queued = 0;
   if (sd_bus_get_n_queued_write(bus_, &queued) < 0 || queued > kQueuedMost) return;
-  sd_bus_emit_properties_changed(bus_, kPath, kInterfaceName, "State", "Quality", "Restored",
-                                 "Valid", "Disagree", "Contradiction", "ContradictionText",
-                                 "Ambiguous", "RatesTooFarApart", "Hypotheses", "RateDps",
-                                 "SigmaDps", "BiasSigmaDps", "CalibratedS", "ConfigRefused",
-                                 "Transmit", "Gyros", "Buses", "Counters", nullptr);
+  sd_bus_emit_properties_changed(
+      bus_, kPath, kInterfaceName, "State", "Quality", "Restored", "Valid", "Disagree",
+      "Contradiction", "ContradictionText", "Ambiguous", "RatesTooFarApart", "Hypotheses",
+      "RateDps", "SigmaDps", "BiasSigmaDps", "CalibratedS", "ConfigRefused", "Transmit",
+      "Fingerprint", "LastStopAgeS", "Gyros", "Buses", "Counters", nullptr);
 }
 
 int Control::on_get(sd_bus*, const char*, const char*, const char* property, sd_bus_message* reply,

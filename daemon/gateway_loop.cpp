@@ -68,14 +68,15 @@ GatewayLoop::Setup::Setup(gateway::Plan the_plan, TurnClock& clock, Log& log)
   }
 }
 
-GatewayLoop::GatewayLoop(gateway::Plan plan, LoadPlan load, std::string instance,
+GatewayLoop::GatewayLoop(LoadedConfig config, LoadPlan load, std::string instance,
                          StateKeeper* keeper, MetricsFile* metrics, Log& log)
     : loader_(std::move(load)),
       keeper_(keeper),
       metrics_(metrics),
       log_(log),
       clock_(&read_clock<CLOCK_REALTIME>, &read_clock<CLOCK_MONOTONIC>),
-      setup_(std::make_unique<Setup>(std::move(plan), clock_, log)) {
+      setup_(std::make_unique<Setup>(std::move(config.plan), clock_, log)) {
+  snapshot_.fingerprint = std::move(config.fingerprint);
   snapshot_.instance = std::move(instance);
 }
 
@@ -391,6 +392,7 @@ void GatewayLoop::second_passed() {
     bus.second_passed();
   reopen_dead_buses();
   look_whether_output_fits();
+  stop_age_.count_is(setup_->pipeline.status().stops, clock_.steady());
   notifier_.status(status_line());
   control_->second_passed();
   if (metrics_ != nullptr && metrics_->second_passed()) metrics_->write(snapshot());
@@ -487,6 +489,7 @@ const Snapshot& GatewayLoop::snapshot() {
     snapshot_.axes.push_back(setup_->pipeline.axis_status(place));
   snapshot_.traffic = traffic();
   snapshot_.uptime_s = to_seconds(clock_.steady() - started_);
+  snapshot_.last_stop_age_s = stop_age_.age_s(clock_.steady());
   snapshot_.config_refused = reload_refused_;
   snapshot_.log_lines_lost = log_.lost();
   snapshot_.service_messages_lost = notifier_.failures();
@@ -516,7 +519,7 @@ void GatewayLoop::begin_reload() {
 }
 
 Expected<void> GatewayLoop::take_reloaded() {
-  std::optional<gateway::ConfigResult> loaded = loader_.take();
+  std::optional<LoadResult> loaded = loader_.take();
   if (!loaded) return {};
   tell_config(*loaded, log_);
   reload_refused_ = !*loaded;
@@ -524,6 +527,10 @@ Expected<void> GatewayLoop::take_reloaded() {
     const Expected<void> replaced = try_to_replace_setup(std::move((*loaded)->plan), true);
     if (!replaced) log_.error("{}", replaced.error().message());
     reload_refused_ = !replaced;
+    if (replaced) {
+      snapshot_.fingerprint = std::move((*loaded)->fingerprint);
+      log_.info("the configuration's fingerprint is {}", snapshot_.fingerprint);
+    }
   }
   if (reload_refused_) {
     log_.tell(Severity::kError, {.cause = "config_refused"},

@@ -27,6 +27,8 @@
 #include "daemon/service.h"
 #include "daemon/snapshot.h"
 #include "daemon/state_keeper.h"
+#include "daemon/stop_age.h"
+#include "gateway/config.h"
 #include "gateway/inheritance.h"
 #include "gateway/pipeline.h"
 #include "gateway/plan.h"
@@ -38,7 +40,7 @@ class GatewayLoop final : private gateway::FrameSink {
   /// `load` reads the configuration again, beside the loop. `instance` is the name of one of
   /// several gateways, or empty. `keeper` is null where nothing is kept across a restart, `metrics`
   /// if they are not configured.
-  GatewayLoop(gateway::Plan plan, LoadPlan load, std::string instance, StateKeeper* keeper,
+  GatewayLoop(LoadedConfig config, LoadPlan load, std::string instance, StateKeeper* keeper,
               MetricsFile* metrics, Log& log);
   GatewayLoop(const GatewayLoop&) = delete;
   GatewayLoop& operator=(const GatewayLoop&) = delete;
@@ -123,6 +125,7 @@ class GatewayLoop final : private gateway::FrameSink {
   EventPointer events_{nullptr, &sd_event_unref};
   std::optional<Control> control_;
   Snapshot snapshot_;
+  StopAge stop_age_;
   int epoll_fd_ = -1;
   DeadlineTimer timer_;
   Alarm alarm_;

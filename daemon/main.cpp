@@ -62,10 +62,14 @@ std::string in_directory(const char* variable, const char* file) {
 
 int run(const Options& options, vgyro::daemon::Log& log) {
   const vgyro::daemon::LoadPlan load = [options] {
-    return vgyro::gateway::load_config(
+    return vgyro::daemon::load_with_fingerprint(
         options.config, {vgyro::gateway::method_from(options.method), options.model});
   };
-  vgyro::gateway::ConfigResult loaded = vgyro::daemon::load_or_refuse(load);
+  vgyro::daemon::LoadResult loaded = vgyro::daemon::load_or_refuse(load);
+  if (loaded) {
+    log.info("vgyrod {} starts with {}, fingerprint {}", VGYRO_VERSION,
+             vgyro::printable(options.config), loaded->fingerprint);
+  }
   vgyro::daemon::tell_config(loaded, log);
   if (!loaded) return kBadInput;
   std::optional<vgyro::daemon::StateKeeper> keeper;
@@ -79,7 +83,7 @@ int run(const Options& options, vgyro::daemon::Log& log) {
   }
   std::optional<vgyro::daemon::MetricsFile> metrics;
   if (!options.metrics.empty()) metrics.emplace(options.metrics, log);
-  vgyro::daemon::GatewayLoop loop(std::move(loaded->plan), load, options.instance,
+  vgyro::daemon::GatewayLoop loop(std::move(*loaded), load, options.instance,
                                   keeper ? &*keeper : nullptr, metrics ? &*metrics : nullptr, log);
   if (const vgyro::Expected<void> started = loop.start(); !started) {
     log.error("{}", started.error().message());

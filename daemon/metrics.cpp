@@ -13,6 +13,8 @@
 
 #include <fmt/format.h>
 
+#include "gateway/config.h"
+
 namespace vgyro::daemon {
 namespace {
 
@@ -67,6 +69,15 @@ class Text {
   std::string_view name_;
   std::string text_;
 };
+
+void add_build(Text& text, const Snapshot& now) {
+  text.family("vgyro_build_info", "gauge",
+              "Always 1: the version, and the method and fingerprint of the configuration in use.");
+  text.sample({{"version", VGYRO_VERSION},
+               {"fingerprint", now.fingerprint},
+               {"method", gateway::to_string(now.plan->corrector.method)}},
+              true);
+}
 
 void add_rate(Text& text, const Snapshot& now) {
   const gateway::Status& status = now.status;
@@ -127,6 +138,9 @@ void add_counters(Text& text, const Snapshot& now) {
   text.sample({{"verdict", "learned"}}, status.stops);
   text.sample({{"verdict", "refused"}}, status.stops_refused);
   text.sample({{"verdict", "open"}}, status.stops_open);
+  text.family("vgyro_last_stop_age_seconds", "gauge",
+              "Since the last stop that was learned from; NaN before the first one.");
+  text.sample({}, now.last_stop_age_s);
   text.family("vgyro_estimate_restarts_total", "counter",
               "Times that the estimate was not finite and was restarted: a fault of vgyro.");
   text.sample({}, status.estimate_restarts);
@@ -349,6 +363,7 @@ bool write_whole(int fd, std::string_view text) {
 
 std::string metrics_text(const Snapshot& now) {
   Text text(now.instance);
+  add_build(text, now);
   add_rate(text, now);
   add_counters(text, now);
   add_layouts(text, now);

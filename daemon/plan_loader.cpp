@@ -25,7 +25,15 @@ std::vector<Error> refusal(std::string what, std::string remedy) {
 
 }  // namespace
 
-gateway::ConfigResult load_or_refuse(const LoadPlan& load) {
+LoadResult load_with_fingerprint(const std::string& path,
+                                 const gateway::ConfigOverrides& overrides) {
+  gateway::ConfigResult loaded = gateway::load_config(path, overrides);
+  if (!loaded) return tl::unexpected(std::move(loaded.error()));
+  std::string fingerprint = gateway::fingerprint_of(*loaded, overrides);
+  return LoadedConfig{std::move(loaded->plan), std::move(fingerprint), std::move(loaded->warnings)};
+}
+
+LoadResult load_or_refuse(const LoadPlan& load) {
   // Made before it is needed: then there may be no memory for it.
   std::vector<Error> no_memory =
       refusal("there is not memory enough to read the configuration",
@@ -39,7 +47,7 @@ gateway::ConfigResult load_or_refuse(const LoadPlan& load) {
   }
 }
 
-void tell_config(const gateway::ConfigResult& loaded, Log& log) {
+void tell_config(const LoadResult& loaded, Log& log) {
   const auto tell = [&](Severity severity, const std::vector<Error>& errors) {
     for (const Error& error : errors)
       log.tell(severity, {.cause = "config"}, "{}", error.message());
@@ -58,7 +66,7 @@ struct PlanLoader::Desk {
   ~Desk() {
     if (fd >= 0) ::close(fd);
   }
-  void hand_over(gateway::ConfigResult what) {
+  void hand_over(LoadResult what) {
     const std::scoped_lock lock(mutex);
     result = std::move(what);
     ::eventfd_write(fd, 1);
@@ -66,7 +74,7 @@ struct PlanLoader::Desk {
 
   int fd = -1;
   std::mutex mutex;  ///< guards what follows
-  std::optional<gateway::ConfigResult> result;
+  std::optional<LoadResult> result;
 };
 
 PlanLoader::PlanLoader(LoadPlan load) : load_(std::move(load)), desk_(std::make_shared<Desk>()) {}
@@ -106,8 +114,8 @@ void PlanLoader::begin() {
   }
 }
 
-std::optional<gateway::ConfigResult> PlanLoader::take() {
-  std::optional<gateway::ConfigResult> result;
+std::optional<LoadResult> PlanLoader::take() {
+  std::optional<LoadResult> result;
   {
     const std::scoped_lock lock(desk_->mutex);
     eventfd_t count = 0;

@@ -8,6 +8,8 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <string>
+#include <vector>
 
 #include "base/error.h"
 #include "daemon/log.h"
@@ -16,14 +18,27 @@
 
 namespace vgyro::daemon {
 
+/// What the gateway needs of a configuration.
+struct LoadedConfig {
+  gateway::Plan plan;
+  std::string fingerprint;      ///< gateway::fingerprint_of(), reckoned beside the loop
+  std::vector<Error> warnings;  ///< usable, but the user should know
+};
+
+using LoadResult = tl::expected<LoadedConfig, std::vector<Error>>;
+
+/// gateway::load_config() and the fingerprint of what it read.
+LoadResult load_with_fingerprint(const std::string& path,
+                                 const gateway::ConfigOverrides& overrides = {});
+
 /// Runs in a thread of its own, so it owns what it uses.
-using LoadPlan = std::function<gateway::ConfigResult()>;
+using LoadPlan = std::function<LoadResult()>;
 
 /// What `load` says; its exceptions as errors.
-gateway::ConfigResult load_or_refuse(const LoadPlan& load);
+LoadResult load_or_refuse(const LoadPlan& load);
 
 /// The errors of a configuration that cannot be used; the warnings of one that can.
-void tell_config(const gateway::ConfigResult& loaded, Log& log);
+void tell_config(const LoadResult& loaded, Log& log);
 
 class PlanLoader {
  public:
@@ -40,7 +55,7 @@ class PlanLoader {
   void ask();
 
   /// The result of one load, once. A load that was asked for meanwhile begins.
-  std::optional<gateway::ConfigResult> take();
+  std::optional<LoadResult> take();
 
   [[nodiscard]] bool is_busy() const { return busy_; }
 

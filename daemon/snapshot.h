@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -16,6 +17,7 @@ namespace vgyro::daemon {
 struct Snapshot {
   std::string instance;                 ///< of several gateways on a host; empty: the only one
   const gateway::Plan* plan = nullptr;  ///< lives as long as the snapshot is the newest
+  std::string fingerprint;              ///< of the configuration in use: gateway::fingerprint_of()
   gateway::Status status;
   std::vector<gateway::Status> axes;       ///< of a platform of several, in the order of Plan::axes
   std::array<double, 2> bias_sigma_dps{};  ///< of each gyro; NaN where it is not known
@@ -23,7 +25,8 @@ struct Snapshot {
   std::array<double, 2> slope_sigma_dps_s{};  ///< of the slope; NaN where it is not known
   Traffic traffic;
   double uptime_s = 0.0;
-  std::uint64_t log_lines_lost = 0;         ///< not read
+  double last_stop_age_s = std::numeric_limits<double>::quiet_NaN();  ///< NaN: no stop so far
+  std::uint64_t log_lines_lost = 0;                                   ///< not read
   std::uint64_t service_messages_lost = 0;  ///< the service manager did not take them at once
   bool config_refused = false;              ///< by the last reload
 };

@@ -400,8 +400,9 @@ std::string status_table(const Json& status, const ViewOptions& options) {
       count_of(counters, "frames_overflowed"), count_of(counters, "frames_refused"));
   text += layouts_line(counters);
   text += unused_inputs(counters);
-  text += paint(Mood::kQuiet, fmt::format("vgyrod {}, method {}, up {}", text_of(status, "version"),
-                                          text_of(status, "method"),
+  text += paint(Mood::kQuiet, fmt::format("vgyrod {}, method {}, configuration {}, up {}",
+                                          text_of(status, "version"), text_of(status, "method"),
+                                          text_of(status, "fingerprint"),
                                           duration_text(number_of(status, "uptime_s")))) +
           '\n';
   return text;

@@ -29,6 +29,8 @@ struct SampleGateway {
     plan.gyros[0].name = "left \"one\" \\";
     plan.gyros[1].name = "right";
     now.plan = &plan;
+    now.fingerprint = "0123456789abcdef";
+    now.last_stop_age_s = 75.0;
     now.status.state = gateway::State::kRunning;
     now.status.quality = gateway::Quality::kTwoGyros;
     now.status.rate_dps = 50.25;

@@ -130,17 +130,19 @@ class OnTheBus(Bench):
         members = {line.split()[0]: line.split()[1:3] for line in listed.stdout.splitlines() if line.startswith(".")}
         expected = {".Recalibrate": ["method", "-"], ".SaveState": ["method", "-"], ".Counters": ["property", "a{st}"],
                     ".Gyros": ["property", "aa{sv}"], ".Axes": ["property", "aa{sv}"], ".Buses": ["property", "aa{sv}"]}
-        expected |= {f".{name}": ["property", "s"] for name in ("Version", "Instance", "Method", "State", "Quality", "Restored", "Contradiction",
+        expected |= {f".{name}": ["property", "s"] for name in ("Version", "Instance", "Method", "Fingerprint", "State", "Quality", "Restored", "Contradiction",
                                                                 "ContradictionText")}
         expected |= {f".{name}": ["property", "b"] for name in ("Valid", "Disagree", "Ambiguous", "RatesTooFarApart",
                                                                 "ConfigRefused", "Transmit")}
         expected |= {".Hypotheses": ["property", "a{sd}"]}
-        expected |= {f".{name}": ["property", "d"] for name in ("RateDps", "SigmaDps", "BiasSigmaDps", "CalibratedS",
+        expected |= {f".{name}": ["property", "d"] for name in ("RateDps", "SigmaDps", "BiasSigmaDps", "CalibratedS", "LastStopAgeS",
                                                                 "RestS", "UptimeS")}
         self.assertEqual(members, expected)
 
     def test_properties_hold_what_the_gateway_knows(self):
         self.assertEqual(self.get("State"), "running")
+        self.assertEqual(self.get("Fingerprint"), "0123456789abcdef")
+        self.assertEqual(self.get("LastStopAgeS"), 75.0)
         self.assertEqual(self.get("Quality"), "two_gyros")
         self.assertIs(self.get("Valid"), True)
         self.assertEqual((self.get("RateDps") - 50.25) % 0.5, 0.0)
@@ -242,6 +244,17 @@ class OnTheBus(Bench):
         self.assertEqual(status["hypotheses"], {"standing": 0.75, "turning": 0.25, "warming_up": 0.5})
         self.assertIs(status["ambiguous"], True)
         self.assertEqual([g["slope_dps_s"] for g in status["gyros"]], [1e-6, None])
+
+    def test_the_configuration_is_told_by_its_fingerprint(self):
+        self.assertIn(", configuration 0123456789abcdef, up ", self.vgyro("status").stdout)
+        self.assertEqual(json.loads(self.vgyro("status", "--json").stdout)["fingerprint"], "0123456789abcdef")
+        self.end(self.sample)
+        metrics = self.folder / "vgyro.prom"
+        self.start_sample(str(metrics))
+        self.assertTrue(until(metrics.exists))
+        text = metrics.read_text(encoding="utf-8")
+        self.assertRegex(text, r'(?m)^vgyro_build_info\{version="[0-9.]+[^"]*",fingerprint="0123456789abcdef",method="[a-z]+"\} 1$')
+        self.assertIn("\nvgyro_last_stop_age_seconds 75\n", text)
 
     def test_shadow_mode_is_said_wherever_one_looks(self):
         self.assertIs(self.get("Transmit"), True)

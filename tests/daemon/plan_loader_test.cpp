@@ -27,14 +27,14 @@ class SlowDisk {
     ++given_;
     changed_.notify_all();
   }
-  gateway::ConfigResult read() {
+  LoadResult read() {
     std::unique_lock lock(mutex_);
     ++begun_;
     changed_.notify_all();
     changed_.wait(lock, [&] { return begun_ <= given_; });
-    gateway::Resolved resolved;
-    resolved.plan.calibration.rest_s = begun_;
-    return resolved;
+    LoadedConfig loaded;
+    loaded.plan.calibration.rest_s = begun_;
+    return loaded;
   }
   void wait_until_begun(int loads) {
     std::unique_lock lock(mutex_);
@@ -60,9 +60,9 @@ bool is_ready(const PlanLoader& loader, int wait_ms) {
 // A hang, and not a slow machine.
 constexpr int kPatience_ms = 60'000;
 
-gateway::ConfigResult result_of(PlanLoader& loader) {
+LoadResult result_of(PlanLoader& loader) {
   EXPECT_TRUE(is_ready(loader, kPatience_ms));
-  std::optional<gateway::ConfigResult> result = loader.take();
+  std::optional<LoadResult> result = loader.take();
   if (result) return std::move(*result);
   return tl::unexpected(std::vector<Error>{{{}, "there was no result", {}}});
 }
@@ -79,7 +79,7 @@ TEST(PlanLoader, TheLoopTurnsWhileADiskGivesNothing) {
     ASSERT_TRUE(loader.is_busy());
   }
   disk->give();
-  const gateway::ConfigResult result = result_of(loader);
+  const LoadResult result = result_of(loader);
   ASSERT_TRUE(result);
   EXPECT_EQ(result->plan.calibration.rest_s, 1.0);
   EXPECT_FALSE(loader.is_busy());
@@ -103,17 +103,16 @@ TEST(PlanLoader, WishesDuringALoadMakeOneFurtherLoad) {
 }
 
 TEST(PlanLoader, MemoryThatRunsShortIsARefusal) {
-  PlanLoader loader([]() -> gateway::ConfigResult { throw std::bad_alloc(); });
+  PlanLoader loader([]() -> LoadResult { throw std::bad_alloc(); });
   ASSERT_TRUE(loader.open());
   loader.ask();
-  const gateway::ConfigResult result = result_of(loader);
+  const LoadResult result = result_of(loader);
   ASSERT_FALSE(result);
   EXPECT_NE(result.error().front().message().find("not memory enough"), std::string::npos);
 }
 
 TEST(PlanLoader, WhateverIsThrownIsARefusal) {
-  PlanLoader loader(
-      []() -> gateway::ConfigResult { throw std::runtime_error("the parser gave up"); });
+  PlanLoader loader([]() -> LoadResult { throw std::runtime_error("the parser gave up"); });
   ASSERT_TRUE(loader.open());
   loader.ask();
   EXPECT_EQ(result_of(loader).error().front().message(), "the parser gave up");
@@ -140,10 +139,10 @@ TEST(PlanLoader, APipeInsteadOfADbcFileIsRefused) {
             "\"\nbus = \"can0\"\ndbc = \"a.dbc\"\nmessage = \"GYRO\"\nrate = \"Rate\"\n";
   }
   scratch.put("vgyro.toml", text + "[output]\nbus = \"can0\"\n");
-  PlanLoader loader([path = scratch.path("vgyro.toml")] { return gateway::load_config(path); });
+  PlanLoader loader([path = scratch.path("vgyro.toml")] { return load_with_fingerprint(path); });
   ASSERT_TRUE(loader.open());
   loader.ask();
-  const gateway::ConfigResult result = result_of(loader);
+  const LoadResult result = result_of(loader);
   ASSERT_FALSE(result);
   EXPECT_NE(result.error().front().message().find("a.dbc: is a pipe"), std::string::npos)
       << result.error().front().message();
@@ -167,32 +166,32 @@ void put_configuration(const Scratch& scratch) {
 TEST(PlanLoader, AReloadTakesWhatLiesOverTheConfiguration) {
   Scratch scratch;
   put_configuration(scratch);
-  PlanLoader loader([path = scratch.path("vgyro.toml")] { return gateway::load_config(path); });
+  PlanLoader loader([path = scratch.path("vgyro.toml")] { return load_with_fingerprint(path); });
   ASSERT_TRUE(loader.open());
   const auto reloaded = [&] {
     loader.ask();
     return result_of(loader);
   };
-  const gateway::ConfigResult alone = reloaded();
+  const LoadResult alone = reloaded();
   ASSERT_TRUE(alone) << alone.error().front().message();
   EXPECT_EQ(alone->plan.calibration.rest_s, 5.0);
 
   std::filesystem::create_directory(scratch.path("vgyro.d"));
   scratch.put("vgyro.d/10-fleet.toml", "[calibration]\nrest_s = 6\n");
   scratch.put("vgyro.d/20-car.toml", "[calibration]\nrest_s = 7\n[output]\ntransmit = false\n");
-  const gateway::ConfigResult overlaid = reloaded();
+  const LoadResult overlaid = reloaded();
   ASSERT_TRUE(overlaid) << overlaid.error().front().message();
   EXPECT_EQ(overlaid->plan.calibration.rest_s, 7.0);
   EXPECT_FALSE(overlaid->plan.output.transmit);
   EXPECT_NE(overlaid->fingerprint, alone->fingerprint);
 
   scratch.put("vgyro.d/20-car.toml", "[calibration]\nresst_s = 7\n");
-  const gateway::ConfigResult broken = reloaded();
+  const LoadResult broken = reloaded();
   ASSERT_FALSE(broken);
   EXPECT_EQ(broken.error().front().where, at_line(scratch.path("vgyro.d/20-car.toml"), 2));
 
   std::filesystem::remove_all(scratch.path("vgyro.d"));
-  const gateway::ConfigResult again = reloaded();
+  const LoadResult again = reloaded();
   ASSERT_TRUE(again) << again.error().front().message();
   EXPECT_EQ(again->plan.calibration.rest_s, 5.0);
   EXPECT_TRUE(again->plan.output.transmit);
