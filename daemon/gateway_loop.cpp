@@ -163,12 +163,13 @@ Expected<void> GatewayLoop::start_events() {
 
   sigset_t signals;
   ::sigemptyset(&signals);
-  for (const int number : {SIGTERM, SIGINT, SIGHUP})
+  for (const int number : {SIGTERM, SIGINT, SIGHUP, SIGUSR1})
     ::sigaddset(&signals, number);
   ::pthread_sigmask(SIG_BLOCK, &signals, nullptr);
   result = sd_event_add_signal(events, nullptr, SIGTERM, &on_stop, this);
   if (result >= 0) result = sd_event_add_signal(events, nullptr, SIGINT, &on_stop, this);
   if (result >= 0) result = sd_event_add_signal(events, nullptr, SIGHUP, &on_hangup, this);
+  if (result >= 0) result = sd_event_add_signal(events, nullptr, SIGUSR1, &on_debug, this);
   if (result >= 0) {
     result = sd_event_add_time_relative(events, nullptr, CLOCK_MONOTONIC, kSecondUsec, 0,
                                         &on_second, this);
@@ -393,7 +394,9 @@ void GatewayLoop::second_passed() {
   reopen_dead_buses();
   look_whether_output_fits();
   stop_age_.count_is(setup_->pipeline.status().stops, clock_.steady());
-  notifier_.status(status_line());
+  const std::string line = status_line();
+  notifier_.status(line);
+  log_.debug("{}", line);
   control_->second_passed();
   if (metrics_ != nullptr && metrics_->second_passed()) metrics_->write(snapshot());
   const std::optional<gateway::SavedState> known = memory();
@@ -528,6 +531,7 @@ Expected<void> GatewayLoop::take_reloaded() {
     if (!replaced) log_.error("{}", replaced.error().message());
     reload_refused_ = !replaced;
     if (replaced) {
+      set_log_level(**loaded, log_);
       snapshot_.fingerprint = std::move((*loaded)->fingerprint);
       log_.info("the configuration's fingerprint is {}", snapshot_.fingerprint);
     }
@@ -613,6 +617,11 @@ int GatewayLoop::on_stop(sd_event_source*, const signalfd_siginfo*, void* self) 
 
 int GatewayLoop::on_hangup(sd_event_source*, const signalfd_siginfo*, void* self) {
   static_cast<GatewayLoop*>(self)->reload_wanted_ = true;
+  return 0;
+}
+
+int GatewayLoop::on_debug(sd_event_source*, const signalfd_siginfo*, void* self) {
+  static_cast<GatewayLoop*>(self)->log_.toggle_debug();
   return 0;
 }
 

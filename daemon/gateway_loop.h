@@ -50,7 +50,7 @@ class GatewayLoop final : private gateway::FrameSink {
   /// do. Interfaces that are not there yet are waited for.
   Expected<void> start();
 
-  /// Until SIGTERM or SIGINT; SIGHUP reads the configuration again.
+  /// Until SIGTERM or SIGINT; SIGHUP reads the configuration again, SIGUSR1 toggles debug messages.
   Expected<void> run();
 
  private:
@@ -111,6 +111,7 @@ class GatewayLoop final : private gateway::FrameSink {
 
   static int on_stop(sd_event_source* source, const struct signalfd_siginfo* info, void* self);
   static int on_hangup(sd_event_source* source, const struct signalfd_siginfo* info, void* self);
+  static int on_debug(sd_event_source* source, const struct signalfd_siginfo* info, void* self);
   static int on_second(sd_event_source* source, std::uint64_t usec, void* self);
   static int on_watchdog(sd_event_source* source, std::uint64_t usec, void* self);
 

@@ -19,7 +19,7 @@
 namespace vgyro::daemon {
 
 /// Priorities of syslog.
-enum class Severity : int { kError = 3, kWarning = 4, kNotice = 5, kInfo = 6 };
+enum class Severity : int { kError = 3, kWarning = 4, kNotice = 5, kInfo = 6, kDebug = 7 };
 
 struct Line {
   Severity severity = Severity::kInfo;

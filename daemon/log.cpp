@@ -68,8 +68,15 @@ Log::Log() : Log(stderr_is_journal() ? &sd_journal_sendv : nullptr) {}
 Log::Log(Journal journal)
     : lines_([journal](const Line& line) { return write_line(journal, line); }) {}
 
+void Log::toggle_debug() {
+  if (debugging_) notice("debug messages end; the configured level applies");
+  debugging_ = !debugging_;
+  if (debugging_) notice("debug messages begin; SIGUSR1 ends them");
+}
+
 void Log::write(Severity severity, const Subject& subject, fmt::string_view text,
                 fmt::format_args args) {
+  if (!is_wanted(severity)) return;
   try {
     lines_.put({.severity = severity,
                 .message = fmt::vformat(text, args),

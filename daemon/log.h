@@ -2,7 +2,8 @@
 
 // One line per event for people: to the journal, with fields to filter by, when systemd connected
 // stderr to it, else to stderr as it is. Rare lines only; nothing here belongs on the frame path.
-// Nobody waits for the journal or for stderr: lines that are not taken are counted (line_queue.h).
+// One thread speaks: the loop. Nobody waits for the journal or for stderr: lines that are not taken
+// are counted (line_queue.h).
 
 #include <chrono>
 #include <cstdint>
@@ -50,10 +51,20 @@ class Log {
   }
 
   template <class... Args>
+  void debug(fmt::format_string<Args...> text, Args&&... args) {
+    write(Severity::kDebug, {}, text, fmt::make_format_args(args...));
+  }
+
+  template <class... Args>
   void tell(Severity severity, const Subject& subject, fmt::format_string<Args...> text,
             Args&&... args) {
     write(severity, subject, text, fmt::make_format_args(args...));
   }
+
+  /// Less severe lines are not written. The queue's own, of lines that were lost, always are.
+  void set_level(Severity least) { least_ = least; }
+  /// Everything is written, whatever the level, until this is called again.
+  void toggle_debug();
 
   /// Waits until all lines are written; false when that takes too long.
   bool flush(std::chrono::milliseconds patience) { return lines_.flush(patience); }
@@ -65,6 +76,10 @@ class Log {
   void write(Severity severity, const Subject& subject, fmt::string_view text,
              fmt::format_args args);
 
+  [[nodiscard]] bool is_wanted(Severity severity) const { return debugging_ || severity <= least_; }
+
+  Severity least_ = Severity::kInfo;
+  bool debugging_ = false;
   LineQueue lines_;
 };
 

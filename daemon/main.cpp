@@ -67,6 +67,7 @@ int run(const Options& options, vgyro::daemon::Log& log) {
   };
   vgyro::daemon::LoadResult loaded = vgyro::daemon::load_or_refuse(load);
   if (loaded) {
+    vgyro::daemon::set_log_level(*loaded, log);
     log.info("vgyrod {} starts with {}, fingerprint {}", VGYRO_VERSION,
              vgyro::printable(options.config), loaded->fingerprint);
   }
@@ -146,6 +147,7 @@ int main(int argc, char** argv) {
   app.footer(
       "`vgyro check FILE` explains a configuration before it is trusted.\n"
       "SIGHUP reads the configuration again; one that cannot be used is refused.\n"
+      "SIGUSR1 begins debug messages, and ends them.\n"
       "Exit codes: 0 stopped by a signal, 1 configuration unusable, or another gateway has the "
       "state "
       "file, 2 wrong usage, 3 the system failed.");

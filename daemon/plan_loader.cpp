@@ -30,7 +30,8 @@ LoadResult load_with_fingerprint(const std::string& path,
   gateway::ConfigResult loaded = gateway::load_config(path, overrides);
   if (!loaded) return tl::unexpected(std::move(loaded.error()));
   std::string fingerprint = gateway::fingerprint_of(*loaded, overrides);
-  return LoadedConfig{std::move(loaded->plan), std::move(fingerprint), std::move(loaded->warnings)};
+  return LoadedConfig{std::move(loaded->plan), std::move(fingerprint), loaded->log_level,
+                      std::move(loaded->warnings)};
 }
 
 LoadResult load_or_refuse(const LoadPlan& load) {
@@ -45,6 +46,10 @@ LoadResult load_or_refuse(const LoadPlan& load) {
   } catch (const std::exception& error) {
     return tl::unexpected(refusal(error.what(), {}));
   }
+}
+
+void set_log_level(const LoadedConfig& config, Log& log) {
+  log.set_level(static_cast<Severity>(config.log_level));  // both are syslog's numbers
 }
 
 void tell_config(const LoadResult& loaded, Log& log) {

@@ -21,7 +21,8 @@ namespace vgyro::daemon {
 /// What the gateway needs of a configuration.
 struct LoadedConfig {
   gateway::Plan plan;
-  std::string fingerprint;      ///< gateway::fingerprint_of(), reckoned beside the loop
+  std::string fingerprint;  ///< gateway::fingerprint_of(), reckoned beside the loop
+  gateway::LogLevel log_level = gateway::LogLevel::kInfo;
   std::vector<Error> warnings;  ///< usable, but the user should know
 };
 
@@ -36,6 +37,9 @@ using LoadPlan = std::function<LoadResult()>;
 
 /// What `load` says; its exceptions as errors.
 LoadResult load_or_refuse(const LoadPlan& load);
+
+/// The level that it asks for.
+void set_log_level(const LoadedConfig& config, Log& log);
 
 /// The errors of a configuration that cannot be used; the warnings of one that can.
 void tell_config(const LoadResult& loaded, Log& log);

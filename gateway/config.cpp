@@ -429,6 +429,30 @@ void read_output(TomlReader& root, Context& context) {
   reader.finish();
 }
 
+std::optional<LogLevel> log_level_from(std::string_view name) {
+  if (name == "error") return LogLevel::kError;
+  if (name == "warning") return LogLevel::kWarning;
+  if (name == "notice") return LogLevel::kNotice;
+  if (name == "info") return LogLevel::kInfo;
+  if (name == "debug") return LogLevel::kDebug;
+  return std::nullopt;
+}
+
+void read_log(TomlReader& root, Context& context) {
+  const toml::table* table = root.table("log");
+  if (table == nullptr) return;
+  TomlReader reader(*table, context.file, "[log]", context.errors);
+  if (const auto name = reader.text("level")) {
+    const std::optional<LogLevel> level = log_level_from(*name);
+    if (level) context.resolved.log_level = *level;
+    if (!level) {
+      reader.complain(reader.where("level"), fmt::format("there is no level \"{}\"", *name),
+                      suggest_name(*name, {"error", "warning", "notice", "info", "debug"}));
+    }
+  }
+  reader.finish();
+}
+
 }  // namespace
 
 std::optional<Method> method_from(std::string_view name) {
@@ -472,6 +496,7 @@ ConfigResult load_config(const std::string& path, const ConfigOverrides& overrid
   read_calibration(root, context);
   read_corrector(root, context, overrides);
   read_output(root, context);
+  read_log(root, context);
   root.finish();
   if (context.errors.empty()) check_apart(root, plan);
   if (context.errors.empty()) apply_knowledge(context);

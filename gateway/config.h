@@ -15,12 +15,16 @@
 
 namespace vgyro::gateway {
 
+/// The least severe messages that are logged, as priorities of syslog.
+enum class LogLevel : int { kError = 3, kWarning = 4, kNotice = 5, kInfo = 6, kDebug = 7 };
+
 struct Resolved {
   Plan plan;
   /// What was read: DBC files, the model file, the file itself and what lies over it.
   std::vector<std::string> files;
-  ConfigText text;              ///< its values, as the last files of `files` say them together
-  std::vector<Error> warnings;  ///< usable, but the user should know
+  ConfigText text;  ///< its values, as the last files of `files` say them together
+  LogLevel log_level = LogLevel::kInfo;  ///< of the live gateway: [log] level
+  std::vector<Error> warnings;           ///< usable, but the user should know
 };
 
 using ConfigResult = tl::expected<Resolved, std::vector<Error>>;

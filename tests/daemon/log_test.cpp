@@ -60,6 +60,41 @@ TEST(Log, GivesTheJournalFieldsToFilterBy) {
   EXPECT_EQ(written(), (Fields{"MESSAGE=broken", "PRIORITY=3"}));
 }
 
+TEST(Log, WritesNothingLessSevereThanItsLevel) {
+  Log log(&keep);
+  const auto is_written = [&](auto say) {
+    written().clear();
+    say();
+    EXPECT_TRUE(log.flush(kPatience));
+    return !written().empty();
+  };
+  EXPECT_FALSE(is_written([&] { log.debug("a"); })) << "info is the default";
+  EXPECT_TRUE(is_written([&] { log.info("a"); }));
+  log.set_level(Severity::kWarning);
+  EXPECT_FALSE(is_written([&] { log.info("a"); }));
+  EXPECT_FALSE(is_written([&] { log.notice("a"); }));
+  EXPECT_TRUE(is_written([&] { log.warning("a"); }));
+  EXPECT_TRUE(is_written([&] { log.error("a"); }));
+}
+
+// Each of the two changes is said, at whatever level; a reload in between does not end it.
+TEST(Log, DebuggingOverridesTheLevelUntilItIsToggledAgain) {
+  Log log(&keep);
+  log.set_level(Severity::kError);
+  log.toggle_debug();
+  ASSERT_TRUE(log.flush(kPatience));
+  EXPECT_EQ(written(), (Fields{"MESSAGE=debug messages begin; SIGUSR1 ends them", "PRIORITY=5"}));
+  log.set_level(Severity::kError);
+  log.debug("{}", 7);
+  ASSERT_TRUE(log.flush(kPatience));
+  EXPECT_EQ(written(), (Fields{"MESSAGE=7", "PRIORITY=7"}));
+  log.toggle_debug();
+  log.info("not written");
+  ASSERT_TRUE(log.flush(kPatience));
+  EXPECT_EQ(written(),
+            (Fields{"MESSAGE=debug messages end; the configured level applies", "PRIORITY=5"}));
+}
+
 TEST(Log, FallsBackToTheStreamWhereTheJournalDoesNotAnswer) {
   Log log(&refuse);
   testing::internal::CaptureStderr();

@@ -162,6 +162,23 @@ void put_configuration(const Scratch& scratch) {
   scratch.put("vgyro.toml", text);
 }
 
+TEST(PlanLoader, TheConfigurationSetsTheLevelOfTheLog) {
+  Scratch scratch;
+  put_configuration(scratch);
+  const auto loaded = [&](const std::string& log) {
+    std::filesystem::create_directory(scratch.path("vgyro.d"));
+    scratch.put("vgyro.d/log.toml", log);
+    return gateway::load_config(scratch.path("vgyro.toml"));
+  };
+  EXPECT_EQ(loaded("")->log_level, gateway::LogLevel::kInfo);
+  EXPECT_EQ(loaded("[log]\nlevel = \"warning\"\n")->log_level, gateway::LogLevel::kWarning);
+  EXPECT_EQ(loaded("[log]\nlevel = \"debug\"\n")->log_level, gateway::LogLevel::kDebug);
+  const gateway::ConfigResult wrong = loaded("[log]\nlevel = \"warn\"\n");
+  ASSERT_FALSE(wrong);
+  EXPECT_EQ(wrong.error().front().where, at_line(scratch.path("vgyro.d/log.toml"), 2));
+  EXPECT_EQ(wrong.error().front().what, "there is no level \"warn\"");
+}
+
 // The folder is read anew with each load: overlays come, go wrong and go away.
 TEST(PlanLoader, AReloadTakesWhatLiesOverTheConfiguration) {
   Scratch scratch;
