@@ -1,10 +1,9 @@
 #pragma once
 
-// What waits to be sent, for each bus of a configuration: its queue, and whether poll is asked for
-// room in its socket. Goes over to the next configuration by the names of the buses, so that
-// nothing that was meant for one bus is sent to another. In shadow mode ([output] transmit = false)
-// no frame gets as far as a queue: it is counted, and no transmitter is asked. Allocates only when
-// constructed.
+// The frames that wait to be sent, for each bus of a configuration: its queue, and whether poll
+// watches for room in its socket. A reload hands them on by the names of the buses, so that a frame
+// meant for one bus is never sent to another. In shadow mode ([output] transmit = false) frames are
+// counted instead of queued, and no transmitter is called. Allocates only when constructed.
 
 #include <cstddef>
 #include <cstdint>
@@ -36,13 +35,14 @@ class Outlets {
   [[nodiscard]] std::size_t size() const { return outlets_.size(); }
   Outlet& operator[](std::size_t bus) { return outlets_[bus]; }
 
-  /// As TransmitQueue's; in shadow mode the frame is counted, and true.
+  /// TransmitQueue::send_at_once() of this bus. In shadow mode it only counts the frame and returns
+  /// true.
   bool send_at_once(std::size_t bus, const can::Frame& frame, can::Transmitter& transmitter);
-  /// Likewise.
+  /// TransmitQueue::push() of this bus. In shadow mode it only counts the frame.
   void push(std::size_t bus, const can::Frame& frame, TimePoint send_by);
 
-  /// The queues of the buses that both have go on, with new sockets; the books of all do. In shadow
-  /// mode nothing waits any more.
+  /// Keeps the waiting frames of buses that the new configuration still has, for their new sockets,
+  /// and the counts of all buses. In shadow mode the waiting frames are dropped.
   void take_over(Outlets&& before);
 
   /// Of all buses, since the program started.
