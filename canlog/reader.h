@@ -51,7 +51,7 @@ class LogReader {
 /// is of no form that is known (canlog/forms.h): then with the way out.
 Expected<std::unique_ptr<LogReader>> open_log(const std::string& path);
 
-/// Likewise from bytes that are unpacked already.
+/// The same for bytes that are unpacked already.
 Expected<std::unique_ptr<LogReader>> open_log(std::unique_ptr<ByteSource> bytes);
 
 }  // namespace vgyro::canlog

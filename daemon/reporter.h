@@ -52,7 +52,8 @@ class Reporter {
     if (status.ambiguous != ambiguous_) ambiguity_changed(status);
   }
 
-  /// Likewise of one axis of a platform of several; `place` is its own from call to call.
+  /// Reports what changed about one axis of a platform with several; each axis keeps its `place`
+  /// from call to call.
   void check_axis(std::size_t place, char axis, const gateway::Status& status) {
     AxisTold& told = axes_[place];
     if (status.state != told.state) axis_state_changed(axis, status, told);

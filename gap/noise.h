@@ -148,8 +148,9 @@ inline std::uint32_t dimensions(const Block& block) {
 /// Returns −½ Σ log of the innovations' variances over the blocks that count.
 double whiten_means(Matrix& means, const Layout& layout, const PairNoise& noise, Part part);
 
-/// Samples → deviations from their block's mean in units of the noise, in place; likewise. Of a
-/// block in fast motion the first rows are the cosines that are kept, the others zero.
+/// Samples → deviations from their block's mean in units of the noise, in place. Zeroes rows and
+/// returns −½ Σ log of variances as whiten_means() does. Of a block in fast motion the first rows
+/// are the cosines that are kept, the others zero.
 double whiten_within(Matrix& columns, const Layout& layout, const PairNoise& noise, Part part);
 
 /// Samples → what whiten_within makes of them, but for the noise, which weighs rows.

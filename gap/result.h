@@ -110,7 +110,7 @@ struct NotIdentifiable {
 struct GyroFigures {
   Figure time;      ///< measured less predicted: before, after, and the 2σ of a simulation
   Figure spectrum;  ///< √PSD: measured less predicted before, after, simulated with the final model
-  Figure allan;     ///< likewise
+  Figure allan;     ///< Allan deviation of the same three
 };
 
 struct Result {

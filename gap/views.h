@@ -39,7 +39,7 @@ Curve allan_curve(const EvenSeries& series, std::string label);
 /// The Allan deviation that the noise terms make together; `rate_square` as the mean of the motion.
 double allan_deviation(const NoiseTerms& terms, double interval_s, double rate_square,
                        double tau_s);
-/// Two-sided PSD, likewise.
+/// The two-sided PSD that the noise terms make together; `rate_square` as the mean of the motion.
 double noise_psd(const NoiseTerms& terms, double interval_s, double rate_square,
                  double frequency_hz);
 /// Mean square of the rate over what a gyro takes part in.

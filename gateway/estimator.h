@@ -69,8 +69,8 @@ class Estimator {
   void set_stop_rate(double rate_dps) { corrector_->set_stop_rate(rate_dps); }
   /// The platform moved about another axis: what was gathered of this one was no rest.
   [[gnu::cold, gnu::noinline]] void restart_calibration();
-  /// Likewise, and about that axis it had rested for long enough: this one's calibration ends too,
-  /// or begins again where it has too little yet.
+  /// The platform moved about another axis after resting long enough for that axis's calibration:
+  /// this axis's calibration ends too, or begins again where it has too little data yet.
   [[gnu::cold, gnu::noinline]] void end_calibration(TimePoint t, TimePoint still_until);
   /// Motion has ended the calibration before its time: until when the platform rested.
   [[nodiscard]] const std::optional<TimePoint>& calibration_cut_at() const { return cut_at_; }

@@ -31,7 +31,7 @@ class LayoutEncoder {
 
   /// The frame to send; null when none is due, or when the layout cannot say what is to be said.
   const can::Frame* rates(const Rates& rates, TimePoint stamp);
-  /// Likewise, of a layout that carries one rate.
+  /// The frame to send of a layout that carries one rate; null as for rates().
   const can::Frame* rate(const RateOutput& output, TimePoint stamp);
 
   [[nodiscard]] bool sends_same_frame(const LayoutEncoder& other) const;

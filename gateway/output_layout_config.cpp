@@ -154,7 +154,7 @@ class LayoutReader {
   const std::vector<std::size_t>& axes_;  ///< of the platform; empty: a single one
   bool by_axes_ = false;                  ///< rate_x … instead of rate
   std::vector<RateEntry> entries_;
-  std::optional<std::string> unit_;  ///< of all rates; likewise the two below
+  std::optional<std::string> unit_;  ///< of all rates, as are the code for "none" and the sign
   std::optional<std::int64_t> none_raw_;
   double sign_ = 1.0;
   bool fd_ = false;

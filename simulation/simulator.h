@@ -71,7 +71,7 @@ class Simulator {
   /// the temperature is kTemperature_c.
   [[nodiscard]] double temperature_c(double t_s) const;
   static constexpr double kTemperature_c = 25.0;
-  /// Likewise.
+  /// At any time of the motion. Where the profile says nothing of it, the supply is kSupply_v.
   [[nodiscard]] double supply_v(double t_s) const;
   static constexpr double kSupply_v = 5.0;
 

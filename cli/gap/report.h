@@ -25,7 +25,7 @@ struct GapSubject {
   /// gyros.
   std::string axis = {};
   std::array<std::string, 2> types = {};    ///< of the gyros; empty: the configuration says none
-  std::array<std::string, 2> serials = {};  ///< likewise
+  std::array<std::string, 2> serials = {};  ///< of the gyros; empty: as for types
   std::array<std::size_t, 2> sensor_axis = {};  ///< which of the unit's own lies along it
   Provenance provenance = {};                   ///< for the page alone
 

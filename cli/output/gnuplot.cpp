@@ -110,7 +110,7 @@ Expected<std::string> picture_of(const std::string& script) {
 
 Expected<void> check_picture_path(const std::string& path) {
   if (terminal_of(path, 1, 1).empty()) {
-    return fail(path, "is no kind of picture that can be drawn",
+    return fail(path, "is not a kind of picture that can be drawn",
                 "a name ending in .svg, .png or .pdf");
   }
   const std::string folder = std::filesystem::path(path).parent_path().string();

@@ -38,7 +38,7 @@ void draw(std::FILE* to, std::string_view text);
 /// Flushes standard output; false when any of it was lost so far.
 bool flush_output();
 
-/// Likewise, as a sentence with the cause.
+/// Flushes standard output. Error: some of it was lost so far, and why.
 Expected<void> finish_output();
 
 }  // namespace vgyro::cli

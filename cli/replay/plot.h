@@ -149,7 +149,7 @@ class ReplayPlot {
   bool valid_begun_ = false;  ///< a virtual rate was valid: headings count from there
   std::array<Heading, 4> headings_;
   double sigma_dps_ = 0.0;       ///< of the newest rate; 0 where it is not stated
-  double bias_sigma_dps_ = 0.0;  ///< of what is taken off it; likewise
+  double bias_sigma_dps_ = 0.0;  ///< of the bias taken off it; 0 where it is not stated
   bool sigma_known_ = false;
   double heading_bias_deg_ = 0.0;    ///< σ of what the drifts left, at most: as if one error
   double heading_white_deg2_ = 0.0;  ///< variance of what the noise adds up to
