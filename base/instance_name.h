@@ -33,7 +33,7 @@ inline Expected<void> check_instance_name(std::string_view name) {
   const bool good = name.empty() || (name.size() <= kBytesMost && is_letter(name.front()) &&
                                      std::all_of(name.begin(), name.end(), fits));
   if (good) return {};
-  return fail({}, "\"" + std::string(name) + "\" is no name of an instance",
+  return fail({}, "\"" + std::string(name) + "\" is not a name for an instance",
               "a letter, then letters, digits and _; at most 32 in all: vgyrod@front2");
 }
 

@@ -356,7 +356,7 @@ std::optional<Error> explain_no_pair(const gateway::Status& status, const gatewa
   if (status.rates_too_far_apart) {
     const std::size_t slow = status.gyros[0].samples < status.gyros[1].samples ? 0 : 1;
     return Error{logs,
-                 fmt::format("gyro {} speaks so much more often than gyro {} that no pairs can be "
+                 fmt::format("gyro {} sends so much more often than gyro {} that no pairs can be "
                              "made of them ({} samples and {})",
                              plan.gyros[1 - slow].name, plan.gyros[slow].name,
                              status.gyros[1 - slow].samples, status.gyros[slow].samples),

@@ -688,7 +688,7 @@ bus = "can1"
         lines += [(i * 1_500_000, bench.line_b(begin_us + i * 1_500_000, 0.3)) for i in range(16)]
         self.write("in.log", "".join(line for _, line in sorted(lines)))
         said = self.refuse("-q", "in.log")
-        for part in ("gyro left speaks so much more often than gyro right", "no pairs", "2000 times"):
+        for part in ("gyro left sends so much more often than gyro right", "no pairs", "2000 times"):
             self.assertIn(part, said)
 
     def test_saved_state_that_cannot_be_used(self):

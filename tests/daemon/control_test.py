@@ -300,7 +300,7 @@ class OnTheBus(Bench):
         self.assertIn("`systemctl status vgyrod@nobody` says whether it runs", missing.stderr)
         wrong = self.vgyro("status", "--instance", "a-b")
         self.assertEqual(wrong.returncode, 2)
-        self.assertIn("is no name of an instance", wrong.stderr)
+        self.assertIn("is not a name for an instance", wrong.stderr)
 
     def test_status_as_a_table(self):
         done = self.vgyro("status")
