@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
-# imufusion 1.3.3 (PyPI): the heading in the first seconds.
+# imufusion 1.3.3 with numpy 2.2.6 (PyPI): the heading in the first seconds.
 #
 # Guess: Ahrs.update_no_magnetometer() integrates the yaw rate from the first sample on; while it starts
-# up it trusts the accelerometer more, which tells nothing of yaw. 10 s at 10 deg/s are 100 deg.
+# up it trusts the accelerometer more, which does not depend on yaw. 10 s at 10 deg/s are 100 deg.
 # Behaviour: during the 3 s of start-up the heading is set to zero at each sample. What is turned in that
 # time is lost for good; a recording of a turn is short by up to three seconds of it.
 # Seen: 70 deg instead of 100, and 100 when the sensor stands still for the first three seconds.
@@ -13,7 +13,7 @@ folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
 cd "$folder"
 python3 -m venv venv
-venv/bin/pip install -q imufusion==1.3.3 >/dev/null 2>&1
+venv/bin/pip install -q imufusion==1.3.3 numpy==2.2.6 >/dev/null 2>&1
 
 venv/bin/python - <<'PY' >seen.txt
 import imufusion
