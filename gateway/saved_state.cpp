@@ -19,25 +19,25 @@ namespace vgyro::gateway {
 namespace {
 
 constexpr std::int64_t kFormat = 1;
-// Of a platform of several axes: what format 1 holds stands in [axis.x] … instead.
+// For a platform of several axes: the contents of format 1 are in [axis.x] … instead.
 constexpr std::int64_t kFormatOfAxes = 2;
 constexpr const char* kRemedy = "the gateway calibrates again; nothing has to be done";
 
-// The text ends with this and eight digits, so that whatever is cut off takes the checksum along.
+// The text ends with this and eight digits, so that any cut also removes the checksum.
 constexpr std::string_view kSealHead = "\n[checksum]\ncrc32 = \"";
 constexpr std::string_view kSealTail = "\"\n";
 constexpr std::size_t kSealBytes = kSealHead.size() + 8 + kSealTail.size();
 
-// What no gyro exceeds, by far; beyond it arithmetic would not stay finite.
+// No gyro comes near this; beyond it arithmetic would not stay finite.
 constexpr double kRateMax_dps = 1e5;
 constexpr double kVarianceMax = kRateMax_dps * kRateMax_dps;
 constexpr double kSkewMax_s = 10.0;
-// Nor changes by so much in a second, or with a kelvin.
+// No gyro changes by so much in a second, or with a kelvin, either.
 constexpr double kChangeMax_dps = kRateMax_dps;
 constexpr double kTemperatureMin_c = -273.15;
 constexpr double kTemperatureMax_c = 1000.0;
 constexpr double kWeightSumTolerance = 1e-6;
-// Probabilities that were added up may come to a rounding more than 1.
+// A sum of probabilities may exceed 1 by rounding.
 constexpr double kWeightMax = 1.0 + kWeightSumTolerance;
 
 std::string seal(std::string_view content) {
@@ -59,8 +59,8 @@ bool is_printable(char c) {
   return c >= 0x20 && c < 0x7F;
 }
 
-// The shortest form that reads back as the same number; with a point, for TOML's whole numbers know
-// no -0.
+// The shortest form that reads back as the same number; with a point, since TOML's integers have no
+// -0.
 std::string shortest(double value) {
   std::string text = fmt::format("{}", value);
   if (text.find_first_not_of("-0123456789") == std::string::npos) text += ".0";
@@ -85,7 +85,7 @@ double sum_of(std::span<const double> values) {
   return std::accumulate(values.begin(), values.end(), 0.0);
 }
 
-// What is not known is not written, and so is read as by a version that did not know of it.
+// Unknown values are left out, so that they read as in a text of an older version.
 std::string kinds_and_slopes(const fusion::DriftMemory& drift) {
   std::string text;
   if (sum_of(drift.kind_weight) > 0.0)
@@ -103,7 +103,7 @@ std::string kinds_and_slopes(const fusion::DriftMemory& drift) {
                             listed(drift.coefficient_dps_k), listed(drift.coefficient_sigma_dps_k));
 }
 
-// Only where there is one, so that the text of a sound pair is what it was.
+// Written only if there is one, so that the text of a sound pair is unchanged.
 std::string contradiction(const fusion::PairVerdict& pair) {
   if (pair.contradiction == fusion::Contradiction::kNone) return {};
   std::string text = fmt::format("contradiction = \"{}\"\n", to_string(pair.contradiction));
@@ -116,7 +116,7 @@ std::string contradiction(const fusion::PairVerdict& pair) {
 
 // --- reading -------------------------------------------------------------------------------------
 
-/// The numbers of one table; the first complaint is kept.
+/// Reads the numbers of one table; keeps the first error.
 class Numbers {
  public:
   Numbers(const toml::table& table, const std::string& where, std::string title)
@@ -184,7 +184,7 @@ class Numbers {
   TomlReader reader_;
 };
 
-/// Of gyro 1, of both, of gyro 2.
+/// Elements: gyro 1, both, gyro 2.
 bool is_covariance(const std::array<double, 3>& m) {
   return m[0] >= 0.0 && m[2] >= 0.0 && m[1] * m[1] <= m[0] * m[2];
 }
@@ -192,7 +192,7 @@ bool is_positive_definite(const std::array<double, 3>& m) {
   return m[0] > 0.0 && m[2] > 0.0 && m[1] * m[1] < m[0] * m[2];
 }
 
-// What older states do not hold. A pair stands there whole or not at all.
+// Older states lack these keys.
 void add_kinds(Numbers& table, fusion::DriftMemory& drift) {
   if (!table.has("kind_weight")) return;
   drift.kind_weight = table.numbers<fusion::kDriftKinds>("kind_weight", 0.0, kWeightMax);
@@ -429,9 +429,9 @@ Expected<SavedState> pair_from(const toml::table& root, const std::string& where
   return state;
 }
 
-// Units that face each other are no small rotation.
+// A larger angle is not a misalignment: the units face each other.
 constexpr double kAngleMax_rad = 3.2;
-// As configured it may be anything that people call a direction.
+// A configured heading may be any number that people call a direction.
 constexpr double kHeadingMax_rad = 100.0;
 
 Expected<fusion::MisalignmentMemory> misalignment_from(const toml::table& root,
@@ -495,7 +495,7 @@ Expected<SavedState> saved_state_from(std::string_view text, const std::string& 
   const Expected<toml::table> parsed = parse_toml(*content, where, kRemedy);
   if (!parsed) return tl::unexpected(parsed.error());
   const toml::table& root = *parsed;
-  // Not by value<>(): the library casts a number with a fraction before it looks whether that fits.
+  // Not by value<>(): the library casts a number with a fraction before it checks that it fits.
   const toml::value<std::int64_t>* format = root["format"].as_integer();
   if (format != nullptr && format->get() == kFormatOfAxes) return axes_from(root, where);
   if (format != nullptr && format->get() == kFormat && root["drift"].is_table())
