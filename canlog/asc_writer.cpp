@@ -43,8 +43,8 @@ void put_classic(Text& text, const can::Frame& frame, unsigned channel, const ch
   if (!remote) put_bytes(text, frame);
 }
 
-// Columns as python-can writes them: name (none), BRS, ESI, code, length, bytes, duration, bits,
-// flags, CRC, bit timings.
+// Columns as in python-can: name (none), BRS, ESI, code, length, bytes, duration, bits, flags, CRC,
+// bit timings.
 void put_fd(Text& text, const can::Frame& frame, unsigned channel, const char* direction) {
   constexpr unsigned kFdFlag = 1U << 12U;
   constexpr unsigned kRateSwitchFlag = 1U << 13U;
@@ -88,7 +88,7 @@ void AscWriter::put(const LogRecord& record, std::string_view bus, const XlFrame
   } else if (record.frame.has(can::kFd)) {
     put_fd(text, record.frame, channel, direction);
   } else {
-    // asc2log drops a classic frame with such a code, python-can takes it for one of 64 bytes.
+    // asc2log drops a classic frame with such a code, python-can reads it as one of 64 bytes.
     if (record.frame.raw_dlc > 0) omit("length codes above 8 of classic frames");
     put_classic(text, record.frame, channel, direction);
   }

@@ -28,7 +28,7 @@ bool PacketReader::take_packet(const Packet& packet, Interface& interface, LogRe
   return true;
 }
 
-// A capture of all interfaces has no names, but may have the kernel's numbers.
+// A capture of all interfaces has no names, but may have the kernel's interface numbers.
 bool PacketReader::set_interface(const PacketResult& result, Interface& interface,
                                  LogRecord& record) {
   if (result.interface) {

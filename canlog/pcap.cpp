@@ -50,7 +50,7 @@ Expected<std::unique_ptr<LogReader>> PcapReader::open(std::unique_ptr<ByteSource
   if (!form || head.size() < kFileHeadBytes) {
     return fail(window->name(), "begins like a pcap file, but its head is cut off");
   }
-  // The upper bits hold something else.
+  // The upper bits have another meaning.
   constexpr std::uint32_t kLinkBits = 0xFFFF;
   const std::uint32_t link = load<std::uint32_t>(&head[kLinkAt], form->order) & kLinkBits;
   if (!may_hold_can(link)) {
@@ -76,7 +76,7 @@ bool PcapReader::next(LogRecord& record) {
     const std::int64_t second = load<std::uint32_t>(&head[0], order_);
     const std::int64_t fraction = load<std::uint32_t>(&head[4], order_);
     const std::uint32_t captured = load<std::uint32_t>(&head[8], order_);
-    // Wireshark takes no larger ones either.
+    // Wireshark's limit is the same.
     constexpr std::uint32_t kCapturedMax = 128U << 20U;
     if (captured > kCapturedMax || fraction * fraction_ns_ >= kSecond_ns) {
       ended_ = true;
