@@ -137,7 +137,7 @@ Parsed read_fd(Words words, int base, LogRecord& record, unsigned& channel) {
   frame.flags = can::kFd;
   if (const char* why = read_id(id, base, frame)) return {Verdict::kMalformed, why};
   std::string_view rate_switch = words.next();
-  if (!is_bit(rate_switch)) rate_switch = words.next();  // a name stood there
+  if (!is_bit(rate_switch)) rate_switch = words.next();  // that was a name
   const std::string_view state = words.next();
   if (!is_bit(rate_switch) || !is_bit(state)) {
     return {Verdict::kMalformed, "BRS and ESI: neither 0 nor 1"};

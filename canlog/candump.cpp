@@ -399,7 +399,7 @@ inline const char* CandumpReader::parse_usual(const char* p, LogRecord& record) 
   if (!same_second && !read_second(p)) return nullptr;
   // Maps digits to 0…9 and the characters after them to 0.
   constexpr std::uint64_t kZeros = 0x2029'3030'3030'3030U;       // "000000) "
-  constexpr std::uint64_t kBeyondMost = 0x7F7F'7676'7676'7676U;  // 9 in a digit, 0 behind it
+  constexpr std::uint64_t kBeyondMost = 0x7F7F'7676'7676'7676U;  // 9 in a digit, 0 after it
   const std::uint64_t fraction = load_word(p + 12) ^ kZeros;
   if (((fraction | (fraction + kBeyondMost)) & 0x8080808080808080U) != 0) return nullptr;
   const KnownInterface& known = known_interface(load_word(p + 20));

@@ -66,7 +66,7 @@ class Crc8 {
   [[nodiscard]] std::uint8_t value() const { return crc_; }
 
  private:
-  // One to eight bytes.
+  // Precondition: one to eight bytes.
   void add_some(Bytes bytes) {
     const std::size_t last = bytes.size() - 1;
     std::uint8_t sum = shares_[last][bytes[0] ^ crc_];

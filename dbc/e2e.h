@@ -20,7 +20,7 @@ namespace vgyro::dbc {
 enum class E2eKind : std::uint8_t {
   kProfile1A,  ///< CRC-8 (0x1D) over both bytes of the data ID and the data; also profile 11 A
   kProfile1B,  ///< the data ID's low byte for even counters, its high byte for odd ones
-  kProfile1C,  ///< its low byte; the high byte's low nibble stands in the header; also 11 C
+  kProfile1C,  ///< its low byte; the high byte's low nibble is in the header; also 11 C
   kProfile2,   ///< CRC-8H2F (0x2F) over the data and one of 16 data IDs, by counter; also 22
   kProfile5,   ///< CRC-16 (0x1021) over the data and the data ID, low byte first
   kCrc8J1850,  ///< CRC-8 (0x1D, init and final xor 0xFF) over the data alone

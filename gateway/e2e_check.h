@@ -41,7 +41,7 @@ class E2eCheck {
     return count_any(payload, missing, page);
   }
 
-  /// verify() and count() together, for a message of which nothing else is read before count().
+  /// verify() and count() together, for messages without other checks between them.
   std::optional<Reject> judge(const can::Frame& frame, Page page = Page::kOwn);
 
   /// After a silence the counter cannot show how many frames are missing. A repetition of the last

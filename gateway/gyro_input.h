@@ -40,7 +40,7 @@ class GyroInput {
   struct Result {
     std::optional<Reject> reject;  ///< set: the frame is not used
     double rate_dps = 0.0;
-    std::uint32_t missing = 0;  ///< frames that the alive counter says were lost before this one
+    std::uint32_t missing = 0;  ///< frames lost before this one, by the alive counter
   };
   /// `result` must be freshly constructed.
   void decode(const can::Frame& frame, Result& result);
