@@ -23,7 +23,7 @@ std::string size_text(std::size_t bytes) {
 
 tl::unexpected<Error> too_large(const std::string& path, std::size_t bytes_max) {
   return fail(path, "is larger than " + size_text(bytes_max),
-              "is it the right file? leave out what is not needed");
+              "check that it is the right file, or shorten it");
 }
 
 Expected<void> check_kind(const std::string& path, const struct stat& about) {

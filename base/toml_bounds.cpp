@@ -39,7 +39,7 @@ class Shape {
   template <class T>
   [[nodiscard]] tl::unexpected<Error> broken(fmt::format_string<T&> what, T most) const {
     return fail(at_line(file_, line_), fmt::format(what, most),
-                "that is no file that this program could use");
+                "this is not a file for this program");
   }
 
   // The library also ends lines at Unicode line ends.
@@ -121,7 +121,7 @@ class Shape {
 Expected<void> check_toml_shape(std::string_view text, const std::string& file) {
   if (text.size() > kTomlBytesMax) {
     return fail(file, fmt::format("is larger than {} KiB", kTomlBytesMax >> 10U),
-                "that is no file that this program could use");
+                "this is not a file for this program");
   }
   return Shape(text, file).check();
 }

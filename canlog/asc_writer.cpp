@@ -77,7 +77,7 @@ void AscWriter::put(const LogRecord& record, std::string_view bus, const XlFrame
   if (record.is_xl) return omit("CAN XL frames");
   if (!zero_ns_) begin(record.stamp);
   const std::int64_t since_ns = to_ns(record.stamp) - *zero_ns_;
-  if (since_ns < 0) return omit("frames whose stamps lie before the first one's second");
+  if (since_ns < 0) return omit("frames stamped before the second of the first frame");
   Text text;
   put_stamp(text, since_ns,
             options_.fraction_digits != 0 ? options_.fraction_digits : record.fraction_digits);

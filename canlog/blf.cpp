@@ -67,7 +67,7 @@ const char* set_fd_content(unsigned dlc, unsigned valid, const char* data, std::
     if (!frame.has(can::kRemote)) copy_payload(data, there, frame);
     return nullptr;
   }
-  if (frame.has(can::kRemote)) return "a remote frame of CAN FD: there is none";
+  if (frame.has(can::kRemote)) return "a remote frame of CAN FD, which does not exist";
   if (const char* why = set_length(valid, frame)) return why;
   // Bytes that the object has no room for are zero, as CANoe writes and reads them.
   copy_payload(data, there, frame);
@@ -102,7 +102,7 @@ Expected<std::unique_ptr<LogReader>> BlfReader::open(std::unique_ptr<ByteSource>
                               ? 0
                               : load_little<std::uint32_t>(&head[blf::file::kHeadBytes]);
   if (head_bytes < blf::file::kBytesMin || head_bytes > blf::file::kBytesMax) {
-    return fail(window->name(), "begins like a BLF file, but its head is none or cut off",
+    return fail(window->name(), "begins like a BLF file, but its head is invalid or cut off",
                 "the file may be damaged; if Vector's tools open it, save it from there");
   }
   const std::string kept(head);
@@ -145,7 +145,7 @@ BlfReader::Outcome BlfReader::read_object(LogRecord& record) {
   if (object.head_bytes < blf::object::kBaseBytes || object.bytes < object.head_bytes ||
       (is_read(object.type) && object.bytes > kObjectBytesMax)) {
     ++counts_.lines;
-    counts_.add_malformed("sizes that cannot be");
+    counts_.add_malformed("impossible sizes");
     at_ += blf::kObjectMark.size();
     lost_ = true;
     return Outcome::kNone;

@@ -41,7 +41,7 @@ void BlfContent::enter_object() {
   left_ = load_little<std::uint32_t>(&head[blf::object::kBytes]);
   if (head_bytes < blf::object::kBaseBytes || left_ < head_bytes) {
     left_ = blf::kObjectMark.size();
-    return leave("the head of an object in the file: sizes that cannot be");
+    return leave("impossible sizes in the head of an object");
   }
   if (load_little<std::uint32_t>(&head[blf::object::kType]) == blf::kContainer) {
     return enter_container(head_bytes);

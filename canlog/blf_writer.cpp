@@ -86,7 +86,7 @@ void BlfWriter::put(const LogRecord& record, std::string_view bus, const XlFrame
     zero_ns_ = first_ns < kDatesFrom_ns ? 0 : first_ns - first_ns % kSecond_ns;
   }
   std::int64_t since_ns = stamp_ns - *zero_ns_;
-  if (since_ns < 0) return omit("frames whose stamps lie before the first one's second");
+  if (since_ns < 0) return omit("frames stamped before the second of the first frame");
   constexpr unsigned kMicroDigits = 6;
   if (options_.fraction_digits == kMicroDigits) since_ns -= since_ns % kMicro_ns;
   last_ns_ = std::max(last_ns_, stamp_ns);

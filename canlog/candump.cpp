@@ -173,7 +173,7 @@ constexpr std::string_view kMissedCarry = "1000000";
 
 const char* parse_stamp(Cursor& at, LogRecord& record) {
   const std::string_view whole = at.digits();
-  if (whole.empty() || whole.size() > 10) return "stamp: the seconds are no number";
+  if (whole.empty() || whole.size() > 10) return "stamp: the seconds are not a number";
   std::int64_t seconds = 0;
   for (const char c : whole)
     seconds = seconds * 10 + (c - '0');
@@ -228,7 +228,7 @@ const char* parse_bytes(Cursor& at, std::uint8_t* out, std::size_t bytes_max, st
 const char* parse_raw_dlc(Cursor& at, can::Frame& frame) {
   if (!at.skip('_')) return nullptr;
   const int dlc = hex_value(at.peek());
-  if (at.at_end() || dlc < 9) return "raw DLC: \"_\" needs 9 to F behind it";
+  if (at.at_end() || dlc < 9) return "raw DLC: \"_\" must be followed by 9 to F";
   at.skip(at.peek());
   if (frame.length != can::kClassicBytesMax) return "raw DLC: only with 8 bytes";
   frame.raw_dlc = static_cast<std::uint8_t>(dlc);
@@ -257,7 +257,7 @@ const char* parse_fd(Cursor& at, can::Frame& frame) {
   constexpr int kBrsNibble = 1;
   constexpr int kEsiNibble = 2;
   const int nibble = hex_value(at.peek());
-  if (at.at_end() || nibble < 0) return "FD frame: no flags behind \"##\"";
+  if (at.at_end() || nibble < 0) return "FD frame: no flags after \"##\"";
   at.skip(at.peek());
   frame.flags |= can::kFd;
   if ((nibble & kBrsNibble) != 0) frame.flags |= can::kBitRateSwitch;
@@ -296,7 +296,7 @@ const char* parse_frame_text(Cursor& at, LogRecord& record, XlFrame& xl) {
   frame.raw_dlc = 0;
   frame.id = 0;
   const std::string_view id = at.hex();
-  if (!at.skip('#')) return "no \"#\" behind the identifier";
+  if (!at.skip('#')) return "no \"#\" after the identifier";
   if (id.size() == 5) {
     record.is_xl = true;
     return parse_xl(id, at, xl);
@@ -314,7 +314,7 @@ const char* parse_direction(Cursor& at, LogRecord& record) {
     record.direction = Direction::kTransmitted;
   }
   at.skip_blanks();
-  return at.at_end() ? nullptr : "something stands behind the frame";
+  return at.at_end() ? nullptr : "unexpected text after the frame";
 }
 
 }  // namespace

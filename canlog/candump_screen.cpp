@@ -116,9 +116,9 @@ const char* read_bytes(std::string_view text, can::Frame& frame) {
   const std::size_t width = base == 2 ? kBinaryDigits : 2;
   for (std::size_t i = 0; i < frame.length; ++i) {
     const std::size_t at = i * (width + 1);
-    if (at + width > shown.size()) return "payload: fewer bytes than the length says";
+    if (at + width > shown.size()) return "payload: shorter than its length";
     const auto byte = number_of<std::uint8_t>(shown.substr(at, width), base);
-    if (!byte) return "payload: a byte is no number";
+    if (!byte) return "payload: a byte is not a number";
     frame.data[swapped ? frame.length - 1 - i : i] = *byte;
   }
   return nullptr;

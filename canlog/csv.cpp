@@ -127,7 +127,7 @@ Parsed read_python_can(const Fields& fields, LogRecord& record) {
   std::size_t count = 0;
   if (const char* why = read_base64(fields.at(6), frame, count)) return {Verdict::kMalformed, why};
   if (count != frame.length) {
-    return {Verdict::kMalformed, "payload: not as many bytes as the length says"};
+    return {Verdict::kMalformed, "payload: does not match its length"};
   }
   return {Verdict::kFrame, ""};
 }
@@ -193,7 +193,7 @@ Parsed SavvyCanCsvReader::parse(std::string_view line, LogRecord& record) {
   if (const char* why = set_length(*length, frame)) return malformed(why);
   for (int i = 0; i < frame.length; ++i) {
     const auto byte = number_of<std::uint8_t>(fields.at(data_ + i), 16);
-    if (!byte) return malformed("payload: fewer bytes than the length says, or one that is none");
+    if (!byte) return malformed("payload: too few bytes, or an invalid one");
     frame.data[static_cast<std::size_t>(i)] = *byte;
   }
   if (fields.at(direction_) == "Rx") record.direction = Direction::kReceived;

@@ -57,7 +57,7 @@ Expected<MdfField> MdfField::describe(MdfFile& file, const MdfBlock& channel,
   if (channel_type == kTypeVirtual || channel_type == kTypeVirtualMaster) {
     field.kind_ = Kind::kConstant;
     if (field.factor_ != 0.0 || !(field.offset_ >= 0.0) || field.offset_ > UINT32_MAX) {
-      return tl::unexpected(file.damage(channel.at, "a channel without data that is no constant"));
+      return tl::unexpected(file.damage(channel.at, "a channel without data that is not constant"));
     }
     field.constant_ = static_cast<std::uint64_t>(field.offset_);
     return field;

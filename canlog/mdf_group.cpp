@@ -21,7 +21,7 @@ constexpr std::size_t kWaitingMax = 1'024;
 // what is wrong.
 const char* set_payload(const char* from, std::size_t there, can::Frame& frame) {
   if (frame.has(can::kRemote)) return nullptr;
-  if (there < frame.length) return "payload: fewer bytes than the length says";
+  if (there < frame.length) return "payload: shorter than its length";
   std::memcpy(frame.data.data(), from, frame.length);
   return nullptr;
 }
@@ -309,7 +309,7 @@ MdfGroup::Step MdfGroup::end_inside() {
 
 MdfGroup::Step MdfGroup::end_damaged(const char* what) {
   error_ = Error{file_->name(), fmt::format("behind record {}: {}", counts_.lines, what),
-                 "the file is damaged there; what stands before was read"};
+                 "the file is damaged there; everything before it was read"};
   return Step::kEnd;
 }
 

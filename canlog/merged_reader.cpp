@@ -99,7 +99,7 @@ bool MergedReader::is_far_from_all_before(const Stream& stream) {
   constexpr double kDay_s = 86'400.0;
   error_ = Error{stream.part.path,
                  fmt::format("begins {:.0f} days after all that came before it has ended: these "
-                             "are no logs of one drive",
+                             "are not logs of one drive",
                              to_seconds(span(*newest_, stream.due())) / kDay_s),
                  "give each drive a run of its own"};
   return true;

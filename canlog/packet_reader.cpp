@@ -61,7 +61,7 @@ void PacketReader::end_inside() {
 
 void PacketReader::end_damaged(const char* what) {
   error_ = Error{bytes_->name(), fmt::format("behind packet {}: {}", counts_.lines, what),
-                 "the file is damaged there; what stands before was read"};
+                 "the file is damaged there; everything before it was read"};
 }
 
 }  // namespace vgyro::canlog

@@ -54,9 +54,10 @@ Expected<std::unique_ptr<LogReader>> PcapReader::open(std::unique_ptr<ByteSource
   constexpr std::uint32_t kLinkBits = 0xFFFF;
   const std::uint32_t link = load<std::uint32_t>(&head[kLinkAt], form->order) & kLinkBits;
   if (!may_hold_can(link)) {
-    return fail(window->name(),
-                fmt::format("is a capture, but its packets are no CAN frames (link type {})", link),
-                "capture the CAN interface itself: `tcpdump -i can0 -w FILE`");
+    return fail(
+        window->name(),
+        fmt::format("is a capture, but its packets are not CAN frames (link type {})", link),
+        "capture the CAN interface itself: `tcpdump -i can0 -w FILE`");
   }
   window->take(kFileHeadBytes);
   std::unique_ptr<PcapReader> reader(
@@ -80,7 +81,7 @@ bool PcapReader::next(LogRecord& record) {
     constexpr std::uint32_t kCapturedMax = 128U << 20U;
     if (captured > kCapturedMax || fraction * fraction_ns_ >= kSecond_ns) {
       ended_ = true;
-      end_damaged("what follows is no packet");
+      end_damaged("no valid packet follows");
       return false;
     }
     bytes().take(kPacketHeadBytes);

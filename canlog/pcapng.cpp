@@ -164,7 +164,7 @@ std::optional<PcapngReader::Block> PcapngReader::next_block() {
   block.bytes = load<std::uint32_t>(&head[4], order_);
   if (block.bytes < kBlockHeadBytes + kBlockTailBytes || block.bytes % 4 != 0) {
     ended_ = true;
-    end_damaged("what follows is no block");
+    end_damaged("no valid block follows");
     return std::nullopt;
   }
   const std::size_t shown = std::min<std::size_t>(block.bytes, kShownBytes);
@@ -195,7 +195,7 @@ void PcapngReader::describe_interface(const Block& block) {
   constexpr std::size_t kHeadBytes = 8;  // link type, reserved, limit
   if (interfaces_.size() == kInterfacesMax || block.content.size() < kHeadBytes) {
     ended_ = true;
-    end_damaged("a description of an interface that cannot be");
+    end_damaged("an invalid interface description");
     return;
   }
   Described& added = interfaces_.emplace_back();

@@ -61,8 +61,8 @@ Error unknown(const HeadedSource& source) {
     }
   }
   return {source.name(),
-          is_text(source.head()) ? "is text, but no log of CAN frames that is known"
-                                 : "is no log of CAN frames that is known",
+          is_text(source.head()) ? "is text, but not a known log of CAN frames"
+                                 : "is not a known log of CAN frames",
           "known are: " + known_forms()};
 }
 

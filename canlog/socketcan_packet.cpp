@@ -97,7 +97,7 @@ const char* read_frame(const Content& content, can::Frame& frame) {
     if (const char* why = set_id(bare, (id & kExtendedFlag) != 0, frame)) return why;
     if ((id & kRemoteFlag) != 0) frame.flags |= can::kRemote;
     if (frame.has(can::kFd) && frame.has(can::kRemote)) {
-      return "a remote frame of CAN FD: there is none";
+      return "a remote frame of CAN FD, which does not exist";
     }
   }
   if (const char* why = set_length(length, frame)) return why;

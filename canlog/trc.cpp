@@ -243,7 +243,7 @@ Parsed TrcReader::parse(std::string_view line, LogRecord& record) {
   if (line.front() == ';') return parse_head(line);
   const std::string_view letters =
       version_ >= 200 ? std::string_view(columns_.data()) : columns_of(version_);
-  if (letters.empty()) return malformed("no $COLUMNS stood before it");
+  if (letters.empty()) return malformed("no $COLUMNS before it");
   const Columns columns = split(line, letters);
   const auto time = decimal_time(columns.time, kMilli_ns);
   if (!time) return malformed("stamp: no number");

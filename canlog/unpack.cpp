@@ -118,7 +118,7 @@ class Xz final : public Unpacker {
               "`xz -dc FILE.xz | vgyro … -` unpacks it outside"};
     }
     if (result_ == LZMA_OPTIONS_ERROR) {
-      return {name, "is packed in a way that this version of liblzma does not know", {}};
+      return {name, "is packed in a way that this liblzma does not support", {}};
     }
     return {name, fmt::format("is damaged (liblzma error {})", static_cast<int>(result_)), {}};
   }

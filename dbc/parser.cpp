@@ -259,7 +259,7 @@ void Parser::comment() {
   std::string text = cursor_.quoted("the comment", Cursor::Wrap::kYes);
   end_of_statement();
   if (cursor_.failed()) return;
-  if (nameless) return odd("this comment does not say which signal it is about; ignored");
+  if (nameless) return odd("this comment names no signal; ignored");
   contents_.comments.push_back({std::move(at), std::move(text)});
 }
 

@@ -103,7 +103,8 @@ std::string stretches_advice(const SteadyStretches& stretches) {
   const std::uint64_t all = stretches.learned + stretches.refused;
   const std::uint64_t fruitless = stretches.refused + stretches.open;
   if (fruitless < kFruitlessMin || 2 * fruitless <= all) return {};
-  return "most of them taught little: if the platform stood still in them, check the true "
+  return "little was learned from most of them: if the platform stood still in them, check the "
+         "true "
          "rate at rest (rate_dps or latitude_deg in [calibration]) and max_bias_dps of both gyros; "
          "wheel speeds ([speed]) distinguish stops from turns";
 }
@@ -205,7 +206,7 @@ std::string contradiction_text(const fusion::PairVerdict& pair, const GyroNames&
 }
 
 std::string contradiction_advice() {
-  return "which of the two is wrong cannot be seen, so no rate is valid until they move together; "
+  return "the data do not show which gyro is wrong, so no rate is valid until they move together; "
          "look at sign, unit, message and signal of both (`vgyro check` shows them)";
 }
 

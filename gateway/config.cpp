@@ -235,13 +235,13 @@ void read_heading(TomlReader& reader, const Plan& plan, CalibrationPlan& calibra
   calibration.heading_deg = heading;
   if (plan.gyros.empty()) return;
   if (plan.output.axes.empty()) {
-    reader.complain(reader.where("heading_deg"), "heading_deg is of no use to a single axis",
+    reader.complain(reader.where("heading_deg"), "heading_deg has no effect for a single axis",
                     "leave it out: only the Earth's rate about horizontal axes depends on it");
   } else if (!(std::abs(*heading) <= 360.0)) {
     reader.complain(reader.where("heading_deg"), fmt::format("heading_deg is {:g}", *heading),
                     "0 to 360, clockwise from north: where x points while calibrating");
   } else if (!reader.has("latitude_deg")) {
-    reader.complain(reader.where("heading_deg"), "heading_deg stands without latitude_deg",
+    reader.complain(reader.where("heading_deg"), "heading_deg needs latitude_deg",
                     "latitude_deg beside it");
   }
 }
@@ -272,7 +272,7 @@ void read_true_rate(TomlReader& reader, const toml::table& table, const Plan& pl
   if (!plan.latitude_deg) return;
   if (reader.has("rate_dps")) {
     reader.complain(reader.where("latitude_deg"),
-                    "rate_dps and latitude_deg both say the true rate", "keep one of them");
+                    "rate_dps and latitude_deg both set the true rate", "keep one of them");
   }
   if (!(std::abs(*plan.latitude_deg) <= 90.0)) {
     reader.complain(reader.where("latitude_deg"),
@@ -423,7 +423,7 @@ void read_output(TomlReader& root, Context& context) {
   check_output_ids(reader, plan);
   const bool failed = !context.errors.empty();
   if (!plan.output.vgyro_frames && plan.output.layouts.empty() && !failed) {
-    reader.complain(reader.where("vgyro_frames"), "nothing would go out",
+    reader.complain(reader.where("vgyro_frames"), "nothing would be sent",
                     "vgyro_frames = false needs an [[output.layout]]");
   }
   reader.finish();

@@ -25,7 +25,7 @@ constexpr std::size_t kNamedFileBytesMax = std::size_t{16} << 20U;
 Expected<toml::table> read_one(const std::string& path) {
   const Expected<std::string> text = read_regular_file(path, kConfigBytesMax);
   if (!text) return tl::unexpected(text.error());
-  return parse_toml(*text, path, "strings stand in quotes, tables in [brackets]");
+  return parse_toml(*text, path, "write strings in quotes and tables in [brackets]");
 }
 
 // Names that begin with a dot are temporary files of an editor.

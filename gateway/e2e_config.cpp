@@ -75,10 +75,10 @@ std::optional<AliveCounter> read_counter(TomlReader& reader, SignalResolver& res
   const auto codec = resolver.codec(*signal);
   if (!codec) return std::nullopt;
   if (!signal->is_integer() || signal->length_bits > 31 || signal->length_bits < 2) {
-    reader.complain(
-        reader.where("counter"),
-        fmt::format("{} is no alive counter: it has {} bits", signal->name, signal->length_bits),
-        "an integer signal of 2 to 31 bits");
+    reader.complain(reader.where("counter"),
+                    fmt::format("{} cannot be an alive counter: it has {} bits", signal->name,
+                                signal->length_bits),
+                    "an integer signal of 2 to 31 bits");
     return std::nullopt;
   }
   const auto pages = resolver.presence(*signal);
@@ -146,7 +146,7 @@ std::optional<DataIds> read_list(TomlReader& reader, const std::string& kind) {
   for (std::size_t i = 0; i < ids.size(); ++i) {
     const auto id = (*list)[i].value_exact<std::int64_t>();
     if (!id) {
-      reader.complain(reader.where("data_id"), "a data ID is no whole number", "0 to 0xFF");
+      reader.complain(reader.where("data_id"), "a data ID is not a whole number", "0 to 0xFF");
       return std::nullopt;
     }
     if (!within(reader, *id, kDataIdMostList)) return std::nullopt;
@@ -190,7 +190,7 @@ std::optional<CheckValue> read_check_value(TomlReader& reader, SignalResolver& r
   if (!name) {
     reader.forgive({"data_id"});
     if (reader.has("crc") && !reader.has("e2e")) {
-      reader.complain(reader.where("crc"), "nothing says how this check value is made",
+      reader.complain(reader.where("crc"), "the kind of this check value is not configured",
                       "e2e = \"NAME\", " + suggest_name({}, kinds));
     } else if (reader.has("data_id") && !reader.has("e2e")) {
       reader.complain(reader.where("data_id"), "data_id without e2e",

@@ -171,7 +171,7 @@ BiasMode Estimator::bias_mode(bool both_in_use, bool any_in_use) const {
 
 Expected<void> Estimator::offer(const SavedState& state) {
   if (plan_.corrector.method != Method::kOptimal) {
-    return fail({}, "is of no use to this method: only `optimal` takes up saved biases",
+    return fail({}, "has no effect: only `optimal` uses saved biases",
                 "set `method = \"optimal\"` under [corrector] to use it");
   }
   if (Expected<void> same = check_devices(state, plan_); !same) return same;

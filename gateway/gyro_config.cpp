@@ -376,7 +376,7 @@ std::string identity_of(TomlReader& reader, std::string_view key) {
   };
   if (text.size() <= kIdentityMax && std::all_of(text.begin(), text.end(), is_good)) return text;
   reader.complain(reader.where(key),
-                  fmt::format("the {} \"{}\" is no plain word", key, printable(text)),
+                  fmt::format("the {} \"{}\" is not a plain word", key, printable(text)),
                   fmt::format("up to {} letters, digits, \"-\", \"_\" and \".\"", kIdentityMax));
   return {};
 }

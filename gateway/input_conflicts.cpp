@@ -129,7 +129,7 @@ void warn_of_others(const dbc::Database& database, const std::string& path, cons
     if (!taken || message.name == ours.message) continue;
     warnings.push_back(
         {at_line(path, message.line),
-         fmt::format("message {} has the identifier {:#x}, with which {} goes out on {}",
+         fmt::format("message {} has the identifier {:#x}, with which {} is sent on {}",
                      message.name, ours.id.id, ours.message, bus),
          ours.remedy});
   }

@@ -109,9 +109,9 @@ std::optional<Mount> checked_matrix(TomlReader& reader, const std::vector<double
   reader.complain(
       reader.where("mount"),
       has_nearest
-          ? fmt::format("mount is no rotation: the nearest one differs by {:.2g} in an element",
+          ? fmt::format("mount is not a rotation: the nearest one differs by {:.2g} in an element",
                         mount.corrected)
-          : fmt::format("mount is no rotation: its determinant is {:.3g}", det),
+          : fmt::format("mount is not a rotation: its determinant is {:.3g}", det),
       fmt::format("rows and columns of length 1 at right angles, to {:g}", kMountRounding));
   return std::nullopt;
 }

@@ -140,7 +140,7 @@ Expected<OutputField> output_field(const dbc::Signal& signal, const Quantity& qu
   } else {
     field.none_raw = field.beyond_raw = raw_of_zero(field);
   }
-  if (range.low > range.high) return fail({}, signal.name + " can say no value");
+  if (range.low > range.high) return fail({}, signal.name + " can carry no value");
   field.minimum = quantity.codec.value_of(range.low);
   field.maximum = quantity.codec.value_of(range.high);
   if (field.minimum > field.maximum) std::swap(field.minimum, field.maximum);

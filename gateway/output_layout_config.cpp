@@ -240,7 +240,7 @@ void LayoutReader::check_axes_keys() {
   for (const std::string_view one : kOfOneRate) {
     if (!reader_.has(one)) continue;
     reader_.forgive({one});
-    reader_.complain(reader_.where(one), fmt::format("{} stands beside {}", one, key),
+    reader_.complain(reader_.where(one), fmt::format("{} cannot be combined with {}", one, key),
                      fmt::format("{}{} for the axis that it is of", one, ending_of(axes_.back())));
   }
   for (const RateEntry& entry : entries_) {
@@ -267,7 +267,7 @@ void LayoutReader::read_axis() {
     if (!reader_.has("axis")) return;
     reader_.forgive({"axis"});
     reader_.complain(reader_.where("axis"),
-                     fmt::format("axis stands beside {}", entries_.front().rate),
+                     fmt::format("axis cannot be combined with {}", entries_.front().rate),
                      "leave it out, or rate = \"SIGNAL\" where the message carries one axis");
     return;
   }
@@ -307,7 +307,7 @@ bool LayoutReader::on_page(std::string_view key, const dbc::Signal& signal) {
   if (presence && presence->holds({layout_->blank.data(), layout_->bytes})) return true;
   reader_.complain(reader_.where(key),
                    fmt::format("{} is not on the page of {}", signal.name, rate_->name),
-                   "signals that stand in the frame of the rate");
+                   "use signals of the frame that carries the rate");
   return false;
 }
 
@@ -479,7 +479,7 @@ void LayoutReader::check_header(const CheckValue& crc) {
     reader_.complain(reader_.where(counter ? "counter" : "e2e"),
                      fmt::format("{} has its counter in {} of byte {}", crc.kind,
                                  whole_byte ? "all" : "the low nibble", byte + header - 1),
-                     "counter = \"NAME\", the signal that stands there");
+                     "counter = \"NAME\", the signal at that place");
     return;
   }
   const bool is_1 = kind == dbc::E2eKind::kProfile1A || kind == dbc::E2eKind::kProfile1B ||
@@ -611,7 +611,7 @@ std::optional<RawValue> LayoutReader::filled(const dbc::Signal& signal, const to
   const bool fits = number && node->is_number() && *number >= codec->representable_min() &&
                     *number <= codec->representable_max();
   if (!fits) {
-    reader_.complain(reader_.where("fill"), fmt::format("{} cannot say this value", signal.name),
+    reader_.complain(reader_.where("fill"), fmt::format("{} cannot carry this value", signal.name),
                      fmt::format("a number, {:g} to {:g}", codec->representable_min(),
                                  codec->representable_max()));
     return std::nullopt;
@@ -654,12 +654,13 @@ void LayoutReader::warn_of_rate(const RateEntry& entry, const LayoutRate& one) {
   const double least = std::min(std::abs(rate.minimum), std::abs(rate.maximum));
   const double reach_dps = (one.sign ? most : least) * std::abs(rate.scale);
   if (reach_dps < kNarrow_dps) {
-    warn(fmt::format("{} carries rates up to {:.4g} deg/s only{}; faster ones go out as not valid",
-                     rate.name, reach_dps, reach_dps == 0.0 ? " in one direction" : ""),
-         one.sign || rate.minimum < 0.0
-             ? ""
-             : fmt::format("if the sign has a signal of its own, name it: {} = \"NAME\"",
-                           entry.sign_signal));
+    warn(
+        fmt::format("{} carries rates up to {:.4g} deg/s only{}; faster ones are sent as not valid",
+                    rate.name, reach_dps, reach_dps == 0.0 ? " in one direction" : ""),
+        one.sign || rate.minimum < 0.0
+            ? ""
+            : fmt::format("if the sign has a signal of its own, name it: {} = \"NAME\"",
+                          entry.sign_signal));
   }
 }
 

@@ -143,7 +143,7 @@ class Numbers {
     std::array<double, kCount> values{};
     const toml::array* list = reader_.array(key);
     if (list == nullptr || list->size() != kCount) {
-      reader_.complain(reader_.where(key), fmt::format("{} is no list of {}", key, kCount));
+      reader_.complain(reader_.where(key), fmt::format("{} is not a list of {}", key, kCount));
       return values;
     }
     for (std::size_t i = 0; i < kCount; ++i) {
@@ -175,8 +175,8 @@ class Numbers {
   }
   double checked(std::string_view key, double value, double minimum, double maximum) {
     if (value >= minimum && value <= maximum) return value;  // NaN is not
-    reader_.complain(reader_.where(key), fmt::format("{} holds {}, which cannot be: {} to {} can",
-                                                     key, value, minimum, maximum));
+    reader_.complain(reader_.where(key),
+                     fmt::format("{} is {}, outside {} to {}", key, value, minimum, maximum));
     return 0.0;
   }
 
@@ -216,7 +216,7 @@ void add_temperatures(Numbers& table, fusion::DriftMemory& drift) {
   if (!any && !table.has("coefficient_dps_k") && !table.has("coefficient_sigma_dps_k")) return;
   drift.coefficient_dps_k = table.numbers<2>("coefficient_dps_k", -kChangeMax_dps, kChangeMax_dps);
   drift.coefficient_sigma_dps_k = table.numbers<2>("coefficient_sigma_dps_k", 0.0, kChangeMax_dps);
-  table.require(any, "coefficient_dps_k", "stands without a temperature");
+  table.require(any, "coefficient_dps_k", "needs a temperature");
 }
 
 fusion::DriftMemory drift_from(Numbers& table) {
@@ -226,7 +226,7 @@ fusion::DriftMemory drift_from(Numbers& table) {
   table.require(is_positive_definite(drift.bias_covariance), "bias_covariance",
                 "is not positive definite");
   drift.white_density = table.numbers<3>("white_density", -kVarianceMax, kVarianceMax);
-  table.require(is_covariance(drift.white_density), "white_density", "is no covariance");
+  table.require(is_covariance(drift.white_density), "white_density", "is not a covariance");
   drift.sample_variance = table.numbers<2>("sample_variance", 0.0, kVarianceMax);
   const auto ratios = table.numbers<fusion::kWalkRatios_per_s.size()>("walk_ratio_per_s", 0.0, 1e9);
   table.require(ratios == fusion::kWalkRatios_per_s, "walk_ratio_per_s", "are of another version");
@@ -251,8 +251,7 @@ fusion::PairVerdict contradiction_from(Numbers& table) {
     const auto one = static_cast<fusion::Contradiction>(i);
     if (to_string(one) == name) pair.contradiction = one;
   }
-  table.require(pair.contradiction != fusion::Contradiction::kNone, "contradiction",
-                "is none that is known");
+  table.require(pair.contradiction != fusion::Contradiction::kNone, "contradiction", "is unknown");
   constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
   pair.slope = table
                    .optional_number("contradiction_slope", -kRateMax_dps * kRateMax_dps,
@@ -270,7 +269,8 @@ fusion::PairVerdict contradiction_from(Numbers& table) {
 Expected<std::string_view> unsealed(std::string_view text, const std::string& where) {
   if (text.size() > kSavedStateBytesMax) {
     return fail(
-        where, fmt::format("is longer than {} bytes, so it is no saved state", kSavedStateBytesMax),
+        where,
+        fmt::format("is longer than {} bytes, so it is not a saved state", kSavedStateBytesMax),
         kRemedy);
   }
   const std::string_view content = text.substr(0, text.size() - std::min(text.size(), kSealBytes));

@@ -58,7 +58,7 @@ can::BusIndex bus_index(std::vector<std::string>& buses, const std::string& name
 std::string required_bus(TomlReader& reader) {
   std::string name = reader.required_text("bus", "can0");
   if (name.size() > kInterfaceNameMax || printable(name) != name) {
-    reader.complain(reader.where("bus"), fmt::format("\"{}\" is no interface name", name),
+    reader.complain(reader.where("bus"), fmt::format("\"{}\" is not an interface name", name),
                     "at most 15 characters, as `ip link` shows them");
   }
   return name;

@@ -108,7 +108,7 @@ Expected<void> check_form(std::string_view text) {
   const bool closed = tables->empty() || tables->get(0)->as_table()->is_inline();
   if (!closed) return {};
   return fail(at_line(kFile, static_cast<unsigned>(tables->source().begin.line)),
-              "effects in an array, effect = [...], cannot be added to",
+              "effects in an array, effect = [...], cannot be extended",
               "write each of them as an [[effect]] table");
 }
 

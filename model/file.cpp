@@ -268,7 +268,7 @@ std::string_view key_of(const Parameter& parameter, bool has_unit_axis) {
 }
 
 ModelResult parse_model(std::string_view text, const std::string& file, const GyroNames& gyros) {
-  const auto parsed = parse_toml(text, file, "strings stand in quotes, effects in [[effect]]");
+  const auto parsed = parse_toml(text, file, "write strings in quotes and effects in [[effect]]");
   if (!parsed) return tl::unexpected(std::vector<Error>{parsed.error()});
   std::vector<Error> errors;
   Model model{.file = file, .effects = {}};

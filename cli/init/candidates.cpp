@@ -69,7 +69,7 @@ std::optional<Candidate> candidate_of(const Found& found, const dbc::Signal& sig
   } else if (level > kPeakMost_dps) {
     candidate.why_not = fmt::format("reaches {:.0f} deg/s: no platform turns so fast", level);
   } else if (score <= -2.0) {
-    candidate.why_not = "by its name another thing turns";
+    candidate.why_not = "its name is that of another rotating part";
   }
   return candidate;
 }

@@ -142,7 +142,7 @@ std::string speed_text(const Proposal& proposal) {
   if (!proposal.circumstances.speed) return "";
   const SpeedFound& speed = *proposal.circumstances.speed;
   constexpr double kStanding_m_s = gateway::Surroundings::kStandingBelow_m_s;
-  std::string why = "CHECK: is it 0 when the vehicle stands? This log has no rest";
+  std::string why = "CHECK: is it 0 while the vehicle stands still? This log has no rest";
   if (speed.resting_m_s && *speed.resting_m_s < kStanding_m_s) {
     why = "0 while the gyros rest in this log";
   } else if (speed.resting_m_s) {

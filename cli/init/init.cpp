@@ -75,7 +75,7 @@ void find_pair(Material& all) {
   all.guess = guess_messages(all.traffic, all.messages);
   const bool none = all.databases.empty();
   tell("{}; the layouts of {}{} identifiers are tried.\n",
-       none ? "No DBC file is given" : "The DBC files know no two gyros of this log",
+       none ? "No DBC file is given" : "The DBC files describe no two gyros in this log",
        all.guess->streams, none ? "" : " other");
   add_guessed(all.candidates, *all.guess);
   all.choice = choose(all.candidates);
@@ -138,7 +138,8 @@ int one_found(const std::string& name, const Material& all) {
                   all.candidates[*all.choice.alone].place()),
       "a log in which the platform turns and both sensors send, and a DBC file of each; a "
       "gateway's "
-      "copy of a gyro is no second one. Is the second sensor on another bus, in a log of its own? "
+      "copy of a gyro is not a second gyro. Is the second sensor on another bus, in a log of its "
+      "own? "
       "Then name both logs"});
 }
 

@@ -103,7 +103,7 @@ Expected<std::string> picture_of(const std::string& script) {
   int status = 0;
   while (::waitpid(*child, &status, 0) < 0 && errno == EINTR) {
   }
-  if (status != 0) return fail({}, "gnuplot failed, as it says above");
+  if (status != 0) return fail({}, "gnuplot failed; see its message above");
   return picture;
 }
 

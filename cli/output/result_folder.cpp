@@ -96,7 +96,7 @@ Expected<void> check_result_folder(const std::string& folder,
   for (const fs::directory_entry& entry : fs::directory_iterator(path, code)) {
     const std::string name = entry.path().filename();
     if (std::find(names.begin(), names.end(), name) != names.end()) continue;
-    return fail(folder, fmt::format("holds \"{}\", which is no part of a result", name),
+    return fail(folder, fmt::format("holds \"{}\", which is not part of a result", name),
                 "an earlier result is replaced, anything else is kept: choose another folder");
   }
   if (code) return tl::unexpected(system_error(folder, code));

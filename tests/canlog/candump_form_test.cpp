@@ -208,10 +208,10 @@ TEST(CandumpForm, TakesLinesWithoutAParenthesisForRemarks) {
 
 // The cause appears in the summary, so it must name the wrong part of the line.
 TEST(CandumpForm, TellsWhatIsWrongWithAStamp) {
-  EXPECT_EQ(why_malformed("("), "stamp: the seconds are no number");
-  EXPECT_EQ(why_malformed("(-1.000000) can0 123#"), "stamp: the seconds are no number");
-  EXPECT_EQ(why_malformed("(nan) can0 123#"), "stamp: the seconds are no number");
-  EXPECT_EQ(why_malformed("(12345678901.0) can0 123#"), "stamp: the seconds are no number");
+  EXPECT_EQ(why_malformed("("), "stamp: the seconds are not a number");
+  EXPECT_EQ(why_malformed("(-1.000000) can0 123#"), "stamp: the seconds are not a number");
+  EXPECT_EQ(why_malformed("(nan) can0 123#"), "stamp: the seconds are not a number");
+  EXPECT_EQ(why_malformed("(12345678901.0) can0 123#"), "stamp: the seconds are not a number");
   EXPECT_EQ(why_malformed("(9000000001.0) can0 123#"), "stamp: beyond the year 2255");
   EXPECT_EQ(why_malformed("(17) can0 123#"), "stamp: no decimal point");
   EXPECT_EQ(why_malformed("(1,5) can0 123#"), "stamp: no decimal point");
@@ -242,9 +242,9 @@ TEST(CandumpForm, TellsWhatIsWrongWithAnInterface) {
 
 // One digit more or less would be another message: identifiers are never guessed.
 TEST(CandumpForm, TellsWhatIsWrongWithAnIdentifier) {
-  EXPECT_EQ(why_malformed("(1.5) can0"), "no \"#\" behind the identifier");
-  EXPECT_EQ(why_malformed_frame("123"), "no \"#\" behind the identifier");
-  EXPECT_EQ(why_malformed_frame("12G#11"), "no \"#\" behind the identifier");
+  EXPECT_EQ(why_malformed("(1.5) can0"), "no \"#\" after the identifier");
+  EXPECT_EQ(why_malformed_frame("123"), "no \"#\" after the identifier");
+  EXPECT_EQ(why_malformed_frame("12G#11"), "no \"#\" after the identifier");
   EXPECT_EQ(why_malformed_frame("#11"), "identifier: neither 3 nor 8 hex digits");
   EXPECT_EQ(why_malformed_frame("12#11"), "identifier: neither 3 nor 8 hex digits");
   EXPECT_EQ(why_malformed_frame("1234#11"), "identifier: neither 3 nor 8 hex digits");
@@ -262,11 +262,13 @@ TEST(CandumpForm, TellsWhatIsWrongWithAPayload) {
   EXPECT_EQ(why_malformed_frame("123##1112"), "payload: an odd number of hex digits");
   EXPECT_EQ(why_malformed_frame("123#112233445566778899"),
             "payload: more bytes than the frame can hold");
-  EXPECT_EQ(why_malformed_frame("123##"), "FD frame: no flags behind \"##\"");
-  EXPECT_EQ(why_malformed_frame("123##G"), "FD frame: no flags behind \"##\"");
+  EXPECT_EQ(why_malformed_frame("123##"), "FD frame: no flags after \"##\"");
+  EXPECT_EQ(why_malformed_frame("123##G"), "FD frame: no flags after \"##\"");
   EXPECT_EQ(why_malformed_frame("123#R9"), "remote frame: length above 8");
-  EXPECT_EQ(why_malformed_frame("123#1122334455667788_"), "raw DLC: \"_\" needs 9 to F behind it");
-  EXPECT_EQ(why_malformed_frame("123#1122334455667788_8"), "raw DLC: \"_\" needs 9 to F behind it");
+  EXPECT_EQ(why_malformed_frame("123#1122334455667788_"),
+            "raw DLC: \"_\" must be followed by 9 to F");
+  EXPECT_EQ(why_malformed_frame("123#1122334455667788_8"),
+            "raw DLC: \"_\" must be followed by 9 to F");
   EXPECT_EQ(why_malformed_frame("123#11223344556677_9"), "raw DLC: only with 8 bytes");
   EXPECT_EQ(why_malformed_frame("123#R7_9"), "raw DLC: only with 8 bytes");
 }
@@ -291,15 +293,15 @@ TEST(CandumpForm, TellsThatSomethingStandsBehindTheFrame) {
                            "123#11 22", "123#11\r", "123#11-22", "45123#81:00:12345678#11T"}) {
     const std::string line =
         std::string(text) + (std::string_view(text).back() == '\r' ? "\r" : "");
-    EXPECT_EQ(why_malformed_frame(line), "something stands behind the frame") << text;
+    EXPECT_EQ(why_malformed_frame(line), "unexpected text after the frame") << text;
   }
 }
 
 // NUL bytes come from disks that lost power; they do not end a string here.
 TEST(CandumpForm, TakesNulBytesForDamage) {
   EXPECT_EQ(why_malformed(std::string("(1.5) can0 123#11\0\0", 19)),
-            "something stands behind the frame");
-  EXPECT_EQ(why_malformed(std::string("(\0\0\0", 4)), "stamp: the seconds are no number");
+            "unexpected text after the frame");
+  EXPECT_EQ(why_malformed(std::string("(\0\0\0", 4)), "stamp: the seconds are not a number");
   EXPECT_EQ(parse(std::string(20, '\0')).kind, LineKind::kOther);
 }
 

@@ -160,7 +160,7 @@ TEST(CandumpReader, KeepsTheFirstFiveMalformedLinesAndCountsAll) {
   const ReadLog log = read_text(text);
   EXPECT_EQ(log.counts.malformed_lines, 50U);
   EXPECT_EQ(log.counts.frames, 50U);
-  const std::string why = ": stamp: the seconds are no number";
+  const std::string why = ": stamp: the seconds are not a number";
   EXPECT_EQ(malformed(log.counts),
             (std::vector<std::string>{"1" + why, "3" + why, "5" + why, "7" + why, "9" + why}));
 }

@@ -142,7 +142,7 @@ TEST_F(Forms, TellWhatIsWrongInAsc) {
       "0.2 1 123 Rx d 4 01 02\n0.3 CANFD 1 Rx 123 1 1 9 65 00\n0.4 1 123 Rx d 1 01\n0.5 1 12");
   EXPECT_EQ(malformed(log.counts), (Lines{"2: date: not understood; the stamps count from zero",
                                           "3: identifier: larger than its kind can be",
-                                          "4: payload: fewer bytes than the length says",
+                                          "4: payload: shorter than its length",
                                           "5: length: more bytes than the frame can hold"}));
   EXPECT_EQ(as_candump(log), Lines{"(0000000000.400000) can0 123#01 R"});
   EXPECT_EQ(log.counts.cut_off_lines, 1U);

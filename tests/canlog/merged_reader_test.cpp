@@ -122,7 +122,7 @@ TEST(MergedReader, CountsEachLogApart) {
   const auto parts = (*reader)->parts();
   EXPECT_EQ(told(*parts[0]),
             "2 lines, 1 frames, 0 XL, 0 other, 1 malformed, 0 cut off, 0 skipped; 2: "
-            "stamp: the seconds are no number");
+            "stamp: the seconds are not a number");
   EXPECT_EQ(told(*parts[1]),
             "2 lines, 0 frames, 1 XL, 1 other, 0 malformed, 0 cut off, 0 skipped; ");
   EXPECT_EQ(log.counts.frames + log.counts.xl_frames, 2U);

@@ -209,7 +209,7 @@ TEST(DbcParser, TellsCommentsWithoutSignalName) {
   const Database database =
       parse(kGyro + "CM_ SG_ 291 \"about what?\";\nCM_ BO_ 291 \"kept\";\n", "test.dbc");
   EXPECT_EQ(database.messages[0].comment, "kept");
-  EXPECT_EQ(told(database), "4: this comment does not say which signal it is about; ignored\n");
+  EXPECT_EQ(told(database), "4: this comment names no signal; ignored\n");
 }
 
 // References to missing elements are reported and ignored.

@@ -809,7 +809,7 @@ TEST_F(Config, RefusesProtectionsThatCannotBe) {
 // The true rate of the calibration may be stated only once.
 TEST_F(Config, RefusesContradictingCalibrations) {
   expect_error("latitude_deg = 50.45", "latitude_deg = 50.45\nrate_dps = 0.0032", "latitude_deg",
-               {"both say the true rate", "keep one"});
+               {"both set the true rate", "keep one"});
   expect_error("latitude_deg = 50.45", "latitude_deg = 90.5", "latitude_deg",
                {"latitude_deg is 90.5", "-90 to 90"});
   expect_error("latitude_deg = 50.45", "rate_dps = nan", "rate_dps", {"rate_dps is nan"});

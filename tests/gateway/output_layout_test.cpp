@@ -665,7 +665,7 @@ TEST_F(OutputLayoutTest, RefusesToSendNothing) {
   write("vgyro.toml", std::string(kConfig) + "vgyro_frames = false\n");
   const auto loaded = load_config((folder_ / "vgyro.toml").string());
   ASSERT_FALSE(loaded);
-  EXPECT_NE(loaded.error()[0].message().find("nothing would go out"), std::string::npos);
+  EXPECT_NE(loaded.error()[0].message().find("nothing would be sent"), std::string::npos);
 }
 
 TEST_F(OutputLayoutTest, WarnsOfWhatIsCoarseOrNarrow) {

@@ -296,7 +296,7 @@ TEST(SavedState, WhatCannotBeIsRefusedBehindARightChecksum) {
       {"slope_sigma_dps_s = [3e-07, 4e-07]\n", "", "slope_sigma_dps_s is no list of 2"},
       {"temperature_2_c = 31.5", "temperature_2_c = nan", "temperature_2_c"},
       {"temperature_2_c = 31.5", "temperature_2_c = -300.0", "temperature_2_c"},
-      {"temperature_2_c = 31.5\n", "", "coefficient_dps_k stands without a temperature"},
+      {"temperature_2_c = 31.5\n", "", "coefficient_dps_k needs a temperature"},
       {"coefficient_dps_k = [0.0", "coefficient_dps_k = [nan", "coefficient_dps_k holds nan"},
       {"coefficient_dps_k = [0.0, -0.0003]\n", "", "coefficient_dps_k is no list of 2"},
       {"coefficient_sigma_dps_k = [0.0", "coefficient_sigma_dps_k = [-0.1",
