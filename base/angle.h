@@ -1,6 +1,6 @@
 #pragma once
 
-// People, frames and files use degrees; sines and angles are computed in radians.
+// People, frames and files use degrees; trigonometry uses radians.
 
 #include <numbers>
 

@@ -12,7 +12,7 @@ tl::unexpected<Error> cannot(const std::string& path) {
   return fail(path, "cannot be read: " + system_reason());
 }
 
-// In the largest unit that leaves no fraction.
+// In the largest unit without a fraction.
 std::string size_text(std::size_t bytes) {
   constexpr std::size_t kKibi = 1024;
   constexpr std::size_t kMebi = kKibi * kKibi;
@@ -23,7 +23,7 @@ std::string size_text(std::size_t bytes) {
 
 tl::unexpected<Error> too_large(const std::string& path, std::size_t bytes_max) {
   return fail(path, "is larger than " + size_text(bytes_max),
-              "is it the right file? leave out what is not needed");
+              "check that it is the right file, or shorten it");
 }
 
 Expected<void> check_kind(const std::string& path, const struct stat& about) {
@@ -32,7 +32,7 @@ Expected<void> check_kind(const std::string& path, const struct stat& about) {
   return fail(path, "is a pipe, a socket or a device", "name a file on a disk");
 }
 
-// A file in /proc tells no size, and one that is being written grows: what was read counts.
+// A file in /proc reports no size, and a file that is being written grows: the bytes read count.
 Expected<std::string> read_all(int fd, const std::string& path, std::size_t bytes_max) {
   std::string text;
   std::array<char, 65'536> block{};
@@ -60,7 +60,8 @@ Expected<std::string> read_open(int fd, const std::string& path, std::size_t byt
 
 Expected<std::string> read_regular_file(const std::string& path, std::size_t bytes_max) {
   struct stat about {};
-  // Before it is opened, for opening a device may do something; and after, for it may be another.
+  // Before opening, since opening a device may have effects, and after it, since the file may
+  // differ.
   if (::stat(path.c_str(), &about) != 0) return cannot(path);
   if (Expected<void> regular = check_kind(path, about); !regular)
     return tl::unexpected(std::move(regular).error());
@@ -70,7 +71,7 @@ Expected<std::string> read_regular_file(const std::string& path, std::size_t byt
     Expected<std::string> text = read_open(fd, path, bytes_max);
     ::close(fd);
     return text;
-  } catch (...) {  // memory ran short, and the caller goes on
+  } catch (...) {  // out of memory, and the caller continues
     ::close(fd);
     throw;
   }

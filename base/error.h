@@ -1,6 +1,6 @@
 #pragma once
 
-// Bad input as a value: where it is, what is wrong, and what would be right.
+// Bad input as a value: the place, what is wrong, and the remedy.
 
 #include <cerrno>
 #include <string>
@@ -11,9 +11,9 @@
 namespace vgyro {
 
 struct Error {
-  std::string where;   ///< "file:line", a file, an interface; empty when `what` says it all
+  std::string where;   ///< "file:line", a file, an interface; empty if `what` suffices
   std::string what;    ///< one sentence, no full stop
-  std::string remedy;  ///< what would be right; empty when `what` implies it
+  std::string remedy;  ///< what to do; empty if `what` implies it
 
   /// "where: what; remedy", as the programs print it: one printable line.
   [[nodiscard]] std::string message() const;
@@ -26,7 +26,7 @@ inline tl::unexpected<Error> fail(std::string where, std::string what, std::stri
   return tl::unexpected<Error>(Error{std::move(where), std::move(what), std::move(remedy)});
 }
 
-/// What a failed system call says of itself; the last one, where no error number is given.
+/// The system's text for a failed call; for the last one if no error number is given.
 std::string system_reason(int error = errno);
 
 /// "file:line"

@@ -23,7 +23,7 @@ struct Descriptor {
   int fd;
 };
 
-// What the file's own size says is only a hint: a pipe has none, and a file may grow.
+// The size that the file reports is only a hint: a pipe has none, and a file may grow.
 std::size_t first_room(const struct stat& info) {
   if (!S_ISREG(info.st_mode) || info.st_size <= 0) return kBlockBytes;
   return std::min(static_cast<std::size_t>(info.st_size), kFileBytesMax) + 1;

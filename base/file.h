@@ -1,6 +1,6 @@
 #pragma once
 
-// Whole small files (configs, DBC): read at the start and when a reload asks for it.
+// Reads whole small files (configurations, DBC) at the start and at a reload.
 
 #include <string>
 

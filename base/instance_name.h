@@ -1,7 +1,8 @@
 #pragma once
 
-// One of several gateways on a host: vgyrod@front.service is "front". Its name is part of a D-Bus
-// name, of paths and of a metric's label, so it holds only what all of them take.
+// The name of one of several gateways on a host: vgyrod@front.service is "front". It is part of a
+// D-Bus name, of paths and of a metric's label, so it holds only characters that all of these
+// allow.
 
 #include <algorithm>
 #include <cstddef>
@@ -12,7 +13,7 @@
 
 namespace vgyro {
 
-/// Of D-Bus; an instance has its own name behind a dot.
+/// The D-Bus name; an instance appends its own name after a dot.
 inline constexpr const char* kGatewayBusName = "org.vgyro.Gateway1";
 
 inline std::string bus_name_of(std::string_view instance) {
@@ -20,14 +21,14 @@ inline std::string bus_name_of(std::string_view instance) {
   return instance.empty() ? common : common + '.' + std::string(instance);
 }
 
-/// Its systemd unit.
+/// The systemd unit of an instance.
 inline std::string unit_of(std::string_view instance) {
   return instance.empty() ? "vgyrod" : "vgyrod@" + std::string(instance);
 }
 
-/// Empty is the gateway that has no name.
+/// The empty name is the gateway without a name.
 inline Expected<void> check_instance_name(std::string_view name) {
-  constexpr std::size_t kBytesMost = 32;  // of 255 that a bus name may have, and people should read
+  constexpr std::size_t kBytesMost = 32;  // a bus name may have 255, but people must read it
   const auto is_letter = [](char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z'); };
   const auto fits = [&](char c) { return is_letter(c) || (c >= '0' && c <= '9') || c == '_'; };
   const bool good = name.empty() || (name.size() <= kBytesMost && is_letter(name.front()) &&

@@ -9,7 +9,7 @@ namespace vgyro {
 namespace {
 
 constexpr std::uint32_t kDelete = 0x7F;
-constexpr std::uint32_t kC1First = 0x80;  // ISO 6429: controls of eight bits
+constexpr std::uint32_t kC1First = 0x80;  // ISO 6429: 8-bit controls
 constexpr std::uint32_t kC1Last = 0x9F;
 
 struct Letter {
@@ -17,7 +17,7 @@ struct Letter {
   std::uint32_t code = 0;
 };
 
-// RFC 3629; overlong forms, surrogates and what lies beyond U+10FFFF are no letters.
+// RFC 3629; overlong forms, surrogates and code points above U+10FFFF are invalid.
 Letter letter_at(std::string_view text) {
   const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
   const std::uint32_t lead = byte(0);

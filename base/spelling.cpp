@@ -13,7 +13,7 @@ char lower(char c) {
   return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
 }
 
-// A list longer than this helps nobody on a terminal.
+// A longer list is useless on a terminal.
 constexpr std::size_t kListedMax = 12;
 
 }  // namespace

@@ -1,6 +1,6 @@
 #pragma once
 
-// Letter case, and the valid name that a mistyped one most likely meant.
+// Lower case, and the valid name that a mistyped one most likely meant.
 
 #include <optional>
 #include <string>
@@ -9,26 +9,26 @@
 
 namespace vgyro {
 
-/// ASCII letters alone are changed.
+/// Changes ASCII letters only.
 std::string lower(std::string_view text);
 
 /// Edits (insert, delete, replace, swap of neighbours) that turn `a` into `b`, letter case ignored.
 std::size_t edit_distance(std::string_view a, std::string_view b);
 
-/// The nearest of `candidates`, or nothing when none is close enough to be a typing error.
+/// The nearest of `candidates`; nothing if none is close enough to be a typing error.
 std::optional<std::string> nearest_name(std::string_view name,
                                         const std::vector<std::string>& candidates);
 
-/// An option that no command line may have.
+/// An option that the command does not have.
 struct UnknownOption {
-  std::string name;                 ///< as it was typed, without a value behind "="
-  std::optional<std::string> near;  ///< what it most likely meant
+  std::string name;                 ///< as typed, without "=" and a value
+  std::optional<std::string> near;  ///< the option that was most likely meant
 };
-/// The first of the words that were left over which looks like an option. `known`: with dashes.
+/// The first of the unparsed words that looks like an option. `known` includes the dashes.
 std::optional<UnknownOption> unknown_option(const std::vector<std::string>& left_over,
                                             const std::vector<std::string>& known);
 
-/// `did you mean "X"?`, or `one of: A, B, C` when nothing is near; empty without candidates.
+/// `did you mean "X"?`, or `one of: A, B, C` if none is near; empty without candidates.
 std::string suggest_name(std::string_view name, const std::vector<std::string>& candidates);
 
 }  // namespace vgyro

@@ -1,6 +1,6 @@
 #pragma once
 
-// Time as types. A stamp says when a frame was on the bus, by the kernel or a log.
+// Types for time. A stamp is the time at which a frame was on the bus, from the kernel or a log.
 // BusClock has no now(): time enters the product only through the drivers (daemon, replay, tests).
 
 #include <chrono>
@@ -27,8 +27,8 @@ constexpr TimePoint time_from_ns(std::int64_t ns) {
 constexpr std::int64_t to_ns(TimePoint t) {
   return t.time_since_epoch().count();
 }
-/// `later` less `earlier`, at the ends of 64 bits instead of beyond them: a clock that was set, or
-/// a damaged stamp, may be centuries wrong.
+/// `later` less `earlier`, saturated to 64 bits: after a clock was set, or with a damaged stamp,
+/// the difference may be centuries.
 constexpr Duration span(TimePoint earlier, TimePoint later) {
   std::int64_t ns = 0;
   if (!__builtin_sub_overflow(to_ns(later), to_ns(earlier), &ns)) return Duration{ns};

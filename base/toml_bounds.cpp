@@ -6,8 +6,8 @@ namespace vgyro {
 
 namespace {
 
-// Goes through a text as TOML does: strings and comments hide brackets and dots. Where it is in
-// doubt it counts too much rather than too little.
+// Scans a text as TOML does: strings and comments hide brackets and dots. In doubt it counts too
+// much rather than too little.
 class Shape {
  public:
   Shape(std::string_view text, const std::string& file) : text_(text), file_(file) {}
@@ -39,10 +39,10 @@ class Shape {
   template <class T>
   [[nodiscard]] tl::unexpected<Error> broken(fmt::format_string<T&> what, T most) const {
     return fail(at_line(file_, line_), fmt::format(what, most),
-                "that is no file that this program could use");
+                "this is not a file for this program");
   }
 
-  // The library also ends a line where Unicode does.
+  // The library also ends lines at Unicode line ends.
   [[nodiscard]] std::size_t line_end() const {
     const std::string_view rest = text_.substr(at_);
     if (rest.front() == '\n' || rest.front() == '\r' || rest.front() == '\v' ||
@@ -64,7 +64,8 @@ class Shape {
       ++at_;
   }
 
-  // Up to its end, or that of its line; of a long one only a piece, so that check() sees its lines.
+  // Skips to the string's end or the end of its line; skips a long string piece by piece, so that
+  // check() sees its lines.
   void skip_string(char quote) {
     const std::string three(3, quote);
     if (text_.substr(at_).starts_with(three)) {
@@ -84,7 +85,7 @@ class Shape {
     while (at_ < text_.size()) {
       if (text_.substr(at_).starts_with(three)) {
         at_ += three.size();
-        // Up to two more quotes belong to the string.
+        // Up to two more quotes are part of the string.
         for (int more = 0; more < 2 && at_ < text_.size() && text_[at_] == three[0]; ++more)
           ++at_;
         return;
@@ -120,7 +121,7 @@ class Shape {
 Expected<void> check_toml_shape(std::string_view text, const std::string& file) {
   if (text.size() > kTomlBytesMax) {
     return fail(file, fmt::format("is larger than {} KiB", kTomlBytesMax >> 10U),
-                "that is no file that this program could use");
+                "this is not a file for this program");
   }
   return Shape(text, file).check();
 }

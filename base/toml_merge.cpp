@@ -23,14 +23,14 @@ void merge_lists(toml::array& into, toml::array&& later) {
   }
 }
 
-// The library's copies forget where they were written; what is moved keeps it, and so does the key
-// where the old one is gone first.
+// The library's copies lose the place where they were written; moved nodes keep it, and so does the
+// key if the old one is removed first.
 void put(toml::table& into, const toml::key& key, toml::node& value) {
   into.erase(key.str());
   value.visit([&](auto& concrete) { into.insert(key, std::move(concrete)); });
 }
 
-// As people would write it: the library writes a double with all 17 digits.
+// As people would write it; the library writes a double with all 17 digits.
 std::string text_of(const toml::node& node) {
   if (const auto* number = node.as_floating_point()) return fmt::format("{}", number->get());
   std::ostringstream text;

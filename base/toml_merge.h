@@ -1,7 +1,7 @@
 #pragma once
 
-// One TOML table laid over another, as a later file over an earlier one. Keys keep the place where
-// they were written, so that complaints name the right file and line.
+// Merges a later TOML file over an earlier one. Keys keep the place where they were written, so
+// that errors name the right file and line.
 
 #include <string>
 #include <vector>
@@ -10,8 +10,8 @@
 
 namespace vgyro {
 
-/// A table is merged key by key, a list of tables table by table in their order (what is beyond the
-/// earlier list is added to it), anything else takes the place of what was there.
+/// Merges a table key by key, and a list of tables table by table in order (further ones are
+/// appended); any other value replaces the earlier one.
 void merge_toml(toml::table& into, toml::table&& later);
 
 /// A value of a table, and where it was written.
@@ -21,7 +21,7 @@ struct TomlOrigin {
   std::string where;  ///< "file:line"
 };
 
-/// Of every value, in the order of their keys.
+/// The origins of all values, in the order of their keys.
 std::vector<TomlOrigin> toml_origins(const toml::table& table);
 
 }  // namespace vgyro

@@ -24,7 +24,7 @@ TomlReader::TomlReader(const toml::table& table, std::string file, std::string t
                        std::vector<Error>& errors)
     : table_(table), file_(std::move(file)), title_(std::move(title)), errors_(errors) {}
 
-// Of several files that make one table (base/toml_merge.h) each node knows its own.
+// If several files make up one table (base/toml_merge.h), each node has the path of its own.
 std::string TomlReader::place(const toml::source_region& source) const {
   return at_line(source.path ? *source.path : file_,
                  std::max(1U, static_cast<unsigned>(source.begin.line)));
@@ -65,7 +65,7 @@ std::optional<double> TomlReader::number(std::string_view key) {
   const toml::node* found = node(key, "a number", toml::node_type::floating_point);
   if (found == nullptr) return std::nullopt;
   const auto value = found->value<double>();
-  // The library gives nothing for an integer that is no double, and a default would take its place.
+  // The library returns nothing for an integer that no double holds; a default would replace it.
   if (!value) {
     complain(where(key), fmt::format("{} {} has more digits than a number can hold", title_, key),
              "at most 15 digits, or an exponent: 9.007e15");
@@ -114,7 +114,7 @@ void TomlReader::forgive(std::initializer_list<std::string_view> keys) {
 }
 
 void TomlReader::finish() {
-  // Whoever gave a wrong file wants to be told so, not all of it.
+  // A wrong file needs one message, not one for each of its keys.
   constexpr std::size_t kUnknownMost = 10;
   std::size_t unknown = 0;
   for (const auto& [key, value] : table_) {

@@ -1,7 +1,7 @@
 #pragma once
 
-// One TOML table, read key by key. Collects every complaint (wrong type, missing key, unknown key
-// with the nearest valid name), each with file and line, instead of stopping at the first.
+// Reads one TOML table key by key. Collects every error (wrong type, missing key, unknown key with
+// the nearest valid name), each with file and line, instead of stopping at the first.
 
 #include <cstdint>
 #include <optional>
@@ -10,10 +10,10 @@
 #include <vector>
 
 #define TOML_EXCEPTIONS 0
-// What its parser asserts, of "[!name]" for one, it then reports as an error of the text as well.
+// The parser reports what it asserts, such as "[!name]", as an error of the text too.
 #define TOML_ASSERT static_cast<void>
 #include <toml++/impl/preprocessor.h>
-// Its table of blanks calls a place unreachable that most letters beyond ASCII reach.
+// Most letters beyond ASCII reach a place in its table of blanks that it declares unreachable.
 #pragma push_macro("TOML_UNREACHABLE")
 #undef TOML_UNREACHABLE
 #define TOML_UNREACHABLE return false
@@ -25,14 +25,14 @@
 
 namespace vgyro {
 
-/// The one way from a text to a table, through check_toml_shape(). `remedy` is for a text that is
-/// no TOML.
+/// The only way from a text to a table: includes check_toml_shape(). `remedy` is for a text that is
+/// not TOML.
 Expected<toml::table> parse_toml(std::string_view text, const std::string& file,
                                  std::string remedy = {});
 
 class TomlReader {
  public:
-  /// `title` names the table in messages, e.g. "[[gyro]]". Errors go to `errors`.
+  /// `title` names the table in errors, e.g. "[[gyro]]". Errors go to `errors`.
   TomlReader(const toml::table& table, std::string file, std::string title,
              std::vector<Error>& errors);
 
@@ -43,19 +43,19 @@ class TomlReader {
   const toml::table* table(std::string_view key);
   const toml::array* array(std::string_view key, const std::string& shape = {});
 
-  /// Like text(), and a complaint when the key is not there.
+  /// Like text(), but reports an error if the key is absent.
   std::string required_text(std::string_view key, std::string_view example);
 
   [[nodiscard]] bool has(std::string_view key) const { return table_.contains(key); }
-  /// "file:line" of the key, or of the table when it is not there.
+  /// "file:line" of the key, or of the table if the key is absent.
   [[nodiscard]] std::string where(std::string_view key) const;
   [[nodiscard]] std::string where() const;
   void complain(std::string where, std::string what, std::string remedy = {});
 
-  /// These keys are known, but are not read after another error.
+  /// Marks keys as known that are not read because of another error.
   void forgive(std::initializer_list<std::string_view> keys);
 
-  /// Complains of keys that were not asked for: of the first ten, and how many more there are.
+  /// Reports unknown keys: the first ten, and the number of others.
   void finish();
 
  private:

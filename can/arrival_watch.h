@@ -1,10 +1,10 @@
 #pragma once
 
-// Is a kernel's stamp the time at which its frame arrived? Where a sender asks for a launch time
-// (SO_TXTIME), a virtual link, and some drivers, hand that time to every reader as the stamp, on
-// whatever clock the sender chose. A frame that is read now came after its queue was last seen
-// empty, so a correct stamp lies between then and now, on the wall clock as it goes now or, where
-// it was set meanwhile, as it went then. Pure: reads no clock.
+// Checks whether a kernel's stamp can be the time at which its frame arrived. Where a sender asks
+// for a launch time (SO_TXTIME), a virtual link and some drivers report that time as the stamp to
+// every reader, on whatever clock the sender chose. A frame that is read now arrived after its
+// queue was last seen empty, so a correct stamp lies between then and now, on the present wall
+// clock or, if that was set meanwhile, on the earlier one. Pure: reads no clock.
 
 #include "base/time.h"
 
@@ -12,9 +12,9 @@ namespace vgyro::can {
 
 class ArrivalWatch {
  public:
-  /// The queue is looked at once a second. So is_near() can spare the caller reading clocks, and a
-  /// stamp that is wrong by more than twice this is always found. Nearer ones are left alone:
-  /// slewing, a late look and a true wait in the queue stay below it.
+  /// The queue is checked once a second. is_near() thus saves the caller from reading clocks, and a
+  /// stamp that is wrong by more than twice this is always found. Smaller errors are accepted,
+  /// because slewing, a late check and a real wait in the queue cause them too.
   static constexpr Duration kTolerance = std::chrono::seconds(1);
 
   struct Clocks {
@@ -22,23 +22,25 @@ class ArrivalWatch {
     TimePoint steady;  ///< cannot be set
   };
 
-  /// With an empty queue.
+  /// Starts the watch; the queue is empty.
   void opened(Clocks now) { last_ = before_ = now; }
 
-  /// About once a second, unless frames were left in the queue.
+  /// Records that the queue is empty: about once a second, unless frames were left in it.
   void seen_empty(Clocks now) {
     before_ = last_;
     last_ = now;
   }
 
-  /// So near the last look that nothing more has to be asked; true for nearly every frame.
+  /// True if the stamp is close enough to the last check to be accepted as it is; true for nearly
+  /// every frame.
   [[nodiscard]] bool is_near(TimePoint stamp) const {
     return stamp >= last_.wall - kTolerance && stamp <= last_.wall + 2 * kTolerance;
   }
 
-  /// `now`: read after the frame was.
+  /// Precondition: `now` was read after the frame.
   [[nodiscard]] bool may_be_arrival(TimePoint stamp, Clocks now) const {
-    // From the look before the last: a process may be stopped between looking and reading the time.
+    // From the check before the last: a process may be stopped between checking and reading the
+    // time.
     const Duration since = now.steady - before_.steady;
     const auto lies_after = [&](TimePoint begin) {
       return stamp >= begin - kTolerance && stamp <= begin + since + kTolerance;

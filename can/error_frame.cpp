@@ -21,7 +21,7 @@ void ControllerWatch::note(const Frame& frame) {
   if ((frame.id & kTransceiver) != 0) add(ErrorCause::kTransceiver);
   if ((frame.id & kNotAcknowledged) != 0) add(ErrorCause::kNotAcknowledged);
   if ((frame.id & kControllerProblem) != 0 && frame.length > 1) note_controller(frame.data[1]);
-  // In one frame the return from bus-off is the newer of the two.
+  // If one frame reports both, the return from bus-off is the newer event.
   if ((frame.id & kBusOff) != 0) {
     add(ErrorCause::kBusOff);
     state_ = ControllerState::kBusOff;

@@ -1,7 +1,7 @@
 #pragma once
 
-// A CAN controller's error reports: Linux's error frames → a state and counters.
-// Pure; can/socket.cpp checks that the numbers are the kernel's.
+// Turns a CAN controller's error reports, Linux's error frames, into a state and counters. Pure;
+// can/socket.cpp checks that the numbers are the kernel's.
 
 #include <array>
 #include <cstdint>
@@ -34,8 +34,8 @@ enum ControllerBit : std::uint8_t {
   kActiveAgain = 0x40
 };
 
-/// What is asked of the kernel. Single bit errors are not: a loose cable makes thousands a second
-/// of them, and the controller's state says what they come to.
+/// The classes requested from the kernel. Single bit errors are not: a loose cable causes thousands
+/// a second of them, and the controller's state shows their effect.
 inline constexpr std::uint32_t kErrorsWanted = kSendTimeout | kLostArbitration |
                                                kControllerProblem | kTransceiver |
                                                kNotAcknowledged | kBusOff | kRestarted;
@@ -45,13 +45,13 @@ std::string_view to_string(ControllerState state);
 
 enum class ErrorCause : std::uint8_t {
   kBusOff,           ///< the controller left the bus
-  kRestarted,        ///< and came back
-  kErrorPassive,     ///< it may no longer disturb others: next to bus-off
+  kRestarted,        ///< the controller came back
+  kErrorPassive,     ///< the controller may no longer disturb others: next to bus-off
   kErrorWarning,     ///< one of its error counters has reached 96
   kLostArbitration,  ///< reported only by controllers that send once
   kNotAcknowledged,  ///< no other node is on the bus
-  kOverflow,         ///< of the controller's own buffers
-  kSendTimeout,      ///< the driver gave a frame up
+  kOverflow,         ///< the controller's own buffers overflowed
+  kSendTimeout,      ///< the driver gave up a frame
   kTransceiver       ///< wires or transceiver
 };
 inline constexpr std::size_t kErrorCauseCount = 9;
@@ -59,9 +59,9 @@ std::string_view to_string(ErrorCause cause);
 
 class ControllerWatch {
  public:
-  /// Anything but an error frame is no news.
+  /// Ignores frames that are not error frames.
   void note(const Frame& frame);
-  /// The link came up again: the earlier state no longer holds.
+  /// Call when the link came up again: the earlier state no longer holds.
   void forget_state() { state_ = ControllerState::kActive; }
 
   [[nodiscard]] ControllerState state() const { return state_; }

@@ -26,8 +26,8 @@ enum FrameFlag : std::uint8_t {
 struct Frame {
   std::uint32_t id = 0;      ///< identifier without flags, 11 or 29 bits (29 for error frames)
   std::uint8_t flags = 0;    ///< FrameFlag
-  std::uint8_t length = 0;   ///< payload bytes; of a remote frame, the bytes asked for
-  std::uint8_t raw_dlc = 0;  ///< 9…15 where a classic frame's DLC said more than its 8 bytes
+  std::uint8_t length = 0;   ///< payload bytes; in a remote frame, the bytes requested
+  std::uint8_t raw_dlc = 0;  ///< 9…15 if a classic frame's DLC exceeds its 8 bytes
   std::array<std::uint8_t, kFdBytesMax> data{};  ///< bytes beyond `length` have no meaning
 
   [[nodiscard]] bool has(FrameFlag flag) const { return (flags & flag) != 0; }

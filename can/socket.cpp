@@ -109,7 +109,7 @@ bool bind_to(int fd, int interface_index) {
   return ::bind(fd, reinterpret_cast<const sockaddr*>(&address), sizeof(address)) == 0;
 }
 
-// A link that is down when it is bound leaves ENETDOWN, as if it had gone down since.
+// Binding to a link that is down leaves ENETDOWN, as if it had gone down since.
 void forget_error(int fd) {
   int error = 0;
   socklen_t size = sizeof(error);
@@ -137,7 +137,7 @@ void from_kernel(const canfd_frame& raw, std::size_t bytes, Frame& frame) {
   }
   const std::size_t most = is_fd ? kFdBytesMax : kClassicBytesMax;
   frame.length = static_cast<std::uint8_t>(std::min<std::size_t>(raw.len, most));
-  // The byte that says "raw DLC" in a classic frame is the last reserved one of the FD layout.
+  // In a classic frame the raw DLC is in the last reserved byte of the FD layout.
   frame.raw_dlc = is_fd ? std::uint8_t{0} : raw.__res1;
   std::copy_n(std::begin(raw.data), frame.length, frame.data.begin());
 }
@@ -209,7 +209,7 @@ Expected<Socket> Socket::open(const std::string& interface, std::span<const Filt
   if (!set_stamps_and_drop_count(*fd)) {
     return fail(interface, "no kernel time stamps: " + system_reason(errno));
   }
-  // Whatever the MTU is now: it may be raised while the link is down.
+  // Set whatever the MTU is now: it may be raised while the link is down.
   if (!set_option(*fd, SOL_CAN_RAW, CAN_RAW_FD_FRAMES, 1)) {
     return fail(interface, "no CAN FD frames: " + system_reason(errno));
   }
@@ -262,11 +262,11 @@ Socket::~Socket() {
 
 LinkState Socket::look() const {
   ifreq request = request_for(interface_);
-  // By the configured name, which may be one of several: ip-link(8) gives alternative ones.
+  // Query by the configured name, which may be an alternative one (ip-link(8)).
   if (::ioctl(fd_, SIOCGIFINDEX, &request) != 0 || request.ifr_ifindex != index_) return {};
   LinkState link{.is_ours = true};
   link.is_up = ::ioctl(fd_, SIOCGIFFLAGS, &request) == 0 && (request.ifr_flags & IFF_UP) != 0;
-  // A link of CAN XL carries FD frames too, by an MTU that is larger still.
+  // A CAN XL link also carries FD frames; its MTU is larger still.
   link.fd_frames = ::ioctl(fd_, SIOCGIFMTU, &request) == 0 && request.ifr_mtu >= int{CANFD_MTU};
   return link;
 }

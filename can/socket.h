@@ -1,10 +1,10 @@
 #pragma once
 
-// One raw SocketCAN socket on one interface; with socket.cpp the only place that uses linux/can.
-// The kernel filters for exactly the wanted identifiers, and frames come in batches with the
-// kernel's stamps; error frames (can/error_frame.h) come among them. Never blocks and never
-// allocates once open. Other programs on the host keep seeing what it sends; it does not see its
-// own frames.
+// One raw SocketCAN socket on one interface; together with socket.cpp the only place that uses
+// linux/can. The kernel filters for exactly the wanted identifiers, and frames come in batches with
+// the kernel's stamps, error frames (can/error_frame.h) among them. Never blocks and never
+// allocates once open. Other programs on the host still see the frames that it sends; it does not
+// see its own frames.
 
 #include <cstdint>
 #include <memory>
@@ -30,29 +30,30 @@ struct SocketOptions {
   int send_buffer_bytes = 0;           ///< 0: the kernel's default
 };
 
-/// What a socket's interface is at a moment. All false where it is not the one that the name means.
+/// The state of a socket's interface. All false if the name no longer refers to that interface.
 struct LinkState {
-  bool is_ours = false;    ///< the name still means the interface that the socket is bound to
-  bool is_up = false;      ///< set up; a controller may be bus-off all the same
+  bool is_ours = false;    ///< the name still refers to the interface that the socket is bound to
+  bool is_up = false;      ///< set up; the controller may still be bus-off
   bool fd_frames = false;  ///< carries CAN FD
   bool operator==(const LinkState&) const = default;
 };
 
-/// Is there hope that the interface appears? Not where one of that name is of another kind, and not
-/// where the kernel has no CAN.
+/// Can the interface still appear? No if the name belongs to an interface of another kind, or if
+/// the kernel has no CAN.
 bool may_appear(const std::string& interface);
 
 struct Received {
   Frame frame;
   TimePoint stamp;     ///< kernel's software stamp, host clock; 0 in its first moments
-  TimePoint hardware;  ///< controller's own clock, whatever its epoch; 0 where it has none
+  TimePoint hardware;  ///< controller's own clock, whatever its epoch; 0 without one
   bool local = false;  ///< sent by another socket of this host
 };
 
 enum class ReceiveStatus : std::uint8_t {
   kMore,        ///< the batch was full: ask again
   kDrained,     ///< nothing is left for now
-  kLinkDown,    ///< once for each time that it went down; the socket goes on when it is up again
+  kLinkDown,    ///< once each time that the link goes down; the socket continues when it is up
+                ///< again
   kDeviceGone,  ///< returned once; the socket is dead, open a new one
   kFailed       ///< see last_errno()
 };
@@ -66,8 +67,8 @@ class Socket final : public Transmitter {
  public:
   static constexpr std::size_t kBatchFrames = 64;
 
-  /// Without filters the socket only writes. FD frames are received wherever the link carries them,
-  /// now or later. A link that is down when it is bound is no event of receive(): look() says so.
+  /// Without filters the socket only writes. FD frames are received whenever the link carries them,
+  /// now or later. A link that is already down is reported by look(), not by receive().
   static Expected<Socket> open(const std::string& interface, std::span<const Filter> filters,
                                const SocketOptions& options = {});
   Socket(Socket&& other) noexcept;
@@ -78,16 +79,16 @@ class Socket final : public Transmitter {
   SendResult send(const Frame& frame) override;
 
   [[nodiscard]] int fd() const { return fd_; }
-  /// Asks the kernel, in two or three calls. The socket is bound to an index, and receives and
-  /// sends there whatever the interface is called by then: a name that means another one is a
-  /// removal.
+  /// Queries the kernel, in two or three calls. The socket is bound to an index, and receives and
+  /// sends there even if the interface is renamed; a name that now belongs to another interface
+  /// counts as a removal.
   [[nodiscard]] LinkState look() const;
-  /// What the interface that the socket was bound to is called; empty where it is no longer here.
+  /// The present name of the interface that the socket is bound to; empty if it is gone.
   [[nodiscard]] std::string name_now() const;
   /// Received frames that the kernel dropped because the buffer was full, as far as reported.
   [[nodiscard]] std::uint64_t drops() const { return drops_; }
   [[nodiscard]] int receive_buffer_bytes() const { return receive_buffer_bytes_; }
-  /// Of the last call that returned kFailed.
+  /// errno of the last call that returned kFailed.
   [[nodiscard]] int last_errno() const { return last_errno_; }
 
  private:

@@ -7,7 +7,7 @@ namespace {
 
 // At 100 ppm a clock drifts by 100 µs in this time, which is how far the result can be off.
 constexpr Duration kInterval = std::chrono::seconds(1);
-// Further apart than any lateness: one of the two clocks was set.
+// A larger change than any lateness: one of the two clocks was set.
 constexpr Duration kStep = std::chrono::milliseconds(100);
 
 }  // namespace

@@ -7,7 +7,7 @@ namespace vgyro::can {
 TransmitQueue::TransmitQueue(const TransmitLimits& limits)
     : limits_(limits), ring_(std::max<std::size_t>(limits.capacity, 1)) {}
 
-// What the kernel refuses is tried once more by drain(), which keeps the books of refusals.
+// A frame that the kernel refuses here is tried again by drain(), which counts refusals.
 bool TransmitQueue::send_at_once(const Frame& frame, Transmitter& transmitter) {
   if (size_ > 0 || awaits_writable_ || wait_ != Duration{}) return false;
   if (transmitter.send(frame) != SendResult::kSent) return false;

@@ -1,7 +1,7 @@
 #pragma once
 
-// What to do with frames that the kernel does not take at once: keep them in order, try again, and
-// rather drop them than send them late, since an old rate in a burst is worse than none. Bounded;
+// Handles frames that the kernel does not take at once: keeps them in order, tries again, and drops
+// them rather than send them late, since an old rate in a burst is worse than none. Bounded;
 // allocates only when constructed; reads no clock: time is an argument.
 
 #include <cstdint>
@@ -17,13 +17,13 @@ namespace vgyro::can {
 struct TransmitLimits {
   std::size_t capacity = 256;
   Duration first_retry = std::chrono::milliseconds(1);
-  Duration last_retry = std::chrono::milliseconds(32);  ///< the waits double up to here
+  Duration last_retry = std::chrono::milliseconds(32);  ///< the wait doubles up to this
 };
 
 struct TransmitCounts {
   std::uint64_t sent = 0;
   std::uint64_t dropped_stale = 0;     ///< not sent before their time ran out
-  std::uint64_t dropped_overflow = 0;  ///< oldest of a full queue
+  std::uint64_t dropped_overflow = 0;  ///< the oldest frame of a full queue
   std::uint64_t dropped_failed = 0;    ///< the kernel refused them for good
   std::uint64_t retries = 0;           ///< attempts after a refusal for want of space
 };
@@ -32,23 +32,23 @@ class TransmitQueue {
  public:
   explicit TransmitQueue(const TransmitLimits& limits = {});
 
-  /// Sends at once, where nothing waits and nothing holds back, which is nearly always; needs no
-  /// time. False when it has not gone out: push() it.
+  /// Sends at once if the queue is empty and no wait is pending, which is nearly always the case;
+  /// needs no time. False if the frame was not sent: then push() it.
   bool send_at_once(const Frame& frame, Transmitter& transmitter);
 
-  /// Last in the order of sending. Dropped when not sent by `send_by`.
+  /// Appends a frame to the queue. It is dropped if it is not sent by `send_by`.
   void push(const Frame& frame, TimePoint send_by);
 
   /// Sends what can be sent now, oldest first; the first refusal ends the attempt.
   void drain(TimePoint now, Transmitter& transmitter);
 
-  /// Poll says that the socket takes frames again.
+  /// Call when poll() reports that the socket takes frames again.
   void on_writable() { awaits_writable_ = false; }
 
   /// Poll for writing, and call on_writable(), while this is true.
   [[nodiscard]] bool wants_writable() const { return awaits_writable_ && size_ > 0; }
 
-  /// When drain() has to be called again; nothing while empty.
+  /// When drain() must be called again; nothing while the queue is empty.
   [[nodiscard]] std::optional<TimePoint> next_deadline() const;
 
   [[nodiscard]] std::size_t size() const { return size_; }

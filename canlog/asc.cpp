@@ -20,13 +20,13 @@ bool same(std::string_view a, std::string_view lower_b) {
          });
 }
 
-/// What stands behind the stamp of an event.
+/// What follows the stamp of an event.
 enum class Event : std::uint8_t { kOther, kClassic, kFd };
 
 struct Opening {
   DecimalTime stamp;
   Event event = Event::kOther;
-  unsigned channel = 0;  ///< of a classic frame
+  unsigned channel = 0;  ///< channel of a classic frame
 };
 
 // "   0.010001 2 …", "   0.04 CANFD …"
@@ -40,7 +40,7 @@ std::optional<Opening> read_opening(Words& words) {
     opening.event = Event::kFd;
     words = ahead;
   } else if (const auto channel = number_of<unsigned>(word)) {
-    // Events of other buses have other words in front: "L1", "Fr".
+    // Events of other buses begin with other words: "L1", "Fr".
     opening.event = *channel >= 1 && *channel <= kChannelMax ? Event::kClassic : Event::kOther;
     opening.channel = *channel;
     words = ahead;
@@ -69,7 +69,7 @@ const char* read_id(std::string_view word, int base, can::Frame& frame) {
   return nullptr;
 }
 
-// "123 Rx d 8 11 22 …", "123 Rx r 5"; behind it "Length = …" and more may stand.
+// "123 Rx d 8 11 22 …", "123 Rx r 5"; "Length = …" and more may follow.
 Parsed read_classic(Words words, int base, LogRecord& record) {
   const std::string_view id = words.next();
   if (same(id, "errorframe")) {
@@ -87,7 +87,7 @@ Parsed read_classic(Words words, int base, LogRecord& record) {
   const auto dlc = number_of<unsigned>(words.next(), base);
   if (remote) {
     record.frame.flags |= can::kRemote;
-    // Tools before version 8.5 of Vector's write none.
+    // Vector's tools before version 8.5 write no length code for remote frames.
     if (!dlc) return {Verdict::kFrame, ""};
   }
   if (!dlc) return {Verdict::kMalformed, "length code: no number"};
@@ -103,14 +103,15 @@ Parsed read_classic(Words words, int base, LogRecord& record) {
 constexpr std::uint32_t kFlagRemote = 1U << 4U;
 constexpr std::uint32_t kFlagFd = 1U << 12U;
 
-// What stands behind the bytes of a CANFD line: duration, length, flags, …; true of an FD frame.
+// Reads what follows the bytes of a CANFD line: duration, length, flags, … Makes the frame classic
+// if the flags say so.
 void apply_flags(Words words, can::Frame& frame) {
   words.next();
   words.next();
   const auto flags = number_of<std::uint32_t>(words.next(), 16);
   if (!flags) return;  // older files have none
   if ((*flags & kFlagRemote) != 0) frame.flags |= can::kRemote;
-  // Loggers of FD buses write classic frames in this form too.
+  // Loggers of FD buses also write classic frames in this form.
   if ((*flags & kFlagFd) != 0 || frame.length > can::kClassicBytesMax) return;
   constexpr unsigned kOfFd = can::kFd | can::kBitRateSwitch | can::kErrorStateIndicator;
   frame.flags &= static_cast<std::uint8_t>(~kOfFd);
@@ -136,7 +137,7 @@ Parsed read_fd(Words words, int base, LogRecord& record, unsigned& channel) {
   frame.flags = can::kFd;
   if (const char* why = read_id(id, base, frame)) return {Verdict::kMalformed, why};
   std::string_view rate_switch = words.next();
-  if (!is_bit(rate_switch)) rate_switch = words.next();  // a name stood there
+  if (!is_bit(rate_switch)) rate_switch = words.next();  // that was a name
   const std::string_view state = words.next();
   if (!is_bit(rate_switch) || !is_bit(state)) {
     return {Verdict::kMalformed, "BRS and ESI: neither 0 nor 1"};
@@ -188,7 +189,7 @@ bool is_asc_line(std::string_view line) {
   if (!opening || opening->event == Event::kOther) return false;
   LogRecord record;
   unsigned channel = 0;
-  // Without the head it may be decimal: bytes of either base are bytes of hexadecimal digits.
+  // Without the head the base is unknown; bytes of either base are valid as hexadecimal ones.
   const Parsed result = opening->event == Event::kFd ? read_fd(words, 16, record, channel)
                                                      : read_classic(words, 16, record);
   return result.verdict == Verdict::kFrame;
@@ -222,9 +223,9 @@ Parsed AscReader::parse_head(std::string_view line) {
   return head();
 }
 
-// A block that begins with the measurement says when that was, with more digits than the file's
-// date; python-can's date is that of the writing. A block behind a trigger has stamps since the
-// file's date.
+// A block that begins with the measurement has its start with more digits than the file's date;
+// python-can's date is the time of writing. In a block that begins with a trigger, stamps count
+// from the file's date.
 void AscReader::settle_zero(std::int64_t stamp_ns) {
   if (stamp_ns == 0 || !date_ns_) zero_ns_ = *block_ns_;
   block_ns_.reset();

@@ -1,8 +1,8 @@
 #pragma once
 
 // Vector's ASC: text that CANoe, CANalyzer, CANape and many loggers write. Classic, FD, remote and
-// error frames; other events are passed over. Stamps count from the date in the file's head, which
-// is local time, or from zero where there is none. docs/log-format.md has the details.
+// error frames; other events are skipped. Stamps count from the date in the file's head, which is
+// local time, or from zero without a date. docs/log-format.md has the details.
 
 #include <memory>
 #include <string_view>
@@ -21,13 +21,13 @@ class AscReader final : public LineReader {
   Parsed parse(std::string_view line, LogRecord& record) override;
   Parsed parse_head(std::string_view line);
   Parsed parse_event(std::string_view line, LogRecord& record);
-  /// Where the stamps of the file, or of a block of it, count from.
+  /// Sets the zero of the stamps of the file, or of a block of it.
   void settle_zero(std::int64_t stamp_ns);
 
   int base_ = 16;
   bool relative_ = false;                 ///< each stamp counts from the one before it
-  std::optional<std::int64_t> date_ns_;   ///< of the file
-  std::optional<std::int64_t> block_ns_;  ///< of a block that has begun and has no stamp yet
+  std::optional<std::int64_t> date_ns_;   ///< date in the file's head
+  std::optional<std::int64_t> block_ns_;  ///< date of a block that has begun but has no stamp yet
   std::int64_t zero_ns_ = 0;
   std::int64_t now_ns_ = 0;  ///< since zero
 };

@@ -43,8 +43,8 @@ void put_classic(Text& text, const can::Frame& frame, unsigned channel, const ch
   if (!remote) put_bytes(text, frame);
 }
 
-// Columns as python-can writes them: name (none), BRS, ESI, code, length, bytes, duration, bits,
-// flags, CRC, bit timings.
+// Columns as in python-can: name (none), BRS, ESI, code, length, bytes, duration, bits, flags, CRC,
+// bit timings.
 void put_fd(Text& text, const can::Frame& frame, unsigned channel, const char* direction) {
   constexpr unsigned kFdFlag = 1U << 12U;
   constexpr unsigned kRateSwitchFlag = 1U << 13U;
@@ -77,7 +77,7 @@ void AscWriter::put(const LogRecord& record, std::string_view bus, const XlFrame
   if (record.is_xl) return omit("CAN XL frames");
   if (!zero_ns_) begin(record.stamp);
   const std::int64_t since_ns = to_ns(record.stamp) - *zero_ns_;
-  if (since_ns < 0) return omit("frames whose stamps lie before the first one's second");
+  if (since_ns < 0) return omit("frames stamped before the second of the first frame");
   Text text;
   put_stamp(text, since_ns,
             options_.fraction_digits != 0 ? options_.fraction_digits : record.fraction_digits);
@@ -88,7 +88,7 @@ void AscWriter::put(const LogRecord& record, std::string_view bus, const XlFrame
   } else if (record.frame.has(can::kFd)) {
     put_fd(text, record.frame, channel, direction);
   } else {
-    // asc2log drops a classic frame with such a code, python-can takes it for one of 64 bytes.
+    // asc2log drops a classic frame with such a code, python-can reads it as one of 64 bytes.
     if (record.frame.raw_dlc > 0) omit("length codes above 8 of classic frames");
     put_classic(text, record.frame, channel, direction);
   }

@@ -1,9 +1,9 @@
 #pragma once
 
-// Records → Vector's ASC, in the form that CANoe, python-can and can-utils' asc2log read. Stamps
-// count from the whole second in which the first frame was, so the date in the head, which some
-// readers take to the second only, loses nothing. What the form has no place for: interface names
-// (channel numbers, canlog/writer.h), the causes of error frames, CAN XL.
+// Writes records as Vector's ASC, in the form that CANoe, python-can and can-utils' asc2log read.
+// Stamps count from the whole second of the first frame, so readers that read the date in the head
+// only to the second lose nothing. The form cannot hold interface names (channel numbers,
+// canlog/writer.h), the causes of error frames, or CAN XL.
 
 #include <array>
 #include <optional>

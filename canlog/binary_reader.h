@@ -1,7 +1,6 @@
 #pragma once
 
-// What the readers of binary forms share: what was counted, and the names of buses that have
-// numbers.
+// Shared by the readers of binary forms: counts, and names of buses that have numbers.
 
 #include <array>
 #include <optional>
@@ -18,11 +17,11 @@ class BinaryReader : public LogReader {
   [[nodiscard]] const std::optional<Error>& error() const final { return error_; }
 
  protected:
-  /// `item` is what the form consists of (LogCounts::item).
+  /// `item` names what the form consists of (LogCounts::item).
   explicit BinaryReader(std::string_view item) { counts_.item = item; }
 
-  /// By the channel's number, from 1 on (canlog/writer.h); 0, which some write, is "can". False
-  /// when there are too many buses.
+  /// Sets the bus by its channel number, from 1 on (canlog/writer.h); channel 0, which some tools
+  /// write, is "can". False if there are too many buses.
   bool set_channel(unsigned channel, LogRecord& record) {
     if (channel < known_.size() && known_[channel]) {
       record.bus = *known_[channel];
@@ -31,7 +30,7 @@ class BinaryReader : public LogReader {
     return set_new_channel(channel, record);
   }
   bool set_bus(std::string_view name, LogRecord& record);
-  /// Nanoseconds since the epoch, and as many digits as they need.
+  /// Takes nanoseconds since the epoch; shows 9 digits if 6 are not enough.
   static void set_stamp(std::int64_t ns, LogRecord& record) {
     constexpr std::int64_t kMicro_ns = 1'000;
     record.stamp = time_from_ns(ns);
@@ -45,7 +44,7 @@ class BinaryReader : public LogReader {
   bool set_new_channel(unsigned channel, LogRecord& record);
 
   InterfaceTable interfaces_;
-  std::array<std::optional<can::BusIndex>, 256> known_{};  ///< by channel
+  std::array<std::optional<can::BusIndex>, 256> known_{};  ///< by channel number
 };
 
 }  // namespace vgyro::canlog

@@ -17,7 +17,7 @@ namespace {
 constexpr const char* kTooShort = "the object is shorter than its contents";
 constexpr const char* kTooManyBuses = "more than 64 different channels";
 
-// None where there is no date, or one that cannot be.
+// Nothing if there is no date, or an impossible one.
 std::optional<std::int64_t> read_date(const char* from) {
   constexpr std::int64_t kMilli_ns = 1'000'000;
   std::array<std::uint16_t, blf::kDateWords> words{};
@@ -28,12 +28,12 @@ std::optional<std::int64_t> read_date(const char* from) {
   return local_to_epoch_ns({year, month, day, hour, minute, second, milli * kMilli_ns});
 }
 
-// Null, or why it is none; `record` gets its time since the measurement's beginning.
+// Reads the time since the start of the measurement. Returns null, or what is wrong.
 const char* read_stamp(const char* object, std::int64_t zero_ns, std::int64_t& ns) {
   constexpr std::int64_t kTenMicros_ns = 10'000;
   const auto unit = load_little<std::uint32_t>(object + blf::object::kStampUnit);
   const auto count = load_little<std::uint64_t>(object + blf::object::kStamp);
-  // Zero is what a writer leaves that knows one unit only.
+  // Writers that use a single unit leave zero.
   if (unit != blf::object::kTenMicros && unit != blf::object::kNanos && unit != 0) {
     return "stamp: neither in 10 us nor in ns";
   }
@@ -58,8 +58,8 @@ void copy_payload(const char* from, std::size_t there, can::Frame& frame) {
   std::memcpy(frame.data.data(), from, std::min<std::size_t>(there, frame.length));
 }
 
-// A frame that an object for CAN FD holds: classic where it does not say otherwise. `there` bytes
-// of it are in the object, of which `valid` count.
+// Sets the content of a frame from an object for CAN FD; the frame may be classic. The object holds
+// `there` bytes of it, of which `valid` count.
 const char* set_fd_content(unsigned dlc, unsigned valid, const char* data, std::size_t there,
                            can::Frame& frame) {
   if (!frame.has(can::kFd)) {
@@ -67,9 +67,9 @@ const char* set_fd_content(unsigned dlc, unsigned valid, const char* data, std::
     if (!frame.has(can::kRemote)) copy_payload(data, there, frame);
     return nullptr;
   }
-  if (frame.has(can::kRemote)) return "a remote frame of CAN FD: there is none";
+  if (frame.has(can::kRemote)) return "a remote frame of CAN FD, which does not exist";
   if (const char* why = set_length(valid, frame)) return why;
-  // What the object has no room for is zero: CANoe writes and reads it like that.
+  // Bytes that the object has no room for are zero, as CANoe writes and reads them.
   copy_payload(data, there, frame);
   return nullptr;
 }
@@ -102,7 +102,7 @@ Expected<std::unique_ptr<LogReader>> BlfReader::open(std::unique_ptr<ByteSource>
                               ? 0
                               : load_little<std::uint32_t>(&head[blf::file::kHeadBytes]);
   if (head_bytes < blf::file::kBytesMin || head_bytes > blf::file::kBytesMax) {
-    return fail(window->name(), "begins like a BLF file, but its head is none or cut off",
+    return fail(window->name(), "begins like a BLF file, but its head is invalid or cut off",
                 "the file may be damaged; if Vector's tools open it, save it from there");
   }
   const std::string kept(head);
@@ -117,7 +117,7 @@ BlfReader::BlfReader(std::unique_ptr<ByteWindow> bytes, std::string_view head)
   const auto date_ns = read_date(&head[blf::file::kBegin]);
   zero_ns_ = date_ns.value_or(0);
   const auto objects = load_little<std::uint32_t>(&head[blf::file::kObjects]);
-  // python-can knows the date when it has seen a frame, and writes it at the end.
+  // python-can writes the date at the end, when it has seen a frame.
   if (!date_ns && objects == 0) {
     counts_.add_malformed(
         "the file's head was never completed: without its date the stamps count from zero");
@@ -145,7 +145,7 @@ BlfReader::Outcome BlfReader::read_object(LogRecord& record) {
   if (object.head_bytes < blf::object::kBaseBytes || object.bytes < object.head_bytes ||
       (is_read(object.type) && object.bytes > kObjectBytesMax)) {
     ++counts_.lines;
-    counts_.add_malformed("sizes that cannot be");
+    counts_.add_malformed("impossible sizes");
     at_ += blf::kObjectMark.size();
     lost_ = true;
     return Outcome::kNone;
@@ -170,7 +170,7 @@ BlfReader::Outcome BlfReader::read_object(LogRecord& record) {
   return is_frame ? Outcome::kFrame : Outcome::kNone;
 }
 
-// To the mark of the next object; false where none follows, or something is missing.
+// Moves to the mark of the next object; false if none follows, or if bytes are missing.
 bool BlfReader::find_object() {
   constexpr std::size_t kNear = blf::kPaddingOf + blf::kObjectMark.size();
   while (true) {
@@ -193,7 +193,7 @@ bool BlfReader::find_object() {
 void BlfReader::resume_at_mark() {
   const std::string_view there(buffer_.get() + at_, end_ - at_);
   const std::size_t found = there.find(blf::kObjectMark);
-  // The mark may begin at the end of what is there.
+  // The mark may begin in the last bytes of the buffer.
   const std::size_t step =
       found != there.npos ? found : there.size() - (blf::kObjectMark.size() - 1);
   at_ += step;
@@ -224,7 +224,7 @@ bool BlfReader::pass(std::uint64_t size) {
   return true;
 }
 
-// No whole object is there: something is missing, or the log has ended, `inside` of one.
+// No whole object is available: bytes are missing, or the log has ended, `inside` an object or not.
 BlfReader::Outcome BlfReader::break_off(bool inside) {
   if (torn_ != nullptr) {
     counts_.add_malformed(torn_);
@@ -247,7 +247,7 @@ BlfReader::Outcome BlfReader::break_off(bool inside) {
   return Outcome::kEnd;
 }
 
-// Null, or why the object says no frame that can be.
+// Returns null, or why the object holds no valid frame.
 const char* BlfReader::read_event(const Object& object, LogRecord& record, bool& is_frame) {
   if (object.head_bytes < blf::object::kEventBytes) return kTooShort;
   std::int64_t ns = 0;
@@ -304,7 +304,7 @@ const char* BlfReader::read_fd(const Object& object, LogRecord& record, bool& is
   return set_message_channel(fields, record);
 }
 
-// What the classic object and the older FD one begin with alike.
+// Reads the beginning that the classic object and the older FD object have in common.
 const char* BlfReader::read_start(const char* fields, LogRecord& record, bool& is_frame) {
   namespace at = blf::message;
   const unsigned flags = load_byte(fields + at::kFlags);
@@ -336,7 +336,7 @@ const char* BlfReader::read_fd64(const Object& object, LogRecord& record, bool& 
     if ((flags & at::kErrorState) != 0) frame.flags |= can::kErrorStateIndicator;
   }
   if (const char* why = set_blf_id(load_little<std::uint32_t>(fields + at::kId), frame)) return why;
-  // Behind the bytes more may stand, whose place counts from the object's beginning.
+  // Other data may follow the bytes, at a place that counts from the object's beginning.
   const std::size_t more_at = load_byte(fields + at::kMoreAt);
   const std::size_t data_at = object.head_bytes + at::kData;
   const std::size_t data_end = more_at > data_at && more_at < object.bytes ? more_at : object.bytes;

@@ -1,9 +1,8 @@
 #pragma once
 
-// Vector's BLF: what CANoe, CANalyzer and many loggers write, and python-can. Classic, FD, remote
-// and error frames; other objects are counted and passed over. Stamps count from the date in the
-// file's head, which is local time, or from zero where there is none. docs/log-format.md tells the
-// details.
+// Vector's BLF, which CANoe, CANalyzer, python-can and many loggers write. Classic, FD, remote and
+// error frames; other objects are counted and skipped. Stamps count from the date in the file's
+// head, which is local time, or from zero without a date. docs/log-format.md has the details.
 
 #include <memory>
 #include <string_view>
@@ -15,10 +14,10 @@ namespace vgyro::canlog {
 
 bool is_blf(std::string_view head);
 
-/// No copy and no allocation per frame.
+/// Neither copies nor allocates per frame.
 class BlfReader final : public BinaryReader {
  public:
-  /// Error where the file's head is none.
+  /// Error if the file has no valid head.
   static Expected<std::unique_ptr<LogReader>> open(std::unique_ptr<ByteSource> bytes);
 
   bool next(LogRecord& record) override;
@@ -34,7 +33,7 @@ class BlfReader final : public BinaryReader {
   struct Object {
     const char* begin = nullptr;
     std::size_t head_bytes = 0;
-    std::size_t bytes = 0;  ///< head included; of objects that are read, all of them are there
+    std::size_t bytes = 0;  ///< head included; all of them are available for types that are read
     std::uint32_t type = 0;
     [[nodiscard]] const char* fields() const { return begin + head_bytes; }
     [[nodiscard]] std::size_t field_bytes() const { return bytes - head_bytes; }
@@ -56,7 +55,7 @@ class BlfReader final : public BinaryReader {
   const char* set_message_channel(const char* fields, LogRecord& record);
   const char* read_fd64(const Object& object, LogRecord& record, bool& is_frame);
 
-  /// Objects that are read are smaller than this.
+  /// Objects of the types that are read are smaller than this.
   static constexpr std::size_t kObjectBytesMax = 4'096;
   static constexpr std::size_t kBufferBytes = 262'144;
 
@@ -65,10 +64,10 @@ class BlfReader final : public BinaryReader {
   std::unique_ptr<char[]> buffer_;
   std::size_t at_ = 0;
   std::size_t end_ = 0;
-  const char* torn_ = nullptr;  ///< why something is missing behind what is in the buffer
-  bool lost_ = false;           ///< what comes next may begin inside an object
+  const char* torn_ = nullptr;  ///< why bytes are missing after those in the buffer
+  bool lost_ = false;           ///< the next bytes may begin inside an object
   bool finished_ = false;
-  bool ended_ = false;  ///< of content_
+  bool ended_ = false;  ///< content_ has ended
 };
 
 }  // namespace vgyro::canlog

@@ -12,7 +12,7 @@ namespace vgyro::canlog {
 
 BlfContent::BlfContent(std::unique_ptr<ByteWindow> bytes)
     : bytes_(std::move(bytes)), stream_(std::make_unique<z_stream_s>()) {
-  // Fails for want of memory only; inflate() then says so for each container.
+  // Fails only without memory; inflate() then reports it for each container.
   ::inflateInit(stream_.get());
 }
 
@@ -41,7 +41,7 @@ void BlfContent::enter_object() {
   left_ = load_little<std::uint32_t>(&head[blf::object::kBytes]);
   if (head_bytes < blf::object::kBaseBytes || left_ < head_bytes) {
     left_ = blf::kObjectMark.size();
-    return leave("the head of an object in the file: sizes that cannot be");
+    return leave("impossible sizes in the head of an object");
   }
   if (load_little<std::uint32_t>(&head[blf::object::kType]) == blf::kContainer) {
     return enter_container(head_bytes);
@@ -50,8 +50,8 @@ void BlfContent::enter_object() {
   place_ = Place::kOutside;
 }
 
-// To the mark of the next object; false where none follows at once. Padding before it is part of
-// the form, more is not.
+// Moves to the mark of the next object; false if it does not follow at once. Some padding is part
+// of the form; more is damage.
 bool BlfContent::find_object() {
   const std::string_view near = bytes_->peek(blf::kPaddingOf + blf::kObjectMark.size());
   const std::size_t padding = near.find(blf::kObjectMark);
@@ -138,7 +138,7 @@ std::size_t BlfContent::inflate(char* to, std::size_t size) {
   return got;
 }
 
-// What is left of the object is passed over.
+// Skips the rest of the object.
 void BlfContent::leave(const char* why) {
   torn_ = why;
   lost_ = true;

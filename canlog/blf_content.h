@@ -1,8 +1,7 @@
 #pragma once
 
-// What the containers of a BLF file hold, one behind the other, unpacked; what stands outside of
-// containers comes as it is. Nothing has to fit into memory, however large a container claims to
-// be.
+// The contents of the containers of a BLF file in sequence, unpacked; objects outside of containers
+// come unchanged. Nothing has to fit into memory, however large a container claims to be.
 
 #include <cstdint>
 #include <memory>
@@ -15,11 +14,11 @@ namespace vgyro::canlog {
 
 class BlfContent {
  public:
-  /// A container that holds more is damaged or malicious. Vector's tools and
-  /// python-can fill them with 128 KiB.
+  /// A container that holds more is damaged or malicious. Vector's tools and python-can fill them
+  /// with 128 KiB.
   static constexpr std::uint64_t kContainerBytesMax = 256ULL << 20U;
 
-  /// `bytes` stand behind the file's head.
+  /// `bytes` begin after the file's head.
   explicit BlfContent(std::unique_ptr<ByteWindow> bytes);
   ~BlfContent();
   BlfContent(const BlfContent&) = delete;
@@ -27,11 +26,11 @@ class BlfContent {
 
   struct Piece {
     std::size_t size = 0;
-    const char* torn = nullptr;  ///< why something is missing here: what follows may begin inside
-                                 ///< an object; then the size is 0
-    bool end = false;            ///< nothing follows; then the size is 0
+    const char* torn = nullptr;  ///< why bytes are missing here; the next ones may begin inside an
+                                 ///< object; size is 0
+    bool end = false;            ///< nothing follows; size is 0
   };
-  /// Up to `size` bytes into `to`.
+  /// Reads up to `size` bytes into `to`.
   Piece read(char* to, std::size_t size);
 
   /// Bytes so far that belong to no object.
@@ -54,10 +53,10 @@ class BlfContent {
 
   std::unique_ptr<ByteWindow> bytes_;
   Place place_ = Place::kBetween;
-  std::uint64_t left_ = 0;      ///< bytes of the object in the file
-  std::uint64_t produced_ = 0;  ///< of the container
+  std::uint64_t left_ = 0;      ///< bytes of the object that remain in the file
+  std::uint64_t produced_ = 0;  ///< bytes unpacked from the container
   const char* torn_ = nullptr;  ///< not reported yet
-  bool lost_ = false;           ///< since then no object was found
+  bool lost_ = false;           ///< no object was found since then
   bool ended_ = false;
   bool cut_off_ = false;
   std::uint64_t skipped_bytes_ = 0;

@@ -19,10 +19,10 @@ constexpr std::int64_t kSecond_ns = 1'000'000'000;
 constexpr std::int64_t kMilli_ns = 1'000'000;
 constexpr std::int64_t kMicro_ns = 1'000;
 
-// What Vector's tools and python-can fill a container with.
+// The size to which Vector's tools and python-can fill a container.
 constexpr std::size_t kContainerBytes = 131'072;
 
-// Stamps before the year 1980 count from some beginning: there is no date then.
+// Stamps before the year 1980 count from an unknown beginning, so there is no date.
 constexpr std::int64_t kDatesFrom_ns = 315'532'800 * kSecond_ns;
 
 void store_date(char* to, std::int64_t ns) {
@@ -86,7 +86,7 @@ void BlfWriter::put(const LogRecord& record, std::string_view bus, const XlFrame
     zero_ns_ = first_ns < kDatesFrom_ns ? 0 : first_ns - first_ns % kSecond_ns;
   }
   std::int64_t since_ns = stamp_ns - *zero_ns_;
-  if (since_ns < 0) return omit("frames whose stamps lie before the first one's second");
+  if (since_ns < 0) return omit("frames stamped before the second of the first frame");
   constexpr unsigned kMicroDigits = 6;
   if (options_.fraction_digits == kMicroDigits) since_ns -= since_ns % kMicro_ns;
   last_ns_ = std::max(last_ns_, stamp_ns);
@@ -113,7 +113,8 @@ void BlfWriter::add_object(std::uint32_t type, std::int64_t since_ns, std::size_
   ++objects_;
 }
 
-// That there was one: what Linux knows of its causes has no place here.
+// Writes only that there was an error frame: the form has no place for the causes that Linux
+// reports.
 void BlfWriter::put_error(unsigned channel, std::int64_t since_ns) {
   add_object(blf::kCanErrorExt, since_ns, blf::error_ext::kBytes);
   store_little(fields_ + blf::message::kChannel, static_cast<std::uint16_t>(channel));
@@ -152,7 +153,7 @@ void BlfWriter::write_container() {
                                      content_.size(), Z_DEFAULT_COMPRESSION) == Z_OK;
   if (is_packed) {
     packed_.resize(kHeadBytes + packed_bytes);
-  } else {  // for want of memory
+  } else {  // out of memory
     packed_.resize(kHeadBytes);
     packed_ += content_;
   }
@@ -169,7 +170,8 @@ void BlfWriter::write_container() {
 }
 
 std::string BlfWriter::head() const {
-  constexpr std::string_view kFormatVersion("\2\6\x8\1", 4);  // what readers know longest
+  constexpr std::string_view kFormatVersion("\2\6\x8\1", 4);  // the version that readers have known
+                                                              // longest
   std::string head(blf::file::kBytes, '\0');
   head.replace(0, blf::kFileMark.size(), blf::kFileMark);
   head.replace(blf::file::kVersion, kFormatVersion.size(), kFormatVersion);

@@ -1,8 +1,8 @@
 #pragma once
 
-// Records → Vector's BLF, in the form that CANoe, python-can and Wireshark read. Stamps count from
-// the whole second in which the first frame was, in nanoseconds. What the form has no place for:
-// interface names (channel numbers, canlog/writer.h), the causes of error frames, CAN XL.
+// Writes records as Vector's BLF, in the form that CANoe, python-can and Wireshark read. Stamps
+// count from the whole second of the first frame, in nanoseconds. The form cannot hold interface
+// names (channel numbers, canlog/writer.h), the causes of error frames, or CAN XL.
 
 #include <cstdint>
 #include <optional>
@@ -35,11 +35,11 @@ class BlfWriter final : public LogWriter {
   std::optional<std::int64_t> zero_ns_;
   std::int64_t last_ns_ = 0;       ///< the latest stamp
   std::uint64_t file_bytes_ = 0;   ///< written so far
-  std::uint64_t plain_bytes_ = 0;  ///< the same as if nothing were packed
+  std::uint64_t plain_bytes_ = 0;  ///< the same with nothing packed
   std::uint32_t objects_ = 0;
-  std::string content_;     ///< of the container to come
+  std::string content_;     ///< content of the next container
   std::string packed_;      ///< room for the container
-  char* fields_ = nullptr;  ///< of the object that add_object() added last, all zero
+  char* fields_ = nullptr;  ///< fields of the last object from add_object(), initially zero
 };
 
 }  // namespace vgyro::canlog

@@ -1,6 +1,6 @@
 #pragma once
 
-// Numbers of binary forms, out of bytes of either order and into them.
+// Reads and writes numbers of binary forms, in either byte order.
 
 #include <bit>
 #include <concepts>
@@ -18,7 +18,7 @@ T swapped(T value) {
   return static_cast<T>(out);
 }
 
-/// Of sizeof(T) bytes at `from`.
+/// Reads sizeof(T) bytes at `from`.
 template <std::unsigned_integral T>
 T load(const char* from, std::endian order) {
   T value = 0;

@@ -14,7 +14,7 @@ namespace vgyro::canlog {
 
 namespace {
 
-// Fewer turns between the writer of a pipe and this process.
+// A larger pipe causes fewer switches between its writer and this process.
 constexpr int kPipeBytes = 262'144;
 
 class FileSource final : public ByteSource {
@@ -40,11 +40,11 @@ class FileSource final : public ByteSource {
   [[nodiscard]] std::uint64_t bytes_read() const override { return read_; }
   [[nodiscard]] std::uint64_t bytes_total() const override { return total_; }
   void before_wait(std::function<void()> callback) override { before_wait_ = std::move(callback); }
-  // Standard input may be a file in whose middle somebody else has stopped reading.
+  // Standard input may be a file that another process has read up to its middle.
   [[nodiscard]] bool can_seek() const override { return is_regular_ && owned_; }
   Expected<void> seek(std::uint64_t offset) override {
     if (!can_seek()) return ByteSource::seek(offset);
-    // Beyond the largest offset there is nothing, as beyond the end.
+    // Nothing is beyond the largest offset, as nothing is beyond the end.
     constexpr auto kOffsetMax = static_cast<std::uint64_t>(INT64_MAX);
     if (::lseek(fd_, static_cast<off_t>(std::min(offset, kOffsetMax)), SEEK_SET) < 0) {
       return fail(name_, "cannot be read: " + system_reason());
@@ -90,11 +90,11 @@ class TextSource final : public ByteSource {
   std::function<void()> before_wait_;
 };
 
-// A file without a name; -1 where there can be none.
+// A file without a name; -1 if it cannot be created.
 int open_nameless(const std::string& folder) {
   const int fd = ::open(folder.c_str(), O_TMPFILE | O_RDWR | O_CLOEXEC, 0600);
   if (fd >= 0) return fd;
-  // Some file systems know no O_TMPFILE.
+  // Some file systems do not support O_TMPFILE.
   std::string pattern = folder + "/vgyro-XXXXXX";
   const int named = ::mkostemp(pattern.data(), O_CLOEXEC);
   if (named >= 0) ::unlink(pattern.c_str());
@@ -107,7 +107,7 @@ Expected<std::uint64_t> copy_all(ByteSource& from, int to, const std::string& fo
   std::uint64_t total = 0;
   while (true) {
     const auto got = from.read(buffer.get(), kBytes);
-    // What came before the damage is there; the form's own reader sees that the end is missing.
+    // Bytes before the damage are copied; the form's reader notices that the end is missing.
     if (!got && total == 0) return tl::unexpected(got.error());
     if (!got || *got == 0) return total;
     for (std::size_t done = 0; done < *got;) {
@@ -131,7 +131,7 @@ Expected<void> ByteSource::seek(std::uint64_t /*offset*/) {
 
 Expected<std::unique_ptr<ByteSource>> open_raw_bytes(const std::string& path) {
   if (path == "-") {
-    // A file or a terminal has no such size.
+    // Ignored by a file or a terminal.
     ::fcntl(STDIN_FILENO, F_SETPIPE_SZ, kPipeBytes);
     return std::make_unique<FileSource>(STDIN_FILENO, "standard input", 0, false, false);
   }
@@ -199,7 +199,7 @@ Expected<std::size_t> HeadedSource::read(char* to, std::size_t size) {
     return count;
   }
   if (error_) return tl::unexpected(*error_);
-  // A terminal's end of file would otherwise have to be typed twice.
+  // Otherwise the end of file would have to be typed twice on a terminal.
   if (ended_) return 0;
   return source_->read(to, size);
 }

@@ -41,7 +41,7 @@ std::uint64_t ByteWindow::pass_until(std::string_view mark) {
       take(found);
       return passed + found;
     }
-    // The mark may begin at the end of what is there.
+    // The mark may begin in the last bytes of the window.
     const bool is_end = there.size() < mark.size();
     const std::size_t step = is_end ? there.size() : there.size() - (mark.size() - 1);
     take(step);

@@ -1,7 +1,7 @@
 #pragma once
 
-// A window onto the bytes of a binary log, which moves from front to back. Memory stays the same
-// however long the log is and whatever sizes it claims.
+// A window that moves over the bytes of a binary log from front to back. Memory does not grow with
+// the log or with the sizes that it claims.
 
 #include <cstdint>
 #include <functional>
@@ -21,25 +21,24 @@ class ByteWindow {
 
   explicit ByteWindow(std::unique_ptr<ByteSource> bytes);
 
-  /// The next `size` bytes (at most kBytes), fewer only where the log ends. Valid until the next
-  /// call.
+  /// The next `size` bytes (at most kBytes), fewer only if the log ends. Valid until the next call.
   std::string_view peek(std::size_t size) {
     if (end_ - at_ < size) fetch(size);
     return {buffer_.get() + at_, end_ - at_ < size ? end_ - at_ : size};
   }
-  /// Whatever is there, at least one byte; none only at the end.
+  /// The bytes available, at least one; none only at the end.
   std::string_view peek_some() {
     if (at_ == end_) fetch(1);
     return {buffer_.get() + at_, end_ - at_};
   }
-  /// Moves on, not farther than the last peek() showed.
+  /// Moves on by at most what the last peek() returned.
   void take(std::size_t size) { at_ += size; }
-  /// Moves on; false where the log ends before that.
+  /// Moves on; false if the log ends before that.
   bool pass(std::uint64_t size);
-  /// Moves on to `mark` and says how many bytes that was; to the end where there is none.
+  /// Moves on to `mark`, or to the end if there is none; returns the number of bytes skipped.
   std::uint64_t pass_until(std::string_view mark);
 
-  /// Why no more bytes come, where that is no end.
+  /// Why no more bytes come, unless it is the end.
   [[nodiscard]] const std::optional<Error>& error() const { return error_; }
   [[nodiscard]] const std::string& name() const { return bytes_->name(); }
   [[nodiscard]] std::uint64_t bytes_read() const { return bytes_->bytes_read(); }

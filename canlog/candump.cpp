@@ -20,7 +20,7 @@ constexpr std::size_t kInterfaceNameMax =
     31;  // the kernel allows 15; logs of other tools a little more
 // Beyond this a stamp in nanoseconds would not fit 64 bits.
 constexpr std::int64_t kSecondsMax = 9'000'000'000;
-// parse_usual() looks no further than this behind the start of a line.
+// parse_usual() reads at most this many bytes from the start of a line.
 constexpr std::ptrdiff_t kLookaheadBytes = 96;
 
 constexpr std::array<std::int8_t, 256> make_hex_values() {
@@ -92,14 +92,14 @@ std::uint64_t digits_value(std::uint64_t word) {
 // leading characters are hex digits.
 [[gnu::always_inline]] inline unsigned unpack_hex16(const char* p, std::uint8_t* out) {
   const __m128i text = _mm_loadu_si128(reinterpret_cast<const __m128i*>(p));
-  // Moved so that what is wanted lies at the bottom of the signed numbers: one comparison does.
+  // Shift the wanted range to the bottom of the signed numbers, so that one comparison suffices.
   const auto first_of = [](__m128i characters, char first, char count) {
     const __m128i moved = _mm_add_epi8(characters, _mm_set1_epi8(static_cast<char>(-128 - first)));
     return _mm_cmplt_epi8(moved, _mm_set1_epi8(static_cast<char>(-128 + count)));
   };
   const __m128i decimal = first_of(text, '0', 10);
   const __m128i letter = first_of(_mm_or_si128(text, _mm_set1_epi8(0x20)), 'a', 6);
-  // 'A' and 'a' end with a 1.
+  // The low nibble of 'A' and of 'a' is 1.
   const __m128i nibble = _mm_add_epi8(_mm_and_si128(text, _mm_set1_epi8(0x0F)),
                                       _mm_and_si128(letter, _mm_set1_epi8(9)));
   const __m128i pairs = _mm_and_si128(
@@ -120,7 +120,7 @@ unsigned unpack_hex16(const char* p, std::uint8_t* out) {
 }
 #endif
 
-// A cursor over one line; every step says whether it could be taken.
+// A cursor over one line; every step returns whether it was possible.
 class Cursor {
  public:
   explicit Cursor(std::string_view text) : text_(text) {}
@@ -167,13 +167,13 @@ std::uint32_t hex_number(std::string_view digits) {
   return value;
 }
 
-// asc2log of can-utils up to 2020.11 carries microseconds above a million into the seconds, but not
-// exactly a million, which it prints as it is. No writer of more than six digits writes seven.
+// asc2log of can-utils up to 2020.11 carries microseconds above a million into the seconds, but
+// prints exactly a million unchanged. No writer of more than six digits writes seven.
 constexpr std::string_view kMissedCarry = "1000000";
 
 const char* parse_stamp(Cursor& at, LogRecord& record) {
   const std::string_view whole = at.digits();
-  if (whole.empty() || whole.size() > 10) return "stamp: the seconds are no number";
+  if (whole.empty() || whole.size() > 10) return "stamp: the seconds are not a number";
   std::int64_t seconds = 0;
   for (const char c : whole)
     seconds = seconds * 10 + (c - '0');
@@ -228,7 +228,7 @@ const char* parse_bytes(Cursor& at, std::uint8_t* out, std::size_t bytes_max, st
 const char* parse_raw_dlc(Cursor& at, can::Frame& frame) {
   if (!at.skip('_')) return nullptr;
   const int dlc = hex_value(at.peek());
-  if (at.at_end() || dlc < 9) return "raw DLC: \"_\" needs 9 to F behind it";
+  if (at.at_end() || dlc < 9) return "raw DLC: \"_\" must be followed by 9 to F";
   at.skip(at.peek());
   if (frame.length != can::kClassicBytesMax) return "raw DLC: only with 8 bytes";
   frame.raw_dlc = static_cast<std::uint8_t>(dlc);
@@ -257,7 +257,7 @@ const char* parse_fd(Cursor& at, can::Frame& frame) {
   constexpr int kBrsNibble = 1;
   constexpr int kEsiNibble = 2;
   const int nibble = hex_value(at.peek());
-  if (at.at_end() || nibble < 0) return "FD frame: no flags behind \"##\"";
+  if (at.at_end() || nibble < 0) return "FD frame: no flags after \"##\"";
   at.skip(at.peek());
   frame.flags |= can::kFd;
   if ((nibble & kBrsNibble) != 0) frame.flags |= can::kBitRateSwitch;
@@ -296,7 +296,7 @@ const char* parse_frame_text(Cursor& at, LogRecord& record, XlFrame& xl) {
   frame.raw_dlc = 0;
   frame.id = 0;
   const std::string_view id = at.hex();
-  if (!at.skip('#')) return "no \"#\" behind the identifier";
+  if (!at.skip('#')) return "no \"#\" after the identifier";
   if (id.size() == 5) {
     record.is_xl = true;
     return parse_xl(id, at, xl);
@@ -314,7 +314,7 @@ const char* parse_direction(Cursor& at, LogRecord& record) {
     record.direction = Direction::kTransmitted;
   }
   at.skip_blanks();
-  return at.at_end() ? nullptr : "something stands behind the frame";
+  return at.at_end() ? nullptr : "unexpected text after the frame";
 }
 
 }  // namespace
@@ -347,7 +347,8 @@ LineResult parse_line(std::string_view line, InterfaceTable& interfaces, LogReco
 CandumpReader::CandumpReader(std::unique_ptr<LogSource> source)
     : blocks_(std::move(source)), xl_(std::make_unique<XlFrame>()) {}
 
-// All are compared, without a branch: two buses take turns in no order that a processor foresees.
+// Compares with all entries without a branch: two buses alternate in an order that no processor
+// predicts.
 inline const CandumpReader::KnownInterface& CandumpReader::known_interface(
     std::uint64_t word) const {
   const auto is = [&](std::size_t i) { return (word & known_[i].mask) == known_[i].word; };
@@ -362,7 +363,7 @@ inline const CandumpReader::KnownInterface& CandumpReader::known_interface(
 
 void CandumpReader::remember_interface(can::BusIndex bus) {
   const std::string& name = interfaces_.name(bus);
-  // Only the first few names of up to seven characters take the quick way.
+  // The fast path takes only the first few names of up to seven characters.
   if (known_count_ == kKnownMax || name.size() > 7) return;
   KnownInterface& known = known_[known_count_++];
   char text[8] = {};
@@ -374,7 +375,7 @@ void CandumpReader::remember_interface(can::BusIndex bus) {
   known.bus = bus;
 }
 
-// "(SSSSSSSSSS." of a second that is not the one before.
+// Reads "(SSSSSSSSSS." of a new second.
 bool CandumpReader::read_second(const char* p) {
   if (p[0] != '(' || p[11] != '.') return false;
   const std::uint64_t high = load_word(p + 1);
@@ -388,17 +389,17 @@ bool CandumpReader::read_second(const char* p) {
   return true;
 }
 
-// "(SSSSSSSSSS.FFFFFF) IFACE ID#HEX\n" as candump writes it nearly always. Returns the start of
-// the next line, or null where the line is of another form, which is for parse_line() to judge.
+// Parses "(SSSSSSSSSS.FFFFFF) IFACE ID#HEX\n", the usual form of a candump line. Returns the start
+// of the next line, or null if the line has another form, which parse_line() then judges.
 // Precondition: kLookaheadBytes are readable at `p`.
 inline const char* CandumpReader::parse_usual(const char* p, LogRecord& record) {
   if constexpr (std::endian::native != std::endian::little) return nullptr;
   const bool same_second = load_word(p) == load_word(second_text_.data()) &&
                            load_half_word(p + 8) == load_half_word(second_text_.data() + 8);
   if (!same_second && !read_second(p)) return nullptr;
-  // Digits become 0…9, and what stands behind them 0.
+  // Maps digits to 0…9 and the characters after them to 0.
   constexpr std::uint64_t kZeros = 0x2029'3030'3030'3030U;       // "000000) "
-  constexpr std::uint64_t kBeyondMost = 0x7F7F'7676'7676'7676U;  // 9 in a digit, 0 behind it
+  constexpr std::uint64_t kBeyondMost = 0x7F7F'7676'7676'7676U;  // 9 in a digit, 0 after it
   const std::uint64_t fraction = load_word(p + 12) ^ kZeros;
   if (((fraction | (fraction + kBeyondMost)) & 0x8080808080808080U) != 0) return nullptr;
   const KnownInterface& known = known_interface(load_word(p + 20));
@@ -458,7 +459,7 @@ std::size_t CandumpReader::next_batch(std::span<LogRecord> room) {
   return count;
 }
 
-// As many records as there is room for, or all that are left of the block, which may be none.
+// Returns as many records as fit, or as many as are left in the block, perhaps none.
 std::size_t CandumpReader::take_from_block(std::span<LogRecord> room) {
   std::size_t count = 0;
   while (count < room.size() && at_ != end_) {
@@ -479,7 +480,7 @@ std::size_t CandumpReader::take_from_block(std::span<LogRecord> room) {
   return count;
 }
 
-// One line of any form. False when it is no record.
+// Reads one line of any form. False if it holds no record.
 bool CandumpReader::take_line(LogRecord& record) {
   ++counts_.lines;
   const auto* newline =
@@ -511,7 +512,7 @@ bool CandumpReader::take_line(LogRecord& record) {
 
 namespace {
 
-// The lowest `digits` decimal digits of `value`, which has no more.
+// Writes `value`, which has at most `digits` decimal digits.
 template <unsigned digits>
 char* put_decimal(char* out, std::uint32_t value) {
   for (unsigned i = digits; i >= 2; i -= 2) {
@@ -661,7 +662,7 @@ std::size_t LineFormatter::format(char* out, TimePoint stamp, const can::Frame& 
     second_ns_ = ns - ns % kSecond_ns;
     put_seconds(prefix_.data(), second_ns_);
   }
-  // Copies of a fixed size, beyond the text where that is shorter: what follows writes over them.
+  // Copies a fixed size, which may exceed the text: the next fields overwrite the rest.
   std::memcpy(out, prefix_.data(), prefix_.size());
   const auto fraction_ns = static_cast<std::uint32_t>(ns - second_ns_);
   char* at = out + kSecondsTextBytes;

@@ -1,8 +1,8 @@
 #pragma once
 
 // The text of can-utils' candump log, "(SECONDS.FRACTION) IFNAME FRAME[ R| T]", both ways: classic,
-// remote, raw DLC, error, FD and XL frames. A line that is none of these is counted with its cause
-// and line number, and never stops the reading. docs/log-format.md explains the forms.
+// remote, raw DLC, error, FD and XL frames. Any other line is counted with its cause and line
+// number and never stops the reading. docs/log-format.md explains the forms.
 
 #include <array>
 #include <cstdint>
@@ -26,19 +26,19 @@ enum class LineKind : std::uint8_t {
   kFrame,
   kXl,
   kOther,     ///< does not begin with "(": DROPCOUNT, comments, blank lines; players ignore it too
-  kMalformed  ///< begins like a frame and is none
+  kMalformed  ///< begins like a frame but is not one
 };
 
 struct LineResult {
   LineKind kind = LineKind::kOther;
-  const char* why = "";  ///< of a malformed line
+  const char* why = "";  ///< for a malformed line
 };
 
-/// Parses one line (without its newline). Every form, no assumption about widths.
+/// Parses one line (without its newline) of any form, with no assumption about widths.
 LineResult parse_line(std::string_view line, InterfaceTable& interfaces, LogRecord& record,
                       XlFrame& xl);
 
-/// No copy and no allocation per line.
+/// Neither copies nor allocates per line.
 class CandumpReader final : public LogReader {
  public:
   explicit CandumpReader(std::unique_ptr<LogSource> source);
@@ -56,13 +56,13 @@ class CandumpReader final : public LogReader {
   }
 
   [[nodiscard]] const XlFrame* xl_frame() const override { return xl_.get(); }
-  /// The frame of the record read last, where that is_xl.
+  /// The frame of the last record, if that is_xl.
   [[nodiscard]] const XlFrame& xl() const { return *xl_; }
 
  private:
   struct KnownInterface {
-    std::uint64_t word = 1;  ///< name and the blank behind it, first byte lowest
-    std::uint64_t mask = 0;  ///< no text is `word` as long as it is 0
+    std::uint64_t word = 1;  ///< name and the following blank, first byte lowest
+    std::uint64_t mask = 0;  ///< 0: no text matches `word`
     std::uint8_t length = 0;
     can::BusIndex bus = 0;
   };
@@ -78,18 +78,19 @@ class CandumpReader final : public LogReader {
   LineBlocks blocks_;
   const char* at_ = nullptr;
   const char* end_ = nullptr;
-  /// "(SSSSSSSSSS." of the newest line of the usual form, and that second.
+  /// "(SSSSSSSSSS." of the newest line of the usual form, and its second.
   std::array<char, 12> second_text_{'(', '0', '0', '0', '0', '0', '0', '0', '0', '0', '0', '.'};
   std::int64_t second_ns_ = 0;
   static constexpr std::size_t kKnownMax = 4;
-  std::array<KnownInterface, kKnownMax + 1> known_{};  ///< the last one stays unknown, length 0
+  std::array<KnownInterface, kKnownMax + 1> known_{};  ///< the last entry stays unknown, with
+                                                       ///< length 0
   std::size_t known_count_ = 0;
   InterfaceTable interfaces_;
   std::unique_ptr<XlFrame> xl_;
   LogCounts counts_;
 };
 
-/// Longest text of a line that format_line writes, newline included.
+/// Longest line that format_line() writes, including the newline.
 inline constexpr std::size_t kLineBytesMax = 200;
 
 /// Writes one line with its newline to `out`, which has room for kLineBytesMax; returns its length.
@@ -98,11 +99,11 @@ std::size_t format_line(char* out, TimePoint stamp, std::string_view interface,
                         const can::Frame& frame, unsigned fraction_digits,
                         Direction direction = Direction::kUnknown);
 
-/// Many lines for one interface: remembers the text that stays the same from line to line.
+/// Formats many lines for one interface: keeps the text that is the same in the next line.
 class LineFormatter {
  public:
   explicit LineFormatter(std::string_view interface);
-  /// As format_line().
+  /// Same as format_line().
   std::size_t format(char* out, TimePoint stamp, const can::Frame& frame, unsigned fraction_digits);
 
  private:

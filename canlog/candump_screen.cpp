@@ -16,7 +16,7 @@ constexpr std::int64_t kSecond_ns = 1'000'000'000;
 constexpr std::size_t kInterfaceNameMax = 31;  // as in candump logs
 
 enum class StampKind : std::uint8_t {
-  kAbsolute,  ///< -ta; of -td and -tz, whichever it is
+  kAbsolute,  ///< -ta; also -td and -tz, which the reader distinguishes
   kDate       ///< -tA
 };
 
@@ -26,7 +26,7 @@ struct Stamp {
   unsigned digits = 0;
 };
 
-// "(…)" at the line's beginning is taken off.
+// Removes "(…)" from the beginning of the line.
 std::optional<Stamp> take_stamp(std::string_view& line) {
   if (!line.starts_with('(')) return std::nullopt;
   const std::size_t end = line.find(')');
@@ -64,7 +64,7 @@ std::string without_colours(std::string_view line) {
   return plain;
 }
 
-// "[8]", or "[08]" for FD; of a raw DLC "{B}".
+// "[8]", or "[08]" for FD; "{B}" for a raw DLC.
 const char* read_length(std::string_view word, can::Frame& frame) {
   if (word.size() < 3) return "no length in brackets";
   const std::string_view inside = word.substr(1, word.size() - 2);
@@ -78,7 +78,7 @@ const char* read_length(std::string_view word, can::Frame& frame) {
   return set_length(*bytes, frame);
 }
 
-// "123", "12345678"; 20000000 is added to those of error frames.
+// "123", "12345678"; error frames have 20000000 added.
 const char* read_id(std::string_view word, can::Frame& frame) {
   constexpr std::uint32_t kErrorBit = 0x20000000U;
   const auto id = number_of<std::uint32_t>(word, 16);
@@ -95,7 +95,7 @@ const char* read_id(std::string_view word, can::Frame& frame) {
   return nullptr;
 }
 
-// Of -x: "RX B E"; the two marks are of FD alone.
+// The additions of -x: "RX B E"; the last two occur with FD only.
 void read_extra(Words& words, LogRecord& record, std::string_view direction) {
   record.direction = direction == "TX" ? Direction::kTransmitted : Direction::kReceived;
   if (words.next() == "B") record.frame.flags |= can::kBitRateSwitch;
@@ -116,9 +116,9 @@ const char* read_bytes(std::string_view text, can::Frame& frame) {
   const std::size_t width = base == 2 ? kBinaryDigits : 2;
   for (std::size_t i = 0; i < frame.length; ++i) {
     const std::size_t at = i * (width + 1);
-    if (at + width > shown.size()) return "payload: fewer bytes than the length says";
+    if (at + width > shown.size()) return "payload: shorter than its length";
     const auto byte = number_of<std::uint8_t>(shown.substr(at, width), base);
-    if (!byte) return "payload: a byte is no number";
+    if (!byte) return "payload: a byte is not a number";
     frame.data[swapped ? frame.length - 1 - i : i] = *byte;
   }
   return nullptr;
@@ -159,7 +159,7 @@ class ScreenReader final : public LineReader {
     if (!line.starts_with('(')) return other();
     const auto stamp = take_stamp(line);
     if (!stamp) return malformed("stamp: neither seconds nor a date");
-    // A delta counts even where its frame cannot be read.
+    // A delta counts even if its frame cannot be read.
     const std::int64_t from_ns = deltas_ ? now_ns_ : 0;
     if (stamp->ns > kStampMax_ns - from_ns) return malformed("stamp: beyond the year 2255");
     now_ns_ = from_ns + stamp->ns;
@@ -175,8 +175,8 @@ class ScreenReader final : public LineReader {
   std::int64_t now_ns_ = 0;
 };
 
-// -td and -tz look alike. Frames come at uneven intervals, so intervals fall soon, and time since
-// the beginning does not; nor does it stand still.
+// -td and -tz look alike. Frames come at uneven intervals, so intervals soon decrease, while the
+// time since the beginning does not; nor does that time stand still.
 class DeltaJudge {
  public:
   void add(std::int64_t ns) {
@@ -196,7 +196,8 @@ class DeltaJudge {
   std::int64_t last_ns_ = 0;
 };
 
-// Whether the log's beginning is one of -td. Reads no further than it must: it may be live.
+// Whether the log begins with the deltas of -td. Reads no further than necessary: the source may be
+// live.
 bool begins_with_deltas(HeadedSource& source) {
   constexpr std::size_t kShortSecondDigits = 3;  // "(000.012345)"; -ta has ten
   DeltaJudge judge;
@@ -221,7 +222,7 @@ bool begins_with_deltas(HeadedSource& source) {
   return judge.are_deltas();
 }
 
-// Interface, identifier and length, as they stand behind a stamp.
+// Interface, identifier and length, as after a stamp.
 bool is_frame_text(std::string_view line) {
   LogRecord record;
   std::string_view bus;

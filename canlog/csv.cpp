@@ -14,7 +14,7 @@ constexpr std::int64_t kSecond_ns = 1'000'000'000;
 constexpr std::int64_t kMicro_ns = 1'000;
 constexpr unsigned kBusMax = 254;
 
-/// The fields of a line, of which more than anybody has are passed over.
+/// The fields of a line; fields beyond any known form are ignored.
 struct Fields {
   explicit Fields(std::string_view line) {
     while (count < values.size()) {
@@ -41,7 +41,7 @@ int base64_value(char c) {
   return c == '+' ? 62 : c == '/' ? 63 : -1;
 }
 
-// Null, or why it is none; `count` bytes come out.
+// Decodes `count` bytes. Returns null, or what is wrong.
 const char* read_base64(std::string_view text, can::Frame& frame, std::size_t& count) {
   while (text.ends_with('='))
     text.remove_suffix(1);
@@ -82,7 +82,7 @@ const char* set_hex_id(std::string_view text, bool extended, can::Frame& frame) 
   return id ? set_id(*id, extended, frame) : "identifier: no hex number";
 }
 
-// As Python prints a float: "1700000000.25", small ones as "1e-05".
+// Seconds as Python prints a float: "1700000000.25", small ones as "1e-05".
 std::optional<DecimalTime> python_seconds(std::string_view text) {
   if (text.find('e') == text.npos) return decimal_time(text, kSecond_ns);
   double seconds = 0.0;
@@ -127,7 +127,7 @@ Parsed read_python_can(const Fields& fields, LogRecord& record) {
   std::size_t count = 0;
   if (const char* why = read_base64(fields.at(6), frame, count)) return {Verdict::kMalformed, why};
   if (count != frame.length) {
-    return {Verdict::kMalformed, "payload: not as many bytes as the length says"};
+    return {Verdict::kMalformed, "payload: does not match its length"};
   }
   return {Verdict::kFrame, ""};
 }
@@ -140,7 +140,7 @@ bool names_savvycan_columns(std::string_view line) {
 
 bool is_python_can_csv_line(std::string_view line) {
   if (trimmed(line) == kPythonCanHead) return true;
-  // A log that was added to, or cut, has no head.
+  // A log that was appended to, or cut, has no head.
   LogRecord record;
   const Fields fields(line);
   return fields.at(1).starts_with("0x") &&
@@ -193,7 +193,7 @@ Parsed SavvyCanCsvReader::parse(std::string_view line, LogRecord& record) {
   if (const char* why = set_length(*length, frame)) return malformed(why);
   for (int i = 0; i < frame.length; ++i) {
     const auto byte = number_of<std::uint8_t>(fields.at(data_ + i), 16);
-    if (!byte) return malformed("payload: fewer bytes than the length says, or one that is none");
+    if (!byte) return malformed("payload: too few bytes, or an invalid one");
     frame.data[static_cast<std::size_t>(i)] = *byte;
   }
   if (fields.at(direction_) == "Rx") record.direction = Direction::kReceived;

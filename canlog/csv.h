@@ -1,7 +1,7 @@
 #pragma once
 
-// Tables of frames with commas between the columns: python-can's, and those of SavvyCAN and the
-// loggers for it (GVRET). Columns are found by the names in the first line.
+// Tables of frames with columns separated by commas: python-can's, and those of SavvyCAN and its
+// loggers (GVRET). Columns are found by the names in the first line.
 
 #include <memory>
 #include <string_view>
@@ -12,8 +12,8 @@ namespace vgyro::canlog {
 
 bool is_python_can_csv_line(std::string_view line);
 
-/// timestamp,arbitration_id,extended,remote,error,dlc,data: seconds, and bytes as base64. It knows
-/// neither buses (all is "can0") nor whether a frame of up to eight bytes is FD.
+/// timestamp,arbitration_id,extended,remote,error,dlc,data: seconds, and bytes as base64. The form
+/// holds neither buses (all frames are on "can0") nor whether a frame of up to eight bytes is FD.
 class PythonCanCsvReader final : public LineReader {
  public:
   explicit PythonCanCsvReader(std::unique_ptr<ByteSource> bytes) : LineReader(std::move(bytes)) {}
@@ -32,7 +32,7 @@ class SavvyCanCsvReader final : public LineReader {
  private:
   Parsed parse(std::string_view line, LogRecord& record) override;
   static constexpr int kNone = -1;
-  int time_ = kNone;  ///< places of the columns
+  int time_ = kNone;  ///< indices of the columns
   int id_ = kNone;
   int extended_ = kNone;
   int direction_ = kNone;

@@ -30,7 +30,7 @@ Opened open_candump(std::unique_ptr<ByteSource> bytes) {
   return std::make_unique<CandumpReader>(std::make_unique<LogSource>(std::move(bytes)));
 }
 
-// "(1700000000.123456) can0 123#…", whatever is wrong with the rest.
+// "(1700000000.123456) can0 123#…", whatever follows the identifier.
 bool is_candump_line(std::string_view line) {
   if (line.starts_with("DROPCOUNT:")) return true;
   if (!line.starts_with('(')) return false;
@@ -62,8 +62,8 @@ bool starts(std::string_view head, std::string_view magic, std::size_t at = 0) {
   return head.size() >= at + magic.size() && head.substr(at, magic.size()) == magic;
 }
 
-// Its mark comes late: a line of a log before it would have been believed already, or not, by the
-// pieces in which the log arrives.
+// The mark comes late, so it counts only without a line before it: otherwise the form would depend
+// on the pieces in which the log arrives.
 bool is_tar(std::string_view head) {
   constexpr std::size_t kMarkAt = 257;
   return starts(head, "ustar", kMarkAt) && head.find('\n') > kMarkAt;

@@ -7,7 +7,7 @@ namespace vgyro::canlog {
 
 namespace {
 
-// By the length code of CAN FD.
+// Indexed by the length code of CAN FD.
 constexpr std::array<std::uint8_t, 16> kFdLengths{0, 1,  2,  3,  4,  5,  6,  7,
                                                   8, 12, 16, 20, 24, 32, 48, 64};
 

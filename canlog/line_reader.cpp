@@ -39,9 +39,9 @@ bool LineReader::set_channel(unsigned channel, LogRecord& record) {
 const char* read_payload(Words& words, can::Frame& frame, int base) {
   for (std::size_t i = 0; i < frame.length; ++i) {
     const std::string_view word = words.next();
-    if (word.empty()) return "payload: fewer bytes than the length says";
+    if (word.empty()) return "payload: shorter than its length";
     const auto byte = number_of<std::uint8_t>(word, base);
-    if (!byte) return "payload: a byte is no number from 0 to 255";
+    if (!byte) return "payload: a byte is not a number from 0 to 255";
     frame.data[i] = *byte;
   }
   return nullptr;

@@ -1,7 +1,7 @@
 #pragma once
 
-// What the readers of text forms share: lines one after the other, counted and judged; each form
-// says what one line means. The candump log has a faster reader of its own.
+// Shared by the readers of text forms: iterates over lines, counts and judges them; each form
+// parses a single line. The candump log has a faster reader of its own.
 
 #include <memory>
 #include <optional>
@@ -16,13 +16,13 @@ namespace vgyro::canlog {
 
 enum class Verdict : std::uint8_t {
   kFrame,
-  kHead,   ///< no frame, and understood: a date, a comment, a blank line; it is not counted apart
-  kOther,  ///< no frame, but something else: counted, as people may miss it
-  kMalformed  ///< looks like a frame and is none
+  kHead,      ///< no frame, and understood: a date, a comment, a blank line; not counted separately
+  kOther,     ///< no frame, but something else: counted, as people may look for it
+  kMalformed  ///< looks like a frame but is not one
 };
 struct Parsed {
   Verdict verdict = Verdict::kOther;
-  const char* why = "";  ///< of a malformed line
+  const char* why = "";  ///< for a malformed line
 };
 
 class LineReader : public LogReader {
@@ -40,17 +40,18 @@ class LineReader : public LogReader {
  protected:
   explicit LineReader(std::unique_ptr<ByteSource> bytes);
 
-  /// `line` has neither its end nor noise. `record` begins as default; for kFrame the callee has
-  /// filled it in.
+  /// `line` has neither its end nor noise. `record` is default-constructed; for kFrame the callee
+  /// fills it in.
   virtual Parsed parse(std::string_view line, LogRecord& record) = 0;
 
   static Parsed frame() { return {Verdict::kFrame, ""}; }
   static Parsed head() { return {Verdict::kHead, ""}; }
   static Parsed other() { return {Verdict::kOther, ""}; }
   static Parsed malformed(const char* why) { return {Verdict::kMalformed, why}; }
-  /// The record's bus by name; false when there are too many: malformed(kTooManyBuses).
+  /// Sets the record's bus by name; false if there are too many: then return
+  /// malformed(kTooManyBuses).
   bool set_bus(std::string_view name, LogRecord& record);
-  /// By the channel's number, from 1 on (canlog/writer.h).
+  /// The same by the channel number, from 1 on (canlog/writer.h).
   bool set_channel(unsigned channel, LogRecord& record);
   static constexpr const char* kTooManyBuses = "more than 64 different interfaces";
 
@@ -61,8 +62,7 @@ class LineReader : public LogReader {
   LogCounts counts_;
 };
 
-/// Payload bytes from words, as many as the frame's length says, in the given base. Null, or why it
-/// cannot be.
+/// Reads payload bytes in the given base, as many as the frame's length. Null, or what is wrong.
 const char* read_payload(Words& words, can::Frame& frame, int base);
 
 }  // namespace vgyro::canlog

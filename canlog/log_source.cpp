@@ -60,7 +60,7 @@ std::string_view LineBlocks::next(LogCounts& counts) {
       counts.add_malformed("the line is longer than any frame");
     }
     if (block->cut_off) ++counts.cut_off_lines;
-    if (!block->text.empty()) return block->text;  // it lives in the source's buffer
+    if (!block->text.empty()) return block->text;  // remains valid in the source's buffer
     if (block->end) source_.reset();
   }
   return {};

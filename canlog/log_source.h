@@ -1,7 +1,6 @@
 #pragma once
 
-// The bytes of a log of lines, in blocks of whole lines. Memory stays the same however long the log
-// is.
+// The bytes of a log of lines, in blocks of whole lines. Memory does not grow with the log.
 
 #include <cstdint>
 #include <functional>
@@ -31,7 +30,7 @@ class LogSource {
   explicit LogSource(std::unique_ptr<ByteSource> bytes);
   Expected<LogBlock> next();
 
-  /// As ByteSource has them.
+  /// Same as in ByteSource.
   void before_wait(std::function<void()> callback) { bytes_->before_wait(std::move(callback)); }
   [[nodiscard]] std::uint64_t bytes_read() const { return bytes_->bytes_read(); }
   [[nodiscard]] std::uint64_t bytes_total() const { return bytes_->bytes_total(); }
@@ -40,11 +39,11 @@ class LogSource {
   std::unique_ptr<ByteSource> bytes_;
   std::unique_ptr<char[]> buffer_;
   std::size_t used_ = 0;    ///< bytes in the buffer
-  std::size_t handed_ = 0;  ///< of these, in the block handed out last
+  std::size_t handed_ = 0;  ///< bytes of the buffer in the block returned last
   bool skipping_ = false;   ///< inside an overlong line
 };
 
-/// A source until it ends or fails, with what is no whole line counted.
+/// Reads a source until it ends or fails, and counts what is not a whole line.
 class LineBlocks {
  public:
   explicit LineBlocks(std::unique_ptr<LogSource> source)
@@ -65,7 +64,7 @@ class LineBlocks {
   std::optional<Error> error_;
 };
 
-/// "-" is standard input; what is packed is unpacked.
+/// "-" is standard input; packed content is unpacked.
 Expected<std::unique_ptr<LogSource>> open_source(const std::string& path);
 
 /// Text in memory, for tests; `chunk` bytes at a time.

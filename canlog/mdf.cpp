@@ -12,10 +12,10 @@ namespace {
 
 constexpr std::int64_t kSecond_ns = 1'000'000'000;
 constexpr std::uint64_t kHeadAt = 64;
-// Memory of each: a window onto its records, and one onto their payloads.
+// Memory for each: a window onto its records, and one onto their payloads.
 constexpr std::size_t kGroupsMax = 128;
 
-// A date without a zone is one of this machine's (canlog/wall_time.h).
+// A date without a zone is in this machine's zone (canlog/wall_time.h).
 std::int64_t from_local(std::int64_t wall_ns) {
   const std::time_t seconds = wall_ns / kSecond_ns;
   std::tm date{};
@@ -108,7 +108,7 @@ bool MdfReader::next(LogRecord& record) {
     record = first->record;
     advance(*first);
     set_stamp(to_ns(record.stamp), record);
-    // "canN" has the file's own N.
+    // The bus of "canN" has the file's own number N.
     if (!set_channel(record.bus + 1U, record)) {
       counts_.add_malformed("more than 64 different buses");
       continue;

@@ -22,16 +22,16 @@ constexpr unsigned kVersionMax = 499;
 constexpr std::size_t kBlockHeadBytes = 24;  // mark, reserved, size, links
 constexpr std::size_t kMarkBytes = 4;
 constexpr std::size_t kLinkBytes = 8;
-// Lists of blocks of data may be long: 4 MiB each make 256 GiB.
+// Lists of data blocks may be long: 4 MiB each make 256 GiB.
 constexpr std::uint64_t kLinksMax = 65'536;
 constexpr std::size_t kBlocksMax = 1'000'000;
-// The standard has 4 MiB.
+// The standard's limit is 4 MiB.
 constexpr std::uint64_t kPackedBytesMax = 16ULL << 20U;
 
 constexpr const char* kWayOut =
     "`can_logconvert FILE.mf4 OUT.log` of python-can with asammdf converts it";
 
-// Packed by columns: the first bytes of all records, then the second ones …
+// Undoes packing by columns: the first bytes of all records, then the second ones …
 std::string by_rows(const std::string& columns, std::size_t width) {
   if (width <= 1) return columns;
   std::string rows = columns;
@@ -149,7 +149,7 @@ Expected<std::size_t> MdfData::read(char* to, std::size_t size) {
   }
 }
 
-// False where none follows.
+// False if no part follows.
 Expected<bool> MdfData::next_part() {
   constexpr std::size_t kHeadBytes = 24;
   if (part_ < parts_.size()) {
@@ -183,7 +183,7 @@ Expected<void> MdfData::open_part(const MdfBlock& block) {
   }
   at_ = block.data_at;
   left_ = block.data_bytes;
-  // The size was to be written at the end.
+  // The writer fills in the size at the end.
   if (left_ == 0 && file_->lacks_data_size() && list_ == 0 && part_ == parts_.size()) {
     left_ = UINT64_MAX;
   }

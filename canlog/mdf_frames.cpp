@@ -20,10 +20,10 @@ constexpr std::size_t kNameLink = 2;
 constexpr std::size_t kConversionLink = 4;
 constexpr std::size_t kDataLink = 5;
 constexpr std::size_t kChannelBytes = 24;
-constexpr unsigned kTypeVariable = 1;  // the payload stands elsewhere
+constexpr unsigned kTypeVariable = 1;  // the payload is elsewhere
 constexpr unsigned kTypeMaster = 2;
 constexpr unsigned kTypeVirtualMaster = 3;
-constexpr unsigned kTypeVirtual = 6;  // a function of the record's number: a constant, here
+constexpr unsigned kTypeVirtual = 6;  // a function of the record's number; here a constant
 
 // Data types.
 constexpr unsigned kUnsignedLittle = 0;
@@ -57,7 +57,7 @@ Expected<MdfField> MdfField::describe(MdfFile& file, const MdfBlock& channel,
   if (channel_type == kTypeVirtual || channel_type == kTypeVirtualMaster) {
     field.kind_ = Kind::kConstant;
     if (field.factor_ != 0.0 || !(field.offset_ >= 0.0) || field.offset_ > UINT32_MAX) {
-      return tl::unexpected(file.damage(channel.at, "a channel without data that is no constant"));
+      return tl::unexpected(file.damage(channel.at, "a channel without data that is not constant"));
     }
     field.constant_ = static_cast<std::uint64_t>(field.offset_);
     return field;
@@ -71,7 +71,7 @@ Expected<MdfField> MdfField::describe(MdfFile& file, const MdfBlock& channel,
   return field;
 }
 
-// Linear and from a table; text for a value has no say here.
+// Reads linear conversions and tables of values; text for a value does not matter here.
 Expected<void> MdfField::read_conversion(MdfFile& file, std::uint64_t at) {
   constexpr std::size_t kHeadBytes = 24;
   constexpr std::size_t kValuesMax = 64;
@@ -120,7 +120,7 @@ std::uint64_t MdfField::value(const char* record) const {
 }
 
 MdfClock::MdfClock(MdfField field) : field_(std::move(field)) {
-  // A factor of 1e-6 is none that doubles have; what it means are microseconds.
+  // 1e-6 is no exact double; a factor close to it means microseconds.
   constexpr double kRelative = 1e-9;
   const double tick_ns = field_.factor_ * kSecond_ns;
   if (tick_ns >= 1.0 && tick_ns < kSecond_ns * kSecond_ns &&
@@ -174,7 +174,7 @@ Expected<void> MdfFrames::add_all(MdfFile& file, std::uint64_t first, std::uint6
     const auto channel = file.block(at, "##CN", kChannelBytes);
     if (!channel) return tl::unexpected(channel.error());
     if (auto done = add(file, *channel, record_bytes); !done) return done;
-    // Parts of an array are described by another kind of block.
+    // Another kind of block describes the parts of an array.
     const std::uint64_t parts = channel->link(kPartsLink);
     const auto part = parts != 0 ? file.block(parts, {}, 0) : MdfBlock();
     if (part && part->kind == "##CN") {
@@ -224,7 +224,7 @@ Expected<void> MdfFrames::add(MdfFile& file, const MdfBlock& channel, std::uint6
 Expected<void> MdfFrames::add_payload(MdfFile& file, const MdfBlock& channel,
                                       std::uint64_t record_bytes) {
   if (load_byte(channel.data.data()) == kTypeVariable) {
-    // What the record has is an offset, however wide the channel says that it is.
+    // The record holds an offset, whatever width the channel states.
     constexpr std::uint32_t kBitsMax = 64;
     MdfBlock place = channel;
     const std::uint64_t room =

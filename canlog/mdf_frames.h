@@ -1,6 +1,6 @@
 #pragma once
 
-// Where a record of a channel group has the parts of a frame: CAN_DataFrame, CAN_RemoteFrame and
+// Where the parts of a frame are in a record of a channel group: CAN_DataFrame, CAN_RemoteFrame and
 // CAN_ErrorFrame of ASAM's bus logging, as CANedge, asammdf and python-can write them.
 
 #include <cstdint>
@@ -14,14 +14,14 @@
 
 namespace vgyro::canlog {
 
-/// A number within a record, or one that is the same in all of them.
+/// A number in a record, or one that is the same in all records.
 class MdfField {
  public:
   [[nodiscard]] bool is_there() const { return kind_ != Kind::kAbsent; }
   [[nodiscard]] std::uint64_t value(const char* record) const;
 
-  /// As the channel's block describes it; `record_bytes` is what a record has. Error where the
-  /// description is none that can be read.
+  /// Reads the description in the channel's block; `record_bytes` is the size of a record. Error if
+  /// the description cannot be read.
   static Expected<MdfField> describe(MdfFile& file, const MdfBlock& channel,
                                      std::uint64_t record_bytes);
 
@@ -46,12 +46,12 @@ class MdfField {
 class MdfClock {
  public:
   explicit MdfClock(MdfField field);
-  /// None where it is no number, or too large.
+  /// Nothing if it is no number, or too large.
   [[nodiscard]] std::optional<std::int64_t> to_ns(const char* record) const;
 
  private:
   MdfField field_;
-  std::int64_t tick_ns_ = 0;  ///< where it is a whole number of them, else 0
+  std::int64_t tick_ns_ = 0;  ///< nanoseconds in a tick, if that is a whole number, else 0
 };
 
 enum class MdfFrameKind : std::uint8_t { kData, kRemote, kError };
@@ -60,16 +60,17 @@ struct MdfFrames {
   MdfFrameKind kind = MdfFrameKind::kData;
   std::optional<MdfClock> clock;
   MdfField bus, id, extended, dlc, length, direction, fd, rate_switch, error_state, remote;
-  // The payload stands in the record, or elsewhere.
+  // The payload is in the record, or elsewhere.
   std::size_t data_at = 0;
   std::size_t data_bytes = 0;
-  std::optional<std::uint64_t> elsewhere;  ///< where: a group of records, or data, by its place
-  MdfField offset;                         ///< into it
+  std::optional<std::uint64_t> elsewhere;  ///< place of the group of records, or of the data, that
+                                           ///< holds the payload
+  MdfField offset;                         ///< offset of the payload there
 
-  /// Of a channel group; none where its records are no frames.
+  /// Describes a channel group; nothing if its records are not frames.
   static Expected<std::optional<MdfFrames>> describe(MdfFile& file, const MdfBlock& group,
                                                      std::uint64_t record_bytes);
-  /// All but stamp, bus and payload. Null, or why it is no frame.
+  /// Reads all but stamp, bus and payload. Null, or why it is no frame.
   const char* read(const char* record, LogRecord& to) const;
 
  private:

@@ -14,13 +14,14 @@ namespace {
 constexpr std::size_t kRecordBytesMax = 65'536;
 constexpr std::size_t kRecordsMax = 1'024;
 constexpr std::size_t kSizeBytes = 4;  // before a payload
-// Frames that wait for a payload that does not come.
+// Limit of frames that wait for a payload.
 constexpr std::size_t kWaitingMax = 1'024;
 
-// Null, or why not; classic frames have the length that they say, whatever more is there.
+// Copies the payload; a classic frame has its stated length, even if more bytes are there. Null, or
+// what is wrong.
 const char* set_payload(const char* from, std::size_t there, can::Frame& frame) {
   if (frame.has(can::kRemote)) return nullptr;
-  if (there < frame.length) return "payload: fewer bytes than the length says";
+  if (there < frame.length) return "payload: shorter than its length";
   std::memcpy(frame.data.data(), from, frame.length);
   return nullptr;
 }
@@ -82,7 +83,7 @@ Expected<void> MdfGroup::add_records(const MdfBlock& block) {
   records->cycles = load_little<std::uint64_t>(&block.data[8]);
   records->is_payload = (load_little<std::uint16_t>(&block.data[16]) & kPayloadFlag) != 0;
   const std::size_t data_bytes = load_little<std::uint32_t>(&block.data[24]);
-  // Behind a record stand bits that say which of its channels are invalid.
+  // Bits after a record mark its invalid channels.
   records->bytes = data_bytes + load_little<std::uint32_t>(&block.data[28]);
   if (!records->is_payload) {
     auto frames = MdfFrames::describe(*file_, block, data_bytes);
@@ -137,7 +138,7 @@ bool MdfGroup::read(LogRecord& record) {
   }
 }
 
-// The first that waits, where it has all that it waits for, or will not get it.
+// Returns the first waiting frame once its payload is there or will not come.
 bool MdfGroup::take_waiting(LogRecord& record) {
   while (!waiting_.empty()) {
     Waiting& first = waiting_.front();
@@ -230,7 +231,7 @@ MdfGroup::Step MdfGroup::read_record(Records& records, LogRecord& record) {
   return Step::kNone;
 }
 
-// Null, or why it is no frame.
+// Returns null, or why it is no frame.
 const char* MdfGroup::read_frame(const Records& records, const char* bytes,
                                  LogRecord& record) const {
   const MdfFrames& frames = *records.frames;
@@ -248,7 +249,7 @@ const char* MdfGroup::read_frame(const Records& records, const char* bytes,
   return set_payload(bytes + frames.data_at, frames.data_bytes, record.frame);
 }
 
-// The payload stands elsewhere: before, behind, or in data of its own.
+// Finds the payload, which is elsewhere: earlier, later, or in data of its own.
 MdfGroup::Step MdfGroup::place_payload(Records& records, std::uint64_t offset, LogRecord& record) {
   can::Frame& frame = record.frame;
   const char* why = nullptr;
@@ -271,7 +272,7 @@ MdfGroup::Step MdfGroup::place_payload(Records& records, std::uint64_t offset, L
   return Step::kNone;
 }
 
-// Null, or why not. Offsets rise, as a rule.
+// Returns null, or what is wrong. Offsets usually increase.
 const char* MdfGroup::fetch(PayloadData& data, std::uint64_t offset, can::Frame& frame) {
   constexpr unsigned kRewoundMax = 64;
   constexpr const char* kMissing = "payload: it is not in the log";
@@ -308,7 +309,7 @@ MdfGroup::Step MdfGroup::end_inside() {
 
 MdfGroup::Step MdfGroup::end_damaged(const char* what) {
   error_ = Error{file_->name(), fmt::format("behind record {}: {}", counts_.lines, what),
-                 "the file is damaged there; what stands before was read"};
+                 "the file is damaged there; everything before it was read"};
   return Step::kEnd;
 }
 

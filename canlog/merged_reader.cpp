@@ -9,11 +9,11 @@ namespace vgyro::canlog {
 
 namespace {
 
-// Stamps below this count from the beginning of something: of the log, or of a logger without a
-// clock. No CAN log of people is older than 1980.
+// Smaller stamps count from some beginning: of the log, or of a logger without a clock. No CAN log
+// is older than 1980.
 constexpr TimePoint kEpochStampsFrom = time_from_ns(315'532'800'000'000'000);
 
-// Rotated logs with a night or a winter between them are one recording if somebody says so.
+// Rotated logs with a night or a winter between them are one recording if the user says so.
 constexpr Duration kPauseMax = std::chrono::hours(366 * 24);
 
 std::string seconds_text(TimePoint t) {
@@ -52,7 +52,7 @@ Expected<std::unique_ptr<LogReader>> MergedReader::make(std::vector<Part> parts)
   return merged;
 }
 
-// Of two logs that count from different beginnings nobody knows what was at the same time.
+// Logs that count from different beginnings cannot be aligned.
 std::optional<Error> MergedReader::mismatch() const {
   const Stream* since_epoch = nullptr;
   const Stream* since_start = nullptr;
@@ -99,7 +99,7 @@ bool MergedReader::is_far_from_all_before(const Stream& stream) {
   constexpr double kDay_s = 86'400.0;
   error_ = Error{stream.part.path,
                  fmt::format("begins {:.0f} days after all that came before it has ended: these "
-                             "are no logs of one drive",
+                             "are not logs of one drive",
                              to_seconds(span(*newest_, stream.due())) / kDay_s),
                  "give each drive a run of its own"};
   return true;
@@ -119,8 +119,8 @@ bool MergedReader::take_bus(Stream& stream, LogRecord& record) {
 
 bool MergedReader::next(LogRecord& record) {
   while (Stream* stream = first_due()) {
-    // What was read before the damage of one log is handed out; behind it the others would be
-    // alone.
+    // The records read before the damage of one log are still returned; after them the other logs
+    // would be alone.
     if (failed_ != nullptr && !failed_->next) break;
     if (is_far_from_all_before(*stream)) break;
     stream->begun = true;
@@ -160,7 +160,7 @@ std::uint64_t MergedReader::bytes_total() const {
   std::uint64_t sum = 0;
   for (const Stream& stream : streams_) {
     const std::uint64_t total = stream.part.reader->bytes_total();
-    if (total == 0) return 0;  // one of them is not known
+    if (total == 0) return 0;  // one total is unknown
     sum += total;
   }
   return sum;

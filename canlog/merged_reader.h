@@ -1,8 +1,8 @@
 #pragma once
 
-// Several logs of one drive as one: records in the order of their stamps, those of equal stamps in
-// the order of the arguments. Within a log nothing is reordered: where its stamps jump back they
-// are handed on like that, as of a single log. Holds two records of each log.
+// Several logs of one drive as one: records in the order of their stamps, with equal stamps in the
+// order of the arguments. Records within a log are not reordered: if its stamps jump back, they are
+// returned in that order, as from a single log. Holds two records of each log.
 
 #include <memory>
 #include <optional>
@@ -13,10 +13,9 @@
 
 namespace vgyro::canlog {
 
-/// One log as open_log() opens it; several merged. Error where one cannot be read, is named twice,
-/// or where they cannot belong together: stamps since a beginning beside stamps since the epoch.
-/// That a log begins more than a year after everything before it is found on the way, as an
-/// error().
+/// Opens one log with open_log(); merges several. Error if one cannot be read or is named twice, or
+/// if they cannot belong together: stamps since a beginning beside stamps since the epoch. A log
+/// that begins more than a year after everything before it is found while reading, as an error().
 Expected<std::unique_ptr<LogReader>> open_logs(const std::vector<std::string>& paths);
 
 class MergedReader final : public LogReader {
@@ -25,7 +24,7 @@ class MergedReader final : public LogReader {
     std::string path;
     std::unique_ptr<LogReader> reader;
   };
-  /// Reads the first records. Error as open_logs().
+  /// Reads the first records. Errors as in open_logs().
   static Expected<std::unique_ptr<LogReader>> make(std::vector<Part> parts);
 
   bool next(LogRecord& record) override;
@@ -41,17 +40,17 @@ class MergedReader final : public LogReader {
  private:
   struct Held {
     LogRecord record;
-    std::unique_ptr<XlFrame> xl;  ///< of an XL frame
+    std::unique_ptr<XlFrame> xl;  ///< for an XL frame
   };
-  /// A log, its next record and the one behind it.
+  /// A log, its next record and the one after that.
   struct Stream {
     Part part;
     std::optional<Held> next;
     std::optional<Held> after;
     std::vector<can::BusIndex> buses;  ///< the log's own index → interfaces_
-    bool begun = false;                ///< a record of it was handed out
-    /// What the log comes forward with. One stamp too late, by a glitch or before a clock was set
-    /// back, must not hold it up until all others are through.
+    bool begun = false;                ///< a record of it was returned
+    /// The stamp by which the log takes its turn. One stamp that is too late, by a glitch or before
+    /// a clock was set back, must not delay the log until all others have ended.
     [[nodiscard]] TimePoint due() const {
       return after && after->record.stamp < next->record.stamp ? after->record.stamp
                                                                : next->record.stamp;
@@ -71,7 +70,7 @@ class MergedReader final : public LogReader {
   std::unique_ptr<XlFrame> xl_;
   std::optional<TimePoint> newest_;
   std::optional<Error> error_;
-  const Stream* failed_ = nullptr;  ///< whose error that is
+  const Stream* failed_ = nullptr;  ///< the stream that error_ belongs to
 };
 
 }  // namespace vgyro::canlog

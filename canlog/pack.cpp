@@ -12,12 +12,12 @@ namespace vgyro::canlog {
 namespace {
 
 constexpr std::size_t kOutputBytes = 65'536;
-// What the programs gzip, xz and zstd do when nothing is asked for.
+// The defaults of the programs gzip, xz and zstd.
 constexpr int kGzipLevel = 6;
 constexpr int kXzLevel = 6;
 constexpr int kZstdLevel = 3;
 
-// The encoders fail for want of memory, or because of a mistake of ours.
+// The encoders fail only without memory, or because of a bug.
 void require(bool holds) {
   if (!holds) std::abort();
 }
@@ -35,7 +35,7 @@ class GzipSink final : public PackingSink {
 
  private:
   void run(std::string_view bytes, int flush) {
-    // zlib only reads it.
+    // zlib only reads the bytes.
     stream_.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(bytes.data()));
     stream_.avail_in = static_cast<uInt>(bytes.size());
     do {

@@ -1,6 +1,6 @@
 #pragma once
 
-// Packs on the way into another sink: gzip, xz or zstd, by the ending of a name.
+// Packs bytes on their way into another sink: gzip, xz or zstd, by the ending of a name.
 
 #include <memory>
 #include <string_view>
@@ -9,19 +9,19 @@
 
 namespace vgyro::canlog {
 
-/// A sink that is called at the end of the data.
+/// A sink that must be told the end of the data.
 class PackingSink : public ByteSink {
  public:
   void rewrite(std::uint64_t /*offset*/, std::string_view /*bytes*/) final {}
   [[nodiscard]] bool can_rewrite() const final { return false; }
-  /// Once, behind the last write().
+  /// Call once, after the last write().
   virtual void finish() = 0;
 };
 
 /// The ending of `path` that names a packing (".gz", ".xz", ".zst"), or an empty one.
 std::string_view packing_ending(std::string_view path);
 
-/// `ending` as of packing_ending(), not empty. What comes out goes into `to`.
+/// `ending` is from packing_ending(), not empty. The packed bytes go into `to`.
 std::unique_ptr<PackingSink> packing_sink(std::string_view ending, ByteSink& to);
 
 }  // namespace vgyro::canlog

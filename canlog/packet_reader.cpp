@@ -28,7 +28,7 @@ bool PacketReader::take_packet(const Packet& packet, Interface& interface, LogRe
   return true;
 }
 
-// A capture of all interfaces has no names, but may have the kernel's numbers.
+// A capture of all interfaces has no names, but may have the kernel's interface numbers.
 bool PacketReader::set_interface(const PacketResult& result, Interface& interface,
                                  LogRecord& record) {
   if (result.interface) {
@@ -61,7 +61,7 @@ void PacketReader::end_inside() {
 
 void PacketReader::end_damaged(const char* what) {
   error_ = Error{bytes_->name(), fmt::format("behind packet {}: {}", counts_.lines, what),
-                 "the file is damaged there; what stands before was read"};
+                 "the file is damaged there; everything before it was read"};
 }
 
 }  // namespace vgyro::canlog

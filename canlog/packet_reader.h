@@ -1,6 +1,6 @@
 #pragma once
 
-// What the readers of captures share: packets of CAN interfaces become records, others are counted.
+// Shared by the readers of captures: packets of CAN interfaces become records, others are counted.
 
 #include <memory>
 #include <string>
@@ -28,15 +28,15 @@ class PacketReader : public BinaryReader {
   /// Where a packet was captured.
   struct Interface {
     std::uint32_t link = 0;
-    std::string name;     ///< empty: none was given
-    unsigned number = 0;  ///< from 0 on: without a name it is "canN"
+    std::string name;     ///< empty: unknown
+    unsigned number = 0;  ///< from 0 on; without a name the interface is "canN"
     std::optional<can::BusIndex> bus;
   };
-  /// Counts the packet; true where `record` is a frame now, but for its stamp and direction.
+  /// Counts the packet; true if `record` now holds a frame, except for its stamp and direction.
   bool take_packet(const Packet& packet, Interface& interface, LogRecord& record);
-  /// The log ends inside a packet, or cannot be read on.
+  /// The log ends inside a packet, or cannot be read further.
   void end_inside();
-  /// What follows cannot be read, because the file is damaged here.
+  /// The rest cannot be read, because the file is damaged here.
   void end_damaged(const char* what);
 
   ByteWindow& bytes() { return *bytes_; }
@@ -47,7 +47,7 @@ class PacketReader : public BinaryReader {
   bool set_interface(const PacketResult& result, Interface& interface, LogRecord& record);
 
   std::unique_ptr<ByteWindow> bytes_;
-  /// Of cooked captures: the kernel's numbers of interfaces, in order of appearance.
+  /// For cooked captures: the kernel's interface numbers, in order of appearance.
   std::vector<std::uint32_t> kernel_interfaces_;
 };
 

@@ -50,13 +50,14 @@ Expected<std::unique_ptr<LogReader>> PcapReader::open(std::unique_ptr<ByteSource
   if (!form || head.size() < kFileHeadBytes) {
     return fail(window->name(), "begins like a pcap file, but its head is cut off");
   }
-  // The upper bits hold something else.
+  // The upper bits have another meaning.
   constexpr std::uint32_t kLinkBits = 0xFFFF;
   const std::uint32_t link = load<std::uint32_t>(&head[kLinkAt], form->order) & kLinkBits;
   if (!may_hold_can(link)) {
-    return fail(window->name(),
-                fmt::format("is a capture, but its packets are no CAN frames (link type {})", link),
-                "capture the CAN interface itself: `tcpdump -i can0 -w FILE`");
+    return fail(
+        window->name(),
+        fmt::format("is a capture, but its packets are not CAN frames (link type {})", link),
+        "capture the CAN interface itself: `tcpdump -i can0 -w FILE`");
   }
   window->take(kFileHeadBytes);
   std::unique_ptr<PcapReader> reader(
@@ -76,11 +77,11 @@ bool PcapReader::next(LogRecord& record) {
     const std::int64_t second = load<std::uint32_t>(&head[0], order_);
     const std::int64_t fraction = load<std::uint32_t>(&head[4], order_);
     const std::uint32_t captured = load<std::uint32_t>(&head[8], order_);
-    // Wireshark takes no larger ones either.
+    // Wireshark's limit is the same.
     constexpr std::uint32_t kCapturedMax = 128U << 20U;
     if (captured > kCapturedMax || fraction * fraction_ns_ >= kSecond_ns) {
       ended_ = true;
-      end_damaged("what follows is no packet");
+      end_damaged("no valid packet follows");
       return false;
     }
     bytes().take(kPacketHeadBytes);

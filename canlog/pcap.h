@@ -1,7 +1,7 @@
 #pragma once
 
-// pcap: what tcpdump and Wireshark write of CAN interfaces, stamps in microseconds or nanoseconds,
-// in either byte order. A file holds one interface, which has no name in it: it is "can0".
+// pcap, which tcpdump and Wireshark write for CAN interfaces, with stamps in microseconds or
+// nanoseconds, in either byte order. A file holds one interface without a name: it is "can0".
 
 #include <memory>
 
@@ -13,7 +13,7 @@ bool is_pcap(std::string_view head);
 
 class PcapReader final : public PacketReader {
  public:
-  /// Error where the file holds packets of another kind than CAN's.
+  /// Error if the file holds packets of another kind than CAN.
   static Expected<std::unique_ptr<LogReader>> open(std::unique_ptr<ByteSource> bytes);
 
   bool next(LogRecord& record) override;
@@ -23,7 +23,7 @@ class PcapReader final : public PacketReader {
       : PacketReader(std::move(bytes)), order_(order), fraction_ns_(fraction_ns) {}
 
   std::endian order_;
-  std::int64_t fraction_ns_;  ///< what a fraction of a second is counted in
+  std::int64_t fraction_ns_;  ///< unit of the fraction of a second
   Interface interface_;
   bool ended_ = false;
 };

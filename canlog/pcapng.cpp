@@ -21,9 +21,9 @@ constexpr std::size_t kBlockTailBytes = 4;  // size again
 constexpr std::size_t kSectionHeadBytes = 12;
 constexpr std::size_t kPacketHeadBytes = 20;  // interface, stamp, two sizes
 
-// More than any packet with its options has: what is beyond is not looked at.
+// More than any packet with its options has; the rest is not examined.
 constexpr std::size_t kShownBytes = 65'536;
-// A section with more is damaged, or made to fill memory.
+// A section with more is damaged, or made to exhaust memory.
 constexpr std::size_t kInterfacesMax = 1'024;
 
 constexpr std::uint16_t kOptionName = 2;
@@ -35,7 +35,7 @@ constexpr std::size_t padded(std::size_t size) {
   return (size + 3) / 4 * 4;
 }
 
-/// The options of a block, one after the other.
+/// The options of a block in sequence.
 class Options {
  public:
   Options(std::string_view bytes, std::endian order) : rest_(bytes), order_(order) {}
@@ -59,7 +59,7 @@ class Options {
   std::endian order_;
 };
 
-// What a line of a candump log, or a configuration, can name.
+// A name that a line of a candump log, or a configuration, can hold.
 std::string interface_name(std::string_view text) {
   constexpr std::size_t kLettersMax = 31;
   std::string name(text.substr(0, std::min(text.find('\0'), kLettersMax)));
@@ -148,7 +148,7 @@ bool PcapngReader::read(LogRecord& record) {
   return false;
 }
 
-// The block that begins here; none at the end, and where what follows is none.
+// The block that begins here; none at the end, or if no valid block follows.
 std::optional<PcapngReader::Block> PcapngReader::next_block() {
   if (ended_) return std::nullopt;
   const std::string_view head = bytes().peek(kSectionHeadBytes);
@@ -164,7 +164,7 @@ std::optional<PcapngReader::Block> PcapngReader::next_block() {
   block.bytes = load<std::uint32_t>(&head[4], order_);
   if (block.bytes < kBlockHeadBytes + kBlockTailBytes || block.bytes % 4 != 0) {
     ended_ = true;
-    end_damaged("what follows is no block");
+    end_damaged("no valid block follows");
     return std::nullopt;
   }
   const std::size_t shown = std::min<std::size_t>(block.bytes, kShownBytes);
@@ -195,7 +195,7 @@ void PcapngReader::describe_interface(const Block& block) {
   constexpr std::size_t kHeadBytes = 8;  // link type, reserved, limit
   if (interfaces_.size() == kInterfacesMax || block.content.size() < kHeadBytes) {
     ended_ = true;
-    end_damaged("a description of an interface that cannot be");
+    end_damaged("an invalid interface description");
     return;
   }
   Described& added = interfaces_.emplace_back();
@@ -225,7 +225,7 @@ bool PcapngReader::read_packet_block(const Block& block, LogRecord& record) {
     counts_.add_malformed("the packet is shorter than its head");
     return false;
   }
-  // The old block has a counter of losses beside the interface.
+  // The old block has a 16-bit interface, followed by a counter of losses.
   const std::size_t number =
       block.type == kPacket ? load<std::uint32_t>(head, order_) : load<std::uint16_t>(head, order_);
   const std::uint64_t stamp = std::uint64_t{load<std::uint32_t>(head + 4, order_)} << 32U |

@@ -1,8 +1,8 @@
 #pragma once
 
-// pcapng: what Wireshark, tshark and dumpcap write, of one or several interfaces, which may have
-// names; also several files one behind the other. dumpcap writes the packets of several interfaces
-// some tenths of a second out of order: they come by stamp. Blocks of other kinds are passed over.
+// pcapng, which Wireshark, tshark and dumpcap write for one or several interfaces, which may have
+// names; also several files in sequence. dumpcap writes the packets of several interfaces some
+// tenths of a second out of order: they are returned by stamp. Blocks of other kinds are skipped.
 
 #include <memory>
 #include <vector>
@@ -24,10 +24,10 @@ class PcapngReader final : public PacketReader {
   explicit PcapngReader(std::unique_ptr<ByteWindow> bytes) : PacketReader(std::move(bytes)) {}
 
   struct Clock {
-    unsigned exponent = 6;  ///< stamps count in 10^-exponent or 2^-exponent seconds
+    unsigned exponent = 6;  ///< unit of the stamps: 10^-exponent or 2^-exponent seconds
     bool is_binary = false;
     std::int64_t offset_s = 0;
-    /// None where it does not fit.
+    /// Nothing if it does not fit.
     [[nodiscard]] std::optional<std::int64_t> to_ns(std::uint64_t count) const;
   };
   struct Described {
@@ -36,8 +36,8 @@ class PcapngReader final : public PacketReader {
   };
   struct Block {
     std::uint32_t type = 0;
-    std::uint32_t bytes = 0;   ///< all of it
-    std::string_view content;  ///< without head and tail, as much as is looked at
+    std::uint32_t bytes = 0;   ///< size of the whole block
+    std::string_view content;  ///< without head and tail, as much as is examined
   };
 
   bool read(LogRecord& record);
@@ -48,10 +48,10 @@ class PcapngReader final : public PacketReader {
 
   std::endian order_ = std::endian::little;
   std::vector<Described> interfaces_;
-  bool has_several_ = false;  ///< interfaces, in some section
-  // dumpcap is a fifth of a second late; the reader of a live capture waits as long.
+  bool has_several_ = false;  ///< several interfaces in some section
+  // dumpcap is a fifth of a second late; a reader of a live capture waits as long.
   static constexpr std::int64_t kLateMax_ns = 1'000'000'000;
-  StampOrder by_stamp_{kLateMax_ns};  ///< used then
+  StampOrder by_stamp_{kLateMax_ns};  ///< used if has_several_
   bool ended_ = false;
 };
 

@@ -10,13 +10,13 @@ namespace vgyro::canlog {
 
 namespace {
 
-// The form that owns the first line that has an owner. `from` is where to begin, and where to go on
-// when there is more.
+// The form that recognises the earliest line. `from` is the place to begin, and to continue from
+// when there are more bytes.
 const Form* form_of_lines(std::string_view head, bool is_whole, std::size_t& from) {
   while (from < head.size()) {
     std::size_t end = head.find('\n', from);
     if (end == head.npos) {
-      // The last line of a log may lack its end, and be cut off.
+      // The last line of a log may lack its end, or be cut off.
       if (!is_whole) return nullptr;
       end = head.size();
     }
@@ -37,7 +37,7 @@ const Form* binary_form(std::string_view head) {
   return nullptr;
 }
 
-// Bytes that no text has: control characters but for those of layout.
+// No control characters except those of layout.
 bool is_text(std::string_view head) {
   const auto odd = std::count_if(head.begin(), head.end(), [](char c) {
     return (c >= '\0' && c < '\t') || (c > '\r' && c < ' ') || c == '\x7F';
@@ -61,8 +61,8 @@ Error unknown(const HeadedSource& source) {
     }
   }
   return {source.name(),
-          is_text(source.head()) ? "is text, but no log of CAN frames that is known"
-                                 : "is no log of CAN frames that is known",
+          is_text(source.head()) ? "is text, but not a known log of CAN frames"
+                                 : "is not a known log of CAN frames",
           "known are: " + known_forms()};
 }
 
@@ -90,14 +90,14 @@ Expected<std::unique_ptr<LogReader>> open_log(std::unique_ptr<ByteSource> bytes)
   std::size_t looked_at = 0;
   while (form == nullptr && source->grow()) {
     form = binary_form(source->head());
-    // A foreign form may hold lines of a log.
+    // A foreign form may contain lines of a log.
     if (form == nullptr && is_foreign(source->head())) return tl::unexpected(unknown(*source));
     if (form == nullptr) form = form_of_lines(source->head(), false, looked_at);
   }
   if (form == nullptr) form = form_of_lines(source->head(), true, looked_at);
   if (form != nullptr) return form->open(std::move(source));
   if (source->head().empty() && source->error()) return tl::unexpected(*source->error());
-  // An empty log is a log; so may be what begins with a great many NUL bytes.
+  // An empty log is a log; a log may also begin with very many NUL bytes.
   if (is_nothing(source->head())) {
     return std::make_unique<CandumpReader>(std::make_unique<LogSource>(std::move(source)));
   }

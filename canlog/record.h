@@ -1,7 +1,6 @@
 #pragma once
 
-// What every form of log is read into: a frame, when it was on which bus, and what was counted on
-// the way.
+// The result of reading a log of any form: a frame with its stamp and bus, and counts.
 
 #include <array>
 #include <cstdint>
@@ -17,7 +16,7 @@ namespace vgyro::canlog {
 
 inline constexpr std::size_t kXlBytesMax = 2048;
 
-/// CAN XL: read and written so that no log loses lines; nothing in the product uses it.
+/// CAN XL: read and written so that no log loses lines; the product does not use it otherwise.
 struct XlFrame {
   std::uint16_t priority = 0;  ///< 11 bits
   std::uint8_t vcid = 0;
@@ -32,8 +31,8 @@ enum class Direction : std::uint8_t { kUnknown, kReceived, kTransmitted };
 
 struct LogRecord {
   TimePoint stamp;
-  can::BusIndex bus = 0;             ///< into InterfaceTable
-  std::uint8_t fraction_digits = 6;  ///< as the log had them: 6 or 9 as a rule
+  can::BusIndex bus = 0;             ///< index in InterfaceTable
+  std::uint8_t fraction_digits = 6;  ///< as in the log: usually 6 or 9
   Direction direction = Direction::kUnknown;
   bool is_xl = false;  ///< then `frame` is empty and LogReader::xl_frame() holds the frame
   can::Frame frame;
@@ -43,7 +42,7 @@ struct LogRecord {
 class InterfaceTable {
  public:
   static constexpr std::size_t kMax = 64;
-  /// Adds the name when new; nothing when the table is full.
+  /// Adds the name if it is new; nothing if the table is full.
   std::optional<can::BusIndex> index_of(std::string_view name);
   [[nodiscard]] const std::string& name(can::BusIndex bus) const { return names_[bus]; }
   [[nodiscard]] const std::vector<std::string>& names() const { return names_; }
@@ -53,24 +52,25 @@ class InterfaceTable {
 };
 
 struct MalformedLine {
-  std::uint64_t line = 0;  ///< 1-based; of LogCounts::item, which may be no line
+  std::uint64_t line = 0;  ///< 1-based; counts LogCounts::item, which may not be a line
   std::string why;
 };
 
-/// Text forms consist of lines; what binary forms consist of takes the place of a line.
+/// Text forms consist of lines; in binary forms, `item` takes the place of a line.
 struct LogCounts {
-  std::string_view item = "line";  ///< "object", "packet", "record" …: one of `lines`
+  std::string_view item = "line";  ///< what `lines` counts: "line", "object", "packet", "record" …
   std::uint64_t lines = 0;
   std::uint64_t frames = 0;
   std::uint64_t xl_frames = 0;
   std::uint64_t other_lines = 0;
   std::uint64_t malformed_lines = 0;
   std::uint64_t cut_off_lines = 0;  ///< the log ends inside a line: its frame is not used
-  std::uint64_t skipped_bytes = 0;  ///< that belong to no line, as NUL bytes after a power cut
+  std::uint64_t skipped_bytes = 0;  ///< bytes that belong to no line, such as NULs after a power
+                                    ///< cut
   std::vector<MalformedLine> first_malformed;  ///< at most kFirstMalformedMax
   static constexpr std::size_t kFirstMalformedMax = 5;
 
-  /// Of the item that `lines` counted last.
+  /// Records an error in the item that `lines` counted last.
   void add_malformed(const char* why) {
     ++malformed_lines;
     if (first_malformed.size() < kFirstMalformedMax) first_malformed.push_back({lines, why});

@@ -71,13 +71,13 @@ void read_xl(const Content& content, XlFrame& xl, PacketResult& result) {
   }
 }
 
-// Captures of a CAN interface by libpcap 1.10 have lost the flags of FD, but not the size.
+// Captures of a CAN interface by libpcap 1.10 lack the FD flags, but have the size.
 bool is_fd(const Content& content, unsigned length, unsigned flags) {
   return content.protocol == kProtocolCanFd || (flags & kFdFormat) != 0 ||
          length > can::kClassicBytesMax || content.bytes.size() >= kFdFrameBytes;
 }
 
-// Null, or why it is none.
+// Returns null, or why it is no frame.
 const char* read_frame(const Content& content, can::Frame& frame) {
   if (content.bytes.size() < kDataAt) return kCutOff;
   const char* from = content.bytes.data();
@@ -97,7 +97,7 @@ const char* read_frame(const Content& content, can::Frame& frame) {
     if (const char* why = set_id(bare, (id & kExtendedFlag) != 0, frame)) return why;
     if ((id & kRemoteFlag) != 0) frame.flags |= can::kRemote;
     if (frame.has(can::kFd) && frame.has(can::kRemote)) {
-      return "a remote frame of CAN FD: there is none";
+      return "a remote frame of CAN FD, which does not exist";
     }
   }
   if (const char* why = set_length(length, frame)) return why;
@@ -113,7 +113,7 @@ const char* read_frame(const Content& content, can::Frame& frame) {
   return nullptr;
 }
 
-// "any" of Linux, in its first and its second form; false where it is cut off.
+// Linux's "any" interface, in the first and second form; false if the packet is cut off.
 bool read_cooked(const Packet& packet, Content& content, LogRecord& record, PacketResult& result) {
   const bool is_second = packet.link == kLinkLinuxCooked2;
   const std::size_t head_bytes = is_second ? 20 : 16;
@@ -128,7 +128,7 @@ bool read_cooked(const Packet& packet, Content& content, LogRecord& record, Pack
   return true;
 }
 
-// Tags before the frame, of which one says who is to read it; false where they are cut off.
+// Skips the tags before the frame, one of which names its dissector; false if they are cut off.
 bool read_export(const Packet& packet, Content& content) {
   constexpr std::size_t kTagBytes = 4;
   constexpr unsigned kReaderTag = 12;
@@ -152,7 +152,7 @@ bool read_export(const Packet& packet, Content& content) {
   return false;
 }
 
-// What the packet's link puts before the frame; false where it is cut off.
+// Skips what the packet's link type puts before the frame; false if it is cut off.
 bool read_link(const Packet& packet, Content& content, LogRecord& record, PacketResult& result) {
   content.bytes = packet.bytes;
   if (packet.link == kLinkWiresharkExport) return read_export(packet, content);

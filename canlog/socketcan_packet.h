@@ -1,7 +1,7 @@
 #pragma once
 
-// A captured packet → the CAN frame in it: packets of CAN interfaces, and of Linux's "any"
-// interface in both of its cooked forms. No file and no stamp is known here.
+// Extracts the CAN frame of a captured packet, from CAN interfaces and from both cooked forms of
+// Linux's "any" interface. Files and stamps are not known here.
 
 #include <bit>
 #include <cstdint>
@@ -23,9 +23,9 @@ bool may_hold_can(std::uint32_t link);
 
 struct Packet {
   std::uint32_t link = 0;
-  std::string_view bytes;  ///< what was captured, or as much of it as any CAN frame has
-  /// Of the machine that captured: the order of its file. Cooked packets have their identifiers in
-  /// it, those of CAN interfaces do not.
+  std::string_view bytes;  ///< the captured bytes, or as many of them as any CAN frame has
+  /// Byte order of the capturing machine, from its file. Cooked packets use it for identifiers,
+  /// packets of CAN interfaces do not.
   std::endian host = std::endian::little;
 };
 /// A packet's head, frame and payload are never longer than this.
@@ -34,10 +34,10 @@ inline constexpr std::size_t kPacketBytesMax = 256 + kXlBytesMax;
 struct PacketResult {
   enum class Kind : std::uint8_t { kFrame, kXl, kOther, kMalformed };
   Kind kind = Kind::kOther;
-  const char* why = "";                    ///< of a malformed one
-  std::optional<std::uint32_t> interface;  ///< the kernel's number of it, where the packet has it
+  const char* why = "";                    ///< for a malformed packet
+  std::optional<std::uint32_t> interface;  ///< the kernel's interface number, if the packet has it
 };
-/// Fills in `record` but for stamp and bus; or `xl`.
+/// Fills in `record`, except for stamp and bus; or `xl`.
 PacketResult read_packet(const Packet& packet, LogRecord& record, XlFrame& xl);
 
 }  // namespace vgyro::canlog

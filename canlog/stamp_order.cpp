@@ -33,7 +33,7 @@ void StampOrder::push(const LogRecord& record, const XlFrame* xl, std::size_t st
   last_ns_ = to_ns(record.stamp);
 }
 
-// Of those that are first in their stream, the one of the lowest stamp.
+// The stream whose first record has the lowest stamp.
 std::size_t StampOrder::first() const {
   std::size_t best = streams_.size();
   for (std::size_t i = 0; i < streams_.size(); ++i) {
@@ -49,7 +49,7 @@ std::size_t StampOrder::first() const {
 bool StampOrder::is_ready() const {
   if (held_ == 0) return false;
   if (closed_ || held_ >= kHeldMax) return true;
-  // A clock that was set back by more does not hold up what came before.
+  // A clock that was set back by more does not delay the earlier records.
   const std::int64_t lead_ns = last_ns_ - to_ns(streams_[first()].front().record.stamp);
   return lead_ns > late_max_ns_ || lead_ns < -late_max_ns_;
 }

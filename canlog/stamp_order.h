@@ -1,8 +1,8 @@
 #pragma once
 
-// Records that were written stream by stream, as each one's buffer was emptied: some tenths of a
-// second of one bus, then of another. They come out by stamp; each stream keeps its own order.
-// Memory is bounded.
+// Sorts records by stamp that were written stream by stream, as each buffer was emptied: some
+// tenths of a second of one bus, then of another. Each stream keeps its own order. Memory is
+// bounded.
 
 #include <memory>
 #include <vector>
@@ -13,26 +13,26 @@ namespace vgyro::canlog {
 
 class StampOrder {
  public:
-  /// As many are held at most: two buses at full load leave fewer in eight seconds.
+  /// Limit of records held: two buses at full load have fewer in eight seconds.
   static constexpr std::size_t kHeldMax = 131'072;
 
-  /// `late_max_ns`: how much later than its place by stamp a record may come.
+  /// `late_max_ns`: how much later than its place by stamp a record may be.
   explicit StampOrder(std::int64_t late_max_ns) : late_max_ns_(late_max_ns) {}
 
   struct Held {
     LogRecord record;
-    std::unique_ptr<XlFrame> xl;  ///< of an XL frame
-    std::uint64_t number = 0;     ///< in the order of the log
+    std::unique_ptr<XlFrame> xl;  ///< for an XL frame
+    std::uint64_t number = 0;     ///< place in the log
   };
 
-  /// Streams count from 0 on.
+  /// `stream` counts from 0.
   void push(const LogRecord& record, const XlFrame* xl, std::size_t stream);
-  /// Nothing more comes.
+  /// No more records come.
   void close() { closed_ = true; }
   [[nodiscard]] bool is_empty() const { return held_ == 0; }
-  /// What is first will stay first.
+  /// No later record can come before the first one.
   [[nodiscard]] bool is_ready() const;
-  /// The first; only where it is not empty.
+  /// Returns the first record. Precondition: not empty.
   Held pop();
 
  private:
@@ -56,7 +56,7 @@ class StampOrder {
   std::vector<Queue> streams_;
   std::size_t held_ = 0;
   std::uint64_t pushed_ = 0;
-  std::int64_t last_ns_ = 0;  ///< of the record pushed last
+  std::int64_t last_ns_ = 0;  ///< stamp of the record pushed last
   bool closed_ = false;
 };
 

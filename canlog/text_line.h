@@ -1,6 +1,6 @@
 #pragma once
 
-// What every form of lines has in common: noise around a line, fields, numbers. Nothing allocates.
+// Shared by all forms of lines: noise around a line, fields, numbers. Nothing allocates.
 
 #include <charconv>
 #include <cstdint>
@@ -13,9 +13,9 @@ namespace vgyro::canlog {
 
 inline constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
 
-/// A line without what is no part of it: its carriage return, a byte-order mark (files put together
-/// have it in the middle too), and everything up to its last NUL byte, as a power cut leaves them.
-/// `skipped` grows by the bytes before and among the NULs.
+/// Removes what is not part of a line: its carriage return, a byte-order mark (joined files also
+/// have one in the middle), and everything up to its last NUL byte, as after a power cut. `skipped`
+/// grows by the bytes before and among the NULs.
 inline std::string_view clean_line(std::string_view line, std::uint64_t& skipped) {
   if (const std::size_t nul = line.rfind('\0'); nul != line.npos) {
     skipped += nul + 1;
@@ -40,7 +40,7 @@ inline std::string_view trimmed(std::string_view text) {
   return text;
 }
 
-/// The words of a line, one after the other.
+/// The words of a line in sequence.
 class Words {
  public:
   explicit Words(std::string_view line) : rest_(trimmed(line)) {}
@@ -62,7 +62,7 @@ class Words {
   std::string_view rest_;
 };
 
-/// A whole number of all of `text`, without a sign.
+/// The whole of `text` as a number without a sign.
 template <class T>
 std::optional<T> number_of(std::string_view text, int base = 10) {
   T value{};
@@ -77,8 +77,8 @@ std::optional<T> number_of(std::string_view text, int base = 10) {
 /// A stamp beyond this (the year 2255) would not fit 64 bits in nanoseconds.
 inline constexpr std::int64_t kStampMax_ns = 9'000'000'000'000'000'000;
 
-/// "12.345678" in units of `unit_ns` → nanoseconds, exact to the last digit that nanoseconds have;
-/// `digits` counts those behind the point. Neither sign nor exponent.
+/// "12.345678" in units of `unit_ns` → nanoseconds, exact to the last digit of a nanosecond;
+/// `digits` counts those after the point. Neither sign nor exponent.
 struct DecimalTime {
   std::int64_t ns = 0;
   unsigned digits = 0;

@@ -17,11 +17,11 @@ using Columns = TrcReader::Columns;
 constexpr std::int64_t kMilli_ns = 1'000'000;
 constexpr std::int64_t kMicro_ns = 1'000;
 constexpr unsigned kChannelMax = 255;
-// A line of version 1.0 has this where another has an identifier: the state of the bus.
+// A line of version 1.0 has this in place of an identifier to report the state of the bus.
 constexpr std::string_view kNoIdentifier = "FFFFFFFF";
 
-// The columns of the versions that do not name them. "-" is a column that says nothing, "N" the
-// number of the line.
+// The columns of versions that do not name them. "-" is an ignored column, "N" the number of the
+// line.
 constexpr std::string_view kColumns10 = "NOILD";
 constexpr std::string_view kColumns11 = "NOTILD";
 constexpr std::string_view kColumns12 = "NOBTILD";
@@ -89,7 +89,7 @@ std::optional<std::int64_t> ole_date_ns(std::string_view text) {
   constexpr std::int64_t kDay_us = 86'400'000'000;
   const double whole = std::floor(days);
   auto micros = static_cast<std::int64_t>(std::llround((days - whole) * 86'400e6));
-  // PEAK's own have ten digits, which is 9 µs, of times in whole milliseconds.
+  // PEAK's own dates have ten digits, or 9 µs, for times in whole milliseconds.
   const std::size_t point = text.find('.');
   constexpr std::size_t kDigitsOfMillis = 10;
   constexpr std::int64_t kMicrosPerMilli = 1000;
@@ -112,18 +112,18 @@ std::optional<std::int64_t> ole_date_ns(std::string_view text) {
   return local_to_epoch_ns(wall);
 }
 
-// ";   Start time: 18.07.2011 14:25:07.065.0" of version 1.0; other tools write it otherwise.
+// ";   Start time: 18.07.2011 14:25:07.065.0" in version 1.0; other tools use other formats.
 std::optional<std::int64_t> start_line_ns(std::string_view text) {
   Words words(text);
   const std::string_view day = words.next();
   std::string_view clock = words.next();
-  // Behind the milliseconds a tenth of them.
+  // The milliseconds are followed by a tenth of one.
   if (std::count(clock.begin(), clock.end(), '.') == 2) clock = clock.substr(0, clock.rfind('.'));
   const auto wall = vector_date(std::string(day) + ' ' + std::string(clock));
   return wall ? local_to_epoch_ns(*wall) : std::nullopt;
 }
 
-// Four digits, or eight: python-can writes seven, too.
+// Four digits, or eight; python-can also writes seven.
 const char* read_id(std::string_view word, can::Frame& frame) {
   constexpr std::size_t kStandardDigits = 4;
   const auto id = number_of<std::uint32_t>(word, 16);
@@ -147,7 +147,7 @@ const char* read_length(const Columns& columns, can::Frame& frame) {
 
 enum class Type : std::uint8_t { kFrame, kRemote, kError, kOther };
 
-// Of version 2: what a line is, and the flags of FD.
+// For version 2: the type of a line, and the flags of FD.
 Type type_of(std::string_view word, can::Frame& frame) {
   if (word == "DT") return Type::kFrame;
   if (word == "RR") return Type::kRemote;
@@ -160,7 +160,7 @@ Type type_of(std::string_view word, can::Frame& frame) {
   return Type::kFrame;
 }
 
-// Of version 1: the direction takes the type's place.
+// For version 1: the direction is in the column of the type.
 Type type_of_first(const Columns& columns, can::Frame& /*frame*/) {
   if (columns.type == "Error") return Type::kError;
   if (!columns.type.empty() && columns.type != "Rx" && columns.type != "Tx") return Type::kOther;
@@ -243,7 +243,7 @@ Parsed TrcReader::parse(std::string_view line, LogRecord& record) {
   if (line.front() == ';') return parse_head(line);
   const std::string_view letters =
       version_ >= 200 ? std::string_view(columns_.data()) : columns_of(version_);
-  if (letters.empty()) return malformed("no $COLUMNS stood before it");
+  if (letters.empty()) return malformed("no $COLUMNS before it");
   const Columns columns = split(line, letters);
   const auto time = decimal_time(columns.time, kMilli_ns);
   if (!time) return malformed("stamp: no number");

@@ -1,7 +1,7 @@
 #pragma once
 
-// PEAK's TRC, versions 1.0 to 2.1: what PCAN-View and PEAK's loggers write. Stamps count from
-// $STARTTIME, which is local time, or from zero where a file (version 1.0) has none.
+// PEAK's TRC, versions 1.0 to 2.1, which PCAN-View and PEAK's loggers write. Stamps count from
+// $STARTTIME, which is local time, or from zero if a file (version 1.0) has none.
 
 #include <array>
 #include <memory>
@@ -17,10 +17,10 @@ class TrcReader final : public LineReader {
  public:
   explicit TrcReader(std::unique_ptr<ByteSource> bytes) : LineReader(std::move(bytes)) {}
 
-  /// The columns of one line, as $COLUMNS or the version names them; empty where there is none.
+  /// The columns of one line, named by $COLUMNS or by the version; empty if the line has none.
   struct Columns {
     std::string_view time;       ///< "O", ms
-    std::string_view type;       ///< "T"; of 1.x the direction, or what kind of message it is
+    std::string_view type;       ///< "T"; in 1.x the direction, or the kind of message
     std::string_view bus;        ///< "B"
     std::string_view id;         ///< "I"
     std::string_view direction;  ///< "d"
@@ -35,7 +35,7 @@ class TrcReader final : public LineReader {
 
   unsigned version_ = 100;  ///< 100 · major + minor
   static constexpr std::size_t kColumnsMax = 16;
-  std::array<char, kColumnsMax> columns_{};  ///< of version 2: letters
+  std::array<char, kColumnsMax> columns_{};  ///< letters, for version 2
   std::int64_t zero_ns_ = 0;
 };
 

@@ -18,7 +18,7 @@ namespace {
 using namespace std::string_view_literals;
 
 constexpr std::uint64_t kMiB = 1U << 20U;
-// A file that asks for more is refused: it would only be a way to take the machine's memory.
+// A file that requests more is refused, since it could be made to exhaust memory.
 constexpr std::uint64_t kMemoryBytesMax = 256 * kMiB;
 constexpr int kWindowLogMax = 28;
 static_assert(std::uint64_t{1} << kWindowLogMax == kMemoryBytesMax);
@@ -33,7 +33,7 @@ struct Buffers {
 
 enum class Step : std::uint8_t { kGoing, kMemberEnd, kFailed };
 
-/// One packing's library.
+/// The library of one packing.
 class Unpacker {
  public:
   Unpacker() = default;
@@ -42,9 +42,9 @@ class Unpacker {
   virtual ~Unpacker() = default;
   virtual bool is_ready() const = 0;
   virtual Step step(Buffers& buffers) = 0;
-  /// Whether another member may begin with this byte; then the next step() begins it.
+  /// Can another member begin with this byte? If so, the next step() begins it.
   virtual bool restart(std::uint8_t first) = 0;
-  /// After kFailed.
+  /// Precondition: step() returned kFailed.
   [[nodiscard]] virtual Error failure(const std::string& name) const = 0;
 };
 
@@ -54,7 +54,7 @@ Error no_memory(const std::string& name) {
 
 class Gzip final : public Unpacker {
  public:
-  // 16: a gzip header and nothing else.
+  // 16: accept a gzip header only.
   Gzip() { ready_ = ::inflateInit2(&stream_, 16 + MAX_WBITS) == Z_OK; }
   ~Gzip() override { ::inflateEnd(&stream_); }
   bool is_ready() const override { return ready_; }
@@ -90,7 +90,7 @@ class Gzip final : public Unpacker {
 
 class Xz final : public Unpacker {
  public:
-  // Members and the padding between them are the library's business.
+  // The library handles members and the padding between them.
   Xz() { ready_ = ::lzma_stream_decoder(&stream_, kMemoryBytesMax, LZMA_CONCATENATED) == LZMA_OK; }
   ~Xz() override { ::lzma_end(&stream_); }
   bool is_ready() const override { return ready_; }
@@ -118,7 +118,7 @@ class Xz final : public Unpacker {
               "`xz -dc FILE.xz | vgyro … -` unpacks it outside"};
     }
     if (result_ == LZMA_OPTIONS_ERROR) {
-      return {name, "is packed in a way that this version of liblzma does not know", {}};
+      return {name, "is packed in a way that this liblzma does not support", {}};
     }
     return {name, fmt::format("is damaged (liblzma error {})", static_cast<int>(result_)), {}};
   }
@@ -148,7 +148,7 @@ class Zstd final : public Unpacker {
     if (::ZSTD_isError(result_) != 0) return Step::kFailed;
     return result_ == 0 ? Step::kMemberEnd : Step::kGoing;
   }
-  // A frame, or one that is to be skipped.
+  // A frame, or a skippable one.
   bool restart(std::uint8_t first) override { return first == 0x28 || (first & 0xF0U) == 0x50; }
   Error failure(const std::string& name) const override {
     const ZSTD_ErrorCode code = ::ZSTD_getErrorCode(result_);
@@ -257,7 +257,7 @@ class UnpackedSource final : public ByteSource {
     }
   }
 
-  // Behind a member: padding, another member, the end, or what is no part of the file.
+  // After a member: padding, another member, the end, or bytes that are not part of the file.
   void begin_member() {
     while (buffers_.in_left > 0 && *buffers_.in == 0) {
       ++buffers_.in;
@@ -277,7 +277,7 @@ class UnpackedSource final : public ByteSource {
   std::unique_ptr<Unpacker> unpacker_;
   std::unique_ptr<std::uint8_t[]> input_ = std::make_unique<std::uint8_t[]>(kInputBytes);
   Buffers buffers_;
-  bool between_ = false;  ///< a member ended, none has begun
+  bool between_ = false;  ///< a member has ended, and no other has begun
   bool done_ = false;
   std::optional<Error> error_;
 };
@@ -289,9 +289,9 @@ std::unique_ptr<Unpacker> make() {
 
 struct Packing {
   bool (*begins)(std::string_view head);
-  std::unique_ptr<Unpacker> (*unpacker)();  ///< null: it can only be named
+  std::unique_ptr<Unpacker> (*unpacker)();  ///< null: the packing can only be named
   std::string_view name;
-  std::string_view command;  ///< that writes the unpacked bytes to standard output
+  std::string_view command;  ///< command that writes the unpacked bytes to standard output
 };
 
 bool begins_zstd(std::string_view head) {
@@ -326,10 +326,10 @@ constexpr std::array kPackings{
         nullptr, "lzma", "xz --format=lzma -dc"},
 };
 
-// No packing needs more to be known.
+// Every packing can be recognised by this many bytes.
 constexpr std::size_t kMagicBytes = 10;
 
-// Four letters that no packing begins with: then nothing need be waited for.
+// Four printable characters that begin no packing: no need to wait for more.
 bool is_plain(std::string_view head) {
   constexpr std::size_t kLetters = 4;
   return head.size() >= kLetters && !head.starts_with("BZh"sv) && !head.starts_with("LZIP"sv) &&
@@ -338,7 +338,7 @@ bool is_plain(std::string_view head) {
 }
 
 const Packing* packing_of(HeadedSource& source) {
-  // The first letters of a live log may come alone.
+  // The first characters of a live log may come alone.
   while (source.head().size() < kMagicBytes && !is_plain(source.head()) && source.grow()) {
   }
   const auto found = std::find_if(kPackings.begin(), kPackings.end(), [&](const Packing& packing) {
@@ -350,7 +350,7 @@ const Packing* packing_of(HeadedSource& source) {
 }  // namespace
 
 Expected<std::unique_ptr<ByteSource>> unpacked(std::unique_ptr<ByteSource> packed) {
-  // Packed once, and by mistake twice: beyond that nobody means it.
+  // Packed once, and by mistake twice; more layers are never intended.
   constexpr int kLayersMax = 2;
   for (int layer = 0;; ++layer) {
     auto headed = std::make_unique<HeadedSource>(std::move(packed));

@@ -1,9 +1,9 @@
 #pragma once
 
-// Packed logs: gzip, xz, zstd and bzip2, known by their first bytes and not by the file's name,
-// also several members one behind the other. What comes out before damage, or before the end of a
-// file whose writer was killed, is handed on first; the next read says what is wrong and where to
-// go. Memory is bounded: 256 MiB for a dictionary, whatever the file asks for.
+// Packed logs: gzip, xz, zstd and bzip2, recognised by their first bytes, not by the file's name;
+// also several members in sequence. Bytes unpacked before damage, or before the end of a file whose
+// writer was killed, are returned first; the next read reports the problem and a remedy. Memory is
+// bounded: 256 MiB for a dictionary, whatever the file requests.
 
 #include <memory>
 
@@ -12,8 +12,8 @@
 
 namespace vgyro::canlog {
 
-/// `packed` itself where it is not packed. Error where it is packed in a way that is not known, or
-/// cannot be read at all.
+/// `packed` itself if it is not packed. Error if its packing is unknown, or if it cannot be read at
+/// all.
 Expected<std::unique_ptr<ByteSource>> unpacked(std::unique_ptr<ByteSource> packed);
 
 }  // namespace vgyro::canlog

@@ -22,12 +22,12 @@ struct MonthName {
   std::string_view name;
   unsigned month;
 };
-// As UTF-8 and as the code page of Windows has them.
+// In UTF-8 and in the Windows code page.
 constexpr std::array kGermanMonths{MonthName{"m\xC3\xA4r", 3}, MonthName{"m\xE4r", 3},
                                    MonthName{"mrz", 3},        MonthName{"mai", 5},
                                    MonthName{"okt", 10},       MonthName{"dez", 12}};
 
-// Zero where it is none.
+// Zero for any other word.
 unsigned month_of(const std::string& word) {
   for (unsigned i = 0; i < kMonths.size(); ++i)
     if (word.starts_with(kMonths[i])) return i + 1;
@@ -72,7 +72,7 @@ bool is_possible(const WallTime& wall) {
          wall.day >= 1 && wall.day <= 31;
 }
 
-// Twelve o'clock is the half's beginning.
+// Twelve o'clock begins each half of the day.
 bool set_half_of_day(std::string_view half, WallTime& wall) {
   constexpr unsigned kNoon = 12;
   if (wall.hour < 1 || wall.hour > kNoon) return false;

@@ -18,18 +18,18 @@ namespace {
 
 constexpr std::string_view kJ1939Format = "J1939PG";
 constexpr std::uint32_t kJ1939FormatNumber = 3;
-constexpr std::string_view kFdFormatEnding = "_FD";  // of StandardCAN_FD and ExtendedCAN_FD
+constexpr std::string_view kFdFormatEnding = "_FD";  // ending of StandardCAN_FD and ExtendedCAN_FD
 constexpr std::array<std::uint32_t, 2> kFdFormatNumbers{14, 15};
 constexpr unsigned kClassicBytesMost = 8;
 constexpr std::string_view kJ1939Protocol = "J1939";
 
-// A large table named by very many signals must not fill the memory.
+// Limits the memory if very many signals refer to one large table.
 constexpr std::size_t kTableCopiesBytesMax = std::size_t{64} << 20U;
 
-/// A message's place among all messages; ordered maps keep hostile names from being slow.
+/// Place of a message among all messages; ordered maps stay fast with hostile names.
 using MessageIndex = std::map<std::pair<bool, std::uint32_t>, std::size_t>;
 using SignalIndex = std::map<std::pair<std::size_t, std::string_view>, std::size_t>;
-/// Pairs of a message's and a signal's place.
+/// Pairs of a message's place and a signal's place.
 using SignalSet = std::set<std::pair<std::size_t, std::size_t>>;
 
 class Assembly {
@@ -71,7 +71,7 @@ Database Assembly::run(std::string path) {
   labels();
   frame_formats();
   start_values();
-  simple_multiplex();  // last: it may take signals out, which the index does not follow
+  simple_multiplex();  // last: it may remove signals, which the index does not track
   check_layouts();
   return {std::move(path), std::move(contents_.messages), contents_.diagnostics.take()};
 }
@@ -149,7 +149,7 @@ void Assembly::labels() {
     Signal* const signal = find(statement.at);
     if (signal == nullptr) continue;
     signal->labels = labels_of(statement);
-    // Some tools write the bit pattern where the signal is signed: 255 for an 8-bit -1.
+    // Some tools write the bit pattern of a signed value: 255 for an 8-bit -1.
     if (signal->type != ValueType::kSigned || signal->length_bits >= 63) continue;
     const std::int64_t span = std::int64_t{1} << signal->length_bits;
     for (ValueLabel& label : signal->labels) {
@@ -218,7 +218,7 @@ void Assembly::simple_multiplex() {
   for (const SimpleMultiplex& item : contents_.simple_multiplex) {
     Signal& signal = messages[item.message].signals[item.signal];
     const Root& root = roots[item.message];
-    if (signal.condition) continue;  // SG_MUL_VAL_ says it all
+    if (signal.condition) continue;  // SG_MUL_VAL_ has set it
     if (root.count == 1) {
       signal.condition = {root.name, {{item.value, item.value}}};
       continue;
@@ -290,7 +290,7 @@ void Assembly::start_values() {
     }
   }
   for (const StartValueStatement& statement : contents_.start_values) {
-    // Many files have such values of signals that were taken out; nobody misses them.
+    // Many files have start values of signals that were removed; they are no error.
     const SplitId id = split_id(statement.at.id);
     const auto message = message_index_.find({id.extended, id.id});
     if (message == message_index_.end()) continue;

@@ -1,7 +1,7 @@
 #pragma once
 
-// The second half of reading a DBC file: comments, labels, float types and multiplexing go to the
-// signals they refer to, wherever in the file they stood, and what does not fit is reported.
+// The second half of reading a DBC file: attaches comments, labels, float types and multiplexing to
+// the signals they refer to, regardless of their order in the file, and reports what does not fit.
 
 #include <string>
 

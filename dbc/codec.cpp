@@ -102,8 +102,8 @@ std::uint64_t SignalCodec::nearest_raw(double value) const {
   if (type_ == ValueType::kFloat32)
     return std::bit_cast<std::uint32_t>(static_cast<float>(clamped));
 
-  // Compared this way round, NaN is not above the minimum. The limit above is a power of two: the
-  // largest 64-bit raw value itself is no double.
+  // NaN fails the comparison, so it becomes the minimum. The limit above is a power of two, because
+  // the largest 64-bit raw value is not a double.
   const bool is_signed = type_ == ValueType::kSigned;
   const int value_bits = 64 - shift_down_ - (is_signed ? 1 : 0);
   const std::uint64_t raw_max = ~std::uint64_t{0} >> shift_down_ >> (is_signed ? 1U : 0U);

@@ -1,7 +1,7 @@
 #pragma once
 
-// One signal of one message, its bit positions resolved once: payload bytes to value and back.
-// A payload shorter than the signal is never read: the caller asks fits() first.
+// One signal of one message, with its bit positions resolved once: converts payload bytes to a
+// value and back. Never reads a payload shorter than the signal: call fits() first.
 
 #include <bit>
 #include <cstddef>
@@ -17,15 +17,16 @@
 namespace vgyro::dbc {
 
 struct Reading {
-  /// Bit pattern as a number; for floats the IEEE bits, for 64-bit unsigned two's complement.
+  /// Bit pattern as a number; for floats the IEEE bits, for 64-bit unsigned values two's
+  /// complement.
   std::int64_t raw = 0;
-  double value = 0.0;  ///< physical: raw · factor + offset (of the float value, where it is one)
+  double value = 0.0;  ///< physical: raw · factor + offset; for floats, of the float value
 };
 
 class SignalCodec {
  public:
-  /// Error when the signal is longer than 64 bits, of zero length, not inside `message_bytes`, or
-  /// a float of another length than 32 or 64. `where` names the place in messages.
+  /// Error if the signal is longer than 64 bits, of zero length, or not inside `message_bytes`, or
+  /// if it is a float of a length other than 32 or 64. `where` names the place in the error.
   static Expected<SignalCodec> make(const Signal& signal, std::size_t message_bytes,
                                     const std::string& where);
 
@@ -39,23 +40,23 @@ class SignalCodec {
   /// Reading::raw alone. Precondition: fits(payload.size()).
   [[nodiscard]] std::int64_t decode_raw(std::span<const std::uint8_t> payload) const;
 
-  /// Rounds to the nearest raw value and saturates at the signal's range of raw values; NaN is an
-  /// error of the caller (it encodes as the smallest raw value). Precondition:
-  /// fits(payload.size()).
+  /// Rounds to the nearest raw value and saturates at the range of raw values. NaN is a caller's
+  /// error and becomes the smallest raw value. Precondition: fits(payload.size()).
   void encode(double value, std::span<std::uint8_t> payload) const;
   /// Writes the lowest bits of `raw`. Precondition: fits(payload.size()).
   void encode_raw(std::uint64_t raw, std::span<std::uint8_t> payload) const;
 
-  /// All bits of the signal, at the bottom of a word.
+  /// All bits of the signal, at the low end of a word.
   [[nodiscard]] std::uint64_t raw_mask() const { return ~std::uint64_t{0} >> shift_down_; }
-  /// The smallest raw value, of an integer.
+  /// The smallest raw value of an integer signal.
   [[nodiscard]] std::int64_t raw_min() const {
     return type_ == ValueType::kSigned ? -static_cast<std::int64_t>(raw_mask() / 2) - 1 : 0;
   }
-  /// The physical value of a raw one, in the very digits that decode() gives.
+  /// The physical value of a raw value, exactly as decode() computes it.
   [[nodiscard]] double value_of(std::int64_t raw) const { return number(raw) * factor_ + offset_; }
 
-  /// Physical values of the smallest and the largest raw value (of floats: ±largest finite).
+  /// Physical values of the smallest and the largest raw value; for floats ± the largest finite
+  /// number.
   [[nodiscard]] double representable_min() const;
   [[nodiscard]] double representable_max() const;
 
@@ -83,16 +84,16 @@ class SignalCodec {
   std::uint32_t window_byte_ = 0;
   std::uint32_t bytes_needed_ = 0;
   std::uint32_t lowest_byte_ = 0;  ///< holds the least significant bit
-  std::uint8_t lowest_bit_ = 0;    ///< of that byte
+  std::uint8_t lowest_bit_ = 0;    ///< in that byte
   std::uint8_t span_bytes_ = 0;
-  std::uint8_t shift_up_ = 0;    ///< brings the signal to the top of the window
-  std::uint8_t shift_down_ = 0;  ///< from the top of a word to its bottom
+  std::uint8_t shift_up_ = 0;    ///< shifts the signal to the high end of the window
+  std::uint8_t shift_down_ = 0;  ///< shifts it from the high end of a word to the low end
   ByteOrder byte_order_ = ByteOrder::kIntel;
   ValueType type_ = ValueType::kUnsigned;
 };
 
-/// Does the signal have a range, and one that its own scale can reach, to a step? Files in the wild
-/// carry others. `codec`: of the same signal.
+/// Does the signal have a range, and can its scale reach that range to within a step? Some real
+/// files have other ranges. `codec` belongs to the same signal.
 bool has_reachable_range(const Signal& signal, const SignalCodec& codec);
 
 inline std::uint64_t SignalCodec::load_window(const std::uint8_t* payload) const {

@@ -13,7 +13,7 @@ namespace {
 
 constexpr unsigned kBitsMax = 64;
 constexpr unsigned kByteBits = 8;
-// J1939: the top byte decides. 0xFB stands for something of the parameter's own, 0xFC and 0xFD are
+// J1939: the top byte decides. 0xFB has a meaning specific to the parameter, 0xFC and 0xFD are
 // reserved.
 constexpr std::uint64_t kJ1939First = 0xFB;
 constexpr std::uint64_t kJ1939Reserved = 0xFC;
@@ -65,8 +65,8 @@ void replace_all(std::string& text, std::string_view from, std::string_view to) 
     text.replace(at, from.size(), to);
 }
 
-/// In lower case, a blank before each word of "NotAvailable" (not inside "0xFFFF"), umlauts written
-/// out, "n/a" and "n.a." as "na".
+/// Lower case, with a blank before each word of "NotAvailable" (not inside "0xFFFF"), umlauts
+/// written out, and "n/a" and "n.a." as "na".
 std::string plain_text(std::string_view label) {
   std::string text;
   bool in_number = false;
@@ -86,7 +86,7 @@ std::string plain_text(std::string_view label) {
   return text;
 }
 
-/// Numbers are left out.
+/// The words of a label without its numbers.
 std::vector<std::string> words_of(std::string_view label) {
   std::vector<std::string> words;
   std::string word;
@@ -106,7 +106,7 @@ bool is_one_of(std::string_view text, const std::array<std::string_view, N>& lis
   return std::find(list.begin(), list.end(), text) != list.end();
 }
 
-/// What is left when words that say nothing are taken out.
+/// The label without words that carry no meaning.
 std::string core_of(std::string_view label) {
   constexpr std::array<std::string_view, 22> kSaysNothing{
       "signal",    "value",     "data",        "sensor",    "measurement", "reading",
@@ -119,7 +119,7 @@ std::string core_of(std::string_view label) {
     if (is_one_of(std::string_view(word), kSaysNothing)) continue;
     core += (core.empty() ? "" : " ") + word;
   }
-  // "Signal not available (SNA)" says it twice.
+  // "Signal not available (SNA)" repeats its meaning.
   constexpr std::string_view kTwice = " sna";
   if (core.size() > kTwice.size() && core.ends_with(kTwice))
     core.resize(core.size() - kTwice.size());
@@ -131,7 +131,7 @@ bool says_unavailable(std::string_view core) {
       "not available",   "na",           "sna",         "unavailable",      "not avail",
       "not availible",   "notavailable", "no",          "nicht verfuegbar", "nicht verfgbar",
       "nicht vorhanden", "nv",           "not present", "missing",          "keine"};
-  // "no data", "keine Daten" and "Signal missing" lose their noun above.
+  // "no data", "keine Daten" and "Signal missing" have lost their noun above.
   return is_one_of(core, kSaid);
 }
 

@@ -1,7 +1,7 @@
 #pragma once
 
-// What the statements of one DBC file say before they are put together. Statements may come in any
-// order, so whatever refers to a message or signal waits here until the whole file has been read.
+// The statements of one DBC file before they are combined. They may come in any order, so anything
+// that refers to a message or signal waits here until the whole file has been read.
 
 #include <cstddef>
 #include <cstdint>
@@ -21,13 +21,13 @@ inline constexpr FileId kExtendedBit = 0x80000000;
 /// VECTOR__INDEPENDENT_SIG_MSG keeps signals that belong to no message.
 inline constexpr FileId kNoMessage = 0xC0000000;
 
-/// Collects the first oddities and counts the others: a hostile file cannot fill the memory.
+/// Keeps the first oddities and counts the others, so that a hostile file cannot fill the memory.
 class Diagnostics {
  public:
   static constexpr std::size_t kShownMax = 100;
 
   void add(unsigned line, std::string what);
-  /// In the order of lines; the last one counts the omitted ones.
+  /// In the order of lines; a last entry counts the omitted ones.
   [[nodiscard]] std::vector<Diagnostic> take();
 
  private:
@@ -39,7 +39,7 @@ class Diagnostics {
 struct Reference {
   unsigned line = 0;
   FileId id = 0;
-  std::string signal;  ///< empty where the message itself is meant
+  std::string signal;  ///< empty: the message itself
 };
 
 struct CommentStatement {
@@ -55,7 +55,7 @@ struct LongNameStatement {
 struct LabelsStatement {
   Reference at;
   std::vector<ValueLabel> labels;
-  std::string table;  ///< names a VAL_TABLE_ instead of giving labels
+  std::string table;  ///< name of a VAL_TABLE_, instead of labels
 };
 
 inline constexpr std::uint32_t kFloatKindMax = 2;
@@ -81,7 +81,7 @@ struct FrameFormatStatement {
   AttributeValue value;
 };
 
-/// `m3` on the SG_ line; which signal is the multiplexor shows when the message is complete.
+/// `m3` on the SG_ line; the multiplexor is known only when the message is complete.
 struct SimpleMultiplex {
   std::size_t message = 0;
   std::size_t signal = 0;

@@ -48,7 +48,7 @@ std::string_view word_at(std::string_view text, std::size_t position) {
   return text.substr(position, end - position);
 }
 
-/// What stands in the way, for a message.
+/// What was found instead, for an error.
 std::string shown(std::string_view text, std::size_t position) {
   if (position >= text.size()) return "the end of the file";
   if (text[position] == '\n') return "the end of the line";
@@ -150,7 +150,7 @@ double Cursor::number(std::string_view what) {
   const char* const begin = text_.data() + position_ + (plus ? 1 : 0);
   double value = 0.0;
   const auto [end, error] = std::from_chars(begin, text_.data() + text_.size(), value);
-  // from_chars also reads "-inf", which no DBC writer means.
+  // from_chars also reads "-inf", which is not meant in a DBC file.
   if (error == std::errc::invalid_argument ||
       (end != begin && !is_digit(end[-1]) && end[-1] != '.')) {
     fail(fmt::format("expected {}, found {}", what, shown(text_, position_)));
@@ -216,7 +216,7 @@ std::string Cursor::quoted(std::string_view what, Wrap wrap) {
   std::string out;
   out.reserve(inside.size());
   for (std::size_t i = 0; i < inside.size(); ++i) {
-    // Inside quotes a quote stands behind a backslash only.
+    // Inside quotes, a quote always follows a backslash.
     if (inside[i] == '\\' && i + 1 < inside.size() && inside[i + 1] == '"') continue;
     out.push_back(inside[i]);
   }

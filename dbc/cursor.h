@@ -1,8 +1,8 @@
 #pragma once
 
-// A place in DBC text and the small things that can be read there. The first thing that is not
-// as asked is remembered; from then on reads return nothing and move nothing, so a statement is
-// written down as a sequence and asked once at its end whether it worked.
+// A position in DBC text, with functions to read elements there. The first mismatch is kept as the
+// error; from then on reads return nothing and do not move, so that a statement can be read as a
+// sequence with one check at its end.
 
 #include <cstddef>
 #include <cstdint>
@@ -21,7 +21,7 @@ class Cursor {
   [[nodiscard]] const std::string& error() const { return error_; }
   void fail(std::string what);
 
-  /// What comes next, read past blanks and newlines, without taking it.
+  /// Looks at what follows blanks and newlines, without taking it.
   [[nodiscard]] char peek();
   [[nodiscard]] std::string_view peek_word();
   [[nodiscard]] bool peek_number();
@@ -40,28 +40,29 @@ class Cursor {
   std::int64_t label_value();
   enum class Wrap : bool { kNo, kYes };
   /// Does \" stand for a quote, or does the text end there? In Shift JIS the second byte of some
-  /// characters is a backslash. From now on, until set again.
+  /// characters is a backslash. Holds until it is set again.
   enum class Backslash : bool { kEscapes, kIsText };
   void take_backslash_as(Backslash backslash) { backslash_ = backslash; }
-  /// Unescaped text between quotes, over several lines where it may wrap.
+  /// Unescaped text between quotes; with Wrap::kYes it may extend over several lines.
   std::string quoted(std::string_view what, Wrap wrap);
   /// Empty when the line ends here.
   std::string_view word_on_this_line();
 
-  /// Up to the end of the line, the newline itself left.
+  /// Skips to the end of the line, before the newline.
   void skip_line();
-  /// Goes to the next line if a word stands alone on it.
+  /// Moves to the next line if that holds a single word.
   bool next_line_is_one_word();
-  /// Takes everything up to and with the next ';' outside quotes, or up to a line that begins
-  /// with a keyword.
+  /// Skips everything including the next ';' outside quotes, or to a line that begins with a
+  /// keyword.
   void skip_statement();
 
-  /// Forgets the error and goes on at the first line after `line_start` that begins with one.
+  /// A position to return to.
   struct Mark {
     std::size_t position;
     unsigned line;
   };
   [[nodiscard]] Mark mark();
+  /// Forgets the error and continues at the first later line that begins with a keyword.
   void resume_after(const Mark& statement_start);
   /// Forgets the error and goes back.
   void go_back_to(const Mark& mark);

@@ -1,7 +1,7 @@
 #pragma once
 
-// What a DBC file says, as values: messages, signals, units, labels. Built by dbc/parser.h;
-// is independent of frames on a bus.
+// The contents of a DBC file as values: messages, signals, units, labels. Built by dbc/parser.h;
+// independent of frames on a bus.
 
 #include <cstdint>
 #include <optional>
@@ -17,7 +17,7 @@ namespace vgyro::dbc {
 enum class ByteOrder : std::uint8_t { kIntel, kMotorola };
 enum class ValueType : std::uint8_t { kUnsigned, kSigned, kFloat32, kFloat64 };
 
-/// Whose rules say which raw values are no measurement (dbc/codes.h).
+/// Whose rules define the raw values that are not measurements (dbc/codes.h).
 enum class CodeRules : std::uint8_t { kNone, kJ1939, kNmea2000 };
 
 struct ValueLabel {
@@ -25,7 +25,7 @@ struct ValueLabel {
   std::string text;
 };
 
-/// Present only while the multiplexor signal's raw value lies in one of the ranges.
+/// A signal is present only while the multiplexor signal's raw value lies in one of the ranges.
 struct MultiplexCondition {
   std::string multiplexor;  ///< name of a signal of the same message, itself perhaps conditional
   std::vector<std::pair<std::uint64_t, std::uint64_t>> ranges;  ///< both ends included
@@ -33,7 +33,7 @@ struct MultiplexCondition {
 
 struct Signal {
   std::string name;
-  std::string long_name;  ///< as SystemSignalLongSymbol gives it; empty: the name is all of it
+  std::string long_name;        ///< from SystemSignalLongSymbol; empty: `name` is complete
   std::uint16_t start_bit = 0;  ///< as in the file: LSB for Intel, MSB for Motorola
   std::uint16_t length_bits = 0;
   ByteOrder byte_order = ByteOrder::kIntel;
@@ -58,11 +58,11 @@ struct Signal {
 
 struct Message {
   std::string name;
-  std::string long_name;  ///< as SystemMessageLongSymbol gives it; empty: the name is all of it
+  std::string long_name;  ///< from SystemMessageLongSymbol; empty: `name` is complete
   std::uint32_t id = 0;   ///< without flags
   bool extended = false;
   bool is_j1939 = false;  ///< compare by PGN, any source address
-  bool is_fd = false;     ///< CAN FD, by VFrameFormat or by its length
+  bool is_fd = false;     ///< CAN FD, according to VFrameFormat or its length
   CodeRules codes = CodeRules::kNone;
   std::uint16_t size_bytes = 0;
   std::string sender;
@@ -70,7 +70,7 @@ struct Message {
   std::vector<Signal> signals;
   unsigned line = 0;
 
-  /// By its name, or by its long name where no signal has that for its name.
+  /// Finds a signal by its name, or by its long name if no signal has that name.
   [[nodiscard]] const Signal* find_signal(std::string_view signal_name) const;
   /// For suggestions: names, then long names.
   [[nodiscard]] std::vector<std::string> signal_names() const;
@@ -80,8 +80,8 @@ struct Message {
   [[nodiscard]] std::uint32_t id_mask() const;
 };
 
-/// The bits of a 29-bit identifier that name its J1939 parameter group: what a message's mask would
-/// be if it were a J1939 message.
+/// The bits of a 29-bit identifier that contain its J1939 parameter group: the mask of a message
+/// with this identifier if it is a J1939 message.
 std::uint32_t pgn_mask(std::uint32_t id);
 /// J1939: the same parameter group from the same sender, whatever its priority, to the same
 /// receiver.
@@ -98,7 +98,7 @@ struct Database {
   std::vector<Message> messages;
   std::vector<Diagnostic> diagnostics;
 
-  /// By its name, or by its long name where no message has that for its name.
+  /// Finds a message by its name, or by its long name if no message has that name.
   [[nodiscard]] const Message* find_message(std::string_view message_name) const;
   /// For suggestions: names, then long names.
   [[nodiscard]] std::vector<std::string> message_names() const;

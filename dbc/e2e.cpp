@@ -10,7 +10,7 @@ namespace {
 constexpr unsigned kCounterMax1 = 14;  // 15 is "invalid"
 constexpr std::size_t kHeaderBytes5 = 3;
 
-/// What a CRC register of W bits becomes after one byte, for each value of its topmost byte.
+/// The state of a CRC register of W bits after one byte, for each value of its topmost byte.
 template <class W>
 constexpr std::array<W, 256> crc_table(unsigned polynomial) {
   constexpr unsigned kBits = 8 * sizeof(W);
@@ -25,8 +25,8 @@ constexpr std::array<W, 256> crc_table(unsigned polynomial) {
   return table;
 }
 
-/// What a byte adds to a CRC-8 once some more bytes have come, at most seven. The shares of eight
-/// bytes are looked up side by side, where byte by byte each one waits for the one before.
+/// The contribution of a byte to a CRC-8 when up to seven bytes follow it. The contributions of
+/// eight bytes are looked up independently; byte by byte, each step would wait for the one before.
 using Crc8Shares = std::array<std::array<std::uint8_t, 256>, 8>;
 constexpr Crc8Shares crc8_shares(unsigned polynomial) {
   Crc8Shares shares{};
@@ -44,7 +44,7 @@ constexpr auto kCrc16 = crc_table<std::uint16_t>(0x1021);
 
 using Bytes = std::span<const std::uint8_t>;
 
-/// What is protected: all bytes but those of the check value.
+/// The protected data: all bytes but those of the check value.
 struct Data {
   Bytes before;
   Bytes after;
@@ -66,7 +66,7 @@ class Crc8 {
   [[nodiscard]] std::uint8_t value() const { return crc_; }
 
  private:
-  // One to eight bytes.
+  // Precondition: one to eight bytes.
   void add_some(Bytes bytes) {
     const std::size_t last = bytes.size() - 1;
     std::uint8_t sum = shares_[last][bytes[0] ^ crc_];
@@ -199,7 +199,7 @@ std::uint16_t E2eProtection::value(Bytes payload) const {
     case E2eKind::kProfile1B:
       return profile_1({(header(payload) & 1U) == 0 ? low_byte(id) : high_byte(id)}, data);
     case E2eKind::kProfile1C:
-      // The high byte's nibble is data, and zero stands here for it.
+      // The high byte's nibble is part of the data, so zero replaces it here.
       return profile_1({low_byte(id), 0U}, data);
     case E2eKind::kProfile2:
       return profile_2(layout_.data_ids[header(payload) & 0x0FU], data);
@@ -238,7 +238,7 @@ E2eProfile11C::E2eProfile11C(std::uint16_t data_id)
       nibble_(static_cast<std::uint8_t>((high_byte(data_id) & 0x0FU) << 4U)),
       crc_of_id_(profile_1({low_byte(data_id), 0U}, {})) {}
 
-// As E2eProtection::seal() for this one layout, in fewer steps.
+// Same as E2eProtection::seal() for this layout, in fewer steps.
 void E2eProfile11C::protect(std::span<std::uint8_t, 8> payload) {
   payload[1] = static_cast<std::uint8_t>(nibble_ | counter_);
   payload[0] = static_cast<std::uint8_t>(

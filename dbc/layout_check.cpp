@@ -15,8 +15,8 @@ namespace vgyro::dbc {
 
 namespace {
 
-// Overlaps are looked for in what one frame can carry; longer (transported) messages have no more
-// than their first 64 bytes looked at.
+// Overlaps are checked within what one frame can carry; in longer (transported) messages only
+// within the first 64 bytes.
 constexpr std::size_t kCheckedBits = 512;
 using Bits = std::bitset<kCheckedBits>;
 using Owners = std::array<const Signal*, kCheckedBits>;
@@ -62,7 +62,7 @@ void check_signal(const Message& message, Signal& signal, Diagnostics& diagnosti
   if (no_range || signal.minimum > signal.maximum) signal.minimum = signal.maximum = 0.0;
 }
 
-/// The first signal without condition that has one of these bits.
+/// The first unconditional signal that has one of these bits.
 const Signal* owner_of(const Bits& bits, const Owners& owners) {
   for (std::size_t i = 0; i < kCheckedBits; ++i) {
     if (bits[i] && owners[i] != nullptr) return owners[i];
@@ -70,7 +70,7 @@ const Signal* owner_of(const Bits& bits, const Owners& owners) {
   return nullptr;
 }
 
-/// Multiplexed signals are compared with those always present and with those of the same value.
+/// Compares multiplexed signals with those always present and with those of the same value.
 void check_overlaps(const Message& message, Diagnostics& diagnostics) {
   const auto overlap = [&](const Signal& signal, std::string_view other) {
     diagnostics.add(signal.line, fmt::format("signal {} of message {} overlaps {}", signal.name,

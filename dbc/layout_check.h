@@ -1,8 +1,7 @@
 #pragma once
 
-// What a careful reader would ask the author of a DBC file about one message: signals outside of
-// the frame, signals on top of each other, scales that lose the value. Reports; changes only a
-// range of values that no value can lie in.
+// Reports problems in the layout of one message: signals outside the frame, overlapping signals,
+// scales that lose the value. Changes only a range in which no value can lie.
 
 #include "dbc/contents.h"
 #include "dbc/database.h"

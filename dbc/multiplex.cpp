@@ -9,7 +9,7 @@
 
 namespace vgyro::dbc {
 
-/// Makes the conditions of a message's signals, each once.
+/// Builds the conditions of a message's signals, each condition once.
 class PresenceBuilder {
  public:
   explicit PresenceBuilder(const Message& message) : message_(message) {

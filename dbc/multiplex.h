@@ -1,8 +1,8 @@
 #pragma once
 
-// Which signals a frame carries. Multiplexed signals are there only while their multiplexor, itself
-// perhaps multiplexed, has one of certain values. Everything is resolved once: looking at a frame
-// allocates nothing and reads nothing beyond the payload.
+// Which signals a frame carries. Multiplexed signals are present only while their multiplexor,
+// itself perhaps multiplexed, has one of certain values. Everything is resolved once: checking a
+// frame allocates nothing and reads nothing beyond the payload.
 
 #include <cstddef>
 #include <cstdint>
@@ -18,14 +18,14 @@
 
 namespace vgyro::dbc {
 
-/// Tells from the payload whether a signal is there. Without conditions it always is.
+/// Decides from the payload whether a signal is present. Without conditions it always is.
 class Presence {
  public:
-  /// Multiplexors of multiplexors that are followed; more, or a circle, is an error.
+  /// Limit of nested multiplexors; more, or a circle, is an error.
   static constexpr std::size_t kDepthMax = 16;
 
-  /// Error when a multiplexor is missing, cannot be decoded, or depends on itself. `where` names
-  /// the place in messages.
+  /// Error if a multiplexor is missing, cannot be decoded, or depends on itself. `where` names the
+  /// place in the error.
   static Expected<Presence> make(const Message& message, const Signal& signal,
                                  const std::string& where);
 
@@ -34,12 +34,12 @@ class Presence {
   void arrange(std::span<std::uint8_t> payload) const;
   [[nodiscard]] bool always() const { return last_ == nullptr; }
 
-  /// The same conditions, from whatever file.
+  /// True for equal conditions, from whatever file.
   friend bool operator==(const Presence& a, const Presence& b);
 
  private:
   friend class PresenceBuilder;
-  /// Signals of the same message share what they have in common.
+  /// One condition; signals of the same message share the conditions they have in common.
   struct Step {
     SignalCodec multiplexor;
     std::uint64_t mask;  ///< a multiplexor declared signed still counts its bit pattern
@@ -55,7 +55,7 @@ class MessageCodec {
  public:
   explicit MessageCodec(const Message& message, const std::string& path = {});
 
-  /// Calls `use(const Signal&, const Reading&)` for every signal that is there, in file order.
+  /// Calls `use(const Signal&, const Reading&)` for every signal present, in file order.
   template <class Use>
   void for_each(std::span<const std::uint8_t> payload, Use&& use) const {
     for (const Entry& entry : entries_) {
@@ -65,7 +65,7 @@ class MessageCodec {
   }
 
   [[nodiscard]] const Message& message() const { return *message_; }
-  /// Why signals of the message are never read.
+  /// The reasons why some signals of the message are never read.
   [[nodiscard]] const std::vector<Error>& left_out() const { return left_out_; }
 
  private:

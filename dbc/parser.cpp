@@ -24,7 +24,7 @@ constexpr std::uint32_t kUint32Max = std::numeric_limits<std::uint32_t>::max();
 constexpr std::string_view kFrameFormat = "VFrameFormat";
 constexpr std::string_view kProtocol = "ProtocolType";
 constexpr std::string_view kStartValue = "GenSigStartValue";
-// Names beyond 32 characters stand in attributes; the file itself shortens them.
+// Names beyond 32 characters are in attributes; the file itself holds shortened names.
 constexpr std::string_view kLongMessageName = "SystemMessageLongSymbol";
 constexpr std::string_view kLongSignalName = "SystemSignalLongSymbol";
 
@@ -65,8 +65,8 @@ class Parser {
 
   Cursor cursor_;
   Contents contents_;
-  unsigned line_ = 0;  ///< of the statement
-  // SG_ lines after a BO_ that is skipped belong to no message, which is not their own fault.
+  unsigned line_ = 0;  ///< line of the statement
+  // SG_ lines after a skipped BO_ belong to no message and are not errors themselves.
   enum class Scope : std::uint8_t { kOutside, kMessage, kSkipped };
   Scope scope_ = Scope::kOutside;
   std::set<std::string, std::less<>> signal_names_;  ///< of the present message
@@ -83,8 +83,8 @@ Contents Parser::run() {
   return std::move(contents_);
 }
 
-/// A statement that failed, once more: \" may be the end of a text in Shift JIS, where the second
-/// byte of a character can be a backslash. What parses is right; a failure is told as it was first.
+/// Reads a failed statement again: \" may be the end of a text in Shift JIS, where the second byte
+/// of a character can be a backslash. If that fails too, the first error is reported.
 bool Parser::read_with_plain_backslashes(const Cursor::Mark& start) {
   const std::string first_error = cursor_.error();
   cursor_.go_back_to(start);
@@ -125,7 +125,7 @@ void Parser::statement() {
   cursor_.fail(fmt::format("'{}' begins no section of a DBC file", keyword.substr(0, 40)));
 }
 
-/// NS_ lists keywords, one a line, that are no statements there.
+/// Skips NS_, which lists keywords, one on each line, that are not statements there.
 void Parser::symbols() {
   cursor_.skip_line();
   while (cursor_.next_line_is_one_word())
@@ -195,7 +195,7 @@ void Parser::keep_signal(Signal signal, std::optional<std::uint64_t> multiplex_v
   message.signals.push_back(std::move(signal));
 }
 
-/// M, m3 or m3M; gives the 3.
+/// M, m3 or m3M; returns the 3.
 std::optional<std::uint64_t> Parser::multiplex_role(Signal& signal) {
   std::string_view role = cursor_.peek_word();
   if (role.empty()) return std::nullopt;
@@ -259,7 +259,7 @@ void Parser::comment() {
   std::string text = cursor_.quoted("the comment", Cursor::Wrap::kYes);
   end_of_statement();
   if (cursor_.failed()) return;
-  if (nameless) return odd("this comment does not say which signal it is about; ignored");
+  if (nameless) return odd("this comment names no signal; ignored");
   contents_.comments.push_back({std::move(at), std::move(text)});
 }
 
@@ -284,7 +284,7 @@ void Parser::value_table() {
   }
 }
 
-/// VAL_ 291 Status 1 "on" 0 "off" ;   or with the name of a table   or of an environment variable
+/// VAL_ 291 Status 1 "on" 0 "off" ;   or with the name of a table, or of an environment variable
 void Parser::value_labels() {
   const bool is_signal = cursor_.peek_number();
   LabelsStatement statement;
@@ -380,7 +380,7 @@ void Parser::attribute() {
   }
 }
 
-/// Gives the message or the signal, where the attribute is one of these.
+/// The message or signal that the attribute refers to; nothing for other targets.
 std::optional<Reference> Parser::attribute_target() {
   if (cursor_.accept_word("BO_")) return Reference{line_, file_id(), {}};
   if (cursor_.accept_word("SG_")) return signal_reference();
@@ -396,7 +396,7 @@ AttributeValue Parser::attribute_value() {
   return {static_cast<std::uint32_t>(number), {}};
 }
 
-/// A number, perhaps in quotes; nothing where it is something else.
+/// A number, perhaps in quotes; nothing for anything else.
 std::optional<double> Parser::start_value() {
   const auto number_in = [](Cursor& cursor) -> std::optional<double> {
     if (!cursor.peek_number()) return std::nullopt;

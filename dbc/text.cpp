@@ -31,7 +31,8 @@ std::size_t sequence_length(std::string_view text, std::size_t i) {
   for (std::size_t k = 1; k < length; ++k) {
     if ((byte_at(text, i + k) & 0xC0U) != 0x80) return 0;
   }
-  // Overlong forms, surrogates and code points beyond the last one show in the second byte.
+  // Overlong forms, surrogates and code points beyond the last one are recognised by the second
+  // byte.
   const std::uint8_t second = byte_at(text, i + 1);
   const bool malformed = (lead == 0xE0 && second < 0xA0) || (lead == 0xED && second > 0x9F) ||
                          (lead == 0xF0 && second < 0x90) || (lead == 0xF4 && second > 0x8F);

@@ -1,7 +1,7 @@
 #pragma once
 
-// The bytes of a DBC file as one kind of text: UTF-8, lines ended by '\n', no byte order mark.
-// Tools on Windows write cp1252 and CRLF; what is valid UTF-8 already is left as it is.
+// Converts the bytes of a DBC file to UTF-8 with lines ended by '\n' and no byte order mark. Tools
+// on Windows write cp1252 and CRLF; text that is valid UTF-8 already is left unchanged.
 
 #include <string>
 #include <string_view>

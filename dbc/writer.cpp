@@ -14,7 +14,7 @@ namespace {
 constexpr std::uint32_t kExtendedBit = 0x80000000;
 constexpr const char* kNobody = "Vector__XXX";
 
-/// The shortest digits that read back the same.
+/// The shortest digits that read back as the same number.
 std::string plain(double value) {
   std::array<char, 400> digits{};
   const auto end =

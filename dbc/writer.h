@@ -1,7 +1,7 @@
 #pragma once
 
-// Messages and signals as the text of a DBC file. Written are names, layouts, factors, ranges,
-// units, comments, value labels and J1939 frame formats; not: multiplexing, long names, receivers.
+// Writes messages and signals as the text of a DBC file: names, layouts, factors, ranges, units,
+// comments, value labels and J1939 frame formats; not multiplexing, long names or receivers.
 
 #include <string>
 #include <vector>
@@ -10,7 +10,7 @@
 
 namespace vgyro::dbc {
 
-/// Reads back as it was (dbc/parser.h). Numbers are plain decimals, because there are readers that
+/// The text reads back unchanged (dbc/parser.h). Numbers are plain decimals, because some readers
 /// drop signals whose factor has an exponent. Quotes in texts become apostrophes. Precondition:
 /// names are C identifiers; no signal is multiplexed.
 std::string to_text(const std::vector<Message>& messages, const std::string& comment);

@@ -49,7 +49,7 @@ bool Attendance::hear_refused(std::size_t gyro, TimePoint t) {
 }
 
 bool Attendance::go_without(std::size_t gyro, bool at_once) {
-  // A frame that is lost makes a hole like any other.
+  // Up to two holes in a row are tolerated, as if those frames had been lost.
   constexpr std::uint32_t kHolesMost = 2;
   const bool goes = ++without_in_row_[gyro] > kHolesMost || at_once;
   if (!goes || !in_use_[gyro]) return false;
@@ -88,7 +88,7 @@ Attendance::Silence Attendance::look_for_silence(TimePoint t) {
   return silence;
 }
 
-// Where the clock was set among the samples that made the choice it says nothing.
+// The limit is for a clock that was set during those samples: the measured interval is then wrong.
 Duration Attendance::usual_interval(std::size_t gyro) const {
   return std::min<Duration>(aligner_.interval(gyro), fusion::StampGuard::kSlowest);
 }

@@ -29,58 +29,58 @@ class Attendance {
   /// But no gyro is missing before two samples have failed to come.
   static constexpr int kTimeOutIntervalsMin = 3;
 
-  /// Aligner and guard, which hold the gyros' intervals, must live as long.
+  /// `aligner` and `guard`, which hold the gyros' intervals, must outlive this object.
   Attendance(const Plan& plan, const fusion::Aligner& aligner, const fusion::StampGuard& guard);
 
   [[nodiscard]] bool in_use(std::size_t gyro) const { return in_use_[gyro]; }
   [[nodiscard]] bool any_in_use() const { return in_use_[0] || in_use_[1]; }
-  /// Pairs flow: both are in use.
+  /// Both gyros are in use, so pairs arrive.
   [[nodiscard]] bool pairing() const { return pairing_; }
 
   [[nodiscard]] double step_dps(std::size_t gyro) const { return health_[gyro].step_dps(); }
-  /// VB_Health, without the bit for disagreement.
+  /// VB_Health, except for the bit that reports disagreement.
   [[nodiscard]] std::uint8_t health_bits() const;
 
-  /// A rate that the frame says is one. Nothing when it may be used, else the cause why not.
-  /// `can_go_alone`: the other gyro, where it is in use, carries on without this one.
+  /// Judges a decoded rate. Returns nothing when it may be used, otherwise the cause of refusal.
+  /// `can_go_alone`: the other gyro, if it is in use, continues without this one.
   std::optional<Reject> judge(std::size_t gyro, TimePoint t, double rate_dps, bool can_go_alone);
-  /// A frame without a rate, for this cause, with an accepted stamp.
+  /// A frame that holds no usable rate, for this cause, and whose stamp was accepted.
   void judge_refused(std::size_t gyro, TimePoint t, Reject cause) {
     health_[gyro].refuse(t, cause);
   }
-  /// The corrector's result.
+  /// Passes the corrector's result on to the health of both gyros.
   void set_opinion(TimePoint t, const fusion::Condition& condition);
 
-  /// No gyro is in use, and no pair has come yet: from now on a gyro waits for the other one.
+  /// From now on, with no gyro in use and no pair so far, a gyro waits for the other one.
   void begin_waiting(TimePoint t) { waiting_since_ = t; }
-  /// A sample that may be used.
+  /// Records a usable sample.
   void hear(std::size_t gyro, TimePoint t);
-  /// A frame of `t` that may not be used. True when its gyro is set aside with it.
+  /// Records an unusable frame of time `t`. True when it takes its gyro out of use.
   bool hear_refused(std::size_t gyro, TimePoint t);
-  /// A sample that another axis of the unit makes unusable in the vehicle's axes. True
-  /// when this gyro goes out of use with it: at once, or after the third in a row.
+  /// Records a sample that cannot be turned into the vehicle's axes because another axis of the
+  /// unit is missing. True when it takes this gyro out of use: at once, or with the third in a row.
   bool go_without(std::size_t gyro, bool at_once);
-  /// Its own sensor's values, or what its frames say of it, are not to be used for now.
+  /// The gyro is not used for now, because of its own sensor's values or of what its frames report.
   [[nodiscard]] bool set_aside(std::size_t gyro) const { return health_[gyro].set_aside(); }
-  /// A pair has come. True when none had since the start, or since one gyro went.
+  /// Records a pair. True for the first one since the start or since a gyro dropped out.
   bool hear_pair();
-  /// A rate of this gyro alone goes out.
+  /// Records that a rate of this gyro alone goes out.
   void hear_alone(std::size_t gyro) { alone_ = gyro; }
-  /// Shall this gyro be used alone? Only when the other one is really missing, not while pairs are
+  /// May this gyro be used alone? Only when the other one is really missing, not while pairs are
   /// about to start. `paired`: there have been pairs.
   [[nodiscard]] bool may_speak_alone(std::size_t gyro, TimePoint t, bool paired) const;
 
   /// Marks the gyros that are silent for too long at `t`.
   struct Silence {
     std::array<bool, 2> fell_silent{};
-    TimePoint next = TimePoint::max();  ///< when a gyro will be, at the earliest
+    TimePoint next = TimePoint::max();  ///< earliest time at which another gyro falls silent
   };
   Silence look_for_silence(TimePoint t);
 
-  /// Of the samples that made the aligner's choice. Precondition: it is made.
+  /// From the samples that the aligner's choice was made of. Precondition: the choice is made.
   [[nodiscard]] Duration usual_interval(std::size_t gyro) const;
   [[nodiscard]] Duration time_out(std::size_t gyro) const;
-  /// Of the gyro at whose stamps the pairs stand; 0 where the choice is not made yet.
+  /// Interval of the gyro whose stamps the pairs have; 0 before the aligner has chosen.
   [[nodiscard]] Duration pair_interval() const;
 
   void tell(Status& status) const;
@@ -92,7 +92,7 @@ class Attendance {
   const fusion::StampGuard& guard_;
   std::array<GyroHealth, 2> health_;
   std::array<bool, 2> in_use_{};
-  std::array<std::uint32_t, 2> without_in_row_{};  ///< of go_without()
+  std::array<std::uint32_t, 2> without_in_row_{};  ///< consecutive calls of go_without()
   std::array<TimePoint, 2> last_heard_{};  ///< newest frame, even of a gyro that is set aside
   TimePoint waiting_since_;
   bool pairing_ = false;

@@ -43,8 +43,8 @@ std::vector<std::size_t> axes_of(const GyroPlan& unit) {
   return axes;
 }
 
-// For each axis of the vehicle one of the sensor's, each once, so that they are as parallel as can
-// be: health and known effects of a pair are those of these two.
+// Assigns a sensor axis to each axis of the vehicle, each once and as parallel as possible: health
+// and known effects of a pair are those of its two sensor axes.
 std::array<std::size_t, kAxes> nearest_sensors(const GyroPlan& unit,
                                                const std::vector<std::size_t>& axes) {
   std::array<std::size_t, kAxes> order{0, 1, 2};
@@ -79,7 +79,7 @@ bool depends_on_other_axes(const model::Effect& effect) {
   return (model::info(effect.kind).needs & model::kNeedsOtherAxes) != 0;
 }
 
-// The effects of these two sensor axes, and the unit's.
+// The effects of these two sensor axes, and those of the whole units.
 model::Model effects_about(const model::Model& model, const Plan& pair) {
   model::Model own{.file = model.file, .effects = {}};
   std::copy_if(model.effects.begin(), model.effects.end(), std::back_inserter(own.effects),
@@ -89,7 +89,7 @@ model::Model effects_about(const model::Model& model, const Plan& pair) {
   return own;
 }
 
-// What a cross-axis effect asks for stands in the same frame, so the pair's own input reads it.
+// A cross-axis effect needs a rate that is in the same frame, so the pair's own input reads it.
 void read_other_axes(const model::Model& model, const Plan& platform, Plan& pair) {
   for (const model::Effect& effect : model.effects) {
     if (!depends_on_other_axes(effect)) continue;
@@ -116,14 +116,14 @@ void set_true_rate(const CalibrationPlan& configured, std::size_t place, std::si
     calibration.doubt_dps = known ? 0.0 : north_dps / std::sqrt(2.0);
   }
   calibration.stop_rate_dps = calibration.rate_dps;
-  // What the reference tells while calibrating nobody tells at a stop.
+  // A reference gives the true rate during the calibration only, not at later stops.
   const bool is_told = !configured.axis_rate_dps.empty() || configured.latitude_deg;
   if (!configured.from_reference || is_told) return;
   calibration.stop_rate_dps = std::nullopt;
   calibration.doubt_dps = 0.0;
 }
 
-// Of the reference what it tells about this axis, if it does.
+// Keeps the reference's rate about this axis, or drops the reference if it has none.
 void set_reference(std::size_t axis, Plan& pair) {
   if (!pair.reference) return;
   if (const auto rate = pair.reference->axes[axis]) {
@@ -138,7 +138,7 @@ void set_output(const OutputPlan& configured, std::size_t axis, OutputPlan& outp
   output.rate_id = configured.rate_id + step;
   output.bias_id = configured.bias_id + step;
   output.model_id = configured.model_id + step;
-  output.layouts.clear();  // the platform's
+  output.layouts.clear();  // they belong to the platform
 }
 
 void set_noise(Plan& pair) {
@@ -172,7 +172,7 @@ Plan plan_about(const Plan& platform, std::size_t place,
   return pair;
 }
 
-// What is wrong with an effect of all axes is said once.
+// An effect that belongs to all axes causes the same error for each: keep the first.
 void drop_repeated(std::vector<Error>& errors) {
   const auto same = [](const Error& a, const Error& b) {
     return a.where == b.where && a.what == b.what;

@@ -1,8 +1,8 @@
 #pragma once
 
-// From two whole units to a pair of gyros about each axis of the vehicle: which sensor axis
-// measures which, what the mounts leave out, identifiers, true rates at rest and the model's
-// effects of each pair. Fills Plan::axes.
+// Turns two whole units into a pair of gyros about each axis of the vehicle: chooses the sensor
+// axis for each, finds axes that a unit does not measure as mounted, and derives each pair's
+// identifiers, true rate at rest and model effects. Fills Plan::axes.
 
 #include <cstddef>
 #include <numbers>
@@ -14,20 +14,20 @@
 
 namespace vgyro::gateway {
 
-/// A sensor axis with less than this share in a vehicle's axis is not missed there: 1.1 deg.
+/// A sensor axis that a unit lacks matters to a vehicle's axis only above this share: 1.1 deg.
 inline constexpr double kShareMissed = 0.02;
 
-/// Sets OutputPlan::axes: those that both units measure; an error where they measure different
-/// ones. Precondition: both gyros are resolved. Of single gyros there are none.
+/// Sets OutputPlan::axes to the axes that both units measure; an error where they measure different
+/// ones. Leaves it empty for single gyros. Precondition: both gyros are resolved.
 void find_axes(TomlReader& root, Plan& plan);
 
-/// The true rate of each axis while the platform rests: of the latitude and, about x and y, of the
-/// heading; `rate_dps` of the configuration goes before. The unknown part is in
-/// CalibrationPlan::doubt_dps. Precondition: all of the configuration is read.
+/// Fills Plan::axes. The true rate of each axis at rest is the configured `rate_dps`, otherwise it
+/// follows from the latitude and, about x and y, from the heading; CalibrationPlan::doubt_dps holds
+/// the unknown part. Precondition: the whole configuration has been read.
 void build_axes(Plan& plan, std::vector<Error>& errors);
 
-/// Sets where `gyro` reads the rate about the unit's own axis `from`: not at all if it is in
-/// another message.
+/// Lets `gyro` also read the rate about the unit's own axis `from`, unless that is in another
+/// message.
 void name_other_axis(const GyroPlan& unit, std::size_t from, GyroPlan& gyro);
 
 /// IERS: the Earth turns 7.292115e-5 rad/s against the stars.

@@ -25,11 +25,12 @@ namespace {
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 constexpr TimePoint kNever = TimePoint::min();
 
-// A frame that comes so long after something was due follows a silence of the whole bus, or carries
-// a stamp of garbage.
+// A frame that comes this long after something was due follows a silence of the whole bus, or has a
+// stamp that is garbage.
 constexpr Duration kOverdueMax = std::chrono::seconds(30);
 
-// What the other axes leave in a rate may be its own up to so many of its standard deviations.
+// The two are compared only if their rate exceeds so many σ of the other axes' unknown
+// contribution.
 constexpr double kCrossSigmas = 5.0;
 
 TimePoint whole_microseconds(TimePoint t) {
@@ -62,7 +63,7 @@ AxisPipeline::AxisPipeline(const Plan& the_plan, std::unique_ptr<fusion::Correct
 void AxisPipeline::receive(can::BusIndex bus, const can::Frame& frame, TimePoint stamp,
                            FrameSink& sink) {
   const std::uint8_t roles = router_.roles(bus, frame);
-  // Most frames of a car's bus are nobody's, and nothing is due.
+  // Most frames on a car's bus are none of the inputs; return at once if nothing is due either.
   if (roles == 0 && guard_.can_be_time(stamp) && stamp + guard_.offset() < deadline_) return;
   const Sender::Turn turn(sender_, sink, stamp);
   if (roles == 0) return let_time_pass(stamp);
@@ -126,15 +127,15 @@ bool AxisPipeline::offer(std::size_t gyro, const Reading& reading, double rate_d
   return true;
 }
 
-// Nothing is wrong with the sensor's own axis here, and others may need it.
+// The sensor's own axis is sound here, and other axes may still need it.
 void AxisPipeline::go_without(std::size_t gyro, TimePoint t, bool other_is_sick) {
   ++status_.gyros[gyro].rejected[static_cast<std::size_t>(Reject::kOtherAxis)];
   if (attendance_.go_without(gyro, other_is_sick)) carry_on_without(gyro, t);
   if (t >= deadline_) do_what_is_due(t);
 }
 
-// A frame without a sample. One that is sick tells of its gyro where its stamp can be believed;
-// what else is refused moves time at most, and a stamp that says nothing new does not.
+// A frame without a usable value. If its stamp is believed, the fault counts as evidence about the
+// gyro; otherwise the frame advances time at most, and with a repeated stamp not even that.
 void AxisPipeline::pass_over(std::size_t gyro, const GyroIntake::Result& taken, TimePoint stamp) {
   if (taken.stamp.believed()) {
     attendance_.judge_refused(gyro, taken.stamp.t, *taken.reject);
@@ -147,13 +148,13 @@ void AxisPipeline::pass_over(std::size_t gyro, const GyroIntake::Result& taken, 
   if (!stamp_alone && !repeated) let_time_pass(stamp);
 }
 
-// What waits for a partner is of the time before the step.
+// Samples that wait for a partner belong to the time before the step.
 void AxisPipeline::step_clock() {
   ++status_.clock_steps;
   aligner_.clear();
 }
 
-// The reading less what the model knows of it.
+// The reading less the known effects.
 template <std::size_t gyro>
 double AxisPipeline::take_back(TimePoint t, double reading_dps) {
   surroundings_.reach(t);
@@ -181,16 +182,16 @@ void AxisPipeline::receive_surroundings(std::uint8_t roles, const can::Frame& fr
   }
 }
 
-// A frame whose stamp can be believed and whose rate cannot be used.
+// A frame with a believable stamp and an unusable rate.
 void AxisPipeline::refuse(std::size_t gyro, Reject cause, TimePoint t) {
   ++status_.gyros[gyro].rejected[static_cast<std::size_t>(cause)];
   if (attendance_.hear_refused(gyro, t)) carry_on_without(gyro, t);
   if (t >= deadline_) do_what_is_due(t);
 }
 
-// Set aside: the other one carries on without waiting for a time-out, and first with what has
-// waited for this one. Beyond an interval it does not look back: VG_Age could not tell how old that
-// is.
+// Continues with the other gyro at once, without waiting for a time-out, beginning with its samples
+// that still wait for a partner. It goes back one interval at most: VG_Age could not hold the age
+// of older ones.
 void AxisPipeline::carry_on_without(std::size_t gyro, TimePoint t) {
   estimator_.break_off_comparison();
   enter_state();
@@ -235,9 +236,9 @@ void AxisPipeline::take_sample(std::size_t gyro, TimePoint t, double rate_dps) {
 
 void AxisPipeline::arrive(std::size_t gyro, TimePoint t) {
   if (!attendance_.any_in_use() && !estimator_.begun()) attendance_.begin_waiting(t);
-  // Where the clock was set back in a silence, what was due then is due too late.
+  // If the clock was set back during a silence, the deadline is too late; check now.
   if (!attendance_.in_use(gyro)) deadline_ = std::min(deadline_, t);
-  // First what is due, or a silence of both would be noticed of one alone.
+  // Check deadlines first, or a silence of both gyros would be noticed for one alone.
   if (t >= deadline_) do_what_is_due(t);
   attendance_.hear(gyro, t);
   reached_ = t;
@@ -261,7 +262,7 @@ void AxisPipeline::take_pair(const fusion::AlignedPair& pair) {
   }
   const bool contradicted = estimator_.contradicted();
   const bool changed = contradicted != (status_.state == State::kContradicted);
-  // What the corrector thought of either gyro was of a pair that is none.
+  // There is no pair any more, so withdraw the corrector's findings about both gyros.
   if (changed && contradicted) attendance_.set_opinion(pair.t, {});
   if (attendance_.hear_pair() || changed) enter_state();
   tell_estimator(pair.t);
@@ -270,7 +271,7 @@ void AxisPipeline::take_pair(const fusion::AlignedPair& pair) {
     if (known_effects_.is_doubted()) known_effects_.settle(surroundings_, pair.t);
     if (estimator_.calibrated()) enter_state();
   }
-  // While one gyro was missing the other spoke alone, perhaps for later instants than this.
+  // While one gyro was missing, rates of the other one alone may have gone out for later instants.
   if (pair.t <= newest_) return;
   newest_ = pair.t;
   const bool valid = estimator_.calibrated() && !contradicted;
@@ -282,9 +283,9 @@ void AxisPipeline::take_pair(const fusion::AlignedPair& pair) {
   if (observer_ != nullptr) {
     observer_->on_rate(pair.t - guard_.offset(), pair.rate_dps, valid ? rate.rate_dps : kNone);
   }
-  // A silence came before the choice of who paces: what waited for it is no rate of now.
+  // A silence before the aligner chose the pacing gyro makes the waiting pairs too old to be sent.
   const Duration age = pair.complete - pair.t;
-  // What is known to come late does.
+  // The known lag of the gyros is no lateness.
   const Duration late = age - known_effects_.lag_most();
   const bool too_late = estimator_.calibrated() && late > Attendance::kTimeOutMin &&
                         late > attendance_.time_out(aligner_.pacing_gyro());
@@ -328,7 +329,7 @@ void AxisPipeline::tell_estimator(TimePoint t) {
     estimator_.set_resolution(gyro, attendance_.step_dps(gyro));
 }
 
-// Until the virtual rate can be believed the platform does what the calibration takes for granted.
+// Until a virtual rate is valid, assume the rate that the calibration assumes.
 void AxisPipeline::tell_surroundings(TimePoint t, double rate_dps, bool valid) {
   if (valid) {
     surroundings_.add_rate(t, rate_dps);
@@ -337,7 +338,7 @@ void AxisPipeline::tell_surroundings(TimePoint t, double rate_dps, bool valid) {
   }
 }
 
-// What was taken off the readings may be wrong, and the corrector cannot see it: the gyros agree.
+// The known effects may be wrong, and the corrector cannot see it, because the gyros agree.
 void AxisPipeline::add_doubt(fusion::VirtualRate& rate, TimePoint t) {
   if (estimator_.condition().stopped) known_effects_.settle(surroundings_, t);
   rate.sigma_dps =
@@ -352,15 +353,15 @@ void AxisPipeline::set_cross(double rate_dps, double variance_dps2) {
   estimator_.set_cross_variance(variance_dps2);
 }
 
-// Where what the other axes may leave in gyro 2 is as large as what there is of this one, the two
-// need not agree about it.
+// If the unknown contribution of the other axes to gyro 2 is as large as the rate itself, the two
+// need not agree.
 bool AxisPipeline::is_parallel_enough(const fusion::AlignedPair& pair) const {
   if (!has_cross_ || cross_variance_dps2_ == 0.0) return true;
   const double rate_dps = std::max(std::abs(pair.rate_dps[0]), std::abs(pair.rate_dps[1]));
   return cross_variance_dps2_ * kCrossSigmas * kCrossSigmas <= rate_dps * rate_dps;
 }
 
-// Neither the other unit's tilt nor the Earth's rate can be seen by a corrector of one axis.
+// A corrector of one axis can see neither the other unit's misalignment nor the Earth's rate.
 void AxisPipeline::add_cross_doubt(fusion::VirtualRate& rate) const {
   const double share = estimator_.shares()[1];
   rate.sigma_dps =
@@ -368,7 +369,7 @@ void AxisPipeline::add_cross_doubt(fusion::VirtualRate& rate) const {
                 earth_doubt_dps_ * earth_doubt_dps_);
 }
 
-// The corrector's opinion of both; of one gyro alone it has none that is new.
+// Passes on the corrector's findings about both gyros. A rate of one gyro alone yields no new ones.
 void AxisPipeline::note_condition(TimePoint t) {
   attendance_.set_opinion(t, estimator_.condition());
   if (observer_ != nullptr) observer_->on_condition(t - guard_.offset(), estimator_.condition());
@@ -392,8 +393,8 @@ void AxisPipeline::enter_state() {
   send_bias();
 }
 
-// Nobody has judged the stamp of a frame that is not a sample. Garbage far ahead would stop
-// time-outs and VG_Bias until then, so the next such frame must agree with it.
+// The stamp of a frame that is not a sample has not been checked. Garbage far ahead would stop
+// time-outs and VG_Bias until that time, so a second such frame must agree with it.
 void AxisPipeline::let_time_pass(TimePoint stamp) {
   if (!guard_.can_be_time(stamp)) return;
   const TimePoint t = on_axis(stamp);
@@ -426,7 +427,7 @@ void AxisPipeline::advance(TimePoint now, FrameSink& sink) {
 
 // --- frames out ----------------------------------------------------------------------------------
 
-// VG_Rate, and VG_Bias where its time has come with it.
+// Sends VG_Rate, and VG_Bias if a point of its grid is reached.
 void AxisPipeline::publish(const fusion::VirtualRate& rate, bool valid, TimePoint t, Duration age) {
   RateOutput output{.valid = valid,
                     .rate_dps = rate.rate_dps,
@@ -460,7 +461,7 @@ fusion::Drift AxisPipeline::present_drift() const {
   return drift;
 }
 
-// To ask for them costs more than a pair, and they change with windows.
+// Reading the biases costs more than a pair, and they change only with a window.
 const std::array<double, 2>& AxisPipeline::bias_dps() {
   if (!estimator_.knows_gyros() || newest_ == kNever) return bias_dps_;
   const std::uint64_t windows = estimator_.windows();
@@ -519,7 +520,7 @@ Expected<void> AxisPipeline::resume(const SavedState& state) {
 }
 
 void AxisPipeline::change_output(const OutputPlan& output) {
-  // Parts of the pipeline refer to the rest of its plan.
+  // Parts of the pipeline refer to the rest of the plan, so only the output is replaced.
   plan_.output = output;
   sender_.change_plan(plan_.output);
 }

@@ -1,10 +1,10 @@
 #pragma once
 
-// One axis of the platform: two gyros about it, frames and time in, virtual rate out. Of a pair of
-// single gyros it is the whole pipeline, and receive() is all that is asked of it. Of two whole
-// units there is one for each axis; gateway/unit_pipeline.h then takes its steps one by one, and
-// between them does what needs all axes. Opens nothing, reads no clock, allocates nothing once it
-// is constructed. The states and their transitions are in ARCHITECTURE.md.
+// One axis of the platform: frames of two gyros and time in, virtual rate out. With two single
+// gyros it is the whole pipeline, and only receive() and advance() are called. With two whole units
+// there is one for each axis; gateway/unit_pipeline.h then calls its steps one by one and does
+// between them what needs all axes. Opens nothing, reads no clock, allocates nothing after
+// construction. ARCHITECTURE.md lists the states and their transitions.
 
 #include <array>
 #include <cstdint>
@@ -39,12 +39,12 @@ class AxisPipeline {
   AxisPipeline(const AxisPipeline&) = delete;
   AxisPipeline& operator=(const AxisPipeline&) = delete;
 
-  // As of Pipeline.
+  // As in Pipeline.
 
   void receive(can::BusIndex bus, const can::Frame& frame, TimePoint stamp, FrameSink& sink);
   void advance(TimePoint now, FrameSink& sink);
   [[nodiscard]] TimePoint next_deadline() const {
-    // Time passes in whole microseconds: due a fraction earlier it would be due and not done.
+    // Time advances in whole microseconds: rounded down, the deadline would pass with nothing done.
     return std::chrono::ceil<std::chrono::microseconds>(deadline_ - guard_.offset());
   }
   const Status& refreshed_status();
@@ -52,24 +52,24 @@ class AxisPipeline {
   [[nodiscard]] std::optional<SavedState> memory() const;
   Expected<void> resume(const SavedState& state);
   void count_on_from(const AxisPipeline& before) { sender_.count_on_from(before.sender_); }
-  /// Its plan is the same as `output`'s but for the output.
+  /// Precondition: the own plan differs from the new one in the output alone.
   void change_output(const OutputPlan& output);
   void observe(RateObserver* observer) { observer_ = observer; }
   void observe_output(OutputObserver* observer) { output_observer_ = observer; }
   [[nodiscard]] const Plan& plan() const { return plan_; }
 
-  // Step by step, for a platform of several axes. Precondition of all: a Turn.
+  // Step by step, for a platform of several axes. Precondition of all steps: a Turn.
 
   using Turn = Sender::Turn;
   [[nodiscard]] Sender& sender() { return sender_; }
   [[nodiscard]] std::uint8_t roles(can::BusIndex bus, const can::Frame& frame) const {
     return router_.roles(bus, frame);
   }
-  /// Nothing is due before this stamp's time, and it is one.
+  /// The stamp is valid, and nothing is due before its time.
   [[nodiscard]] bool nothing_due(TimePoint stamp) const {
     return guard_.can_be_time(stamp) && stamp + guard_.offset() < deadline_;
   }
-  /// What is not a gyro's: reference, accelerometer, speed; and time.
+  /// Inputs other than the gyros (reference, accelerometer, speed), and passing time.
   void receive_besides(std::uint8_t roles, const can::Frame& frame, TimePoint stamp);
 
   /// A usable reading, less the known effects, in the sensor's own axis.
@@ -78,56 +78,58 @@ class AxisPipeline {
     double raw_dps = 0.0;
     double rate_dps = 0.0;
   };
-  /// False where the frame gives none; that is dealt with then.
+  /// False when the frame holds no usable reading; admit() has then handled it.
   bool admit(std::size_t gyro, const can::Frame& frame, TimePoint stamp, Reading& reading);
-  /// No rate about this axis, because another axis of its unit is missing: that one is faulty, or
-  /// its last reading is too old.
+  /// This axis gets no rate, because another axis of its unit is missing: either faulty
+  /// (`other_is_sick`), or its last reading is too old.
   void go_without(std::size_t gyro, TimePoint t, bool other_is_sick);
-  /// The reading, turned into the vehicle's axes. False where it comes too late to be used.
+  /// Takes the reading, turned into the vehicle's axes. False when it is too late to be used.
   bool offer(std::size_t gyro, const Reading& reading, double rate_dps);
-  /// The next pair; to be followed by take_pair().
+  /// The next pair. The caller then passes it to take_pair().
   bool pop(fusion::AlignedPair& pair) { return aligner_.pop(pair); }
   void take_pair(const fusion::AlignedPair& pair);
-  /// Another axis's calibration was ended by motion at `t`.
+  /// Motion ended the calibration of another axis at `t`.
   void end_calibration(TimePoint t, TimePoint still_until);
-  /// An offered reading arrives: first what is due, then …
+  /// Handles an offered reading: first what is due, then …
   void arrive(std::size_t gyro, TimePoint t);
-  /// … the pairs that came of it, and this, where none does because the other gyro is not there.
+  /// … the caller takes the pairs, and calls this for a rate of one gyro alone if the other is
+  /// missing.
   void speak_alone(std::size_t gyro, TimePoint t, double rate_dps);
 
-  /// What gyro 2 reads too much for it is not quite parallel to gyro 1, and the variance that is
-  /// left of it; of the rates to come.
+  /// Set for the rates to come: the part of gyro 2's reading that comes from other axes because it
+  /// is not quite parallel to gyro 1, and the remaining variance of that estimate.
   void set_cross(double rate_dps, double variance_dps2);
   [[nodiscard]] Estimator& estimator() { return estimator_; }
   [[nodiscard]] const Estimator& estimator() const { return estimator_; }
-  /// The newest virtual rate; NaN where that is not valid.
+  /// The newest virtual rate; NaN if that was not valid.
   [[nodiscard]] double rate_dps() const { return sender_.rate_dps(); }
-  /// 1σ of what the Earth's rate may have been instead while the biases were learned.
+  /// 1σ of the error in the Earth's rate that was assumed while the biases were learned.
   void set_earth_doubt(double doubt_dps) { earth_doubt_dps_ = doubt_dps; }
   [[nodiscard]] double earth_doubt_dps() const { return earth_doubt_dps_; }
-  /// Its σ, and that of the bias in it as of the last window; NaN where none is stated.
+  /// σ of the newest rate, and σ of its bias at the last window; NaN where none is stated.
   [[nodiscard]] double sigma_dps() const { return sender_.sigma_dps(); }
   [[nodiscard]] double bias_sigma_dps() {
     (void)bias_dps();
     return bias_sigma_dps_;
   }
-  /// Of both gyros, as of the last window; 0 before there are any.
+  /// Biases of both gyros at the last window; 0 before the first.
   [[nodiscard]] const std::array<double, 2>& bias_dps();
-  /// A time of the pairs on the clock of the frames.
+  /// Converts a time of the pairs to the clock of the frames.
   [[nodiscard]] TimePoint stamp_of(TimePoint t) const { return t - guard_.offset(); }
   [[nodiscard]] const Status& status() const { return status_; }
   [[nodiscard]] bool in_use(std::size_t gyro) const { return attendance_.in_use(gyro); }
   [[nodiscard]] bool pairing() const { return attendance_.pairing(); }
-  /// Its own sensor axis may not be used for now.
+  /// The gyro's own sensor axis may not be used for now.
   [[nodiscard]] bool set_aside(std::size_t gyro) const { return attendance_.set_aside(gyro); }
-  /// Between its samples; 0 while unknown.
+  /// Usual interval between samples of this gyro; 0 while unknown.
   [[nodiscard]] Duration interval(std::size_t gyro) const {
     return aligner_.chosen() ? attendance_.usual_interval(gyro) : guard_.interval(gyro);
   }
 
  private:
-  /// Code of its own for each gyro, to which the places of all that belongs to it are constants,
-  /// and in one piece: some twenty calls a frame would cost a fifth of it. What is rare says so.
+  /// Instantiated for each gyro and inlined completely, so that addresses of its members are
+  /// constants: some twenty calls for each frame would cost a fifth of its time. Rare paths are
+  /// marked noinline.
   template <std::size_t gyro>
   [[gnu::flatten]] void receive_gyro(const can::Frame& frame, TimePoint stamp);
   template <std::size_t gyro>
@@ -181,13 +183,13 @@ class AxisPipeline {
   TimePoint newest_;                  ///< newest instant given to the output
   TimePoint deadline_{};              ///< nothing is due before; may be too early, never too late
   TimePoint reached_{};               ///< newest accepted time
-  TimePoint suspect_{};               ///< stamp far ahead, not confirmed yet
+  TimePoint suspect_{};               ///< stamp far ahead that no other has confirmed yet
   std::array<double, 2> bias_dps_{};  ///< for bias_dps()
   double bias_sigma_dps_;             ///< for bias_sigma_dps()
-  std::uint64_t bias_windows_ = 0;    ///< when that was asked for last
+  std::uint64_t bias_windows_ = 0;    ///< Estimator::windows() at the last bias_dps()
   bool has_cross_ = false;
-  double cross_dps_ = 0.0;            ///< what gyro 2 reads of the other axes
-  double cross_variance_dps2_ = 0.0;  ///< and how far that may be wrong
+  double cross_dps_ = 0.0;            ///< part of gyro 2's rate that comes from the other axes
+  double cross_variance_dps2_ = 0.0;  ///< and its variance
   double earth_doubt_dps_;            ///< for add_cross_doubt()
 };
 

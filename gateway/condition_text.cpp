@@ -12,9 +12,9 @@ namespace {
 
 using fusion::Hypothesis;
 
-constexpr std::uint64_t kFruitlessMin = 3;  // fewer are no habit
+constexpr std::uint64_t kFruitlessMin = 3;  // fewer are not a pattern
 constexpr double kSecondsPerHour = 3600.0;
-constexpr double kDegPerHourAnHour = kSecondsPerHour * kSecondsPerHour;  // of 1 deg/s a second
+constexpr double kDegPerHourAnHour = kSecondsPerHour * kSecondsPerHour;  // for 1 (deg/s)/s
 
 double of(const Probabilities& probability, Hypothesis hypothesis) {
   return probability[static_cast<std::size_t>(hypothesis)];
@@ -29,7 +29,7 @@ void add_likely(std::string& text, const char* separator, const std::string& wor
   if (p > kWorthTelling) add(text, separator, fmt::format("{} {:.0f} %", words, 100.0 * p));
 }
 
-// To the second digit of its doubt, and without an exponent.
+// Rounded to the second significant digit of σ, without an exponent.
 std::string with_doubt(double value, double sigma) {
   const int decimals = std::clamp(1 - static_cast<int>(std::floor(std::log10(sigma))), 0, 6);
   const double step = std::pow(10.0, -decimals);
@@ -37,7 +37,7 @@ std::string with_doubt(double value, double sigma) {
   return fmt::format("{:+.{}f} ± {:.{}f}", rounded, decimals, sigma, decimals);
 }
 
-// Three digits or more, and two behind the point.
+// Two decimals; two significant digits below 0.1.
 std::string times(double slope) {
   return std::abs(slope) < 0.1 ? fmt::format("{:.2g}", slope) : fmt::format("{:.2f}", slope);
 }
@@ -46,7 +46,7 @@ struct UnitMistake {
   double factor;
   const char* units;
 };
-// Factors between the units in which rates come, and by which bytes are worth more.
+// Factors that are typical of a wrong unit or a wrong byte.
 constexpr UnitMistake kMistakes[] = {{6.0, "rpm and deg/s"},
                                      {10.0, "a factor of ten"},
                                      {17.453292519943295, "mrad/s and deg/s"},
@@ -58,7 +58,7 @@ constexpr UnitMistake kMistakes[] = {{6.0, "rpm and deg/s"},
                                      {3600.0, "deg/s and deg/h"},
                                      {65536.0, "two bytes more or less"},
                                      {206264.80624709636, "rad/s and deg/h"}};
-// Scale factors differ, and so do the slopes that motion shows.
+// Scale factors scatter, and so do slopes estimated from motion.
 constexpr double kMistakeTolerance = 0.25;
 
 std::string unit_guess(double slope) {
@@ -103,7 +103,8 @@ std::string stretches_advice(const SteadyStretches& stretches) {
   const std::uint64_t all = stretches.learned + stretches.refused;
   const std::uint64_t fruitless = stretches.refused + stretches.open;
   if (fruitless < kFruitlessMin || 2 * fruitless <= all) return {};
-  return "most of them taught little: if the platform stood still in them, check the true "
+  return "little was learned from most of them: if the platform stood still in them, check the "
+         "true "
          "rate at rest (rate_dps or latitude_deg in [calibration]) and max_bias_dps of both gyros; "
          "wheel speeds ([speed]) distinguish stops from turns";
 }
@@ -125,7 +126,8 @@ std::string hypotheses_text(const Probabilities& probability, const GyroNames& n
   return text;
 }
 
-// Where no kind has a probability the method knows of none, and the walk is no finding either.
+// If no other kind is likely, the method distinguishes none, so the random walk is no finding
+// either.
 std::string drift_kind_text(const Probabilities& probability) {
   const double warming = of(probability, Hypothesis::kWarmingUp);
   const double own = of(probability, Hypothesis::kOwnSlopes);
@@ -204,7 +206,7 @@ std::string contradiction_text(const fusion::PairVerdict& pair, const GyroNames&
 }
 
 std::string contradiction_advice() {
-  return "which of the two is wrong cannot be seen, so no rate is valid until they move together; "
+  return "the data do not show which gyro is wrong, so no rate is valid until they move together; "
          "look at sign, unit, message and signal of both (`vgyro check` shows them)";
 }
 

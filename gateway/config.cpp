@@ -46,12 +46,12 @@ TableContext tables_of(Context& context) {
           context.resolved.warnings};
 }
 
-// A bias from less than a second is an accident of the noise; after a day nobody waits any more.
+// A bias from less than a second is mostly noise; nobody waits for more than a day.
 constexpr Limits kRest_s{1.0, 86'400.0};
-// A window needs several samples of each gyro; over an hour every drift has turned.
+// A window needs several samples of each gyro; within an hour every drift has changed.
 constexpr Limits kWindow_s{0.1, 3'600.0};
 
-// The message of `a` that `b` reads as well; null: there is none.
+// The message of `a` that `b` reads as well; null if there is none.
 const GyroPlan* sharing_frames(const GyroPlan& a, const GyroPlan& b) {
   const auto messages_of = [](const GyroPlan& gyro) {
     return gyro.axes.empty() ? std::span(&gyro, 1) : std::span(gyro.axes);
@@ -112,8 +112,8 @@ void read_optional(TomlReader& root, std::string_view key, Context& context, Rea
 
 constexpr std::array<const char*, kAxes> kReferenceAxes{"rate_x", "rate_y", "rate_z"};
 
-// The rates that a table of a reference names: one, or of a platform of several axes one for each.
-// One alone is then about z, about which a vehicle turns.
+// Reads the rates that a reference table names: one, or with several axes one for each. A single
+// one is then about z, the axis about which a vehicle turns.
 std::array<std::optional<Quantity>, kAxes> read_reference_rates(TomlReader& reader,
                                                                 SignalResolver& resolver,
                                                                 bool of_axes,
@@ -211,7 +211,7 @@ void read_when_moving(TomlReader& reader, CalibrationPlan& plan) {
                   suggest_name(word, {"wait", "accept"}));
 }
 
-// Of a platform of several axes: a number for each.
+// With several axes, rate_dps is a list with a number for each.
 void read_axis_rates(TomlReader& reader, const Plan& plan, CalibrationPlan& calibration) {
   const std::size_t axes = plan.output.axes.size();
   if (axes == 0 || !reader.has("rate_dps")) return;
@@ -228,20 +228,20 @@ void read_axis_rates(TomlReader& reader, const Plan& plan, CalibrationPlan& cali
                   "the platform's true rate about each axis while calibrating, in deg/s");
 }
 
-// The Earth's rate about the vehicle's horizontal axes is told by where it heads.
+// The Earth's rate about the vehicle's horizontal axes depends on its heading.
 void read_heading(TomlReader& reader, const Plan& plan, CalibrationPlan& calibration) {
   const auto heading = reader.number("heading_deg");
   if (!heading) return;
   calibration.heading_deg = heading;
   if (plan.gyros.empty()) return;
   if (plan.output.axes.empty()) {
-    reader.complain(reader.where("heading_deg"), "heading_deg is of no use to a single axis",
+    reader.complain(reader.where("heading_deg"), "heading_deg has no effect for a single axis",
                     "leave it out: only the Earth's rate about horizontal axes depends on it");
   } else if (!(std::abs(*heading) <= 360.0)) {
     reader.complain(reader.where("heading_deg"), fmt::format("heading_deg is {:g}", *heading),
                     "0 to 360, clockwise from north: where x points while calibrating");
   } else if (!reader.has("latitude_deg")) {
-    reader.complain(reader.where("heading_deg"), "heading_deg stands without latitude_deg",
+    reader.complain(reader.where("heading_deg"), "heading_deg needs latitude_deg",
                     "latitude_deg beside it");
   }
 }
@@ -250,7 +250,7 @@ void read_heading(TomlReader& reader, const Plan& plan, CalibrationPlan& calibra
 void read_true_rate(TomlReader& reader, const toml::table& table, const Plan& platform,
                     CalibrationPlan& plan) {
   read_axis_rates(reader, platform, plan);
-  // After trouble with the units nobody knows how many axes there are.
+  // After an error in the units the number of axes is unknown.
   const bool any_unit = std::any_of(platform.gyros.begin(), platform.gyros.end(),
                                     [](const GyroPlan& gyro) { return !gyro.axes.empty(); });
   const bool troubled = platform.gyros.empty() || (any_unit && platform.output.axes.empty());
@@ -272,7 +272,7 @@ void read_true_rate(TomlReader& reader, const toml::table& table, const Plan& pl
   if (!plan.latitude_deg) return;
   if (reader.has("rate_dps")) {
     reader.complain(reader.where("latitude_deg"),
-                    "rate_dps and latitude_deg both say the true rate", "keep one of them");
+                    "rate_dps and latitude_deg both set the true rate", "keep one of them");
   }
   if (!(std::abs(*plan.latitude_deg) <= 90.0)) {
     reader.complain(reader.where("latitude_deg"),
@@ -281,7 +281,7 @@ void read_true_rate(TomlReader& reader, const toml::table& table, const Plan& pl
   plan.rate_dps = kEarthRate_dps * std::sin(*plan.latitude_deg * std::numbers::pi / 180.0);
 }
 
-// What calibrates a platform must tell the rate about each of its axes.
+// A reference that calibrates a platform must have a rate about each of its axes.
 void check_reference(TomlReader& root, TomlReader& reader, const Plan& plan) {
   if (!root.has("reference")) {
     reader.complain(reader.where("source"), "source = \"reference\" needs a [reference] table");
@@ -311,7 +311,7 @@ void read_calibration(TomlReader& root, Context& context) {
     reader.complain(reader.where("source"), fmt::format("source is \"{}\"", source),
                     suggest_name(source, {"rest", "reference"}));
   }
-  // The reference tells the rate while calibrating; what it will be at a stop it does not tell.
+  // The reference gives the rate during the calibration, not at later stops.
   plan.stop_rate_dps = plan.rate_dps;
   const bool is_told = reader.has("rate_dps") || reader.has("latitude_deg");
   if (plan.from_reference && !is_told) plan.stop_rate_dps = std::nullopt;
@@ -320,7 +320,7 @@ void read_calibration(TomlReader& root, Context& context) {
   reader.finish();
 }
 
-// A file that cannot be opened is a mistake of the line that names it.
+// A model file that cannot be opened is reported at the line that names it.
 void read_model(const std::string& path, const std::string& named_at, Context& context) {
   const std::vector<GyroPlan>& gyros = context.resolved.plan.gyros;
   model::GyroNames names{.names = {}, .any = gyros.size() != 2};
@@ -369,7 +369,7 @@ void read_corrector(TomlReader& root, Context& context, const ConfigOverrides& o
   reader.finish();
 }
 
-// Precondition: nothing was complained of so far.
+// Precondition: no errors so far.
 void apply_knowledge(Context& context) {
   Plan& plan = context.resolved.plan;
   for (std::size_t gyro = 0; gyro < 2; ++gyro) {
@@ -423,7 +423,7 @@ void read_output(TomlReader& root, Context& context) {
   check_output_ids(reader, plan);
   const bool failed = !context.errors.empty();
   if (!plan.output.vgyro_frames && plan.output.layouts.empty() && !failed) {
-    reader.complain(reader.where("vgyro_frames"), "nothing would go out",
+    reader.complain(reader.where("vgyro_frames"), "nothing would be sent",
                     "vgyro_frames = false needs an [[output.layout]]");
   }
   reader.finish();

@@ -1,7 +1,7 @@
 #pragma once
 
-// vgyro.toml and the DBC files it names → a Plan. Every complaint carries file and line and what
-// would be right; all complaints of a file are reported at once. Nothing is guessed.
+// vgyro.toml and the DBC files it names → a Plan. Every error names file, line and remedy; all
+// errors of a file are reported at once. Nothing is guessed.
 
 #include <optional>
 #include <string>
@@ -20,11 +20,12 @@ enum class LogLevel : int { kError = 3, kWarning = 4, kNotice = 5, kInfo = 6, kD
 
 struct Resolved {
   Plan plan;
-  /// What was read: DBC files, the model file, the file itself and what lies over it.
+  /// What was read: DBC files, the model file, the configuration and its overlays.
   std::vector<std::string> files;
-  ConfigText text;  ///< its values, as the last files of `files` say them together
+  ConfigText text;  ///< the merged values of the configuration and its overlays, the last of
+                    ///< `files`
   LogLevel log_level = LogLevel::kInfo;  ///< of the live gateway: [log] level
-  std::vector<Error> warnings;           ///< usable, but the user should know
+  std::vector<Error> warnings;           ///< usable, but worth the user's attention
 };
 
 using ConfigResult = tl::expected<Resolved, std::vector<Error>>;
@@ -34,11 +35,12 @@ struct ConfigOverrides {
   std::optional<std::string> model = {};  ///< path, instead of [corrector] model
 };
 
-/// Reads the file, and what lies over it (gateway/config_files.h); paths inside are relative to the
-/// file itself.
+/// Reads the file and its overlays (gateway/config_files.h); paths inside are relative to the file
+/// itself.
 ConfigResult load_config(const std::string& path, const ConfigOverrides& overrides = {});
 
-/// config_fingerprint() of what was loaded, by the same overrides. Reads DBC and model files again.
+/// config_fingerprint() of a loaded configuration with the same overrides. Reads DBC and model
+/// files again.
 std::string fingerprint_of(const Resolved& loaded, const ConfigOverrides& overrides);
 
 /// The methods of this build by name; nothing for any other word.

@@ -15,20 +15,20 @@
 namespace vgyro::gateway {
 namespace {
 
-// A configuration takes some kB; what is so much larger is another file.
+// A configuration takes some kB; a file this large is something else.
 constexpr std::size_t kConfigBytesMax = std::size_t{1} << 20U;
-// A fleet's, a vehicle's and a workshop's are three; more are a folder of something else.
+// A fleet's, a vehicle's and a workshop's make three; more than this is a folder of something else.
 constexpr std::size_t kOverlaysMax = 64;
-// What the reader of DBC files takes at most.
+// The limit of the DBC reader.
 constexpr std::size_t kNamedFileBytesMax = std::size_t{16} << 20U;
 
 Expected<toml::table> read_one(const std::string& path) {
   const Expected<std::string> text = read_regular_file(path, kConfigBytesMax);
   if (!text) return tl::unexpected(text.error());
-  return parse_toml(*text, path, "strings stand in quotes, tables in [brackets]");
+  return parse_toml(*text, path, "write strings in quotes and tables in [brackets]");
 }
 
-// Names that begin with a dot are an editor's.
+// Names that begin with a dot are temporary files of an editor.
 bool is_overlay(const std::filesystem::path& path) {
   return path.extension() == ".toml" && !path.filename().string().starts_with('.');
 }
@@ -80,7 +80,7 @@ std::string config_fingerprint(const toml::table& table, const std::string& over
     crc = add(crc, origin.key + '=' + origin.value + '\n');
   crc = add(crc, overrides + '\n');
   for (const std::string& file : named_files) {
-    // It was read a moment ago; one that is gone since counts as empty.
+    // The file was read a moment ago; if it has disappeared since, it counts as empty.
     const Expected<std::string> text = read_regular_file(file, kNamedFileBytesMax);
     const std::uint64_t bytes = text ? text->size() : 0;
     crc = add(crc, fmt::format("{}\n", bytes));

@@ -27,13 +27,13 @@ std::uint32_t E2eCheck::step(std::uint32_t from, std::uint32_t to) const {
   return to >= from ? to - from : to + plan_->counter->modulus - from;
 }
 
-// The counter did not move: another page of the same round, or the frame once more?
+// The counter did not move: is it another page of the same round, or a repeated frame?
 bool E2eCheck::is_new_round(std::uint32_t now, Page page) const {
-  if (page == Page::kOther) return true;  // only its number is asked
+  if (page == Page::kOther) return true;  // another page matters only for its number
   return page_ == Page::kOther && own_counter_ != now;
 }
 
-// A sender that counts by two, or loses frames there, comes to its last value by a jump.
+// A sender that counts by two, or that loses frames there, reaches its last value by a jump.
 void E2eCheck::note_early_turn() {
   if (jumped_to_ == counter_) return;
   if (counter_ != early_turn_) early_turns_ = 0;
@@ -49,8 +49,8 @@ std::optional<Reject> E2eCheck::follow(std::uint32_t now, std::uint32_t& missing
     if (most == 0 || moved <= most) {
       missing = moved - 1;
     } else {
-      // Two that follow each other are a sender that began anew. Among frames of another one, the
-      // true sender's own come in between and the series never begins.
+      // Two refused frames in sequence are a sender that restarted. Frames of a foreign sender
+      // alternate with the true sender's own and never form such a sequence.
       const std::uint32_t since = out_of_sequence_ ? step(*out_of_sequence_, now) : 0;
       out_of_sequence_ = now;
       if (since == 0 || since > most) return Reject::kWrongSequence;

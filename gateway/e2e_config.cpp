@@ -13,12 +13,12 @@ namespace vgyro::gateway {
 namespace {
 
 constexpr std::int64_t kDataIdMost = 0xFFFF;
-constexpr std::int64_t kDataIdMost1C = 0xFFF;   // a nibble of the high byte is carried
+constexpr std::int64_t kDataIdMost1C = 0xFFF;   // the frame carries a nibble of the high byte
 constexpr std::int64_t kDataIdMostList = 0xFF;  // profile 2: a byte for each counter
 
 using DataIds = std::array<std::uint16_t, dbc::kE2eDataIdsMost>;
 
-// Profiles 1 and 11 leave 15 out, whatever a DBC file says of the signal.
+// Profiles 1 and 11 skip the value 15, whatever the DBC file says of the signal.
 constexpr std::uint32_t kModulusProfile1 = 15;
 constexpr unsigned kCounterBitsProfile1 = 4;
 
@@ -27,15 +27,15 @@ bool is_profile_1(dbc::E2eKind kind) {
          kind == dbc::E2eKind::kProfile1C;
 }
 
-/// counter_max, the sender's profile, or the DBC file's range says how far a counter runs. False
-/// after a complaint.
+/// Sets the counter's modulus from counter_max, the sender's profile or the DBC file's range. False
+/// after an error.
 bool set_modulus(TomlReader& reader, const dbc::Signal& signal,
                  const std::optional<CheckValue>& crc, AliveCounter& counter) {
   const std::int64_t bits_most = (std::int64_t{1} << signal.length_bits) - 1;
   const bool profile_1 =
       crc && is_profile_1(crc->protection.kind()) && signal.length_bits == kCounterBitsProfile1;
   if (profile_1) counter.modulus = kModulusProfile1;
-  // AUTOSAR counters leave the last value out; any other range is not about the counter.
+  // AUTOSAR counters skip the last value; any other range in the DBC file says nothing about them.
   if (signal.maximum == static_cast<double>(bits_most - 1)) {
     counter.modulus = static_cast<std::uint32_t>(bits_most);
   }
@@ -75,10 +75,10 @@ std::optional<AliveCounter> read_counter(TomlReader& reader, SignalResolver& res
   const auto codec = resolver.codec(*signal);
   if (!codec) return std::nullopt;
   if (!signal->is_integer() || signal->length_bits > 31 || signal->length_bits < 2) {
-    reader.complain(
-        reader.where("counter"),
-        fmt::format("{} is no alive counter: it has {} bits", signal->name, signal->length_bits),
-        "an integer signal of 2 to 31 bits");
+    reader.complain(reader.where("counter"),
+                    fmt::format("{} cannot be an alive counter: it has {} bits", signal->name,
+                                signal->length_bits),
+                    "an integer signal of 2 to 31 bits");
     return std::nullopt;
   }
   const auto pages = resolver.presence(*signal);
@@ -98,7 +98,7 @@ std::optional<AliveCounter> read_counter(TomlReader& reader, SignalResolver& res
   return counter;
 }
 
-/// The byte of a check value: the first, where it has two. Nothing after a complaint.
+/// The byte of a check value, the first if it has two. Nothing after an error.
 std::optional<std::size_t> crc_byte(TomlReader& reader, const dbc::Signal& signal,
                                     const dbc::Message& message, dbc::E2eKind kind) {
   const bool wide = kind == dbc::E2eKind::kProfile5;
@@ -136,7 +136,7 @@ std::optional<DataIds> read_list(TomlReader& reader, const std::string& kind) {
   DataIds ids{};
   const bool there = reader.has("data_id");
   const toml::array* list = reader.array("data_id", "a list of 16 numbers: [0x12, …]");
-  if (list == nullptr && there) return std::nullopt;  // complained of
+  if (list == nullptr && there) return std::nullopt;  // an error was reported
   if (list == nullptr || list->size() != ids.size()) {
     reader.complain(reader.where("data_id"),
                     fmt::format("{} has {} data IDs", kind, list == nullptr ? 0 : list->size()),
@@ -146,7 +146,7 @@ std::optional<DataIds> read_list(TomlReader& reader, const std::string& kind) {
   for (std::size_t i = 0; i < ids.size(); ++i) {
     const auto id = (*list)[i].value_exact<std::int64_t>();
     if (!id) {
-      reader.complain(reader.where("data_id"), "a data ID is no whole number", "0 to 0xFF");
+      reader.complain(reader.where("data_id"), "a data ID is not a whole number", "0 to 0xFF");
       return std::nullopt;
     }
     if (!within(reader, *id, kDataIdMostList)) return std::nullopt;
@@ -190,7 +190,7 @@ std::optional<CheckValue> read_check_value(TomlReader& reader, SignalResolver& r
   if (!name) {
     reader.forgive({"data_id"});
     if (reader.has("crc") && !reader.has("e2e")) {
-      reader.complain(reader.where("crc"), "nothing says how this check value is made",
+      reader.complain(reader.where("crc"), "the kind of this check value is not configured",
                       "e2e = \"NAME\", " + suggest_name({}, kinds));
     } else if (reader.has("data_id") && !reader.has("e2e")) {
       reader.complain(reader.where("data_id"), "data_id without e2e",

@@ -1,6 +1,6 @@
 #pragma once
 
-// The keys of a table of the configuration that say how its message proves itself: crc, e2e,
+// The keys of a configuration table that define the E2E protection of its message: crc, e2e,
 // data_id, counter, max_delta_counter, counter_max.
 
 #include "base/toml_reader.h"
@@ -9,11 +9,11 @@
 
 namespace vgyro::gateway {
 
-/// `main` is the signal that the message is read for. Complaints go to the reader; what they are of
-/// is left out.
+/// `main` is the signal that the message is read for. Errors go to the reader; the part with an
+/// error is left out.
 E2ePlan read_e2e(TomlReader& reader, SignalResolver& resolver, const dbc::Signal& main);
 
-/// These keys are not read after another error.
+/// Marks these keys as known where they are not read because of another error.
 void forgive_e2e(TomlReader& reader);
 
 }  // namespace vgyro::gateway

@@ -109,8 +109,9 @@ void Estimator::note_motion_in_calibration() {
   if (!calibrated_) calibrator_.note_motion();
 }
 
-// Only where the calibration waits for rest can it begin again: motion would give the same result
-// once more, and a reference knows better.
+// The result is checked only if the calibration waits for rest, since only then is it worth
+// beginning again: with motion allowed the result would be the same, and a reference is trusted
+// more.
 bool Estimator::result_can_be() const {
   const bool waits_for_rest = !plan_.calibration.from_reference &&
                               plan_.calibration.when_moving == fusion::WhenMoving::kWait;
@@ -126,13 +127,13 @@ fusion::VirtualRate Estimator::update(const fusion::AlignedPair& pair) {
   const fusion::VirtualRate rate =
       corrector_->update({seconds(pair.t), pair.rate_dps, pair.noise_gain});
   read_condition();
-  // A stop measures each gyro against the known rate, as a calibration does; that is why none runs
-  // beside restored biases.
+  // A stop measures each gyro against the known rate, as a calibration does; hence no calibration
+  // runs beside restored biases.
   if (restored_ == Restored::kTakenUp && condition_.stops > 0) restored_ = Restored::kConfirmed;
   return rate;
 }
 
-// To ask for it costs as much as a rate, and it says the same for some hundred pairs.
+// Reading the condition costs as much as a rate, and it is unchanged for some hundred pairs.
 void Estimator::read_condition() {
   const std::uint64_t edition = corrector_->condition_edition();
   if (edition == condition_edition_) return;
@@ -170,7 +171,7 @@ BiasMode Estimator::bias_mode(bool both_in_use, bool any_in_use) const {
 
 Expected<void> Estimator::offer(const SavedState& state) {
   if (plan_.corrector.method != Method::kOptimal) {
-    return fail({}, "is of no use to this method: only `optimal` takes up saved biases",
+    return fail({}, "has no effect: only `optimal` uses saved biases",
                 "set `method = \"optimal\"` under [corrector] to use it");
   }
   if (Expected<void> same = check_devices(state, plan_); !same) return same;
@@ -197,7 +198,7 @@ std::optional<SavedState> Estimator::memory(
     const std::array<std::optional<double>, 2>& temperature_c) const {
   if (restored_ == Restored::kOffered) return saved_;
   if (!knows_gyros()) return std::nullopt;
-  // Motion learned as drift must not outlive the run.
+  // Motion that was learned as drift must not outlive the run.
   if (moved_in_calibration_ && corrector_->condition().stops == 0) return std::nullopt;
   const std::optional<fusion::DriftMemory> drift = corrector_->memory(seconds(t));
   if (!drift) return std::nullopt;

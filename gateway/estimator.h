@@ -1,10 +1,10 @@
 #pragma once
 
-// From aligned pairs to virtual rates: first the calibration, at rest or against the reference, or
-// biases of an earlier run in its place; then the corrector. Owns all that was learned and what of
-// it is worth keeping. Has no frames and no time-outs: the pipeline decides which gyros are in use,
-// and passes `both_in_use`. Times are on the axis of fusion::StampGuard; nothing is allocated after
-// construction.
+// Turns aligned pairs into virtual rates: first the calibration, at rest or against the reference,
+// or in its place biases of an earlier run; then the corrector. Owns everything learned, and
+// decides what is worth keeping. Has no frames and no time-outs: the pipeline decides which gyros
+// are in use, and passes `both_in_use`. Times are on the axis of fusion::StampGuard; nothing is
+// allocated after construction.
 
 #include <array>
 #include <cstddef>
@@ -27,7 +27,7 @@
 
 namespace vgyro::gateway {
 
-/// The corrector that the plan asks for.
+/// The corrector of the plan's method.
 std::unique_ptr<fusion::Corrector> make_corrector(const Plan& plan);
 
 class Estimator {
@@ -35,19 +35,19 @@ class Estimator {
   /// The age of saved biases when the clock cannot give it, because it is before their stamp.
   static constexpr double kUnknownAge_s = 30 * 86400.0;
 
-  /// The plan must live as long.
+  /// `plan` must outlive this object.
   Estimator(const Plan& plan, std::unique_ptr<fusion::Corrector> corrector);
 
-  /// Before the first pair, which takes this up instead of a calibration. Error when the state is
-  /// of other gyros, or the method keeps none; then nothing has changed.
+  /// Offers a saved state before the first pair, which takes it up instead of a calibration. Error
+  /// if it belongs to other gyros, or if the method keeps no state; nothing has changed then.
   Expected<void> offer(const SavedState& state);
-  /// The first pair stands at `t`, which is `stamp` on the clock of the frames. The estimation's
-  /// seconds count from here.
+  /// Call at the first pair, of time `t`, which is `stamp` on the clock of the frames. The
+  /// estimation's seconds count from here.
   [[gnu::cold, gnu::noinline]] void begin(TimePoint t, TimePoint stamp);
   [[nodiscard]] bool begun() const { return begun_; }
   [[nodiscard]] bool calibrated() const { return calibrated_; }
-  /// May the rate of one gyro alone be used? Not if it was never compared with the other,
-  /// with any method.
+  /// May the rate of one gyro alone be used? With no method if it was never compared with the
+  /// other.
   [[nodiscard]] bool knows_gyros() const { return calibrated_ && begun_; }
 
   /// The corrector's other inputs from now on: wheels, vibration, temperatures …
@@ -55,33 +55,33 @@ class Estimator {
   /// … and the smallest step that this gyro's values have shown, deg/s.
   void set_resolution(std::size_t gyro, double step_dps);
 
-  /// Every pair, calibrated or not: can the two be of one platform?
+  /// Checks every pair, calibrated or not: can both gyros be on one platform?
   void compare(const fusion::AlignedPair& pair) { relation_.add(seconds(pair.t), pair.rate_dps); }
-  /// One of them is set aside.
+  /// One gyro is set aside, which ends the comparison.
   void break_off_comparison() { relation_.break_off(); }
-  /// They cannot: nothing says which one is wrong, so no rate is valid, and nothing is learned.
+  /// They cannot. Nothing shows which one is wrong, so no rate is valid and nothing is learned.
   [[nodiscard]] bool contradicted() const { return relation_.contradicts(); }
 
-  /// What the platform's other axes show, and what they leave in the gyros' difference, from now
-  /// on; and the true rate at a stop.
+  /// Set from now on: evidence of the platform's other axes; the variance that these leave in the
+  /// gyros' difference; the true rate at a stop.
   void set_elsewhere(const fusion::Elsewhere& elsewhere) { corrector_->set_elsewhere(elsewhere); }
   void set_cross_variance(double variance_dps2) { corrector_->set_cross_variance(variance_dps2); }
   void set_stop_rate(double rate_dps) { corrector_->set_stop_rate(rate_dps); }
-  /// The platform moved about another axis: what was gathered of this one was no rest.
+  /// The platform moved about another axis, so the data gathered for this one were not at rest.
   [[gnu::cold, gnu::noinline]] void restart_calibration();
   /// The platform moved about another axis after resting long enough for that axis's calibration:
   /// this axis's calibration ends too, or begins again where it has too little data yet.
   [[gnu::cold, gnu::noinline]] void end_calibration(TimePoint t, TimePoint still_until);
-  /// Motion has ended the calibration before its time: until when the platform rested.
+  /// Until when the platform rested, if motion ended the calibration early.
   [[nodiscard]] const std::optional<TimePoint>& calibration_cut_at() const { return cut_at_; }
-  /// Motion in the calibration that was accepted is one of the platform.
+  /// Motion occurred during the calibration and was accepted.
   [[nodiscard]] bool moved_in_calibration() const {
     return moved_in_calibration_ || (!calibrated_ && calibrator_.moved());
   }
   void note_motion_in_calibration();
   [[nodiscard]] std::uint64_t calibration_restarts() const { return calibrator_.restarts(); }
 
-  /// A pair before calibrated().
+  /// Takes a pair while not calibrated().
   [[gnu::noinline]] void calibrate(const fusion::AlignedPair& pair);
   /// A reference rate, which may complete the calibration.
   void add_reference(TimePoint t, double rate_dps);
@@ -91,17 +91,17 @@ class Estimator {
   /// The next sample of one gyro alone. Precondition: knows_gyros().
   fusion::VirtualRate update_alone(std::size_t gyro, TimePoint t, double rate_dps);
 
-  /// What of the newest rate is either gyro's.
+  /// The weight of each gyro in the newest rate.
   [[nodiscard]] std::array<double, 2> shares() const { return corrector_->shares(); }
-  /// What the corrector thinks of its data, as of the newest rate.
+  /// The corrector's findings, as of the newest rate.
   [[nodiscard]] const fusion::Condition& condition() const { return condition_; }
-  /// Grows when that, or whether it is calibrated, says something new.
+  /// Grows when condition() or calibrated() changes.
   [[nodiscard]] std::uint64_t condition_edition() const {
     return 2 * condition_edition_ + (calibrated_ ? 1 : 0);
   }
-  /// What is known of the drifts at `t`. Precondition: knows_gyros().
+  /// The drifts at `t`. Precondition: knows_gyros().
   [[nodiscard]] fusion::Drift drift(TimePoint t) const { return corrector_->drift(seconds(t)); }
-  /// Do the gyros contradict each other, at present or altogether?
+  /// Do the gyros disagree at present, or contradict each other altogether?
   [[nodiscard]] bool disagree(bool both_in_use) const {
     return (both_in_use && condition_.disagree) || contradicted();
   }
@@ -110,9 +110,9 @@ class Estimator {
   [[nodiscard]] Quality quality(bool both_in_use) const;
   [[nodiscard]] BiasMode bias_mode(bool both_in_use, bool any_in_use) const;
 
-  /// What to keep across a restart, of a last rate at `t`, which is t − clock_offset on the clock
-  /// of the frames; nothing before there is anything worth it. What was offered and not taken up
-  /// yet is.
+  /// The state to keep across a restart. `t` is the time of the last rate, t − clock_offset that
+  /// time on the clock of the frames. Nothing before anything worth keeping was learned; an offered
+  /// state that was not taken up yet is returned unchanged.
   [[nodiscard]] std::optional<SavedState> memory(
       TimePoint t, Duration clock_offset,
       const std::array<std::optional<double>, 2>& temperature_c) const;
@@ -137,7 +137,7 @@ class Estimator {
   TimePoint origin_;  ///< zero of the estimation's seconds: the first pair
   bool begun_ = false;
   bool calibrated_;
-  bool moved_in_calibration_ = false;  ///< and that was accepted
+  bool moved_in_calibration_ = false;  ///< and the calibration was accepted
   std::optional<TimePoint> cut_at_;
 
   std::optional<SavedState> saved_;  ///< to be taken up by the first pair

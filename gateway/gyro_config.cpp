@@ -121,7 +121,7 @@ std::optional<GyroPlan> read_single(TomlReader& reader, SignalResolver& resolver
     }
     read_other_axes(resolver, other_axes, *gyro);
   } else {
-    // Ask for the rest, so that a good key is not called unknown on top of the real trouble.
+    // Mark the other keys as known, so that they are not called unknown on top of the real error.
     reader.forgive({"sign", "source_address", "valid", "max_bias_dps"});
     forgive_e2e(reader);
   }
@@ -136,8 +136,8 @@ bool is_unit(const TomlReader& reader) {
                                             [&](const char* key) { return reader.has(key); }));
 }
 
-// What a table says of the message that it reads, as far as a single gyro's table says it too.
-// `main` is a signal of it.
+// The settings of the message that a table reads, as far as they are the same as for a single gyro.
+// `main` is a signal of the message.
 GyroPlan read_message(TomlReader& reader, SignalResolver& resolver, const std::string& name,
                       const dbc::Signal& main, const Quantity& rate) {
   GyroPlan gyro{.name = name,
@@ -169,8 +169,8 @@ void forgive_message(TomlReader& reader) {
 
 /// One axis on its way into the plan.
 struct AxisEntry {
-  const toml::table* own = nullptr;  ///< its [[gyro.axis]], where it has one
-  bool named_above = false;          ///< rate_x … stands in [[gyro]]
+  const toml::table* own = nullptr;  ///< its [[gyro.axis]] table, if any
+  bool named_above = false;          ///< rate_x, rate_y or rate_z stands in [[gyro]]
 };
 using AxisEntries = std::array<AxisEntry, kAxes>;
 
@@ -212,14 +212,14 @@ AxisEntries entries_of(TomlReader& reader, TableContext context) {
   return entries;
 }
 
-/// What all axes of a unit have from its own table.
+/// What all axes of a unit take from its own table.
 struct UnitTable {
   TomlReader& reader;
   SignalResolver& resolver;
   const std::string& name;
   std::optional<std::string> unit;
   double sign = 1.0;
-  std::optional<GyroPlan> message = {};  ///< what the unit's own message tells besides rates
+  std::optional<GyroPlan> message = {};  ///< everything but the rates in the unit's own message
 };
 
 const GyroPlan& message_of(UnitTable& unit, const dbc::Signal& main, const Quantity& rate) {
@@ -244,7 +244,7 @@ std::optional<GyroPlan> read_plain_axis(UnitTable& unit, std::size_t axis) {
   return finished_axis(message_of(unit, *signal, *rate), *rate, unit.sign, axis);
 }
 
-// An axis with a table of its own, which may have a message of its own.
+// Reads an axis with a table of its own, which may name a message of its own.
 std::optional<GyroPlan> read_own_axis(UnitTable& unit, const AxisEntry& entry, std::size_t axis,
                                       TableContext context) {
   TomlReader reader(*entry.own, context.file, "[[gyro.axis]]", context.errors);
@@ -283,7 +283,7 @@ std::optional<GyroPlan> read_own_axis(UnitTable& unit, const AxisEntry& entry, s
   return gyro;
 }
 
-// One signal about two axes is a mistake in either name.
+// One signal for two axes is a mistake in one of the names.
 void check_signals(const std::vector<GyroPlan>& axes, TomlReader& reader) {
   for (std::size_t i = 0; i < axes.size(); ++i) {
     for (std::size_t k = i + 1; k < axes.size(); ++k) {
@@ -300,7 +300,7 @@ void check_signals(const std::vector<GyroPlan>& axes, TomlReader& reader) {
   }
 }
 
-// Readings of two messages are of two instants, and may come at two rates.
+// Readings of two messages belong to two instants, and may come at two rates.
 void warn_of_mixed_messages(const std::vector<GyroPlan>& axes, const Mount& mount,
                             TomlReader& reader, std::vector<Error>& warnings) {
   const auto needs = [&](std::size_t axis, const GyroPlan& sensor) {
@@ -364,10 +364,10 @@ std::optional<GyroPlan> read_unit(TomlReader& reader, SignalResolver& resolver,
   return gyro;
 }
 
-// It stands in the names of files, in tables and in pages.
+// The text appears in file names, tables and pages.
 constexpr std::size_t kIdentityMax = 64;
 
-// `type` or `serial`; empty where the key is not there, or after a complaint.
+// `type` or `serial`; empty if the key is absent, or after an error.
 std::string identity_of(TomlReader& reader, std::string_view key) {
   std::string text = reader.text(key).value_or("");
   const auto is_good = [](char c) {
@@ -376,7 +376,7 @@ std::string identity_of(TomlReader& reader, std::string_view key) {
   };
   if (text.size() <= kIdentityMax && std::all_of(text.begin(), text.end(), is_good)) return text;
   reader.complain(reader.where(key),
-                  fmt::format("the {} \"{}\" is no plain word", key, printable(text)),
+                  fmt::format("the {} \"{}\" is not a plain word", key, printable(text)),
                   fmt::format("up to {} letters, digits, \"-\", \"_\" and \".\"", kIdentityMax));
   return {};
 }

@@ -1,7 +1,7 @@
 #pragma once
 
-// The [[gyro]] tables: a single gyro, or a whole unit of two or three axes. Complaints carry file
-// and line, as gateway/config.
+// The [[gyro]] tables: a single gyro, or a whole unit of two or three axes. Errors carry file and
+// line, as in gateway/config.
 
 #include <optional>
 #include <set>
@@ -17,7 +17,7 @@
 
 namespace vgyro::gateway {
 
-/// What the tables of a configuration share.
+/// Shared by all tables of a configuration.
 struct TableContext {
   const std::string& file;    ///< the configuration's own path
   const std::string& folder;  ///< DBC paths are relative to it
@@ -28,22 +28,22 @@ struct TableContext {
   std::vector<Error>& warnings;
 };
 
-/// One [[gyro]] table; nothing after a complaint. Of a unit GyroPlan::axes are filled.
+/// Reads one [[gyro]] table; nothing after an error. For a whole unit, GyroPlan::axes are filled.
 std::optional<GyroPlan> read_gyro(const toml::table& table, std::size_t index,
                                   TableContext context);
 
 struct Limits {
   double low = 0.0;
   double high = 0.0;
-  bool above_low = false;  ///< the lower one itself is too little
+  bool above_low = false;  ///< `low` itself is excluded
 };
 
-/// A number inside limits; nothing after a complaint, or where the key is not there.
+/// A number within limits; nothing after an error, or if the key is absent.
 std::optional<double> number_within(TomlReader& reader, std::string_view key, const Limits& limits,
                                     std::string_view unit);
 
-/// The key `sign` of any table that names rates, or another one like it: 1 or -1; nothing where it
-/// is not there, or after a complaint.
+/// The key `sign` of any table that names rates, or a similar key: 1 or -1; nothing if it is
+/// absent, or after an error.
 std::optional<double> sign_of(TomlReader& reader, std::string_view key = "sign");
 /// The key `source_address` of any table that reads a message.
 void read_source_address(TomlReader& reader, const dbc::Message& message, FrameMatch& match);

@@ -6,11 +6,11 @@ namespace vgyro::gateway {
 
 namespace {
 
-// One spoilt frame is a hole like any other; this many in a row are a sensor's fault.
+// Up to this many unusable frames in a row count as lost; more are a fault of the sensor.
 constexpr std::uint32_t kUnusableMost = 2;
 
-// Well again: for so long and so many samples, twice as long after each relapse within a minute.
-// More samples than the alignment's gap, so that no line is drawn across the fault.
+// A gyro recovers after so much time and so many samples, both doubled with each relapse within a
+// minute. The samples outnumber the alignment's gap, so that no line is drawn across the fault.
 struct Probation {
   Duration time;
   std::uint32_t samples;
@@ -24,7 +24,7 @@ Probation probation_of(Fault fault) {
   return fault == Fault::kStuck || fault == Fault::kCounterStuck ? kLong : kShort;
 }
 
-// At a clip or in a dead band a healthy sensor comes and goes.
+// A healthy sensor, too, reaches its clip or its dead band now and then.
 bool is_defect(Fault fault) {
   return fault != Fault::kSaturated && fault != Fault::kDeadBand;
 }

@@ -1,8 +1,8 @@
 #pragma once
 
-// May this gyro be used? Gathers the evidence of its frames and values, sets it aside at
-// once at a fault, and uses it again when it has been good for a while: longer each time that
-// the fault returns. Counts faults. Attendance decides whether the gyro is silent.
+// Decides whether a gyro may be used. Gathers evidence from its frames and values, sets it aside at
+// once at a fault, and uses it again when it has been good for a while: longer each time that the
+// fault returns. Counts faults. Attendance decides whether the gyro is silent.
 
 #include <array>
 #include <cstdint>
@@ -19,38 +19,38 @@ class GyroHealth {
  public:
   explicit GyroHealth(const GyroPlan& plan);
 
-  /// A rate that the frame says is one. Nothing when it may be used, else the cause why not.
-  /// `other` is the other gyro when that is in use, else null. `can_spare`: without this one the
-  /// other carries on, so that a zero of the dead band need not be used.
+  /// Judges a decoded rate. Returns nothing when it may be used, otherwise the cause of refusal.
+  /// `other` is the other gyro if that is in use, else null. `can_spare`: the other gyro continues
+  /// without this one, so that a zero of the dead band need not be used.
   std::optional<Reject> judge(TimePoint t, double rate_dps, const GyroHealth* other,
                               bool can_spare);
-  /// A frame without a rate, for this cause, with an accepted stamp.
+  /// A frame that holds no usable rate, for this cause, and whose stamp was accepted.
   void refuse(TimePoint t, Reject cause);
-  /// It timed out: it is silent.
+  /// The gyro timed out.
   void fall_silent(TimePoint t);
-  /// The corrector's result: far noisier than before, or blind to rotation. Such a gyro
-  /// stays in use, with a smaller weight.
+  /// The corrector's findings: far noisier than before, or blind to rotation. Such a gyro stays in
+  /// use, with a smaller weight.
   void set_opinion(TimePoint t, bool noisy, bool blind);
 
-  /// Is the cause evidence about the sensor, not about a foreign frame?
+  /// Is the cause evidence about the sensor, rather than about a foreign frame?
   static bool tells_of_sensor(Reject cause);
 
   [[nodiscard]] bool set_aside() const { return fault_.has_value(); }
-  /// For VB_Health. Zeros of a dead band are no defect.
+  /// The bit of VB_Health. Zeros of a dead band are no defect.
   [[nodiscard]] bool suspect() const {
     return noisy_ || blind_ || (fault_ && *fault_ != Fault::kDeadBand);
   }
-  /// What is wrong at present; what sets it aside comes first.
+  /// The present fault; one that sets the gyro aside takes precedence.
   [[nodiscard]] std::optional<Fault> fault() const;
-  /// How close two different values of late have been; 0.5 deg/s, or the frame's own step if that
-  /// is larger, until any two differed. What lies within one step is not known.
+  /// The smallest recent distance between two different values; before any two differed, 0.5 deg/s,
+  /// or the frame's own step if that is larger. Anything within one step is unknown.
   [[nodiscard]] double step_dps() const { return watch_.step_dps(); }
-  /// Has it ever sent two different values? One that has not may be dead.
+  /// Has it ever sent two different values? If not, it may be dead.
   [[nodiscard]] bool ever_changed() const { return watch_.ever_changed(); }
   [[nodiscard]] const std::array<FaultRecord, kFaultCount>& records() const { return records_; }
 
  private:
-  /// Of a finding that is not kSound, or of one that may end a fault.
+  /// Handles a finding other than kSound, or one that may end a fault.
   [[gnu::cold, gnu::noinline]] std::optional<Reject> judge_finding(
       TimePoint t, fusion::SensorWatch::Finding finding, bool can_spare);
   [[nodiscard]] std::optional<Fault> fault_in(fusion::SensorWatch::Finding finding,
@@ -61,8 +61,9 @@ class GyroHealth {
 
   fusion::SensorWatch watch_;
   std::array<FaultRecord, kFaultCount> records_{};
-  std::optional<Fault> fault_;  ///< for which it is set aside
-  bool hasty_ = false;          ///< on a few samples, of which nothing worse was found since
+  std::optional<Fault> fault_;  ///< the fault for which the gyro is set aside
+  bool hasty_ = false;          ///< set aside after a few samples, and nothing worse was found
+                                ///< since
   bool noisy_ = false;
   bool blind_ = false;
   std::uint32_t unusable_in_row_ = 0;

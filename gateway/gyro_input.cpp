@@ -21,7 +21,7 @@ std::size_t bytes_of(const GyroPlan& plan) {
   return bytes;
 }
 
-// Precondition: the signal is there and fits.
+// Precondition: the frame carries the signal and is long enough for it.
 inline std::optional<Reject> convert(const Quantity& quantity,
                                      std::span<const std::uint8_t> payload, double& value) {
   const dbc::Reading reading = quantity.codec.decode(payload);

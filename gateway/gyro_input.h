@@ -16,16 +16,16 @@
 
 namespace vgyro::gateway {
 
-/// Another quantity in a gyro's message, perhaps on a page of its own: of the newest frame
-/// that carried it.
+/// Another quantity in a gyro's message, perhaps on a page of its own. Holds the value of the
+/// newest frame that carried it.
 class Beside {
  public:
-  /// The plan's part must live as long.
+  /// `quantity` must outlive this object.
   explicit Beside(const std::optional<Quantity>& quantity) : quantity_(quantity) {}
   [[nodiscard]] bool wanted() const { return quantity_.has_value(); }
   /// Precondition: wanted(); a data frame.
   void keep(const can::Frame& frame);
-  /// In the product's unit; NaN where there is none.
+  /// In the product's unit; NaN before any value.
   [[nodiscard]] double value() const { return value_; }
 
  private:
@@ -40,9 +40,9 @@ class GyroInput {
   struct Result {
     std::optional<Reject> reject;  ///< set: the frame is not used
     double rate_dps = 0.0;
-    std::uint32_t missing = 0;  ///< frames that the alive counter says were lost before this one
+    std::uint32_t missing = 0;  ///< frames lost before this one, by the alive counter
   };
-  /// `result` is a new one.
+  /// `result` must be freshly constructed.
   void decode(const can::Frame& frame, Result& result);
   Result decode(const can::Frame& frame) {
     Result result;
@@ -50,17 +50,17 @@ class GyroInput {
     return result;
   }
 
-  /// The check of the counter restarts.
+  /// Restarts the check of the alive counter.
   void fall_silent() { e2e_.fall_silent(); }
 
-  /// As the newest frame that was used carried it.
+  /// The alive counter in the newest frame that was used.
   [[nodiscard]] std::uint32_t counter() const { return e2e_.counter(); }
   [[nodiscard]] std::optional<std::uint32_t> early_turn() const { return e2e_.early_turn(); }
 
-  /// Of the newest frame that was used or held nothing else; NaN when there is none.
+  /// From the newest frame that was used or that held no rate; NaN before one.
   [[nodiscard]] double temperature_c() const { return temperature_.value(); }
   [[nodiscard]] double supply_v() const { return supply_voltage_.value(); }
-  /// About x, y and z.
+  /// Rates about the sensor axes x, y and z.
   [[nodiscard]] std::array<double, 3> other_rate_dps() const {
     return {other_axes_[0].value(), other_axes_[1].value(), other_axes_[2].value()};
   }
@@ -77,10 +77,10 @@ class GyroInput {
   E2eCheck e2e_;
 };
 
-/// Is the comparison true of this value?
+/// Does the comparison hold for this value?
 bool holds(const ValidCondition& condition, double value);
 
-/// A quantity's value in the product's unit, or the cause why it is none.
+/// A quantity's value in the product's unit, or the cause why it has none.
 std::optional<Reject> decode_quantity(const Quantity& quantity, const can::Frame& frame,
                                       double& value);
 

@@ -11,11 +11,11 @@ namespace vgyro::gateway {
 
 namespace {
 
-// Further apart, rates do not tell what lies between them.
+// Rates further apart than this do not show how the vehicle turned in between.
 constexpr double kLeap_s = 1.0;
-// 1σ of how a vehicle turns while nobody looks: a slow bend of a road.
+// 1σ of the unobserved turn rate of a vehicle: a slow bend of a road.
 constexpr double kUnseenTurn_dps = 10.0;
-// Of the angle turned so much is doubtful: gyros of one kind may share an error of their scale.
+// Relative 1σ of the angle turned: gyros of one type may share a scale factor error.
 constexpr double kScaleDoubt = 0.003;
 
 }  // namespace

@@ -1,9 +1,9 @@
 #pragma once
 
-// Where the vehicle's x axis points, and with it how much of the Earth's rate stands about x and y:
-// as configured while the platform calibrates, from then on by the virtual rate about z. Its σ
-// grows with that rate's σ, with the angle turned, and with every second without a known
-// rate. Reads no clock, allocates nothing.
+// The direction of the vehicle's x axis, and from it the Earth's rate about x and y. The heading is
+// the configured one during calibration; from then on the virtual rate about z is integrated. Its σ
+// grows with that rate's σ, with the angle turned, and with every second without a known rate.
+// Reads no clock, allocates nothing.
 
 #include <cstddef>
 #include <optional>
@@ -13,7 +13,7 @@
 
 namespace vgyro::gateway {
 
-/// What is kept of it across a restart.
+/// What is kept of the heading across a restart.
 struct HeadingMemory {
   double heading_rad = 0.0;  ///< clockwise from north
   double sigma_rad = 0.0;
@@ -21,14 +21,14 @@ struct HeadingMemory {
 
 class Heading {
  public:
-  /// Beyond this nothing is known of it: a uniform distribution has less.
+  /// Beyond this σ the heading is unknown: even a uniform distribution has a smaller one.
   static constexpr double kSigmaMost_rad = 4.0;
 
-  /// Configured, or not: then there is no heading.
+  /// Without a configured heading and latitude is_told() stays false.
   explicit Heading(const CalibrationPlan& calibration);
 
-  /// The rate about z at `t`, with its σ and the σ of its bias; nothing where it is not valid, or
-  /// there is none. `rests`: the platform calibrates, so it does not turn.
+  /// The rate about z at `t`, with its σ and the σ of its bias; nothing if there is no valid rate.
+  /// `rests`: the platform calibrates, so it does not turn.
   struct Turn {
     double rate_dps = 0.0;
     double sigma_dps = 0.0;
@@ -39,27 +39,27 @@ class Heading {
   [[nodiscard]] bool is_told() const { return north_dps_.has_value(); }
   /// The horizontal component of the Earth's rate. Precondition: is_told().
   [[nodiscard]] double north_dps() const { return *north_dps_; }
-  /// About x (0) or y (1): what is expected of the Earth's rate, and 1σ of what it may be instead.
+  /// The expected Earth's rate about x (0) or y (1), and 1σ of its error.
   /// Precondition: is_told().
   [[nodiscard]] double earth_rate_dps(std::size_t axis) const;
   [[nodiscard]] double earth_doubt_dps(std::size_t axis) const;
 
   [[nodiscard]] std::optional<HeadingMemory> memory() const;
-  /// Nothing: where it points is not known any more.
+  /// Without a memory the heading becomes unknown.
   void resume(const std::optional<HeadingMemory>& memory);
-  /// Nobody looked for so long.
+  /// Adds the uncertainty of this many seconds without a known rate.
   void age(double seconds);
 
  private:
   [[nodiscard]] double sigma_rad() const;
-  /// cos and sin of the heading about x and y.
+  /// The expected value of cos (x) or sin (y) of `multiple` times the heading.
   [[nodiscard]] double part(std::size_t axis, double multiple) const;
 
   std::optional<double> north_dps_;
   double heading_rad_ = 0.0;
-  double turned_rad_ = 0.0;  ///< since it was known
-  double drift_rad_ = 0.0;   ///< 1σ of what grows with time
-  double white_rad2_ = 0.0;  ///< variance of what averages out
+  double turned_rad_ = 0.0;  ///< since the heading was last known
+  double drift_rad_ = 0.0;   ///< 1σ of the part that grows with time
+  double white_rad2_ = 0.0;  ///< variance of the part that averages out
   TimePoint at_;
   bool begun_ = false;
 };

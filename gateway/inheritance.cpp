@@ -11,7 +11,7 @@
 namespace vgyro::gateway {
 namespace {
 
-/// The old biases with the σ that the time since has left them; nothing where they cannot be right.
+/// The old biases with σ grown by the time since; nothing if the memory cannot be right.
 std::optional<fusion::DriftMemory> aged(const SavedState& before, const SavedState& now,
                                         const Plan& plan) {
   const bool age_is_known = now.rate_stamp >= before.rate_stamp;
@@ -25,10 +25,10 @@ std::optional<fusion::DriftMemory> aged(const SavedState& before, const SavedSta
   return corrector->memory(0.0);
 }
 
-/// `shift_dps`: what the new biases would differ by, were the old ones right.
+/// `shift_dps`: difference to expect between new and old biases if the old ones were right.
 bool agree(const fusion::DriftMemory& before, const fusion::DriftMemory& now, double shift_dps) {
   for (std::size_t gyro = 0; gyro < 2; ++gyro) {
-    const std::size_t own = 2 * gyro;  // of the covariance
+    const std::size_t own = 2 * gyro;  // index in the covariance
     const double sigma_dps = std::sqrt(before.bias_covariance[own] + now.bias_covariance[own]);
     const double apart_dps = now.bias_dps[gyro] - before.bias_dps[gyro] - shift_dps;
     if (std::abs(apart_dps) > Inheritance::kSigmasMost * sigma_dps) return false;
@@ -38,7 +38,7 @@ bool agree(const fusion::DriftMemory& before, const fusion::DriftMemory& now, do
 
 bool contradict(const SavedState& before, const SavedState& now, const Plan& plan);
 
-// An axis that is not what it was is a platform that turned.
+// A contradiction about one axis is one of the platform, which turned.
 bool axes_contradict(const SavedState& before, const SavedState& now, const Plan& plan) {
   for (const Plan& pair : plan.axes) {
     const auto of_axis = [&](const SavedState& state) { return state.axis == pair.axis; };
@@ -52,11 +52,11 @@ bool axes_contradict(const SavedState& before, const SavedState& now, const Plan
 
 bool contradict(const SavedState& before, const SavedState& now, const Plan& plan) {
   if (!plan.axes.empty()) return axes_contradict(before, now, plan);
-  if (before.devices != now.devices) return false;  // biases of others
+  if (before.devices != now.devices) return false;  // these biases belong to other gyros
   const std::optional<fusion::DriftMemory> old = aged(before, now, plan);
   if (!old) return false;
-  // Where the configured rate at rest has changed, the place has, or a mistake was put right: then
-  // the old biases were off by it.
+  // If the configured rate at rest has changed, the platform is at another place, or a mistake was
+  // corrected; in the second case the old biases were wrong by the difference.
   return !agree(*old, now.drift, 0.0) &&
          !agree(*old, now.drift, before.rest_rate_dps - now.rest_rate_dps);
 }

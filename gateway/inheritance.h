@@ -1,9 +1,9 @@
 #pragma once
 
-// What was learned before a reload that calls for a new calibration. Until the new one is complete
-// the old biases are what is worth keeping. A new calibration that contradicts them by more than
-// both are unsure of (the platform turned, and that was learned as drift) does not take their place
-// before a stop has confirmed it. Clock-free; ages go by the stamps of the frames.
+// What was learned before a reload that requires a new calibration. The old biases are the ones
+// worth keeping until the new calibration is complete. If it contradicts them by more than the σ of
+// both explain (the platform turned, and that was learned as drift), they are kept until a stop has
+// confirmed the new ones. Reads no clock; ages follow from the stamps of the frames.
 
 #include <cstdint>
 #include <optional>
@@ -15,17 +15,18 @@ namespace vgyro::gateway {
 
 class Inheritance {
  public:
-  /// Biases apart by more of their joint σ contradict each other. Both σ are honest, so what is
-  /// beyond is one calibration in a million.
+  /// Biases further apart than this many joint σ contradict each other. Both σ are honest, so a
+  /// correct calibration exceeds the limit once in a million.
   static constexpr double kSigmasMost = 5.0;
 
-  /// From the setup that is given up.
+  /// Keeps the state of the setup that is given up.
   void keep(SavedState before);
-  /// They are in use again, or not needed.
+  /// The old biases are in use again, or not needed.
   void forget();
 
-  /// What is worth keeping across a restart or for the next setup: the old biases, or what is known
-  /// now, with which the old ones are forgotten. `stops` were learned from since.
+  /// The state to keep across a restart or for the next setup: the old biases, or the present state
+  /// `now`, which then also drops the old ones. `stops` counts the stops learned from since the
+  /// reload.
   std::optional<SavedState> choose(const std::optional<SavedState>& now, const Plan& plan,
                                    std::uint64_t stops);
 

@@ -14,10 +14,10 @@ namespace {
 
 struct Input {
   std::string name;
-  std::string_view key;  ///< of the table, for the place
+  std::string_view key;  ///< key of its table, for the place of an error
   const std::string& message;
   const FrameMatch& match;
-  const Quantity* rate;  ///< null: it reads none
+  const Quantity* rate;  ///< null: the input reads no rate
 };
 
 std::vector<Input> inputs_of(const Plan& plan) {
@@ -37,8 +37,8 @@ std::vector<Input> inputs_of(const Plan& plan) {
   return inputs;
 }
 
-// Two inputs may read the same frames for other signals. Frames of one sender that pass for another
-// one's, and one rate for two, are a mistake.
+// Two inputs may read different signals of the same frames. It is a mistake if frames of one sender
+// match the input of another, or if two inputs read the same rate.
 bool confused(const Input& a, const Input& b) {
   if (!may_share_frames(a.match, b.match)) return false;
   const bool same_bits = a.rate != nullptr && b.rate != nullptr && a.rate->codec == b.rate->codec &&
@@ -55,7 +55,7 @@ bool may_share_frames(const FrameMatch& a, const FrameMatch& b) {
   const bool same_group =
       a.bus == b.bus && a.extended == b.extended && ((a.id ^ b.id) & a.mask & b.mask) == 0;
   if (!same_group) return false;
-  // Who takes any sender passes over those that the DBC file describes as other messages.
+  // An input that takes any sender skips identifiers that the DBC file describes as other messages.
   const auto passes_over = [](const FrameMatch& any, const FrameMatch& one) {
     return (any.mask & kSourceMask) == 0 && (one.mask & kSourceMask) != 0 &&
            !any.carries(one.id, one.extended);
@@ -69,7 +69,7 @@ void check_apart(TomlReader& root, const Plan& plan) {
     for (std::size_t k = i + 1; k < inputs.size(); ++k) {
       const Input& a = inputs[i];
       const Input& b = inputs[k];
-      // The gyros among themselves were looked at before.
+      // config.cpp has compared the gyros with each other already.
       if (b.key == "gyro" || !confused(a, b)) continue;
       root.complain(root.where(b.key),
                     fmt::format("{} ({}) and {} ({}) cannot be told apart: a frame of one of them "
@@ -129,7 +129,7 @@ void warn_of_others(const dbc::Database& database, const std::string& path, cons
     if (!taken || message.name == ours.message) continue;
     warnings.push_back(
         {at_line(path, message.line),
-         fmt::format("message {} has the identifier {:#x}, with which {} goes out on {}",
+         fmt::format("message {} has the identifier {:#x}, with which {} is sent on {}",
                      message.name, ours.id.id, ours.message, bus),
          ours.remedy});
   }

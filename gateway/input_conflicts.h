@@ -1,7 +1,7 @@
 #pragma once
 
-// What single tables of a configuration cannot see: inputs that take each other's frames, names and
-// identifiers that stand for two things.
+// Checks across tables of a configuration: inputs that take each other's frames, names and
+// identifiers that are used twice.
 
 #include <set>
 #include <string>
@@ -17,18 +17,18 @@ namespace vgyro::gateway {
 /// J1939: the last byte of an identifier is the sender's address.
 inline constexpr std::uint32_t kSourceMask = 0xFF;
 
-/// Can one frame be of both?
+/// Can one frame match both?
 bool may_share_frames(const FrameMatch& a, const FrameMatch& b);
 
-/// An error for inputs besides the gyros that cannot be distinguished from another one. Signals of
-/// one message may serve several inputs.
+/// Reports an error for each input besides the gyros that cannot be distinguished from another
+/// input. Signals of one message may serve several inputs.
 void check_apart(TomlReader& root, const Plan& plan);
 
 /// A bus and the path of a DBC file that describes it.
 using BusFile = std::pair<std::string, std::string>;
 
-/// What is usable, but will puzzle people: one name for both gyros; a message of the bus that has
-/// an identifier of ours.
+/// Warns of what is usable but misleading: one name for both gyros; a message on the bus that has
+/// an identifier of the gateway's own output.
 void warn_of_conflicts(TomlReader& root, const Plan& plan, const DatabaseCache& cache,
                        const std::set<BusFile>& files, std::vector<Error>& warnings);
 

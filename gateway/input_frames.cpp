@@ -31,8 +31,8 @@ can::Frame empty_frame(const FrameMatch& match) {
   return frame;
 }
 
-// What the bits are already, where that will do; otherwise the value compared with, one of its
-// neighbours, or an end of the signal's range.
+// Tries the present bits, then the value compared with, its neighbours, and the ends of the
+// signal's range.
 bool put_valid(const ValidCondition& condition, std::span<std::uint8_t> payload) {
   const dbc::SignalCodec& codec = condition.codec;
   const auto fulfilled = [&] { return holds(condition, codec.decode(payload).value); };
@@ -47,7 +47,7 @@ bool put_valid(const ValidCondition& condition, std::span<std::uint8_t> payload)
 void put_quantity(const Quantity& quantity, double value, can::Frame& frame) {
   quantity.presence.arrange(payload_of(frame));
   double there = in_unit_of(quantity, value);
-  // What is too large must not become a code that says "not available".
+  // Too large a value must not become a code that means "not available".
   if (!quantity.codes.empty())
     there = std::clamp(there, quantity.sendable_lowest(), quantity.sendable_highest());
   quantity.codec.encode(there, payload_of(frame));

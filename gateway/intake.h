@@ -1,10 +1,10 @@
 #pragma once
 
-// Frames of one stream in, accepted values with their time out, or the cause why a frame cannot be
-// used. Owns the order of the checks: is the frame complete and new (E2E), does it hold a value,
-// is its stamp plausible. The live pipeline and the readers of recordings use it, so that both
-// refuse the same. Counts nothing and does not use the pipeline's states; the guard belongs to the
-// caller.
+// Turns frames of one stream into accepted values with their time, or the cause why a frame cannot
+// be used. Owns the order of the checks: is the frame complete and new (E2E), does it hold a value,
+// is its stamp plausible. The live pipeline and the readers of recordings share it, so that both
+// refuse the same frames. Counts nothing and knows no states of the pipeline; the guard belongs to
+// the caller.
 
 #include <algorithm>
 #include <array>
@@ -23,22 +23,22 @@
 
 namespace vgyro::gateway {
 
-/// The streams of a fusion::StampGuard. The gyros, 0 and 1, come first: they lead.
+/// The streams of a fusion::StampGuard. The gyros, 0 and 1, come first, as they lead.
 inline constexpr std::size_t kReferenceStream = 2;
 inline constexpr std::size_t kAccelerometerStream = 3;
 inline constexpr std::size_t kSpeedStream = 4;
 
-/// What the guard says of one stamp.
+/// The guard's verdict on one stamp.
 struct StampResult {
-  bool judged = false;           ///< false: the frame was not worth asking for
+  bool judged = false;           ///< false: the frame was refused before its stamp mattered
   std::optional<Reject> reject;  ///< kStampRepeated or kStampJump
-  bool clock_step = false;       ///< accepted, and earlier times are of before the step
-  TimePoint t;  ///< monotone; of a stamp that is accepted, and of one that is repeated
+  bool clock_step = false;       ///< accepted; earlier times belong to before the step
+  TimePoint t;                   ///< monotone; set for accepted and for repeated stamps
 
   [[nodiscard]] bool believed() const { return judged && !reject; }
 };
-/// `result` is a new one. It is filled in where it stands, as the results of frames are, because a
-/// processor waits when it copies what was written in smaller parts a moment ago.
+/// `result` must be freshly constructed. It is filled in place, as the results of frames are,
+/// because a processor stalls when it copies data that it has just written in smaller parts.
 inline void judge_stamp(std::size_t stream, TimePoint stamp, fusion::StampGuard& guard,
                         StampResult& result) {
   using Verdict = fusion::StampGuard::StampVerdict;
@@ -50,16 +50,16 @@ inline void judge_stamp(std::size_t stream, TimePoint stamp, fusion::StampGuard&
   result.clock_step = verdict == Verdict::kClockStep;
 }
 
-/// Whose stamps are judged in addition to those of values: none, or those of authentic frames that
-/// report a sensor fault (GyroHealth needs their time).
+/// Which stamps are judged: those of values alone, or also those of authentic frames that report a
+/// sensor fault (GyroHealth needs their time).
 enum class Timed : std::uint8_t { kValues, kSickToo };
 [[nodiscard]] bool is_timed(Reject reject, Timed timed);
 
-/// N quantities of one message, all or none, with the message's E2E check.
+/// N quantities of one message, all or none of them, with the message's E2E check.
 template <std::size_t N>
 class QuantityInput {
  public:
-  /// The plan's parts must live as long.
+  /// The plan's parts must outlive this object.
   QuantityInput(const std::array<const Quantity*, N>& quantities, const E2ePlan& e2e)
       : quantities_(quantities), e2e_(e2e) {}
 
@@ -67,7 +67,7 @@ class QuantityInput {
     std::optional<Reject> reject;   ///< set: the frame is not used
     std::array<double, N> value{};  ///< in the product's units
   };
-  /// `result` is a new one.
+  /// `result` must be freshly constructed.
   void decode(const can::Frame& frame, Result& result) {
     const bool own = std::all_of(quantities_.begin(), quantities_.end(), [&](const Quantity* q) {
       return q->presence.always() || q->presence.holds(frame.payload());
@@ -82,15 +82,15 @@ class QuantityInput {
   E2eCheck e2e_;
 };
 
-/// `Input` turns a frame into its Result, which holds a `reject`.
+/// `Input` decodes a frame into its Result, which has a member `reject`.
 template <class Input>
 class Intake {
  public:
   Intake(std::size_t stream, Input input, Timed timed = Timed::kValues)
       : stream_(stream), input_(std::move(input)), timed_(timed) {}
 
-  /// The value, used when nothing is in `reject`. What the frame itself says comes before what its
-  /// stamp says.
+  /// The value, valid if `reject` is empty. A cause found in the frame itself takes precedence over
+  /// one of its stamp.
   struct Result : Input::Result {
     StampResult stamp;
   };
@@ -104,7 +104,7 @@ class Intake {
   }
 
   [[nodiscard]] const Input& input() const { return input_; }
-  /// The check of the alive counter restarts.
+  /// Restarts the check of the alive counter.
   void fall_silent() { input_.fall_silent(); }
 
  private:

@@ -14,7 +14,7 @@ namespace {
 
 constexpr std::string_view kTakesBack = "takes back";
 
-// Independent noises add in squares.
+// Independent noises add as squares.
 void add_density(std::optional<double>& density, double more) {
   density = std::hypot(density.value_or(0.0), more);
 }
@@ -43,9 +43,8 @@ void add_noise(const model::Effect& effect, fusion::GyroParameters& parameters) 
   }
 }
 
-// Flicker as drifts of the corrector, as many as there is room for beside those that are given:
-// three are a decade apart. What is quicker drowns in white noise; what is slower is a bias to
-// every stop.
+// Flicker as drift terms of the corrector, as many as fit beside the given ones: three, a decade
+// apart in time. Faster terms are hidden by white noise; to any stop, slower ones are a bias.
 constexpr double kFlickerFrom_s = 3.0;
 constexpr double kFlickerTo_s = 3000.0;
 void add_flicker(double coefficient_dps, fusion::GyroParameters& parameters) {
@@ -169,7 +168,7 @@ void apply_model(const model::Model& model, Plan& plan, std::vector<Error>& erro
       double& sum_dps = flicker_dps[effect.gyro];
       sum_dps = std::hypot(sum_dps, effect.parameters[0]);
     }
-    // What the model tells of the temperature is not learned besides.
+    // A temperature effect that the model states is not learned as well.
     if (effect.kind == model::Kind::kTemperatureBias ||
         effect.kind == model::Kind::kTemperatureBiasQuadratic)
       plan.corrector.gyros[effect.gyro].learns_temperature = false;

@@ -1,8 +1,8 @@
 #pragma once
 
-// A model file's place in the plan: noise goes to the corrector's parameters, limits to the gyros;
-// what is taken back stays in Plan::model. Complains, at the file's lines, of effects whose inputs
-// the configuration does not name.
+// Puts a model file into the plan: noise goes to the corrector's parameters, limits to the gyros,
+// and the effects to subtract stay in Plan::model. Reports, at the file's lines, effects whose
+// inputs the configuration does not name.
 
 #include <string_view>
 #include <vector>
@@ -13,7 +13,7 @@
 
 namespace vgyro::gateway {
 
-/// Delay and group delay of one gyro together that can be taken back.
+/// The largest total of delay and group delay of one gyro that can be taken back.
 inline constexpr double kLagMax_s = 0.25;
 
 /// Precondition: both gyros are resolved.
@@ -22,7 +22,7 @@ void apply_model(const model::Model& model, Plan& plan, std::vector<Error>& erro
 /// Effects of one gyro (0 or 1); empty without a model.
 std::vector<model::Effect> effects_of(const Plan& plan, std::size_t gyro);
 
-/// What the gateway does with a kind, in a word or two: "takes back", "as noise" …
+/// What the gateway does with a kind, in one or two words: "takes back", "as noise" …
 std::string_view treatment(model::Kind kind);
 
 /// A bit mask of model::Need as words: "temperature", "acceleration".

@@ -13,11 +13,11 @@ namespace {
 
 using Matrix = std::array<double, kAxes * kAxes>;
 
-// Beyond a whole turn each way nobody means an angle.
+// An angle beyond a whole turn either way is a mistake.
 constexpr double kAngleMost_deg = 360.0;
-// What is flatter has no rotation that is the nearest, in the digits that people write.
+// A flatter matrix has no well-defined nearest rotation in the digits that people write.
 constexpr double kDeterminantMin = 0.01;
-// The iteration doubles its digits with each step.
+// Each step of the iteration doubles the number of correct digits.
 constexpr int kStepsMost = 20;
 
 Matrix product(const Matrix& a, const Matrix& b) {
@@ -67,7 +67,7 @@ Matrix nearest_rotation(Matrix m) {
       m[i] = 0.5 * (before[i] + cofactor[i] / det);
     if (furthest(m, before) < 1e-16) break;
   }
-  // A swap of axes stays one: what rounding has left of zeros and ones goes.
+  // Keep a permutation of axes exact: remove what rounding has left of zeros and ones.
   for (double& element : m) {
     if (std::abs(element - std::round(element)) < 1e-15) element = std::round(element) + 0.0;
   }
@@ -109,9 +109,9 @@ std::optional<Mount> checked_matrix(TomlReader& reader, const std::vector<double
   reader.complain(
       reader.where("mount"),
       has_nearest
-          ? fmt::format("mount is no rotation: the nearest one differs by {:.2g} in an element",
+          ? fmt::format("mount is not a rotation: the nearest one differs by {:.2g} in an element",
                         mount.corrected)
-          : fmt::format("mount is no rotation: its determinant is {:.3g}", det),
+          : fmt::format("mount is not a rotation: its determinant is {:.3g}", det),
       fmt::format("rows and columns of length 1 at right angles, to {:g}", kMountRounding));
   return std::nullopt;
 }

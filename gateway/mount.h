@@ -1,9 +1,9 @@
 #pragma once
 
-// The key `mount` of a unit: how its axes lie in the vehicle, as a rotation. Three angles in
-// degrees (roll about x, then pitch about y, then yaw about z, all of the vehicle), or the nine
-// numbers of the matrix, row by row. What is nearly a rotation becomes the nearest one; what is
-// none, or mirrors, is refused.
+// The key `mount` of a unit: the rotation from its axes to the vehicle's. Three angles in degrees
+// (roll about x, then pitch about y, then yaw about z, all of the vehicle), or the nine numbers of
+// the matrix, row by row. A matrix close to a rotation becomes the nearest one; others, and
+// reflections, are refused.
 
 #include <array>
 #include <optional>
@@ -13,10 +13,10 @@
 
 namespace vgyro::gateway {
 
-/// Tolerance of an element of the matrix: numbers rounded to two digits.
+/// Tolerance of a matrix element: the numbers may be rounded to two digits.
 inline constexpr double kMountRounding = 0.01;
 
-/// Nothing where the key is not there, or after a complaint.
+/// Nothing if the key is absent, or after an error.
 std::optional<Mount> read_mount(TomlReader& reader);
 
 /// Ω_vehicle = Rz(yaw) · Ry(pitch) · Rx(roll) · Ω_sensor.

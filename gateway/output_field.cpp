@@ -10,9 +10,9 @@ namespace vgyro::gateway {
 
 namespace {
 
-// Beyond, not every whole number is a double, and a step is none.
+// Beyond this, not every whole number is a double, and a step is none.
 constexpr unsigned kBitsMost = 53;
-// The ends of a range are written in decimals, which miss the raw value by a rounding.
+// The ends of a range are written in decimals, which differ from the raw value by rounding.
 constexpr double kRangeSlack_steps = 1e-6;
 
 struct RawRange {
@@ -29,7 +29,7 @@ RawRange type_range(const dbc::SignalCodec& codec) {
   return {low, low + static_cast<std::int64_t>(codec.raw_mask())};
 }
 
-// The raw values whose physical ones lie inside what is accepted of the signal.
+// The raw values whose physical values lie inside the accepted range of the signal.
 RawRange inside(const dbc::Signal& signal, const Quantity& quantity, RawRange range) {
   double low = (quantity.minimum - signal.offset) / signal.factor;
   double high = (quantity.maximum - signal.offset) / signal.factor;
@@ -41,7 +41,7 @@ RawRange inside(const dbc::Signal& signal, const Quantity& quantity, RawRange ra
   return range;
 }
 
-// Codes at the ends are no values.
+// Codes at the ends of the range are not values.
 RawRange without_codes(const dbc::Signal& signal, dbc::CodeRules rules, RawRange range) {
   const dbc::Codes codes = dbc::codes_of(signal, rules);
   const auto is_code = [&](std::int64_t raw) {
@@ -60,11 +60,11 @@ std::string hex(const dbc::Signal& signal, std::uint64_t raw) {
   return fmt::format("0x{:0{}X}", raw, (signal.length_bits + 3) / 4);
 }
 
-// The bit pattern that the configuration names as a code, which is then no value of the range.
+// The bit pattern that the configuration names as a code; removes it from the range of values.
 Expected<std::uint64_t> code_in(const dbc::Signal& signal, const Quantity& quantity,
                                 std::int64_t raw, RawRange& range) {
   const RawRange all = type_range(quantity.codec);
-  // People write the bit pattern of a negative number, too.
+  // People also write the unsigned bit pattern of a negative number.
   const std::int64_t patterns = all.high - all.low + 1;
   const std::int64_t code = raw > all.high && raw < patterns ? raw - patterns : raw;
   if (code < all.low || code > all.high)
@@ -80,7 +80,7 @@ Expected<std::uint64_t> code_in(const dbc::Signal& signal, const Quantity& quant
   return bits_of(signal, code);
 }
 
-// NMEA 2000 has a code of its own for "out of range".
+// NMEA 2000 has a separate code for "out of range".
 std::uint64_t beyond_of(const dbc::Signal& signal, dbc::CodeRules rules, std::uint64_t none_raw) {
   const dbc::Codes codes = dbc::codes_of(signal, rules);
   const bool has_own = rules == dbc::CodeRules::kNmea2000 && !codes.empty() &&
@@ -88,8 +88,8 @@ std::uint64_t beyond_of(const dbc::Signal& signal, dbc::CodeRules rules, std::ui
   return has_own ? codes.last - 1 : none_raw;
 }
 
-// What stands in a signal without codes while another one says that it is not valid. NaN would
-// poison a receiver that does not expect it.
+// The value of a signal without codes while another signal marks it as not valid. NaN would poison
+// a receiver that does not expect it.
 std::uint64_t raw_of_zero(const OutputField& field) {
   std::array<std::uint8_t, can::kFdBytesMax> scratch{};
   field.codec.encode(-field.shift / field.scale, scratch);
@@ -140,7 +140,7 @@ Expected<OutputField> output_field(const dbc::Signal& signal, const Quantity& qu
   } else {
     field.none_raw = field.beyond_raw = raw_of_zero(field);
   }
-  if (range.low > range.high) return fail({}, signal.name + " can say no value");
+  if (range.low > range.high) return fail({}, signal.name + " can carry no value");
   field.minimum = quantity.codec.value_of(range.low);
   field.maximum = quantity.codec.value_of(range.high);
   if (field.minimum > field.maximum) std::swap(field.minimum, field.maximum);
@@ -152,7 +152,8 @@ std::optional<RawValue> not_available(const dbc::Signal& signal, dbc::CodeRules 
   if (!codes.empty()) return RawValue{codes.last, hex(signal, codes.last) + ", not available"};
   if (!signal.is_integer() || signal.length_bits == 0 || signal.length_bits > kBitsMost)
     return std::nullopt;
-  // Of several the largest: sensors count their kinds of error downwards from "not available".
+  // Of several labels take the largest: sensors count kinds of error downwards from "not
+  // available".
   const dbc::ValueLabel* found = nullptr;
   for (const dbc::ValueLabel& label : signal.labels) {
     if (!dbc::labelled_no_value(signal, label.raw)) continue;
@@ -162,7 +163,7 @@ std::optional<RawValue> not_available(const dbc::Signal& signal, dbc::CodeRules 
     const std::uint64_t raw = bits_of(signal, found->raw);
     return RawValue{raw, fmt::format("{}, \"{}\"", hex(signal, raw), found->text)};
   }
-  // J1939 keeps codes of its states as well: all bits set is "not available" of two bits and more.
+  // J1939 reserves codes in states too: with two bits or more, all bits set is "not available".
   if (rules == dbc::CodeRules::kNone || signal.length_bits < 2) return std::nullopt;
   const std::uint64_t ones = bits_of(signal, -1);
   return RawValue{ones, hex(signal, ones) + ", not available"};

@@ -1,7 +1,7 @@
 #pragma once
 
-// A signal of a foreign message → what it can carry: the range of its values, which of its bit
-// patterns mean "not available", and its value while unused.
+// What a signal of a foreign message can carry: the range of its values, the bit patterns that mean
+// "not available", and its value while unused.
 
 #include <cstdint>
 #include <optional>
@@ -14,19 +14,19 @@
 
 namespace vgyro::gateway {
 
-/// `quantity` is of the same signal; `none_raw` is the configuration's own code, where it gives
-/// one. Error, without a place, when that code is a value like any other, or when the signal can
-/// say no value at all.
+/// `quantity` belongs to the same signal; `none_raw` is the code from the configuration, if any.
+/// Error, without a place, if that code is also a valid value, or if the signal can carry no value
+/// at all.
 Expected<OutputField> output_field(const dbc::Signal& signal, const Quantity& quantity,
                                    dbc::CodeRules rules, std::optional<std::int64_t> none_raw = {});
 
-/// A bit pattern, and in words what it is.
+/// A bit pattern and its meaning in words.
 struct RawValue {
   std::uint64_t raw = 0;
   std::string text;
 };
 
-/// "Not available", where the file labels a value so or the rules keep one.
+/// The pattern for "not available", if the file labels a value so or the rules reserve one.
 std::optional<RawValue> not_available(const dbc::Signal& signal, dbc::CodeRules rules);
 
 /// The value of an unused signal: not available, or the file's start value, or 0.

@@ -21,14 +21,14 @@ std::uint64_t low_bits(std::int64_t value, unsigned bits) {
   return static_cast<std::uint64_t>(value) & (~0ULL >> (64U - bits));
 }
 
-// Two's complement in `bits`; what does not fit, and NaN, is the most negative number.
+// Two's complement in `bits`; NaN and values that do not fit become the most negative number.
 std::uint64_t signed_field(double scaled, unsigned bits) {
   const double limit = std::ldexp(1.0, static_cast<int>(bits) - 1);
   if (!(std::abs(scaled) < limit - 0.5)) return 1ULL << (bits - 1);
   return low_bits(std::llrint(scaled), bits);
 }
 
-// All ones is "not available", for NaN and for what does not fit.
+// NaN and values that do not fit become all ones, "not available".
 std::uint64_t sigma_field(double scaled, unsigned bits) {
   const std::uint64_t none = ~0ULL >> (64U - bits);
   if (!(scaled >= 0.0 && scaled < static_cast<double>(none) - 0.5)) return none;
@@ -120,7 +120,7 @@ void OutputEncoder::put_fd_rate(const RateOutput& output) {
   const auto corrected = [&](std::size_t gyro) {
     return valid ? signed_field(output.corrected_dps[gyro] * kFdRatePerDps, 32) : 0x80000000U;
   };
-  // Of a log that starts at zero, readings that are dated back may be of before.
+  // In a log that starts at zero, readings that are dated back may lie before it.
   const auto instant_us =
       static_cast<std::uint64_t>(std::max<std::int64_t>(to_ns(output.instant), 0) / 1000);
   const auto age_us = static_cast<std::uint64_t>(
@@ -157,12 +157,12 @@ const can::Frame& OutputEncoder::model(const ModelOutput& output) {
 namespace {
 
 constexpr std::size_t kAxesRateBytes = 48;
-constexpr std::size_t kAxesState = 3;    ///< of each axis a byte: state, validity, quality
-constexpr std::size_t kAxesHealth = 6;   ///< of each axis a byte
+constexpr std::size_t kAxesState = 3;    ///< a byte for each axis: state, validity, quality
+constexpr std::size_t kAxesHealth = 6;   ///< a byte for each axis
 constexpr std::size_t kAxesAge = 9;      ///< two bytes
-constexpr std::size_t kAxesTime = 12;    ///< eight
-constexpr std::size_t kAxesRates = 20;   ///< of each axis four
-constexpr std::size_t kAxesSigmas = 32;  ///< of each axis four
+constexpr std::size_t kAxesTime = 12;    ///< eight bytes
+constexpr std::size_t kAxesRates = 20;   ///< four bytes for each axis
+constexpr std::size_t kAxesSigmas = 32;  ///< four bytes for each axis
 
 void store_bytes(std::uint8_t* to, std::uint64_t value, std::size_t bytes) {
   for (std::size_t i = 0; i < bytes; ++i)

@@ -22,7 +22,7 @@ enum class BiasMode : std::uint8_t {
   kTracking = 2,
   kHold = 3,
   kStop = 4,      ///< standing still: both biases are being learned
-  kAmbiguous = 5  ///< two readings of what the gyros show are likely: both are carried on
+  kAmbiguous = 5  ///< two explanations of the data are likely: both are carried on
 };
 
 /// VB_Health on the wire, a bit field.
@@ -43,7 +43,7 @@ struct RateOutput {
   Quality quality = Quality::kUnusable;
   std::uint8_t health = 0;
   Duration age{0};    ///< from the instant of the rate to the stamp of the causing frame
-  TimePoint instant;  ///< what the rate refers to; FD only
+  TimePoint instant;  ///< the instant that the rate belongs to; FD only
 };
 
 struct BiasOutput {
@@ -62,13 +62,13 @@ class OutputEncoder {
  public:
   explicit OutputEncoder(const OutputPlan& plan);
 
-  /// Counters of the streams that both send go on where the other's stand.
+  /// Continues the counters of the frames that both encoders send.
   void count_on_from(const OutputEncoder& before);
 
   /// Can VG_Rate carry this rate in the chosen format?
   [[nodiscard]] bool can_carry(double rate_dps) const;
 
-  /// An invalid output carries 0x800000 and quality 0, whatever else it says.
+  /// An invalid output carries 0x800000 and quality 0, whatever its other members hold.
   const can::Frame& rate(const RateOutput& output);
   const can::Frame& bias(const BiasOutput& output);
   const can::Frame& model(const ModelOutput& output);
@@ -92,10 +92,11 @@ class AxesEncoder {
  public:
   explicit AxesEncoder(const OutputPlan& plan);
 
-  /// Where the identifier is the same the counter goes on where the other's stands.
+  /// Continues the counter of the other encoder if the identifier is the same.
   void count_on_from(const AxesEncoder& before);
 
-  /// About x, y and z, of one instant; null: there is none. Precondition: one is there.
+  /// The rates about x, y and z of one instant; null: no rate. Precondition: at least one is not
+  /// null.
   const can::Frame& rates(const std::array<const RateOutput*, kAxes>& axes);
 
  private:

@@ -11,15 +11,14 @@ namespace vgyro::gateway {
 
 namespace {
 
-// Sensors that speak as often as frames are wanted are now and then a little early: arbitration on
-// a bus delays a frame by one or two others, some 0.1 to 2 ms.
+// A sensor as frequent as the wanted frames is a little early now and then: arbitration delays a
+// frame by one or two others, some 0.1 to 2 ms.
 constexpr Duration kEarlyMost = std::chrono::milliseconds(2);
 constexpr Duration::rep kEarlyShare = 4;  // of the period, where that is shorter
-// Frames that came late are made up for, but not in heaps.
+// Late frames are made up for, but at no less than half a period's distance.
 constexpr Duration::rep kCloseShare = 2;
 constexpr double kRoundingSlack_steps = 1e-6;
-// Between the axes of one bunch and between bunches there is more of a difference than jitter
-// makes.
+// The pause between bunches of axes exceeds the pauses inside one by more than jitter does.
 constexpr Duration::rep kLongerPause = 2;
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
@@ -31,7 +30,7 @@ double in_unit_of(const OutputField& field, double value) {
   return (value - field.shift) / field.scale;
 }
 
-// False for NaN too.
+// False for NaN.
 bool fits(const OutputField& field, double in_unit) {
   return in_unit >= field.minimum && in_unit <= field.maximum;
 }
@@ -100,13 +99,13 @@ const can::Frame* LayoutEncoder::rates(const Rates& rates, TimePoint stamp) {
   return &frame_;
 }
 
-// Each frame a period after the last one was due, so that the average is right whatever the rates'
-// own distance is; and a rate that is a little early need not wait for its successor.
+// Each frame is due one period after the one before was due, so that the average is right whatever
+// the interval of the rates; a rate that is slightly early is used instead of the next one.
 bool LayoutEncoder::is_due(TimePoint stamp) {
   if (!plan_.every) return true;
   const Duration period = *plan_.every;
   const Duration early = next_ - stamp;
-  // After a silence, or where the clock was set back, it begins anew.
+  // After a silence, or if the clock was set back, start anew.
   const bool begins = early <= -period || early > 2 * period;
   if (!begins && early > std::min(period / kEarlyShare, kEarlyMost)) return false;
   next_ = begins ? stamp + period : std::max(next_ + period, stamp + period / kCloseShare);
@@ -124,7 +123,7 @@ void LayoutEncoder::put_rate(const LayoutRate& one, const RateOutput* output, bo
     rate.codec.encode_raw(beyond ? rate.beyond_raw : rate.none_raw, payload);
   }
   if (one.sign) {
-    // What is rounded to zero has no sign.
+    // A value rounded to zero has no sign.
     const bool negative = valid && in_unit < 0.0 && rate.codec.decode(payload).raw != 0;
     one.sign->encode_raw(negative ? 1 : 0, payload);
   }
@@ -136,7 +135,7 @@ void LayoutEncoder::put_flag(const OutputFlag& flag, bool valid) {
   flag.codec.encode_raw(valid ? flag.valid_raw : flag.invalid_raw, payload_of(frame_));
 }
 
-// Rounded up: rounded to zero it would claim a rate without error.
+// Rounded up; rounded to zero it would claim a rate without error.
 void LayoutEncoder::put_sigma(const OutputField& field, double sigma_dps, bool valid) {
   const std::span<std::uint8_t> payload = payload_of(frame_);
   const double in_unit = in_unit_of(field, sigma_dps);
@@ -176,14 +175,14 @@ void LayoutSet::take(std::size_t axis, const RateOutput& output, TimePoint stamp
   }
   if (!any_of_several_) return;
   begin_round(output.instant);
-  // Whoever is waited for has missed its turn.
+  // The axes still missing have missed their turn.
   if (newest_[axis].fresh) send_all_axes(stamp, sink);
   newest_[axis] = {.output = output, .there = true, .fresh = true};
   newest_instant_ = output.instant;
 }
 
 // Axes in messages of their own come in bunches. A pause much longer than the one before the bunch
-// that is being gathered says that this one is the end of another.
+// being gathered begins another bunch.
 void LayoutSet::begin_round(TimePoint instant) {
   const Duration pause = span(newest_instant_, instant);
   const bool gathering =
@@ -203,7 +202,7 @@ void LayoutSet::settle(TimePoint stamp, FrameSink& sink) {
   if (any_fresh && all_fresh) send_all_axes(stamp, sink);
 }
 
-// A clock that is set back leaves rates of a time to come.
+// After a clock was set back, rates may be left that lie in the future.
 bool LayoutSet::speaks(const Newest& one) const {
   if (!one.there) return false;
   const Duration apart = span(one.output.instant, newest_instant_);
@@ -231,7 +230,7 @@ void LayoutSet::put(const LayoutEncoder& layout, const can::Frame* frame, TimePo
   }
 }
 
-// One identifier may go out on several buses: the first of them goes on from the first, and so on.
+// One identifier may be sent on several buses: the first continues from the first, and so on.
 const LayoutEncoder* LayoutSet::predecessor(std::size_t index, const LayoutSet& before) const {
   const LayoutEncoder& layout = layouts_[index];
   const auto is_same = [&](const LayoutEncoder& other) { return layout.sends_same_frame(other); };

@@ -1,12 +1,11 @@
 #pragma once
 
-// The virtual rate as a frame of a foreign layout: the gateway replaces a sensor that
-// receivers already use. Every frame holds what the sensor's DBC file defines: the rate to the
-// nearest step, or those about several axes, σ rounded up, validity, alive counter, check value. A
-// rate that is not valid, or beyond what its signal can carry, or whose σ is and would be
-// understated, goes out as the layout's "not available" or invalid; where the layout has no way to
-// say so nothing goes out, which every receiver takes for a silent sensor. Allocates nothing; reads
-// no clock.
+// The virtual rate as a frame of a foreign layout: the gateway replaces a sensor that receivers
+// already use. Every frame holds what the sensor's DBC file defines: the rate or the rates about
+// several axes, rounded to the nearest step, σ rounded up, validity, alive counter, check value. A
+// rate is sent as the layout's "not available" or invalid if it is not valid, or if its signal
+// cannot carry it, or if the σ signal would understate σ. If the layout can express neither, no
+// frame is sent, which every receiver takes for a silent sensor. Allocates nothing; reads no clock.
 
 #include <array>
 #include <cstdint>
@@ -26,16 +25,16 @@ class LayoutEncoder {
  public:
   explicit LayoutEncoder(const OutputLayout& plan);
 
-  /// The rates of one frame, by axis of the platform; null: there is none.
+  /// The rates of one frame, by axis of the platform; null: no rate.
   using Rates = std::array<const RateOutput*, kAxes>;
 
-  /// The frame to send; null when none is due, or when the layout cannot say what is to be said.
+  /// The frame to send; null if none is due, or if the layout cannot express these rates.
   const can::Frame* rates(const Rates& rates, TimePoint stamp);
   /// The frame to send of a layout that carries one rate; null as for rates().
   const can::Frame* rate(const RateOutput& output, TimePoint stamp);
 
   [[nodiscard]] bool sends_same_frame(const LayoutEncoder& other) const;
-  /// The counter, and when the next frame is due, go on where the other's stand.
+  /// Continues the counter and the due time of the other encoder.
   void go_on_from(const LayoutEncoder& before);
   void take_books_of(const LayoutEncoder& before) { counts_ = before.counts_; }
 
@@ -52,29 +51,29 @@ class LayoutEncoder {
   OutputLayout plan_;
   can::Frame frame_;
   std::uint32_t counter_ = 0;
-  TimePoint next_;  ///< when the next frame is due, give or take what `every` allows
+  TimePoint next_;  ///< when the next frame is due, within the tolerance that `every` allows
   LayoutCounts counts_;
 };
 
-/// All layouts of a platform. One of a single rate goes out with that; one of several once all axes
-/// in use have a new one, and never with rates of another motion: an axis that has long been
-/// silent is "not available" in it.
+/// All layouts of a platform. A layout of a single rate is sent with that rate; one of several
+/// rates once all axes in use have a new one, and never with rates of different motion: it marks an
+/// axis that has long been silent as "not available".
 class LayoutSet {
  public:
-  /// Rates further apart than this are of different motion.
+  /// Rates further apart in time than this belong to different motion.
   static constexpr Duration kApartMost = std::chrono::milliseconds(25);
 
   explicit LayoutSet(const OutputPlan& plan);
 
   [[nodiscard]] bool empty() const { return layouts_.empty(); }
-  /// A new rate about an axis of the platform; of two single gyros that is 0.
+  /// A new rate about an axis of the platform; with two single gyros the axis is 0.
   void take(std::size_t axis, const RateOutput& output, TimePoint stamp, FrameSink& sink);
-  /// No more rates come of what was received.
+  /// The frame received last yields no more rates.
   void settle(TimePoint stamp, FrameSink& sink);
 
-  /// The counters of frames that both send go on where the other's stand.
+  /// Continues the counters of the frames that both sets send.
   void count_on_from(const LayoutSet& before);
-  /// From now on as this plan says; counters and books go on.
+  /// Replaces the plan; counters and counts go on.
   void change_plan(const OutputPlan& plan);
   void tell(Status& status) const;
 
@@ -83,7 +82,7 @@ class LayoutSet {
   struct Newest {
     RateOutput output;
     bool there = false;
-    bool fresh = false;  ///< no frame of several rates carried it yet
+    bool fresh = false;  ///< no frame of several rates has carried it yet
   };
 
   void begin_round(TimePoint instant);
@@ -91,7 +90,7 @@ class LayoutSet {
   void send_all_axes(TimePoint stamp, FrameSink& sink);
   void put(const LayoutEncoder& layout, const can::Frame* frame, TimePoint stamp,
            FrameSink& sink) const;
-  /// The layout of `before` that the frame of our layout `index` was; null: there was none.
+  /// The layout of `before` that sent the frame of the own layout `index`; null: none did.
   [[nodiscard]] const LayoutEncoder* predecessor(std::size_t index, const LayoutSet& before) const;
 
   std::vector<LayoutEncoder> layouts_;
@@ -99,7 +98,7 @@ class LayoutSet {
   bool any_of_several_ = false;  ///< a layout carries several rates
   std::array<Newest, kAxes> newest_;
   TimePoint newest_instant_{};
-  Duration pause_before_{};  ///< before the first of the fresh ones
+  Duration pause_before_{};  ///< pause before the first of the fresh rates
 };
 
 }  // namespace vgyro::gateway

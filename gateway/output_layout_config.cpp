@@ -26,20 +26,20 @@ namespace vgyro::gateway {
 
 namespace {
 
-// J1939-21: the address that nobody has, and the one that means everybody.
+// J1939-21: the null address, which no node has, and the global address, which reaches all.
 constexpr std::uint32_t kNullAddress = 0xFE;
 constexpr std::uint32_t kGlobalAddress = 0xFF;
-// PDU formats below are sent to one address, which stands where others have part of their number.
+// PDU formats below are sent to one address, in the byte that other formats use for their number.
 constexpr std::uint32_t kPdu2First = 240;
-// A day's worth of rounding of such steps is a degree; a car's own sensor has 0.01 to 0.06 deg/s.
+// Rounding to such steps adds up to a degree a day; a car's own sensor has 0.01 to 0.06 deg/s.
 constexpr double kCoarse_dps = 0.1;
-// No road vehicle turns faster in normal driving; a boat has a third of it.
+// No road vehicle turns faster in normal driving; a boat reaches a third of it.
 constexpr double kNarrow_dps = 100.0;
 constexpr double kEveryMost_ms = 60'000.0;
 constexpr std::size_t kProfile1Values = 15;  // 15 itself is "invalid"
 constexpr unsigned kNibble = 4;
 
-// How people name what receivers check, in any case of letters.
+// Usual names of signals that receivers check, compared in lower case.
 constexpr std::array<std::string_view, 4> kCrcNames{"crc", "checksum", "chksum", "chksm"};
 constexpr std::array<std::string_view, 4> kCounterNames{"counter", "alive", "cntr", "rolling"};
 
@@ -51,7 +51,7 @@ Payload mask_of(const dbc::SignalCodec& codec) {
   return mask;
 }
 
-// The bits that arrange() writes are those that come out alike whatever they were.
+// The bits that arrange() writes are those that come out the same from zeros and from ones.
 Payload mask_of(const dbc::Presence& presence) {
   Payload zeros{};
   Payload ones;
@@ -76,7 +76,7 @@ void add(Payload& to, const Payload& mask) {
     to[i] = static_cast<std::uint8_t>(to[i] | mask[i]);
 }
 
-/// One rate on its way into the plan: the keys that say how it goes out, and their signals.
+/// One rate while its part of the plan is made: the keys that define its output, and their signals.
 struct RateEntry {
   std::size_t axis = 0;
   std::string rate, sign, sign_signal, sigma, valid, invalid;  ///< keys
@@ -103,7 +103,7 @@ std::string ending_of(std::size_t axis) {
   return fmt::format("_{}", kAxisNames[axis]);
 }
 
-/// One table.
+/// Reads one table.
 class LayoutReader {
  public:
   LayoutReader(const toml::table& table, TableContext context, Plan& plan)
@@ -151,17 +151,18 @@ class LayoutReader {
   TableContext context_;
   SignalResolver resolver_;
   Method method_;
-  const std::vector<std::size_t>& axes_;  ///< of the platform; empty: a single one
+  const std::vector<std::size_t>& axes_;  ///< of the platform; empty: a single axis
   bool by_axes_ = false;                  ///< rate_x … instead of rate
   std::vector<RateEntry> entries_;
-  std::optional<std::string> unit_;  ///< of all rates, as are the code for "none" and the sign
+  std::optional<std::string> unit_;  ///< of all rates, as are none_raw_ and sign_
   std::optional<std::int64_t> none_raw_;
   double sign_ = 1.0;
   bool fd_ = false;
   dbc::CodeRules rules_ = dbc::CodeRules::kNone;
   const dbc::Signal* rate_ = nullptr;   ///< the first one
-  std::optional<OutputLayout> layout_;  ///< as soon as a rate is known
-  Payload taken_{};                     ///< bits that a key has named, or that choose the page
+  std::optional<OutputLayout> layout_;  ///< set once a rate is known
+  Payload taken_{};                     ///< bits of signals that a key has named, or that select
+                                        ///< the page
 };
 
 std::optional<OutputLayout> LayoutReader::read() {
@@ -198,7 +199,7 @@ std::optional<OutputLayout> LayoutReader::read() {
   return layout_;
 }
 
-// What the table names: one rate, or those about some of the axes.
+// Finds the rates that the table names: one, or those about some of the axes.
 void LayoutReader::find_entries() {
   for (std::size_t axis = 0; axis < kAxes; ++axis) {
     RateEntry entry = entry_named(ending_of(axis), axis);
@@ -218,7 +219,7 @@ void LayoutReader::find_entries() {
   }
 }
 
-// What is said of an axis whose rate the table does not name.
+// Reports keys for an axis whose rate the table does not name.
 void LayoutReader::refuse_besides(const RateEntry& entry) {
   for (const std::string& key :
        {entry.sign, entry.sign_signal, entry.sigma, entry.valid, entry.invalid}) {
@@ -239,7 +240,7 @@ void LayoutReader::check_axes_keys() {
   for (const std::string_view one : kOfOneRate) {
     if (!reader_.has(one)) continue;
     reader_.forgive({one});
-    reader_.complain(reader_.where(one), fmt::format("{} stands beside {}", one, key),
+    reader_.complain(reader_.where(one), fmt::format("{} cannot be combined with {}", one, key),
                      fmt::format("{}{} for the axis that it is of", one, ending_of(axes_.back())));
   }
   for (const RateEntry& entry : entries_) {
@@ -251,7 +252,7 @@ void LayoutReader::check_axes_keys() {
   }
 }
 
-// After other trouble nobody reads these keys.
+// Marks keys as known that are not read because of another error.
 void LayoutReader::forgive_all() {
   reader_.forgive({"unit", "sign", "rate_not_available", "id", "source_address", "valid", "invalid",
                    "every_ms", "fd", "fill", "axis"});
@@ -260,13 +261,13 @@ void LayoutReader::forgive_all() {
   forgive_e2e(reader_);
 }
 
-// Of a platform of several axes a layout with one rate carries one of them.
+// On a platform of several axes, a layout with one rate carries one of them.
 void LayoutReader::read_axis() {
   if (by_axes_) {
     if (!reader_.has("axis")) return;
     reader_.forgive({"axis"});
     reader_.complain(reader_.where("axis"),
-                     fmt::format("axis stands beside {}", entries_.front().rate),
+                     fmt::format("axis cannot be combined with {}", entries_.front().rate),
                      "leave it out, or rate = \"SIGNAL\" where the message carries one axis");
     return;
   }
@@ -300,13 +301,13 @@ void LayoutReader::take(std::string_view key, const Payload& mask) {
   add(taken_, mask);
 }
 
-// Precondition: the page of the rate is arranged.
+// Precondition: the page of the rate is selected.
 bool LayoutReader::on_page(std::string_view key, const dbc::Signal& signal) {
   const auto presence = dbc::Presence::make(resolver_.message(), signal, {});
   if (presence && presence->holds({layout_->blank.data(), layout_->bytes})) return true;
   reader_.complain(reader_.where(key),
                    fmt::format("{} is not on the page of {}", signal.name, rate_->name),
-                   "signals that stand in the frame of the rate");
+                   "use signals of the frame that carries the rate");
   return false;
 }
 
@@ -321,14 +322,14 @@ void LayoutReader::read_rate(const RateEntry& entry) {
   layout_->rates.push_back({.rate = std::move(*field), .axis = entry.axis});
 }
 
-// The frame, turned to the page of the first rate.
+// Starts the frame, with the page of the first rate selected.
 void LayoutReader::begin_layout(const Quantity& quantity) {
   layout_.emplace(OutputLayout{
       .bus = resolver_.match().bus,
       .message = resolver_.message().name,
       .fd = fd_,
       .bytes = static_cast<std::uint8_t>(can::fd_padded_length(resolver_.match().bytes))});
-  // What J1939 and NMEA 2000 do not use is all ones.
+  // J1939 and NMEA 2000 fill unused bits with ones.
   if (rules_ != dbc::CodeRules::kNone) layout_->blank.fill(0xFF);
   quantity.presence.arrange(layout_->blank);
   add(taken_, mask_of(quantity.presence));
@@ -337,7 +338,7 @@ void LayoutReader::begin_layout(const Quantity& quantity) {
 void LayoutReader::read_entry(const RateEntry& entry, LayoutRate& one) {
   read_sign(entry, one);
   if (entry.sigma_signal != nullptr) read_sigma(entry, one);
-  // Of a single rate it is the frame's.
+  // With a single rate, `valid` belongs to the frame.
   if (by_axes_) one.valid = read_valid(entry.valid, entry.invalid);
 }
 
@@ -366,7 +367,7 @@ void LayoutReader::read_sigma(const RateEntry& entry, LayoutRate& one) {
                                    to_string(method_), signal.name),
                        fmt::format("leave {} out, or method = \"optimal\"", entry.sigma));
     }
-    // Beside a rate that is not valid: as much as can be said.
+    // Beside an invalid rate: the largest σ that the signal can carry.
     Payload scratch{};
     field->codec.encode(field->maximum, scratch);
     field->none_raw = static_cast<std::uint64_t>(field->codec.decode(scratch).raw);
@@ -391,7 +392,7 @@ std::optional<OutputFlag> LayoutReader::read_valid(const std::string& key,
   return flag_of(*valid, key, invalid);
 }
 
-// What to write where the comparison shall hold, and where it must not.
+// Finds what to write for a comparison that must hold, and for one that must not.
 std::optional<OutputFlag> LayoutReader::flag_of(const NamedCondition& valid, const std::string& key,
                                                 const std::string& invalid) {
   const dbc::SignalCodec& codec = valid.condition.codec;
@@ -450,7 +451,7 @@ void LayoutReader::read_protection() {
     const dbc::Signal& signal = *message.find_signal(counter->name);
     if (!on_page("counter", signal)) return;
     take("counter", mask_of(counter->codec));
-    // The protocol's own "not available" is no number of a sequence.
+    // The protocol's "not available" code is not a value of the counter.
     const dbc::Codes codes = dbc::codes_of(signal, rules_);
     if (!codes.empty() && codes.first < counter->modulus)
       counter->modulus = static_cast<std::uint32_t>(codes.first);
@@ -464,7 +465,7 @@ void LayoutReader::read_protection() {
   check_header(*layout_->e2e.crc);
 }
 
-// Of AUTOSAR's profiles the counter has its place, and the receiver looks for it there.
+// In AUTOSAR's profiles the counter has a fixed place, where the receiver looks for it.
 void LayoutReader::check_header(const CheckValue& crc) {
   const dbc::E2eKind kind = *dbc::e2e_kind_from(crc.kind);
   const std::size_t header = dbc::E2eProtection::header_bytes(kind);
@@ -478,7 +479,7 @@ void LayoutReader::check_header(const CheckValue& crc) {
     reader_.complain(reader_.where(counter ? "counter" : "e2e"),
                      fmt::format("{} has its counter in {} of byte {}", crc.kind,
                                  whole_byte ? "all" : "the low nibble", byte + header - 1),
-                     "counter = \"NAME\", the signal that stands there");
+                     "counter = \"NAME\", the signal at that place");
     return;
   }
   const bool is_1 = kind == dbc::E2eKind::kProfile1A || kind == dbc::E2eKind::kProfile1B ||
@@ -537,8 +538,8 @@ void LayoutReader::read_source_address() {
   }
   if (!is_j1939) return;
   if (address) layout_->id = (layout_->id & ~0xFFU) | static_cast<std::uint32_t>(*address);
-  // A DBC file's receiver is a placeholder, as its sender is; one that the configuration names is
-  // meant.
+  // A receiver address in a DBC file is a placeholder, like the sender's; one from the
+  // configuration is intended.
   const bool to_one = (layout_->id >> 16U & 0xFFU) < kPdu2First;
   if (to_one && !reader_.has("id")) layout_->id |= kGlobalAddress << 8U;
   if ((layout_->id & 0xFFU) >= kNullAddress) {
@@ -560,9 +561,9 @@ void LayoutReader::read_every() {
   layout_->every = std::chrono::microseconds(std::llround(*every_ms * 1000.0));
 }
 
-// --- what nobody fills ---------------------------------------------------------------------------
+// --- unused signals ------------------------------------------------------------------------------
 
-// Signals of the rate's page that no key names.
+// Fills the signals on the rate's page that no key names.
 void LayoutReader::fill_rest() {
   const toml::table* fill = reader_.table("fill");
   check_fill(fill);
@@ -610,7 +611,7 @@ std::optional<RawValue> LayoutReader::filled(const dbc::Signal& signal, const to
   const bool fits = number && node->is_number() && *number >= codec->representable_min() &&
                     *number <= codec->representable_max();
   if (!fits) {
-    reader_.complain(reader_.where("fill"), fmt::format("{} cannot say this value", signal.name),
+    reader_.complain(reader_.where("fill"), fmt::format("{} cannot carry this value", signal.name),
                      fmt::format("a number, {:g} to {:g}", codec->representable_min(),
                                  codec->representable_max()));
     return std::nullopt;
@@ -621,7 +622,7 @@ std::optional<RawValue> LayoutReader::filled(const dbc::Signal& signal, const to
                   fmt::format("{:g} {}", *number, printable(signal.unit))};
 }
 
-// Its readers take no frame whose counter stands still or whose check value is wrong.
+// Receivers ignore frames with a constant counter or a wrong check value.
 void LayoutReader::warn_of_resting(const dbc::Signal& signal, const RawValue& value) {
   const std::string name = lower(signal.name);
   const auto named = [&](const auto& parts) {
@@ -653,12 +654,13 @@ void LayoutReader::warn_of_rate(const RateEntry& entry, const LayoutRate& one) {
   const double least = std::min(std::abs(rate.minimum), std::abs(rate.maximum));
   const double reach_dps = (one.sign ? most : least) * std::abs(rate.scale);
   if (reach_dps < kNarrow_dps) {
-    warn(fmt::format("{} carries rates up to {:.4g} deg/s only{}; faster ones go out as not valid",
-                     rate.name, reach_dps, reach_dps == 0.0 ? " in one direction" : ""),
-         one.sign || rate.minimum < 0.0
-             ? ""
-             : fmt::format("if the sign has a signal of its own, name it: {} = \"NAME\"",
-                           entry.sign_signal));
+    warn(
+        fmt::format("{} carries rates up to {:.4g} deg/s only{}; faster ones are sent as not valid",
+                    rate.name, reach_dps, reach_dps == 0.0 ? " in one direction" : ""),
+        one.sign || rate.minimum < 0.0
+            ? ""
+            : fmt::format("if the sign has a signal of its own, name it: {} = \"NAME\"",
+                          entry.sign_signal));
   }
 }
 

@@ -1,9 +1,9 @@
 #pragma once
 
-// The gateway itself: frames and time in, frames out. Decode → align → correct → encode.
-// One object behind the daemon, the replay and the tests; it opens nothing and reads no clock, and
-// once it is constructed neither a frame nor passing time makes it allocate. The states and their
-// transitions are in ARCHITECTURE.md.
+// The gateway itself: frames and time in, frames out. Decode → align → correct → encode. The
+// daemon, the replay and the tests use this one object; it opens nothing and reads no clock, and
+// after construction neither frames nor passing time make it allocate. ARCHITECTURE.md lists the
+// states and their transitions.
 
 #include <array>
 #include <cstdint>
@@ -34,7 +34,7 @@ class UnitPipeline;
 class Pipeline {
  public:
   explicit Pipeline(const Plan& plan);
-  /// With a corrector of the caller's instead of the plan's. Precondition: two single gyros.
+  /// Uses the caller's corrector instead of the plan's. Precondition: two single gyros.
   Pipeline(const Plan& plan, std::unique_ptr<fusion::Corrector> corrector);
   Pipeline(Pipeline&&) noexcept;
   Pipeline& operator=(Pipeline&&) noexcept;
@@ -44,48 +44,48 @@ class Pipeline {
   /// resolution of a candump log, so that a replay of what candump saw repeats the run bit for bit.
   void receive(can::BusIndex bus, const can::Frame& frame, TimePoint stamp, FrameSink& out);
 
-  /// Time passed without a frame: time-outs, and VG_Bias where no sample drives it. Cheap when
+  /// Passes time without a frame: time-outs, and VG_Bias if no sample triggers it. Cheap when
   /// nothing is due.
   void advance(TimePoint now, FrameSink& out);
 
-  /// When advance() has to be called next, at the latest.
+  /// The latest time at which advance() must be called next.
   [[nodiscard]] TimePoint next_deadline() const;
 
   [[nodiscard]] const Status& status() const;
-  /// Of a platform of several axes how many there are, in the order of Plan::axes, and what the
-  /// pipeline has of each; of two single gyros there are none.
+  /// The number of axes of the platform, in the order of Plan::axes, and the status of each; none
+  /// with two single gyros.
   [[nodiscard]] std::size_t axis_count() const;
   [[nodiscard]] const Status& axis_status(std::size_t place) const;
 
-  /// How often there was something to say so far, whether or not a frame went out for it. No state
-  /// changes without.
+  /// How often there was something to send so far, whether or not a frame was sent. Grows with
+  /// every change of state.
   [[nodiscard]] std::uint64_t spoken() const;
 
-  /// What to keep across a restart; nothing before there is anything worth it. What was given to
-  /// resume() and not taken up yet is.
+  /// The state to keep across a restart; nothing before anything worth keeping was learned. A state
+  /// given to resume() that was not taken up yet is returned unchanged.
   [[nodiscard]] std::optional<SavedState> memory() const;
 
-  /// Before the first frame: the first pair takes this up instead of a calibration, aged by the
-  /// time between its own stamp and the state's. Error when the state is of other gyros, or the
-  /// method keeps none; then nothing has changed.
+  /// Call before the first frame: the first pair takes the state up instead of a calibration, aged
+  /// by the time between its own stamp and the state's. Error if the state belongs to other gyros,
+  /// or if the method keeps no state; nothing has changed then.
   Expected<void> resume(const SavedState& state);
 
-  /// Before the first output: the counters of the frames' headers go on where another one's stand,
-  /// so that receivers see no break. A frame with another identifier is another stream and begins
-  /// anew.
+  /// Call before the first output: continues the counters of another pipeline's frames, so that
+  /// receivers see no break. A frame with another identifier is another stream and begins anew.
   void count_on_from(const Pipeline& before);
 
-  /// Instead of a beginning: goes on as another one whose plan is the same but for the output, and
-  /// which is at its end then. The frames' counters go on as with count_on_from().
+  /// Call before the first frame: continues as another pipeline, whose plan differs in the output
+  /// alone and which must not be used afterwards. The frames' counters go on as with
+  /// count_on_from().
   void take_over(Pipeline&& before);
 
-  /// Null to take it off again. Of a platform of several axes of the one in this `place`.
+  /// Null removes the observer. On a platform of several axes, `place` selects the axis.
   void observe(RateObserver* observer, std::size_t place = 0);
   void observe_output(OutputObserver* observer, std::size_t place = 0);
 
  private:
-  std::unique_ptr<AxisPipeline> single_;  ///< of two single gyros …
-  std::unique_ptr<UnitPipeline> units_;   ///< … or of two units; the other is null
+  std::unique_ptr<AxisPipeline> single_;  ///< with two single gyros …
+  std::unique_ptr<UnitPipeline> units_;   ///< … or with two units; the other is null
 };
 
 }  // namespace vgyro::gateway

@@ -13,7 +13,7 @@ bool FrameMatch::carries(std::uint32_t frame_id, bool frame_extended) const {
   });
 }
 
-// The codes lie at the top of the raw values; what is below them measures.
+// The codes are at the top of the raw values; those below are measurements.
 double Quantity::sendable_lowest() const {
   if (codes.empty()) return codec.representable_min();
   const double top = codec.value_of(static_cast<std::int64_t>(codes.first - 1));
@@ -65,7 +65,7 @@ std::vector<FrameId> output_ids(const OutputPlan& plan, can::BusIndex bus) {
   return ids;
 }
 
-// The names of the buses stand in what is read from them.
+// The buses' names are compared with the inputs that are read from them.
 bool same_but_output(const Plan& a, const Plan& b) {
   return a.gyros == b.gyros && a.reference == b.reference && a.accelerometer == b.accelerometer &&
          a.speed == b.speed && a.calibration == b.calibration && a.corrector == b.corrector &&

@@ -1,7 +1,7 @@
 #pragma once
 
-// A configuration after everything in it has been resolved: which bits of which frame on which bus
-// are which quantity. Built by gateway/config.h from files, or by tests by hand.
+// A configuration with everything in it resolved: which bits of which frame on which bus are which
+// quantity. Built from files by gateway/config.h, or by hand in tests.
 
 #include <algorithm>
 #include <array>
@@ -24,16 +24,17 @@ namespace vgyro::gateway {
 
 enum class Method : std::uint8_t { kMean, kMutual, kOptimal };
 
-/// A frame identifier on a bus: matches when (id & mask) == (frame.id & mask) and the format
-/// agrees, unless it is that of another message: an exact identifier goes before a PGN.
+/// A frame identifier on a bus. Matches when (id & mask) == (frame.id & mask) and the format
+/// agrees, unless the identifier is that of another message: an exact identifier takes precedence
+/// over a PGN.
 struct FrameMatch {
   can::BusIndex bus = 0;
   std::uint32_t id = 0;
   std::uint32_t mask = 0;
   bool extended = false;
-  std::uint8_t bytes = can::kClassicBytesMax;  ///< of the payload, by the DBC file
-  /// J1939 without a source address: identifiers that the DBC file gives other messages of the same
-  /// PGN.
+  std::uint8_t bytes = can::kClassicBytesMax;  ///< length of the payload in the DBC file
+  /// For J1939 without a source address: identifiers that the DBC file assigns to other messages of
+  /// the same PGN.
   std::vector<std::uint32_t> others = {};
 
   /// Does a frame of this identifier carry the message? The caller checks the bus.
@@ -44,10 +45,10 @@ struct FrameMatch {
 
 /// A physical quantity in a frame.
 struct Quantity {
-  std::string name;  ///< of the signal
+  std::string name;  ///< name of the signal
   std::string unit;  ///< as in the DBC file
   dbc::SignalCodec codec;
-  dbc::Presence presence;  ///< of a multiplexed signal: the page it stands on
+  dbc::Presence presence;  ///< for a multiplexed signal: the page that it is on
   double scale = 1.0;  ///< value · scale + shift is in the product's unit: deg/s, degC, g, m/s, V;
   double shift = 0.0;  ///< the sign of the configuration is part of the scale
   double minimum = 0.0;  ///< accepted values, in the DBC's unit
@@ -55,13 +56,13 @@ struct Quantity {
   std::string layout;     ///< for people: "32 bits from bit 0, Intel, signed, x 1e-06"
   double step = 0.0;      ///< between neighbouring values, in the product's unit; 0 for floats
   dbc::Codes codes = {};  ///< raw values that are no measurement; outside minimum and maximum
-  bool codes_in_range = false;  ///< the DBC file's range does not leave them out
+  bool codes_in_range = false;  ///< the DBC file's range includes codes
 
-  /// What the bits can hold and is a measurement, in the DBC's unit.
+  /// The lowest and highest measurement that the bits can hold, in the DBC's unit.
   [[nodiscard]] double sendable_lowest() const;
   [[nodiscard]] double sendable_highest() const;
 
-  /// The least and the greatest accepted value that can be sent, in the DBC's unit.
+  /// The lowest and highest accepted value that can be sent, in the DBC's unit.
   [[nodiscard]] double lowest() const { return std::max(minimum, sendable_lowest()); }
   [[nodiscard]] double highest() const { return std::min(maximum, sendable_highest()); }
 
@@ -90,23 +91,24 @@ struct ValidCondition {
 struct AliveCounter {
   std::string name;
   dbc::SignalCodec codec;
-  std::uint32_t modulus = 256;  ///< values it runs through: 0 … modulus − 1
-  std::uint32_t max_delta = 0;  ///< a longer step is a wrong sequence; 0: any step is right
+  std::uint32_t modulus = 256;  ///< number of values: 0 … modulus − 1
+  std::uint32_t max_delta = 0;  ///< a longer step is a wrong sequence; 0: any step is allowed
   bool strict = false;          ///< a value beyond the modulus is a wrong sequence
-  dbc::Presence presence = {};  ///< of a multiplexed counter: the pages that carry it
+  dbc::Presence presence = {};  ///< for a multiplexed counter: the pages that carry it
 
   friend bool operator==(const AliveCounter&, const AliveCounter&) = default;
 };
 
 struct CheckValue {
-  std::string name;  ///< of the signal
+  std::string name;  ///< name of the signal
   std::string kind;  ///< as configured: "profile_11c"
   dbc::E2eProtection protection;
 
   friend bool operator==(const CheckValue&, const CheckValue&) = default;
 };
 
-/// How a message proves that it is whole, from its sender and new, where it does.
+/// How a message can be checked to be complete, from its sender and new, as far as it has the
+/// signals.
 struct E2ePlan {
   std::optional<CheckValue> crc;
   std::optional<AliveCounter> counter;
@@ -119,11 +121,11 @@ struct E2ePlan {
 inline constexpr std::size_t kAxes = 3;
 inline constexpr std::array<char, kAxes> kAxisNames{'x', 'y', 'z'};
 
-/// Row by row: the rate about the vehicle's axis i is the sum of matrix[3·i + s] times the rate
-/// about the sensor's axis s. A rotation, to the rounding of a double.
+/// Row by row: the rate about the vehicle's axis i is the sum over s of matrix[3·i + s] times the
+/// rate about the sensor's axis s. A rotation, within the rounding of a double.
 struct Mount {
   std::array<double, kAxes * kAxes> matrix{1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0};
-  double corrected = 0.0;  ///< by how much an element was off, as configured, to be a rotation
+  double corrected = 0.0;  ///< largest change of a configured element to make it a rotation
 
   [[nodiscard]] double at(std::size_t axis, std::size_t sensor_axis) const {
     return matrix[kAxes * axis + sensor_axis];
@@ -134,8 +136,8 @@ struct Mount {
 
 struct GyroPlan {
   std::string name;
-  std::string type = {};    ///< of which make; empty: not told
-  std::string serial = {};  ///< which of that type; empty: not told
+  std::string type = {};    ///< the make and model; empty: not stated
+  std::string serial = {};  ///< identifies one of that type; empty: not stated
   std::string bus;
   std::string message;
   FrameMatch match;
@@ -143,7 +145,7 @@ struct GyroPlan {
   std::optional<dbc::SignalCodec> sign;  ///< separate sign bit: 1 means negative
   std::optional<Quantity> temperature;
   std::optional<Quantity> supply_voltage = {};
-  std::optional<Quantity> rate_x = {};  ///< about other axes of the same unit, beside `rate`
+  std::optional<Quantity> rate_x = {};  ///< about other axes of the same unit, in the same message
   std::optional<Quantity> rate_y = {};
   std::optional<Quantity> rate_z = {};
   E2ePlan e2e = {};
@@ -151,12 +153,13 @@ struct GyroPlan {
   std::optional<double> saturation_dps = {};  ///< from the model file: it clips at ± this
   double dead_band_dps = 0.0;                 ///< from the model file: it reads 0 below; 0: none
   std::optional<double> max_bias_dps = {};    ///< no bias of this gyro is larger
-  std::string taken_back = {};                ///< digest of what is taken back; empty: nothing
-  /// Of a whole unit: its sensor's axes, each as a gyro; what stands above is the first one's.
+  std::string taken_back = {};                ///< digest of the subtracted effects; empty: none
+  /// For a whole unit: its sensor axes, each as a gyro; the members above are those of the first.
   std::vector<GyroPlan> axes = {};
-  std::size_t sensor_axis = 0;  ///< of one of these: which it is
-  bool flipped = false;         ///< of the pair about an axis: `rate` is against the sensor's sign
-  Mount mount = {};             ///< of the unit in the vehicle
+  std::size_t sensor_axis = 0;  ///< in an element of `axes`: which axis it is
+  bool flipped = false;         ///< in the pair about an axis: `rate` is opposite to the sensor's
+                                ///< sign
+  Mount mount = {};             ///< mount of the unit in the vehicle
 
   friend bool operator==(const GyroPlan&, const GyroPlan&) = default;
 };
@@ -170,9 +173,9 @@ struct ReferencePlan {
   std::string bus;
   std::string message;
   FrameMatch match;
-  Quantity rate;  ///< of a platform of several axes: the last of those below
+  Quantity rate;  ///< with several axes: the last of those below
   E2ePlan e2e = {};
-  /// Of a platform of several axes: the rates about the vehicle's that it measures.
+  /// With several axes: the rates about the vehicle's axes that it measures.
   std::array<std::optional<Quantity>, kAxes> axes = {};
 
   friend bool operator==(const ReferencePlan&, const ReferencePlan&) = default;
@@ -200,12 +203,12 @@ struct SpeedPlan {
 
 struct CalibrationPlan {
   double rest_s = 60.0;
-  double rate_dps = 0.0;        ///< true rate along the axis while calibrating at rest
+  double rate_dps = 0.0;        ///< true rate about the axis while calibrating at rest
   bool from_reference = false;  ///< calibrate against [reference] instead
-  std::optional<double> stop_rate_dps = 0.0;  ///< true rate at a stop, where it is known
-  double doubt_dps = 0.0;  ///< 1σ of rate_dps that stays in every rate: the Earth's, of an unknown
-                           ///< heading
-  /// As configured, for all axes of a platform: [calibration] rate_dps, latitude_deg, heading_deg.
+  std::optional<double> stop_rate_dps = 0.0;  ///< true rate at a stop, if it is known
+  double doubt_dps = 0.0;  ///< 1σ of rate_dps, which stays in every rate: the Earth's rate at an
+                           ///< unknown heading
+  /// As configured for all axes of a platform: [calibration] rate_dps, latitude_deg, heading_deg.
   std::vector<double> axis_rate_dps = {};
   std::optional<double> latitude_deg = {};
   std::optional<double> heading_deg = {};
@@ -223,26 +226,26 @@ struct CorrectorPlan {
   friend bool operator==(const CorrectorPlan&, const CorrectorPlan&) = default;
 };
 
-/// A quantity on its way out: which values a signal can say, and what it says of the others.
+/// A quantity to be sent: which values the signal can carry, and which code replaces the others.
 struct OutputField {
-  std::string name;       ///< of the signal
+  std::string name;       ///< name of the signal
   std::string unit = {};  ///< as in the DBC file
   dbc::SignalCodec codec;
-  double scale = 1.0;  ///< value · scale + shift is in the product's unit, as of a Quantity
+  double scale = 1.0;  ///< value · scale + shift is in the product's unit, as in Quantity
   double shift = 0.0;
-  double minimum = 0.0;          ///< values that the signal can say, in the DBC's unit;
-  double maximum = 0.0;          ///< codes are not among them
-  std::uint64_t none_raw = 0;    ///< said of a value that there is not
-  std::uint64_t beyond_raw = 0;  ///< said of one beyond what the signal can say
-  bool has_code = false;         ///< no measurement looks like none_raw and beyond_raw
+  double minimum = 0.0;          ///< range of values in the DBC's unit;
+  double maximum = 0.0;          ///< excludes codes
+  std::uint64_t none_raw = 0;    ///< code for a value that is not available
+  std::uint64_t beyond_raw = 0;  ///< code for a value outside the range
+  bool has_code = false;         ///< none_raw and beyond_raw cannot be mistaken for measurements
   std::string code = {};         ///< for people: "0xFFFF, not available"
-  std::string layout = {};       ///< for people, as of a Quantity
-  double step = 0.0;             ///< as of a Quantity
+  std::string layout = {};       ///< for people, as in Quantity
+  double step = 0.0;             ///< as in Quantity
 
   friend bool operator==(const OutputField&, const OutputField&) = default;
 };
 
-/// The signal of `valid = "Status == 0"`, on its way out.
+/// The signal of `valid = "Status == 0"`, to be sent.
 struct OutputFlag {
   std::string name;
   dbc::SignalCodec codec;
@@ -253,7 +256,7 @@ struct OutputFlag {
   friend bool operator==(const OutputFlag&, const OutputFlag&) = default;
 };
 
-/// A signal without a value, for people: "AccX", "0xFFFF, not available".
+/// A signal that gets no value, as text: "AccX", "0xFFFF, not available".
 struct RestingSignal {
   std::string name;
   std::string says = {};
@@ -263,11 +266,11 @@ struct RestingSignal {
 
 /// One rate in a message that a vehicle already reads.
 struct LayoutRate {
-  OutputField rate;                           ///< the direction is part of the scale
-  std::optional<dbc::SignalCodec> sign = {};  ///< of its own: 1 means negative
+  OutputField rate;                           ///< the configured sign is part of the scale
+  std::optional<dbc::SignalCodec> sign = {};  ///< separate sign bit: 1 means negative
   std::optional<OutputField> sigma = {};
-  std::optional<OutputFlag> valid = {};  ///< of this one of several alone
-  std::size_t axis = 0;                  ///< of a platform of several: about which it is
+  std::optional<OutputFlag> valid = {};  ///< validity of this rate alone, among several
+  std::size_t axis = 0;                  ///< with several axes: the axis of the rate
 
   friend bool operator==(const LayoutRate&, const LayoutRate&) = default;
 };
@@ -279,15 +282,17 @@ struct OutputLayout {
   std::uint32_t id = 0;
   bool extended = false;
   bool fd = false;
-  std::uint8_t bytes = can::kClassicBytesMax;          ///< of the frame
-  std::array<std::uint8_t, can::kFdBytesMax> blank{};  ///< all but what is filled in
+  std::uint8_t bytes = can::kClassicBytesMax;          ///< length of the frame
+  std::array<std::uint8_t, can::kFdBytesMax> blank{};  ///< the frame before the values are filled
+                                                       ///< in
   std::vector<LayoutRate> rates = {};                  ///< one, or one for each axis
-  std::optional<OutputFlag> valid = {};                ///< of all rates of the frame
+  std::optional<OutputFlag> valid = {};                ///< validity of all rates of the frame
   E2ePlan e2e = {};
-  std::optional<Duration> every = {};  ///< at most one frame in this time; nothing: with every rate
+  std::optional<Duration> every = {};  ///< at most one frame in this time; empty: one with every
+                                       ///< rate
   std::vector<RestingSignal> resting = {};
 
-  /// Can its frames say of each rate that it is not valid? Where they cannot, none is sent then.
+  /// Can its frames mark each rate as not valid? If not, no frame is sent for an invalid rate.
   [[nodiscard]] bool can_say_invalid() const {
     return valid || std::all_of(rates.begin(), rates.end(), [](const LayoutRate& one) {
              return one.valid || one.rate.has_code;
@@ -306,16 +311,16 @@ struct OutputPlan {
   bool vgyro_frames = true;  ///< VG_Rate, VG_Bias and VG_Model
   bool transmit = true;      ///< false: shadow mode, in which the live gateway sends nothing
   std::vector<OutputLayout> layouts = {};
-  /// Of a platform of several axes: which; the identifiers are axis 0's, another's are kAxisIdStep
-  /// higher for each. Empty: a single one.
+  /// The axes of a platform of several; empty: a single axis. The identifiers above are those of
+  /// axis 0, each further axis has them kAxisIdStep higher.
   std::vector<std::size_t> axes = {};
   bool rate_is_shared = false;  ///< one FD frame carries the rates of all axes
 };
 
-/// From the identifiers of one axis to those of the next: VG_Rate, VG_Bias, VG_Model.
+/// Distance between the identifiers of one axis and those of the next: VG_Rate, VG_Bias, VG_Model.
 inline constexpr std::uint32_t kAxisIdStep = 3;
 
-/// Who sends what: an identifier on a bus.
+/// An identifier on a bus.
 struct FrameId {
   std::uint32_t id = 0;
   bool extended = false;
@@ -323,10 +328,10 @@ struct FrameId {
   friend bool operator==(const FrameId&, const FrameId&) = default;
 };
 
-/// As candump writes it: "174", "0CF02A31".
+/// Formatted as by candump: "174", "0CF02A31".
 std::string to_string(const FrameId& id);
 
-/// Everything that goes out on a bus.
+/// Identifiers of all frames that the gateway sends on a bus.
 std::vector<FrameId> output_ids(const OutputPlan& plan, can::BusIndex bus);
 
 struct Plan {
@@ -337,18 +342,18 @@ struct Plan {
   std::optional<SpeedPlan> speed;
   CalibrationPlan calibration;
   CorrectorPlan corrector;
-  std::optional<model::Model> model;  ///< effects that are known and taken back
+  std::optional<model::Model> model;  ///< known effects, which are subtracted
   OutputPlan output;
-  /// Of a platform of several axes: for each the plan of the pair of gyros about it, in the order
-  /// x, y, z; what the axes share stands in all of them. Empty: two single gyros.
+  /// For a platform of several axes: the plan of the pair of gyros about each, in the order x, y,
+  /// z, with the shared parts repeated in all of them. Empty: two single gyros.
   std::vector<Plan> axes = {};
-  std::size_t axis = 0;  ///< of one of these: which of the vehicle's axes it is
+  std::size_t axis = 0;  ///< in an element of `axes`: which of the vehicle's axes it is
 
-  /// Every frame that the pipeline wants to receive: the kernel filters.
+  /// Every frame that the pipeline reads, for the kernel's filters.
   [[nodiscard]] std::vector<FrameMatch> inputs() const;
 };
 
-/// Do both mean the same but for where the result goes?
+/// Do both plans differ in their output at most?
 bool same_but_output(const Plan& a, const Plan& b);
 
 }  // namespace vgyro::gateway

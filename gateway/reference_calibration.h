@@ -15,7 +15,7 @@ namespace vgyro::gateway {
 class ReferenceCalibration {
  public:
   static constexpr std::size_t kPendingMax = 1024;
-  /// Between reference samples further apart than this nothing is interpolated.
+  /// Reference samples further apart than this are not interpolated.
   static constexpr Duration kGapMax = std::chrono::seconds(1);
 
   struct Ready {
@@ -25,7 +25,7 @@ class ReferenceCalibration {
 
   void add_pair(const fusion::AlignedPair& pair);
   void add_reference(TimePoint t, double rate_dps);
-  /// The next pair that the reference covers. Pairs that it never will cover are passed over.
+  /// The next pair that the reference covers. Skips pairs that it will never cover.
   std::optional<Ready> next();
 
  private:

@@ -1,6 +1,6 @@
 #pragma once
 
-// Which roles a received frame plays: one table look-up for standard identifiers, a short list for
+// Finds the roles of a received frame: one table look-up for standard identifiers, a short list for
 // extended ones. Built once from the plan.
 
 #include <array>
@@ -12,7 +12,7 @@
 
 namespace vgyro::gateway {
 
-/// Bit mask: a frame may be a gyro's and the reference's at once.
+/// Bit mask: a frame may carry a gyro and the reference at once.
 enum Role : std::uint8_t {
   kGyro1 = 1U << 0U,
   kGyro2 = 1U << 1U,

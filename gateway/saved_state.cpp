@@ -19,25 +19,25 @@ namespace vgyro::gateway {
 namespace {
 
 constexpr std::int64_t kFormat = 1;
-// Of a platform of several axes: what format 1 holds stands in [axis.x] … instead.
+// For a platform of several axes: the contents of format 1 are in [axis.x] … instead.
 constexpr std::int64_t kFormatOfAxes = 2;
 constexpr const char* kRemedy = "the gateway calibrates again; nothing has to be done";
 
-// The text ends with this and eight digits, so that whatever is cut off takes the checksum along.
+// The text ends with this and eight digits, so that any cut also removes the checksum.
 constexpr std::string_view kSealHead = "\n[checksum]\ncrc32 = \"";
 constexpr std::string_view kSealTail = "\"\n";
 constexpr std::size_t kSealBytes = kSealHead.size() + 8 + kSealTail.size();
 
-// What no gyro exceeds, by far; beyond it arithmetic would not stay finite.
+// No gyro comes near this; beyond it arithmetic would not stay finite.
 constexpr double kRateMax_dps = 1e5;
 constexpr double kVarianceMax = kRateMax_dps * kRateMax_dps;
 constexpr double kSkewMax_s = 10.0;
-// Nor changes by so much in a second, or with a kelvin.
+// No gyro changes by so much in a second, or with a kelvin, either.
 constexpr double kChangeMax_dps = kRateMax_dps;
 constexpr double kTemperatureMin_c = -273.15;
 constexpr double kTemperatureMax_c = 1000.0;
 constexpr double kWeightSumTolerance = 1e-6;
-// Probabilities that were added up may come to a rounding more than 1.
+// A sum of probabilities may exceed 1 by rounding.
 constexpr double kWeightMax = 1.0 + kWeightSumTolerance;
 
 std::string seal(std::string_view content) {
@@ -59,8 +59,8 @@ bool is_printable(char c) {
   return c >= 0x20 && c < 0x7F;
 }
 
-// The shortest form that reads back as the same number; with a point, for TOML's whole numbers know
-// no -0.
+// The shortest form that reads back as the same number; with a point, since TOML's integers have no
+// -0.
 std::string shortest(double value) {
   std::string text = fmt::format("{}", value);
   if (text.find_first_not_of("-0123456789") == std::string::npos) text += ".0";
@@ -85,7 +85,7 @@ double sum_of(std::span<const double> values) {
   return std::accumulate(values.begin(), values.end(), 0.0);
 }
 
-// What is not known is not written, and so is read as by a version that did not know of it.
+// Unknown values are left out, so that they read as in a text of an older version.
 std::string kinds_and_slopes(const fusion::DriftMemory& drift) {
   std::string text;
   if (sum_of(drift.kind_weight) > 0.0)
@@ -103,7 +103,7 @@ std::string kinds_and_slopes(const fusion::DriftMemory& drift) {
                             listed(drift.coefficient_dps_k), listed(drift.coefficient_sigma_dps_k));
 }
 
-// Only where there is one, so that the text of a sound pair is what it was.
+// Written only if there is one, so that the text of a sound pair is unchanged.
 std::string contradiction(const fusion::PairVerdict& pair) {
   if (pair.contradiction == fusion::Contradiction::kNone) return {};
   std::string text = fmt::format("contradiction = \"{}\"\n", to_string(pair.contradiction));
@@ -116,7 +116,7 @@ std::string contradiction(const fusion::PairVerdict& pair) {
 
 // --- reading -------------------------------------------------------------------------------------
 
-/// The numbers of one table; the first complaint is kept.
+/// Reads the numbers of one table; keeps the first error.
 class Numbers {
  public:
   Numbers(const toml::table& table, const std::string& where, std::string title)
@@ -143,7 +143,7 @@ class Numbers {
     std::array<double, kCount> values{};
     const toml::array* list = reader_.array(key);
     if (list == nullptr || list->size() != kCount) {
-      reader_.complain(reader_.where(key), fmt::format("{} is no list of {}", key, kCount));
+      reader_.complain(reader_.where(key), fmt::format("{} is not a list of {}", key, kCount));
       return values;
     }
     for (std::size_t i = 0; i < kCount; ++i) {
@@ -175,8 +175,8 @@ class Numbers {
   }
   double checked(std::string_view key, double value, double minimum, double maximum) {
     if (value >= minimum && value <= maximum) return value;  // NaN is not
-    reader_.complain(reader_.where(key), fmt::format("{} holds {}, which cannot be: {} to {} can",
-                                                     key, value, minimum, maximum));
+    reader_.complain(reader_.where(key),
+                     fmt::format("{} is {}, outside {} to {}", key, value, minimum, maximum));
     return 0.0;
   }
 
@@ -184,7 +184,7 @@ class Numbers {
   TomlReader reader_;
 };
 
-/// Of gyro 1, of both, of gyro 2.
+/// Elements: gyro 1, both, gyro 2.
 bool is_covariance(const std::array<double, 3>& m) {
   return m[0] >= 0.0 && m[2] >= 0.0 && m[1] * m[1] <= m[0] * m[2];
 }
@@ -192,7 +192,7 @@ bool is_positive_definite(const std::array<double, 3>& m) {
   return m[0] > 0.0 && m[2] > 0.0 && m[1] * m[1] < m[0] * m[2];
 }
 
-// What older states do not hold. A pair stands there whole or not at all.
+// Older states lack these keys.
 void add_kinds(Numbers& table, fusion::DriftMemory& drift) {
   if (!table.has("kind_weight")) return;
   drift.kind_weight = table.numbers<fusion::kDriftKinds>("kind_weight", 0.0, kWeightMax);
@@ -216,7 +216,7 @@ void add_temperatures(Numbers& table, fusion::DriftMemory& drift) {
   if (!any && !table.has("coefficient_dps_k") && !table.has("coefficient_sigma_dps_k")) return;
   drift.coefficient_dps_k = table.numbers<2>("coefficient_dps_k", -kChangeMax_dps, kChangeMax_dps);
   drift.coefficient_sigma_dps_k = table.numbers<2>("coefficient_sigma_dps_k", 0.0, kChangeMax_dps);
-  table.require(any, "coefficient_dps_k", "stands without a temperature");
+  table.require(any, "coefficient_dps_k", "needs a temperature");
 }
 
 fusion::DriftMemory drift_from(Numbers& table) {
@@ -226,7 +226,7 @@ fusion::DriftMemory drift_from(Numbers& table) {
   table.require(is_positive_definite(drift.bias_covariance), "bias_covariance",
                 "is not positive definite");
   drift.white_density = table.numbers<3>("white_density", -kVarianceMax, kVarianceMax);
-  table.require(is_covariance(drift.white_density), "white_density", "is no covariance");
+  table.require(is_covariance(drift.white_density), "white_density", "is not a covariance");
   drift.sample_variance = table.numbers<2>("sample_variance", 0.0, kVarianceMax);
   const auto ratios = table.numbers<fusion::kWalkRatios_per_s.size()>("walk_ratio_per_s", 0.0, 1e9);
   table.require(ratios == fusion::kWalkRatios_per_s, "walk_ratio_per_s", "are of another version");
@@ -251,8 +251,7 @@ fusion::PairVerdict contradiction_from(Numbers& table) {
     const auto one = static_cast<fusion::Contradiction>(i);
     if (to_string(one) == name) pair.contradiction = one;
   }
-  table.require(pair.contradiction != fusion::Contradiction::kNone, "contradiction",
-                "is none that is known");
+  table.require(pair.contradiction != fusion::Contradiction::kNone, "contradiction", "is unknown");
   constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
   pair.slope = table
                    .optional_number("contradiction_slope", -kRateMax_dps * kRateMax_dps,
@@ -270,7 +269,8 @@ fusion::PairVerdict contradiction_from(Numbers& table) {
 Expected<std::string_view> unsealed(std::string_view text, const std::string& where) {
   if (text.size() > kSavedStateBytesMax) {
     return fail(
-        where, fmt::format("is longer than {} bytes, so it is no saved state", kSavedStateBytesMax),
+        where,
+        fmt::format("is longer than {} bytes, so it is not a saved state", kSavedStateBytesMax),
         kRemedy);
   }
   const std::string_view content = text.substr(0, text.size() - std::min(text.size(), kSealBytes));
@@ -429,9 +429,9 @@ Expected<SavedState> pair_from(const toml::table& root, const std::string& where
   return state;
 }
 
-// Units that face each other are no small rotation.
+// A larger angle is not a misalignment: the units face each other.
 constexpr double kAngleMax_rad = 3.2;
-// As configured it may be anything that people call a direction.
+// A configured heading may be any number that people call a direction.
 constexpr double kHeadingMax_rad = 100.0;
 
 Expected<fusion::MisalignmentMemory> misalignment_from(const toml::table& root,
@@ -495,7 +495,7 @@ Expected<SavedState> saved_state_from(std::string_view text, const std::string& 
   const Expected<toml::table> parsed = parse_toml(*content, where, kRemedy);
   if (!parsed) return tl::unexpected(parsed.error());
   const toml::table& root = *parsed;
-  // Not by value<>(): the library casts a number with a fraction before it looks whether that fits.
+  // Not by value<>(): the library casts a number with a fraction before it checks that it fits.
   const toml::value<std::int64_t>* format = root["format"].as_integer();
   if (format != nullptr && format->get() == kFormatOfAxes) return axes_from(root, where);
   if (format != nullptr && format->get() == kFormat && root["drift"].is_table())

@@ -42,7 +42,7 @@ bool Sender::send_rate(const RateOutput& output) {
   rate_dps_ = valid ? output.rate_dps : kNone;
   sigma_dps_ = valid ? output.sigma_dps : kNone;
   quality_ = valid ? output.quality : Quality::kUnusable;
-  // The encoder, too, makes one that it cannot carry invalid.
+  // The encoder also marks a rate that it cannot carry as invalid.
   if (vgyro_frames_ && collector_ != nullptr) {
     collector_->collect(axis_, output);
   } else if (vgyro_frames_) {

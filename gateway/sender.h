@@ -1,10 +1,9 @@
 #pragma once
 
-// What leaves the gateway: VG_Rate, and the rate in every foreign layout, whenever there is one,
-// VG_Bias with VG_Model on a grid of the bus's time and on request. Owns the
-// frames with their counters, the grid, and the count of sent frames. Contains no estimation: it
-// gets the frames' values, and times on the axis of fusion::StampGuard. Reads no clock,
-// allocates nothing.
+// Sends the gateway's output: VG_Rate and every foreign layout whenever there is a rate, VG_Bias
+// with VG_Model on a grid of the bus's time and on request. Owns the frames with their counters,
+// the grid, and the counts of sent frames. Contains no estimation: it receives the values, and
+// times on the axis of fusion::StampGuard. Reads no clock, allocates nothing.
 
 #include <cstddef>
 #include <cstdint>
@@ -18,7 +17,7 @@
 
 namespace vgyro::gateway {
 
-/// Takes the rates of several senders that share a frame.
+/// Collects the rates of several senders that share a frame.
 class RateCollector {
  public:
   virtual ~RateCollector() = default;
@@ -28,15 +27,15 @@ class RateCollector {
 class Sender {
  public:
   static constexpr Duration kBiasPeriod = std::chrono::milliseconds(100);
-  /// Samples drive the grid; the timer steps in only when none came for half a period more, so that
-  /// a replay sends the same frames at the same places.
+  /// Samples drive the grid; the timer sends only if none has come half a period later, so that a
+  /// replay sends the same frames at the same places.
   static constexpr Duration kBiasGrace = kBiasPeriod / 2;
-  /// No sample lies so far before the grid, for it stands a period ahead: the clock was set back.
+  /// The next grid point is one period ahead; a sample this far before it means a clock set back.
   static constexpr Duration kGridAheadMax = std::chrono::seconds(1);
 
   explicit Sender(const OutputPlan& plan);
 
-  /// As long as it lives, what is sent goes to its sink with its stamp. One at a time.
+  /// While it lives, the sender's output goes to its sink with its stamp. One at a time.
   class Turn {
    public:
     Turn(Sender& sender, FrameSink& sink, TimePoint stamp);
@@ -48,47 +47,47 @@ class Sender {
     Sender& sender_;
   };
 
-  /// From now on rates of this axis go out in a frame of several, made elsewhere; its identifier is
-  /// none of ours.
+  /// From now on rates of this axis are sent in a shared frame, made by the collector; the own
+  /// VG_Rate is not sent.
   void share_rates(RateCollector* collector, std::size_t axis) {
     collector_ = collector;
     axis_ = axis;
   }
-  /// From now on rates of this axis go out in these layouts; there are none of our own.
+  /// From now on rates of this axis are sent in these layouts; the sender has none of its own.
   void share_layouts(LayoutSet* layouts, std::size_t axis) {
     shared_layouts_ = layouts;
     axis_ = axis;
   }
 
-  /// Precondition of both: a Turn. A rate that the frame cannot carry goes out as invalid: false
-  /// then, and where it was not valid before.
+  /// Precondition of both: a Turn. A rate that the frame cannot carry is sent as invalid. Returns
+  /// whether the rate was sent as valid.
   bool send_rate(const RateOutput& output);
-  /// At once, independent of the grid.
+  /// Sends VG_Bias and VG_Model at once, independent of the grid.
   void send_bias(const BiasOutput& bias, const ModelOutput& model);
 
-  /// A sample says that time is `t`. Is a point of the grid reached? Then it is used up: send.
+  /// True if a sample of time `t` reaches a grid point; the point is used up, and the caller sends.
   bool reach_grid(TimePoint t);
-  /// As above, of a timer: only where samples should have driven the grid and did not.
-  /// `sample_interval` is that of the slower stream, 0 if unknown: its samples, however
-  /// slow, keep their right to drive the grid.
+  /// The same for the timer: true only if samples should have driven the grid and did not.
+  /// `sample_interval` is that of the slower stream, 0 if unknown: its samples, however slow, drive
+  /// the grid first.
   bool miss_grid(TimePoint t, Duration sample_interval);
-  /// When miss_grid() is true, at the earliest.
+  /// The earliest time at which miss_grid() is true.
   [[nodiscard]] TimePoint grid_missed_at(Duration sample_interval) const;
 
-  /// The counters of frames that both send go on where the other's stand.
+  /// Continues the counters of the frames that both senders send.
   void count_on_from(const Sender& before);
-  /// From now on as this plan says; counters, books and grid go on.
+  /// Replaces the plan; counters, counts and grid go on.
   void change_plan(const OutputPlan& plan);
 
-  /// How often there was something to say, whether or not a frame went out for it.
+  /// How often there was something to send, whether or not a frame was sent.
   [[nodiscard]] std::uint64_t spoken() const { return rates_ + bias_times_; }
-  /// The last VG_Rate's; NaN when that was invalid.
+  /// The rate in the last VG_Rate; NaN if that was invalid.
   [[nodiscard]] double rate_dps() const { return rate_dps_; }
 
-  /// σ of that rate; NaN when it was invalid, or where the method states none.
+  /// σ of that rate; NaN if it was invalid, or if the method states no σ.
   [[nodiscard]] double sigma_dps() const { return sigma_dps_; }
 
-  /// The books, and what the last rate said.
+  /// Adds the counts and the last rate to the status.
   void tell(Status& status) const;
 
  private:
@@ -102,7 +101,7 @@ class Sender {
   RateCollector* collector_ = nullptr;
   std::size_t axis_ = 0;
   TimePoint stamp_;
-  TimePoint next_bias_;  ///< the next point of the grid, or 0: at once
+  TimePoint next_bias_;  ///< the next point of the grid; 0: send at once
   std::uint64_t rates_ = 0;
   std::uint64_t rates_valid_ = 0;
   std::uint64_t rates_out_of_range_ = 0;

@@ -17,8 +17,8 @@ namespace {
 
 constexpr std::size_t kInterfaceNameMax = 15;  // IFNAMSIZ less the closing zero
 constexpr std::size_t kDiagnosticsShown = 5;
-// What lies beyond is a bit pattern, not a measurement: no gyro turns faster, no part that measures
-// gets hotter, no vehicle goes on after such a knock, no sensor is fed with more.
+// Larger values are bit patterns, not measurements: no gyro turns faster, no part that measures
+// gets hotter, no vehicle survives such a shock, no sensor has a higher supply voltage.
 double widest_of(Dimension dimension) {
   switch (dimension) {
     case Dimension::kRate:
@@ -58,7 +58,7 @@ can::BusIndex bus_index(std::vector<std::string>& buses, const std::string& name
 std::string required_bus(TomlReader& reader) {
   std::string name = reader.required_text("bus", "can0");
   if (name.size() > kInterfaceNameMax || printable(name) != name) {
-    reader.complain(reader.where("bus"), fmt::format("\"{}\" is no interface name", name),
+    reader.complain(reader.where("bus"), fmt::format("\"{}\" is not an interface name", name),
                     "at most 15 characters, as `ip link` shows them");
   }
   return name;
@@ -100,7 +100,7 @@ std::vector<std::string> DatabaseCache::paths() const {
 
 namespace {
 
-// Of a key that may be missing where there is a default.
+// Reads a key that may be absent if there is a default.
 std::string text_or(TomlReader& reader, std::string_view key, const std::string& fallback,
                     std::string_view example) {
   if (fallback.empty() || reader.has(key)) return reader.required_text(key, example);
@@ -241,7 +241,8 @@ std::optional<Quantity> SignalResolver::quantity(const dbc::Signal& signal, std:
   return quantity;
 }
 
-// Whatever range the file gives. Where that leaves the codes out already, they are out of range.
+// Excludes codes whatever range the file gives. If that range already excludes them, they count as
+// out of range.
 void SignalResolver::exclude_codes(Quantity& quantity, const dbc::Signal& signal) const {
   quantity.codes = dbc::codes_of(signal, rules_);
   if (quantity.codes.empty()) return;
@@ -251,9 +252,9 @@ void SignalResolver::exclude_codes(Quantity& quantity, const dbc::Signal& signal
   quantity.maximum = std::min(quantity.maximum, quantity.sendable_highest());
 }
 
-// The DBC's range is believed only where the signal can reach it, and only with both directions of
-// a rate: files in the wild carry ranges that contradict their own scale, and believing those would
-// throw good samples away.
+// The DBC's range is used only if the signal can reach it, and for a rate only if it spans both
+// directions: real files contain ranges that contradict their own scale, and using those would
+// discard good samples.
 void SignalResolver::set_limits(Quantity& quantity, const dbc::Signal& signal,
                                 Dimension dimension) {
   const double widest = widest_of(dimension) / quantity.scale;
@@ -263,7 +264,7 @@ void SignalResolver::set_limits(Quantity& quantity, const dbc::Signal& signal,
   const double lowest = quantity.codec.representable_min();
   const double highest = quantity.codec.representable_max();
   const bool plausible = dbc::has_reachable_range(signal, quantity.codec);
-  // A gyro turns both ways: [0|100] is what its author thought of, no limit of the sensor.
+  // A gyro turns both ways: [0|100] is what its author considered, not a limit of the sensor.
   const bool one_direction = dimension == Dimension::kRate && lowest < 0.0 && highest > 0.0 &&
                              (signal.minimum >= 0.0 || signal.maximum <= 0.0);
   if (plausible && !one_direction) {

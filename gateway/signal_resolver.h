@@ -21,9 +21,9 @@ namespace vgyro::gateway {
 class DatabaseCache {
  public:
   explicit DatabaseCache(std::vector<Error>& warnings) : warnings_(warnings) {}
-  /// Null after a complaint.
+  /// Null after an error.
   const dbc::Database* get(const std::string& path, TomlReader& reader);
-  /// Null when it was never asked for, or after a complaint.
+  /// Null if it was never requested, or after an error.
   [[nodiscard]] const dbc::Database* loaded(const std::string& path) const;
   [[nodiscard]] std::vector<std::string> paths() const;
 
@@ -32,7 +32,7 @@ class DatabaseCache {
   std::vector<Error>& warnings_;
 };
 
-/// What is meant where a table has no such key; an empty one must be there.
+/// Values for a table that lacks these keys; an empty one makes its key required.
 struct SignalDefaults {
   std::string bus = {};
   std::string dbc = {};
@@ -51,24 +51,24 @@ class SignalResolver {
   [[nodiscard]] const std::string& bus() const { return bus_; }
   [[nodiscard]] const dbc::Message& message() const { return *message_; }
   [[nodiscard]] FrameMatch match() const;
-  /// Whose codes the message has, by its DBC file or the configuration.
+  /// The rules of the message's codes, from its DBC file or the configuration.
   [[nodiscard]] dbc::CodeRules rules() const { return rules_; }
   [[nodiscard]] const std::string& dbc_path() const { return dbc_path_; }
-  /// For a table that need not say them again.
+  /// Defaults for a table that need not repeat these keys.
   [[nodiscard]] const SignalDefaults& named() const { return named_; }
 
-  /// The signal that `key` names; null after a complaint, or when the key is not there.
+  /// The signal that `key` names; null after an error, or if the key is absent.
   const dbc::Signal* signal(std::string_view key, bool required);
   const dbc::Signal* signal_named(std::string_view name, std::string_view key);
 
-  /// Is `helper` on every page that has `main`? A complaint at `key` when it is not.
+  /// Is `helper` on every page that has `main`? Reports an error at `key` if not.
   bool shares_page(std::string_view key, const dbc::Signal& helper, const dbc::Signal& main);
 
   std::optional<Quantity> quantity(const dbc::Signal& signal, std::string_view key,
                                    Dimension dimension,
                                    const std::optional<std::string>& unit = {});
   std::optional<dbc::SignalCodec> codec(const dbc::Signal& signal);
-  /// The pages that carry the signal; nothing after a complaint.
+  /// The pages that carry the signal; nothing after an error.
   std::optional<dbc::Presence> presence(const dbc::Signal& signal);
 
  private:
@@ -86,13 +86,13 @@ class SignalResolver {
   std::string dbc_path_;
   const dbc::Message* message_ = nullptr;
   const dbc::Database* database_ = nullptr;
-  dbc::CodeRules rules_ = dbc::CodeRules::kNone;  ///< of the key "codes", or of the DBC file
+  dbc::CodeRules rules_ = dbc::CodeRules::kNone;  ///< from the key "codes", or from the DBC file
 };
 
-/// The key "bus" of any table, after a complaint where it cannot be an interface.
+/// The key "bus" of any table; reports an error if it cannot be an interface.
 std::string required_bus(TomlReader& reader);
 
-/// Adds the name when it is new.
+/// The index of the name; adds it if it is new.
 can::BusIndex bus_index(std::vector<std::string>& buses, const std::string& name);
 
 }  // namespace vgyro::gateway

@@ -18,10 +18,10 @@ fusion::TemperatureFilter filter_of(const GyroPlan& gyro) {
 
 }  // namespace
 
-/// Of one input: who tells it, and whether anybody has.
+/// Where one input comes from, and whether a value was ever received.
 struct Surroundings::Source {
   model::Need need;
-  /// Null where it is not the gyro.
+  /// Null if it does not come from the gyro's own frames.
   void (*from_gyro)(Surroundings& to, std::size_t gyro, TimePoint t, const GyroInput& input);
   bool (*heard)(const Surroundings& from, std::size_t gyro);
 };
@@ -67,7 +67,7 @@ void Surroundings::set_zero(TimePoint t) {
   angle_at_ = t;
 }
 
-// Time that does not just go on.
+// Handles a time that does not simply follow the newest one.
 void Surroundings::leap(TimePoint t) {
   if (!begun_ || t < zero_) {
     // The first frame's stamp was garbage, or it came on the slower of two buses.
@@ -82,7 +82,7 @@ void Surroundings::leap(TimePoint t) {
   angle_at_ += step;
 }
 
-// Of every sample: the compiler sees each source by itself, and calls it directly.
+// Runs for every sample; the compiler sees each source as a constant and calls it directly.
 template <std::size_t... places>
 void Surroundings::hear_from(std::index_sequence<places...> /*all*/, std::size_t gyro, TimePoint t,
                              const GyroInput& input, std::uint8_t needs) {
@@ -123,7 +123,7 @@ bool Surroundings::receive_acceleration(const can::Frame& frame, TimePoint raw,
 bool Surroundings::receive_speed(const can::Frame& frame, TimePoint raw,
                                  fusion::StampGuard& guard) {
   const ScalarIntake::Result taken = speed_->take(frame, raw, guard);
-  // The sensor says that it does not know: what it said before is worth no more.
+  // The sensor reports that its speed is unknown, so the last value is no longer usable either.
   const bool unknown = taken.reject == Reject::kOutOfRange || taken.reject == Reject::kNotFinite ||
                        taken.reject == Reject::kNoMeasurement;
   if (unknown) speed_at_ = std::nullopt;
@@ -137,7 +137,7 @@ void Surroundings::add_rate(TimePoint t, double rate_dps) {
   if (!std::isfinite(rate_dps) || t <= angle_at_ || t - newest_ > kLeap) return;
   const double turned_deg = 0.5 * (rate_dps_ + rate_dps) * to_seconds(t - angle_at_);
   angle_rad_ += turned_deg * kRadPerDeg;
-  // Within half a turn it is its own remainder.
+  // remainder() changes nothing within half a turn; skip it.
   if (!(std::abs(angle_rad_) < std::numbers::pi))
     angle_rad_ = std::remainder(angle_rad_, kTurn_rad);
   angle_at_ = t;

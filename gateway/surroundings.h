@@ -1,10 +1,10 @@
 #pragma once
 
-// The quantities that the gyros' errors depend on besides the rate, from the frames that carry
+// The quantities besides the rate that the gyros' errors depend on, from the frames that carry
 // them: temperatures, supply voltages, acceleration, the angle turned so far, and time since the
-// first frame. Also the wheels' state. Values that were never received are unknown; acceleration,
-// temperature and voltage that fall silent are held, because gravity, heat and supply go on, speed
-// is not.
+// first frame. Also the wheels' state. Values that were never received are unknown. When
+// acceleration, temperature or voltage falls silent, the last value is held, because gravity, heat
+// and supply go on; speed is not held.
 
 #include <array>
 #include <optional>
@@ -27,12 +27,12 @@ namespace vgyro::gateway {
 
 class Surroundings {
  public:
-  /// A speed older than this is no speed.
+  /// A speed older than this is unknown.
   static constexpr Duration kSpeedStale = std::chrono::seconds(1);
   static constexpr double kStandingBelow_m_s = 0.05;
-  /// After the last known rate the angle is carried on for no longer than this.
+  /// After the last known rate the angle is extrapolated for no longer than this.
   static constexpr Duration kAngleAhead = std::chrono::seconds(1);
-  /// A longer leap of time is a clock that was set, not a gyro that went on warming up.
+  /// A longer leap of time means that a clock was set, not that a gyro went on warming up.
   static constexpr Duration kLeap = std::chrono::hours(24);
 
   explicit Surroundings(const Plan& plan);
@@ -41,36 +41,38 @@ class Surroundings {
   void begin(TimePoint t) {
     if (!begun_) set_zero(t);
   }
-  /// A sample was accepted: its time is valid.
+  /// Moves time on to that of an accepted sample.
   void reach(TimePoint t) {
     const bool goes_on = begun_ && t >= zero_ && t >= newest_ && span(newest_, t) <= kLeap;
     if (!goes_on) return leap(t);
     newest_ = t;
   }
 
-  /// The gyro's own temperature, voltage and other axes, as far as in `needs` (model::Need).
+  /// Takes the gyro's own temperature, voltage and other axes, as far as `needs` (model::Need) has
+  /// them.
   void hear_gyro(std::size_t gyro, TimePoint t, const GyroInput& input, std::uint8_t needs);
-  /// NaN is passed over.
+  /// Ignores NaN.
   void add_temperature(std::size_t gyro, TimePoint t, double temperature_c);
   void add_supply(std::size_t gyro, double supply_v);
-  /// About x, y and z, of the same frame as the rate; NaN is none, and ends what was before.
+  /// Rates about x, y and z in the same frame as the gyro's rate; NaN is none, and replaces the
+  /// last one.
   void set_other_rates(std::size_t gyro, const std::array<double, 3>& rate_dps) {
     other_rate_dps_[gyro] = rate_dps;
   }
   /// False when the frame cannot be used.
   bool receive_acceleration(const can::Frame& frame, TimePoint raw, fusion::StampGuard& guard);
   bool receive_speed(const can::Frame& frame, TimePoint raw, fusion::StampGuard& guard);
-  /// The true rate, as well as it is known; times may come out of order. A leap ahead of the gyros
-  /// is passed over: only they move time.
+  /// The true rate as far as it is known; times may be out of order. A leap ahead of the gyros is
+  /// ignored, since only they move time.
   void add_rate(TimePoint t, double rate_dps);
 
   [[nodiscard]] model::Surroundings at(std::size_t gyro, TimePoint t) const;
   [[nodiscard]] fusion::Wheels wheels(TimePoint t) const;
-  /// NaN where none is known.
+  /// NaN if unknown.
   [[nodiscard]] double temperature_c(std::size_t gyro) const {
     return temperatures_[gyro].temperature_c();
   }
-  /// Variance of the specific force's magnitude; NaN where there is no accelerometer.
+  /// Variance of the specific force's magnitude; NaN without an accelerometer.
   [[nodiscard]] double vibration_g2() const;
   /// The inputs in `needs` (model::Need) that were never received.
   [[nodiscard]] std::uint8_t missing(std::size_t gyro, std::uint8_t needs) const;

@@ -13,12 +13,12 @@ namespace vgyro::gateway {
 
 namespace {
 
-// What one axis shows of a turn counts for no more than this with the others: a wrong opinion must
-// not last for ever.
+// The evidence of one axis for a turn counts for no more than this with the others: a wrong finding
+// must not last for ever.
 constexpr double kLogTurningMost = 6.0;
-// From this probability on a steady turn about one axis is motion of the platform: nobody stands.
+// From this probability on, a steady turn about one axis is motion of the platform.
 constexpr double kSurelyTurning = 0.9;
-// Pairs of different axes that are further apart are of different motion.
+// Pairs of different axes that are further apart belong to different motion.
 constexpr Duration kApartMost = LayoutSet::kApartMost;
 constexpr std::array<std::uint8_t, 2> kGyroRoles{kGyro1, kGyro2};
 
@@ -40,7 +40,7 @@ void SharedRates::end() {
   sink_ = nullptr;
 }
 
-// Where an axis goes on alone its instants are others than those of the pairs.
+// While one axis has a single gyro, its instants differ from those of the pairs.
 void SharedRates::collect(std::size_t axis, const RateOutput& output) {
   const bool other_instant = std::any_of(
       rates_.begin(), rates_.end(),
@@ -62,7 +62,7 @@ void SharedRates::flush() {
 
 // --- setting up ----------------------------------------------------------------------------------
 
-/// As long as it lives, all axes send to one sink.
+/// While it lives, all axes send to one sink.
 class UnitPipeline::Turn {
  public:
   Turn(UnitPipeline& units, FrameSink& sink, TimePoint stamp) : units_(units) {
@@ -109,7 +109,7 @@ void UnitPipeline::end_output() {
   sink_ = nullptr;
 }
 
-// The rates of one instant are all there.
+// All rates of one instant have been collected.
 void UnitPipeline::settle_output() {
   if (shared_) shared_->flush();
   layouts_.settle(stamp_, *sink_);
@@ -152,8 +152,8 @@ void UnitPipeline::receive(can::BusIndex bus, const can::Frame& frame, TimePoint
   share_restarts();
 }
 
-// First every axis says whether its reading can be used; then they are turned into the vehicle's,
-// all of them are heard, and what they complete is taken.
+// First every axis decides whether its reading can be used. Then the readings are turned into the
+// vehicle's axes and offered, and the pairs they complete are taken.
 void UnitPipeline::receive_unit(std::size_t gyro, std::uint8_t role,
                                 const std::array<std::uint8_t, kAxes>& roles,
                                 const can::Frame& frame, TimePoint stamp) {
@@ -200,8 +200,8 @@ UnitPipeline::Worth UnitPipeline::worth(std::size_t gyro, std::size_t place, std
   return age <= most && age >= -most ? Worth::kNew : Worth::kOld;
 }
 
-// In place of a sensor axis that has little to say here, and nothing new, stands what is known of
-// the vehicle's rate about it.
+// If a sensor axis with a small share here has no new reading, the vehicle's known rate about it is
+// used instead.
 UnitPipeline::Worth UnitPipeline::turn(std::size_t gyro, std::size_t place, TimePoint stamp,
                                        double& rate_dps) const {
   const Unit& unit = units_[gyro];
@@ -223,8 +223,8 @@ UnitPipeline::Worth UnitPipeline::turn(std::size_t gyro, std::size_t place, Time
 
 // --- rates ---------------------------------------------------------------------------------------
 
-// All axes of a unit have the same stamps, and so the pairs of one instant come out together; an
-// axis in a message of its own comes with its own.
+// All axes of a unit have the same stamps, so the pairs of one instant come out together; an axis
+// in a message of its own has stamps of its own.
 void UnitPipeline::take_pairs() {
   while (true) {
     Pairs pairs;
@@ -266,8 +266,8 @@ void UnitPipeline::set_cross(std::size_t place) {
                           misalignment_.cross_variance(axis, rate_dps_));
 }
 
-// How the platform turns at this instant, to a bias or so: only what is multiplied by small angles
-// depends on it.
+// The rate of the platform at this instant. An error as large as a bias is harmless, since it is
+// only multiplied by small angles.
 void UnitPipeline::note_rates(const Pairs& pairs) {
   for (std::size_t place = 0; place < axes_.size(); ++place) {
     double& rate_dps = rate_dps_[plan_.axes[place].axis];
@@ -281,7 +281,7 @@ void UnitPipeline::note_rates(const Pairs& pairs) {
   }
 }
 
-// One unit alone: what it says of all axes, or what is known of them.
+// One unit alone: uses its rate about this axis and the known rates about the others.
 void UnitPipeline::note_single(std::size_t gyro, std::size_t place, double rate_dps) {
   if (!learns_misalignment_) return;
   for (std::size_t other = 0; other < axes_.size(); ++other) {
@@ -291,9 +291,9 @@ void UnitPipeline::note_single(std::size_t gyro, std::size_t place, double rate_
   set_cross(place);
 }
 
-// Of axes in messages of their own the newest pairs are taken for one instant: what the platform
-// does in a millisecond is nothing against what it does in a cell. An axis that goes on with one
-// unit tells nothing itself, and what it is to the others.
+// If axes have messages of their own, their newest pairs are taken for one instant: the platform's
+// motion within a millisecond is small against that within a cell. An axis with one gyro alone
+// yields no evidence itself, but its known rate serves the others.
 void UnitPipeline::learn_misalignment(const Pairs& pairs) {
   TimePoint oldest = TimePoint::max();
   TimePoint newest = TimePoint::min();
@@ -334,21 +334,21 @@ void UnitPipeline::begin(TimePoint t) {
   if (saved_) (void)misalignment_.resume(*saved_, age_s(t));
 }
 
-// As of an axis: a clock that stands before the state tells nothing.
+// As with a single axis: if the clock is before the state's stamp, the age is unknown.
 double UnitPipeline::age_s(TimePoint t) const {
   const TimePoint stamp = axes_[0]->stamp_of(t);
   if (stamp < saved_stamp_) return Estimator::kUnknownAge_s;
   return to_seconds(stamp - saved_stamp_);
 }
 
-// --- what the axes tell each other ---------------------------------------------------------------
+// --- shared between axes -------------------------------------------------------------------------
 
-// A stop is a stop of all axes, and a turn about one of them is one of the platform.
+// A stop must be a stop of all axes, and a turn about one axis is a turn of the platform.
 void UnitPipeline::share_motion() {
   std::array<std::uint64_t, kAxes> editions{};
   for (std::size_t place = 0; place < axes_.size(); ++place)
     editions[place] = axes_[place]->estimator().condition_edition();
-  // They say the same for some hundred pairs.
+  // The conditions stay the same for some hundred pairs.
   if (editions == told_of_) return;
   told_of_ = editions;
   for (std::size_t place = 0; place < axes_.size(); ++place) {
@@ -373,8 +373,8 @@ void UnitPipeline::share_motion() {
   }
 }
 
-// A stop that ends for one axis ends for all: whoever has rested for long enough is calibrated as
-// well, whoever has not begins again. Motion that is accepted is motion of all.
+// Rest that ends for one axis ends for all: axes that have rested long enough are calibrated, the
+// others begin again. Motion that one calibration has accepted counts for all axes.
 void UnitPipeline::share_calibrations(TimePoint t) {
   bool moved = false;
   std::optional<TimePoint> still_until;
@@ -406,7 +406,7 @@ void UnitPipeline::share_restarts() {
   }
 }
 
-// The Earth's rate about the vehicle's horizontal axes turns with its heading.
+// The Earth's rate about the vehicle's horizontal axes changes with its heading.
 void UnitPipeline::follow_heading(TimePoint t) {
   if (!heading_.is_told()) return;
   begin(t);
@@ -426,8 +426,7 @@ std::optional<Heading::Turn> UnitPipeline::turn_about_z() {
                        .bias_sigma_dps = finite_or_0(axis.bias_sigma_dps())};
 }
 
-// What is learned at a stop, or in a calibration, is as wrong as what is expected of the Earth
-// then.
+// What a stop or a calibration teaches is as uncertain as the Earth's rate that is expected then.
 void UnitPipeline::share_heading() {
   for (const auto& axis : axes_) {
     const std::size_t about = axis->plan().axis;
@@ -486,7 +485,7 @@ std::optional<SavedState> UnitPipeline::memory() const {
   return all;
 }
 
-// An older state does not say where the vehicle pointed when it learned.
+// An older state lacks the uncertainty of the heading at the time of learning.
 double UnitPipeline::doubt_of(const SavedState& state, const Plan& pair) const {
   if (state.earth_doubt_dps) return std::max(*state.earth_doubt_dps, pair.calibration.doubt_dps);
   const bool turns = heading_.is_told() && pair.axis != 2;
@@ -535,7 +534,7 @@ void UnitPipeline::change_output(const Plan& plan) {
 
 namespace {
 
-// What of several axes is worst comes first.
+// The platform's state is that of its worst axis.
 constexpr std::array kWorstFirst{State::kContradicted, State::kLost,     State::kWaiting,
                                  State::kCalibrating,  State::kDegraded, State::kRunning};
 
@@ -583,7 +582,7 @@ void add_axis(const Status& axis, Status& all) {
 }  // namespace
 
 const Status& UnitPipeline::refreshed_status() {
-  // The rate that stands for all is about the last axis, about which a vehicle turns.
+  // The last axis, about which a vehicle turns, provides the rate that stands for all.
   status_ = axes_.back()->refreshed_status();
   for (std::size_t place = 0; place + 1 < axes_.size(); ++place)
     add_axis(axes_[place]->refreshed_status(), status_);

@@ -1,9 +1,9 @@
 #pragma once
 
 // Two whole units: an AxisPipeline for each axis of the vehicle, fed from the units' frames, and
-// what needs all axes together: mounts, the small rotation between the units, stops that are stops
-// of all axes, and a frame that carries all rates. Opens nothing, reads no clock, allocates nothing
-// once it is constructed.
+// what needs all axes together: mounts, the misalignment of the units, stops, which are stops of
+// all axes, and frames that carry all rates. Opens nothing, reads no clock, allocates nothing after
+// construction.
 
 #include <array>
 #include <cstdint>
@@ -27,13 +27,13 @@
 
 namespace vgyro::gateway {
 
-/// One FD frame of all axes: gathers the rates of one instant until they are complete.
+/// One FD frame for all axes: collects the rates of one instant until they are complete.
 class SharedRates final : public RateCollector {
  public:
   explicit SharedRates(const OutputPlan& plan) : encoder_(plan) {}
 
   void begin(FrameSink& sink, TimePoint stamp);
-  /// Sends what is gathered.
+  /// Sends the collected rates.
   void flush();
   void end();
   void collect(std::size_t axis, const RateOutput& output) override;
@@ -49,15 +49,15 @@ class SharedRates final : public RateCollector {
 
 class UnitPipeline {
  public:
-  /// Precondition: plan.axes.
+  /// Precondition: plan.axes is not empty.
   explicit UnitPipeline(const Plan& plan);
 
-  // As of Pipeline.
+  // As in Pipeline.
 
   void receive(can::BusIndex bus, const can::Frame& frame, TimePoint stamp, FrameSink& sink);
   void advance(TimePoint now, FrameSink& sink);
   [[nodiscard]] TimePoint next_deadline() const;
-  /// Of the platform: sums and worsts of its axes.
+  /// The platform's status: sums, and the worst of its axes.
   const Status& refreshed_status();
   [[nodiscard]] std::size_t axis_count() const { return axes_.size(); }
   const Status& axis_status(std::size_t place) { return axes_[place]->refreshed_status(); }
@@ -74,21 +74,21 @@ class UnitPipeline {
 
  private:
   using Pairs = std::array<std::optional<fusion::AlignedPair>, kAxes>;
-  /// What a unit's sensor reads, and how it turns into the vehicle's axes. Both in the order of
-  /// `axes_`: a pair's own sensor axis stands in its place.
+  /// The readings of a unit's sensor axes, and how they turn into the vehicle's. Both are in the
+  /// order of `axes_`: a pair's own sensor axis has the same place.
   struct Unit {
     std::array<std::array<double, kAxes>, kAxes> share{};
     bool turns = false;
-    /// Both axes stand in one message.
+    /// Whether both axes are in one message.
     std::array<std::array<bool, kAxes>, kAxes> together{};
     std::array<double, kAxes> reading_dps{};
     std::array<TimePoint, kAxes> read_at{};  ///< stamp of the reading
   };
-  /// What a reading is worth to another axis.
+  /// Whether the reading of one axis can be used for another.
   enum class Worth : std::uint8_t { kNew, kOld, kSick };
   class Turn;
 
-  /// Between the two, what concerns all axes goes to this sink.
+  /// Between these two calls, output that concerns all axes goes to this sink.
   void begin_output(FrameSink& sink, TimePoint stamp);
   void end_output();
   void share_output();
@@ -100,7 +100,8 @@ class UnitPipeline {
                     TimePoint stamp);
   [[nodiscard]] Worth worth(std::size_t gyro, std::size_t place, std::size_t other,
                             TimePoint stamp) const;
-  /// The rate about an axis of the vehicle. Where what is missing matters there: kOld or kSick.
+  /// Computes the rate about an axis of the vehicle. kOld or kSick if a sensor axis that matters
+  /// there is missing.
   Worth turn(std::size_t gyro, std::size_t place, TimePoint stamp, double& rate_dps) const;
   void take_pairs();
   void take_round(Pairs& pairs);
@@ -128,18 +129,19 @@ class UnitPipeline {
   TimePoint stamp_;
   fusion::Misalignment misalignment_;
   bool learns_misalignment_ = false;
-  fusion::AxisRates rate_dps_{};  ///< about x, y, z: the newest of the platform, biases taken off
+  fusion::AxisRates rate_dps_{};  ///< about x, y, z: the platform's newest rates, less biases
   TimePoint origin_;
   bool begun_ = false;
   std::optional<fusion::MisalignmentMemory> saved_;
   TimePoint saved_stamp_;
   bool resumed_ = false;
-  Pairs waiting_;  ///< for the pairs of the other axes
+  Pairs waiting_;  ///< pairs that wait for those of the other axes
 
   std::array<fusion::Elsewhere, kAxes> told_{};
-  std::array<std::uint64_t, kAxes> told_of_{};  ///< editions of the conditions that made it
+  std::array<std::uint64_t, kAxes> told_of_{};  ///< editions of the conditions that told_ was made
+                                                ///< from
   std::array<std::uint64_t, kAxes> restarts_{};
-  bool cut_short_ = false;  ///< the calibrations of all axes, by the motion that one of them saw
+  bool cut_short_ = false;  ///< motion seen by one axis has cut short the calibrations of all
   Heading heading_;
   Status status_;
 };

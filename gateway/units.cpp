@@ -34,7 +34,7 @@ constexpr Spelling kSpellings[] = {
     {Dimension::kTemperature, "degreesc", {1.0}},
     {Dimension::kTemperature, "degreecelsius", {1.0}},
     {Dimension::kTemperature, "degreescelsius", {1.0}},
-    {Dimension::kTemperature, "degrecelsi", {1.0}},  // of "Unit_DegreCelsi"
+    {Dimension::kTemperature, "degrecelsi", {1.0}},  // as in "Unit_DegreCelsi"
     {Dimension::kTemperature, "gradc", {1.0}},
     {Dimension::kTemperature, "gradcelsius", {1.0}},
     {Dimension::kTemperature, "degk", {1.0, -273.15}},
@@ -72,13 +72,13 @@ constexpr Spelling kSpellings[] = {
     {Dimension::kVoltage, "mv", {1e-3}},
 };
 
-// An angle or a time as people write it, in degrees or seconds.
+// A word for an angle or a time, with its size in degrees or seconds.
 struct Word {
   std::string_view word;
   double size;
 };
-// German "Grad" is a degree, not a gon. Exports of some tools spell units out, and DBC names end
-// after 32 characters: "Unit_DegreOfArcPerSecon".
+// German "Grad" is a degree, not a gon. Some tools export units in words, and DBC names end after
+// 32 characters: "Unit_DegreOfArcPerSecon".
 constexpr Word kAngles[] = {{"deg", 1.0},
                             {"degree", 1.0},
                             {"degrees", 1.0},
@@ -100,7 +100,7 @@ constexpr Word kTimes[] = {
     {"sek", 1.0},    {"sekunde", 1.0},  {"min", kMinute_s}, {"minute", kMinute_s}, {"h", kHour_s},
     {"hr", kHour_s}, {"hour", kHour_s}, {"std", kHour_s},   {"stunde", kHour_s}};
 constexpr Word kPrefixes[] = {{"milli", 1e-3}, {"m", 1e-3}, {"", 1.0}};
-// What stands between angle and time, and behind the time.
+// The text between angle and time, and after the time.
 struct Quotient {
   std::string_view between;
   std::string_view behind;
@@ -110,8 +110,8 @@ constexpr Quotient kQuotients[] = {{"/", ""},    {"per", ""},  {"pro", ""},  {""
                                    {"*", "-1"},  {"·", "-1"},  {".", "-1"},  {"", "⁻¹"},
                                    {"*", "⁻¹"},  {"·", "⁻¹"},  {".", "⁻¹"}};
 
-// Signs that are typed or shown for the degree sign: the ordinal indicator, the ring, UTF-8 that
-// was taken for cp1252 and written as UTF-8 once more; and letters that hold it.
+// Characters used instead of the degree sign: the ordinal indicator, the ring, UTF-8 mistaken for
+// cp1252 and encoded again; and characters that include it.
 struct Sign {
   std::string_view typed;
   std::string_view meant;
@@ -145,7 +145,7 @@ std::optional<double> degrees_of(std::string_view angle) {
   return std::nullopt;
 }
 
-// An angle by a time, in deg/s.
+// An angle over a time, in deg/s.
 std::optional<double> rate_unit(std::string_view unit) {
   for (const Quotient& quotient : kQuotients) {
     for (const Word& time : kTimes) {

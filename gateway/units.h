@@ -17,8 +17,9 @@ struct Conversion {
   double shift = 0.0;
 };
 
-/// Letter case, blanks and underscores do not matter; a rate is any angle by any time, as English
-/// and German files write them. Nothing for a unit of another dimension or none at all.
+/// Ignores letter case, blanks and underscores. A rate is any unit of angle over any unit of time,
+/// as English and German files write them. Nothing for a unit of another dimension or an unknown
+/// one.
 std::optional<Conversion> convert_unit(Dimension dimension, std::string_view unit);
 
 /// The spellings to recommend, e.g. "deg/s, rad/s, deg/h".

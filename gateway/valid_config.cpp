@@ -55,7 +55,7 @@ std::optional<NamedCondition> read_condition(TomlReader& reader, SignalResolver&
   const auto parsed = parse_comparison(*text);
   if (!parsed) {
     reader.complain(
-        reader.where(key), fmt::format("\"{}\" is no comparison", *text),
+        reader.where(key), fmt::format("\"{}\" is not a comparison", *text),
         fmt::format("for example {} = \"Status == 0\"; ==, !=, <, <=, >, >= and a number", key));
     return std::nullopt;
   }

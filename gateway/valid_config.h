@@ -16,8 +16,8 @@ struct NamedCondition {
   ValidCondition condition;
 };
 
-/// `main` is the signal that the message is read, or sent, for. Nothing where the key is not there,
-/// or after a complaint.
+/// `main` is the signal that the message is read, or sent, for. Nothing if the key is absent, or
+/// after an error.
 std::optional<NamedCondition> read_condition(TomlReader& reader, SignalResolver& resolver,
                                              const dbc::Signal& main,
                                              std::string_view key = "valid");

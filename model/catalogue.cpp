@@ -20,20 +20,20 @@ using S = Surroundings;
 
 constexpr double kRateMax_dps = 1e5;
 constexpr double kTimeMax_s = 1e9;
-// Memory shorter than the time between two samples of the fastest gyro is white noise.
+// A memory shorter than the interval of the fastest gyro is white noise.
 constexpr double kTauMin_s = 1e-3;
-// A slower low-pass, or line, is drift.
+// A slower low-pass or line is drift.
 constexpr double kCutoffMin_hz = 1e-2;
 constexpr double kLineMin_hz = 1e-6;
-// A gyro that reads no more than this is none.
+// A gyro that reads no more than this does not work.
 constexpr double kLimitMin_dps = 1e-6;
 // Finer than any signal: the Earth turns a million times faster.
 constexpr double kStepMin_dps = 1e-9;
-// The best gyros have some 1e-7, the worst some 1; squares of either end are far from the ends of
-// double precision.
+// The best gyros have some 1e-7, the worst some 1; squares of these limits are far from the limits
+// of double precision.
 constexpr double kNoiseLeast = 1e-12;
 constexpr double kNoiseMax = 1e2;
-// No gyro is written so far off that it answers backwards or ten times too strongly.
+// No gyro is so wrong that it responds in reverse or ten times too strongly.
 constexpr double kScaleMin = -0.9;
 constexpr double kScaleMax = 9.0;
 constexpr double kLagMax_s = 0.25;
@@ -42,7 +42,7 @@ constexpr double kFrequencyMax_hz = 1e5;
 constexpr Parameter kReference{
     .name = "reference_c", .unit = "degC", .minimum = -273.15, .maximum = 1000.0, .preset = 25.0};
 
-// What sensors of vehicles are fed with; those of 3.3 or 12 V say so.
+// The usual supply of vehicle sensors; the model file states others, such as 3.3 or 12 V.
 constexpr Parameter kReferenceSupply{
     .name = "reference_v", .unit = "V", .minimum = 0.0, .maximum = 1000.0, .preset = 5.0};
 
@@ -55,7 +55,7 @@ constexpr Parameter not_negative(std::string_view name, std::string_view unit, d
 constexpr Parameter noise(std::string_view name, std::string_view unit, double limit) {
   return {.name = name, .unit = unit, .minimum = 0.0, .maximum = limit, .least = kNoiseLeast};
 }
-/// Something is divided by it.
+/// A parameter that something is divided by.
 constexpr Parameter divisor(std::string_view name, std::string_view unit, double least,
                             double limit) {
   return {.name = name, .unit = unit, .minimum = least, .maximum = limit};
@@ -83,7 +83,7 @@ constexpr std::array kGSensitivity{
 constexpr std::array kVibrationRectification{number("coefficient_dps_g2", "(deg/s)/g^2", 1e3)};
 constexpr std::array kDelay{number("seconds", "s", kLagMax_s)};
 constexpr std::array kBandwidth{divisor("cutoff_hz", "Hz", kCutoffMin_hz, kFrequencyMax_hz)};
-// Less damping rings for a hundred periods, more is a low-pass of the first order.
+// A smaller damping rings for a hundred periods; a larger one is a low-pass of the first order.
 constexpr std::array kBandwidthSecondOrder{
     divisor("cutoff_hz", "Hz", kCutoffMin_hz, kFrequencyMax_hz),
     divisor("damping", "", 0.01, 10.0)};
@@ -176,7 +176,7 @@ constexpr KindInfo kCatalogue[] = {
      [](const P& p, double, const S& s) { return p[1] * std::cos(p[0] * s.angle_rad + p[2]); }},
     {Kind::kLine, Nature::kOffset, kNeedsNothing, "line", "A * sin(2 pi f t + phase)", kLine,
      [](const P& p, double, const S& s) {
-       // Whole periods first, so that the phase keeps its digits after a year.
+       // Remove whole periods first, so that the phase keeps its digits after a year.
        const double periods = p[0] * s.t_s;
        return p[1] * std::sin(2.0 * std::numbers::pi * (periods - std::floor(periods)) + p[2]);
      }},
@@ -207,7 +207,7 @@ constexpr KindInfo kCatalogue[] = {
      [](const P& p, double, const S& s) { return p[0] * (s.supply_v - p[1]); }},
     {Kind::kRunIn, Nature::kOffset, kNeedsNothing, "run_in", "c * ln(1 + t / tau)", kRunIn,
      [](const P& p, double, const S& s) {
-       // A reading dated back before the first frame is of a gyro that has not begun.
+       // A reading dated back to before the first frame has t < 0.
        return p[0] * std::log1p(std::max(0.0, s.t_s) / p[1]);
      }},
     {Kind::kTemperatureHysteresis, Nature::kOffset, kNeedsTemperature, "temperature_hysteresis",
@@ -244,7 +244,8 @@ constexpr bool needs_are_counted() {
 }
 static_assert(needs_are_counted());
 
-// Products, quotients and squares of a few of them, and of times, stay finite and are not lost.
+// Products, quotients and squares of a few parameters, and of times, stay finite and do not
+// underflow.
 constexpr bool is_sane(const Parameter& parameter) {
   constexpr double kMagnitudeMax = 1e9;
   constexpr double kDivisorMin = 1e-9;
@@ -261,7 +262,7 @@ constexpr bool all_are_sane() {
     for (const Parameter& parameter : row.parameters) {
       if (!is_sane(parameter)) return false;
       if (row.nature == Nature::kNoise && parameter.minimum == 0.0 && parameter.least <= 0.0) {
-        return false;  // a density that is not 0 but whose square is
+        return false;  // the density is not 0 but its square is
       }
     }
   }
@@ -307,7 +308,7 @@ std::vector<std::string> kind_names() {
 
 const Parameter* size_parameter(Kind kind) {
   for (const Parameter& parameter : info(kind).parameters) {
-    // A line's frequency stands before its amplitude, and says when, not how much.
+    // A line's frequency precedes its amplitude, but is not its size.
     const bool says_when = kind == Kind::kLine && parameter.unit == "Hz";
     if (parameter.form == Form::kNumber && !parameter.preset && !says_when) return &parameter;
   }

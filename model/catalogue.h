@@ -1,11 +1,11 @@
 #pragma once
 
-// Every kind of effect: its name and parameters in the model file, what it does to a gyro, and, of
-// the deterministic ones, its equation. A new offset or response is a new row; HACKING.md says what
-// else another kind touches.
+// Every kind of effect: its name and parameters in the model file, what it does to a gyro, and, for
+// deterministic kinds, its equation. A new offset or response is a new row; HACKING.md lists what
+// else a new kind touches.
 //
-// How the effects of one gyro act together is said in model/equation.h: every response is to the
-// rate behind delay and low-passes, and offsets depend on no rate.
+// model/equation.h defines how the effects of one gyro act together: every response acts on the
+// rate after delay and low-passes, and offsets depend on no rate.
 
 #include <cstddef>
 #include <cstdint>
@@ -20,11 +20,11 @@
 
 namespace vgyro::model {
 
-/// Where in that chain a kind acts, which decides what can be done about it.
+/// Where in that chain a kind acts, which decides how it can be corrected.
 enum class Nature : std::uint8_t {
   kOffset,       ///< adds to the reading, whatever the rate
   kResponse,     ///< adds a function of the rate
-  kLag,          ///< the reading is of an earlier rate
+  kLag,          ///< the reading belongs to an earlier rate
   kClip,         ///< changes the finished reading; information is lost
   kNoise,        ///< random, with a known density or variance
   kDisturbance,  ///< frames or stamps go wrong
@@ -40,8 +40,8 @@ enum Need : std::uint8_t {
 };
 inline constexpr std::size_t kNeedCount = 4;
 
-/// For a table with one row for each need, in the order of the bits. To be
-/// asserted beside the table, so that a new need does not compile until every table has it.
+/// For a table with one row for each need, in the order of the bits. Assert it beside the table, so
+/// that a new need does not compile until every table has it.
 template <typename Rows>
 constexpr bool answers_each_need(const Rows& rows) {
   if (std::size(rows) != kNeedCount) return false;
@@ -58,7 +58,7 @@ struct Parameter {
   std::string_view unit;
   double minimum = 0.0;
   double maximum = 0.0;
-  double least = 0.0;  ///< what is not 0 is at least this large
+  double least = 0.0;  ///< magnitude that a non-zero value must have
   std::optional<double> preset = {};
   Form form = Form::kNumber;
 
@@ -76,8 +76,8 @@ struct KindInfo {
   std::string_view name;
   std::string_view meaning;  ///< for people: what the gyro reads in addition
   std::span<const Parameter> parameters;
-  Equation added = nullptr;  ///< deg/s; of offsets and responses
-  Equation slope = nullptr;  ///< d added / d rate; of responses
+  Equation added = nullptr;  ///< deg/s; for offsets and responses
+  Equation slope = nullptr;  ///< d added / d rate; for responses
 };
 
 /// All kinds, in the order of Kind.
@@ -87,33 +87,33 @@ const KindInfo& info(Kind kind);
 const KindInfo* find_kind(std::string_view name);
 std::vector<std::string> kind_names();
 
-/// The parameter that says how large the effect is: what a plain `sigma` in the model file is of.
-/// Null where it has none.
+/// The parameter that determines the size of the effect; a plain `sigma` in the model file refers
+/// to it. Null if the kind has none.
 const Parameter* size_parameter(Kind kind);
 
-/// Within `parameter.minimum` and `parameter.maximum`, for a sum of value and σ.
+/// Clamps a sum of value and σ to `parameter.minimum` and `parameter.maximum`.
 double within_limits(const Parameter& parameter, double value);
 
-/// What an offset or a response adds to the reading, deg/s; `rate_dps` is the late rate. 0 where it
-/// depends on something that is not known.
+/// What an offset or a response adds to the reading, deg/s; `rate_dps` is the late rate. 0 if the
+/// effect depends on an unknown input.
 double added_dps(const Effect& effect, double rate_dps, const Surroundings& surroundings);
 
-/// Of responses: d added_dps / d rate_dps.
+/// For responses: d added_dps / d rate_dps.
 double slope(const Effect& effect, double rate_dps, const Surroundings& surroundings);
 
-/// What the kinds of Nature::kClip make of a reading.
+/// The reading after an effect of Nature::kClip.
 double clipped_dps(const Effect& effect, double reading_dps);
 
-/// Lags, and what happens to frames and stamps: of a unit of several axes it is of all of them.
+/// True for lags and for effects on frames and stamps: they apply to all axes of a unit.
 bool acts_on_unit(Kind kind);
 
-/// Of Nature::kLag: 1σ of lag_s(), from the effect's σ.
+/// For Nature::kLag: 1σ of lag_s(), from the effect's σ.
 double lag_sigma_s(const Effect& effect);
 
-/// Of Nature::kLag: how much later than the rate the reading comes, for rates that change slowly.
+/// For Nature::kLag: how much later than the rate the reading is, for rates that change slowly.
 double lag_s(const Effect& effect);
 
-/// "error 0.00042 ± 3e-06", as check and the summaries print it.
+/// "error 0.00042 ± 3e-06", as printed by check and the summaries.
 std::string parameters_text(const Effect& effect);
 
 }  // namespace vgyro::model

@@ -19,7 +19,7 @@ std::string_view newline_of(std::string_view text) {
   return end != std::string_view::npos && end > 0 && text[end - 1] == '\r' ? "\r\n" : "\n";
 }
 
-// TOML allows no control character in a comment but the tab.
+// TOML allows no control character in a comment except the tab.
 std::string comment_lines(std::string_view comment, std::string_view newline) {
   std::string lines;
   while (!comment.empty()) {
@@ -43,7 +43,7 @@ std::string value_text(const Parameter& parameter, double value) {
                                  : "\"\"";
 }
 
-// Empty where it says nothing. One number where only the effect's size has one.
+// Empty without any σ; one number if only the parameter of the effect's size has a σ.
 std::string sigma_text(const Effect& effect) {
   const std::span<const Parameter> parameters = info(effect.kind).parameters;
   const Parameter* size = size_parameter(effect.kind);
@@ -78,7 +78,7 @@ std::string table_text(const Effect& effect, std::string_view newline) {
 }
 
 Expected<Model> read(std::string_view text) {
-  // An edit does not know the configuration, and leaves the gyros' names as they are.
+  // An edit has no configuration, so it leaves the gyros' names as they are.
   auto model = parse_model(text, kFile, {.names = {}, .any = true});
   if (!model) return tl::unexpected(model.error().front());
   return *std::move(model);
@@ -89,7 +89,7 @@ bool same(const Effect& a, const Effect& b) {
          a.sigma == b.sigma && a.ambiguous == b.ambiguous && a.of_axis == b.of_axis;
 }
 
-// `text` must hold these effects, whatever else it holds.
+// Checks that `text` holds these effects, whatever else it holds.
 Expected<std::string> read_back(std::string text, const std::vector<Effect>& wanted) {
   const auto model = read(text);
   if (!model) return tl::unexpected(model.error());
@@ -99,7 +99,7 @@ Expected<std::string> read_back(std::string text, const std::vector<Effect>& wan
   return text;
 }
 
-// A table can follow [[effect]] tables, or nothing; not a closed array.
+// A table can follow [[effect]] tables or nothing, but not a closed array.
 Expected<void> check_form(std::string_view text) {
   const Expected<toml::table> parsed = parse_toml(text, kFile);
   if (!parsed) return tl::unexpected(parsed.error());
@@ -108,7 +108,7 @@ Expected<void> check_form(std::string_view text) {
   const bool closed = tables->empty() || tables->get(0)->as_table()->is_inline();
   if (!closed) return {};
   return fail(at_line(kFile, static_cast<unsigned>(tables->source().begin.line)),
-              "effects in an array, effect = [...], cannot be added to",
+              "effects in an array, effect = [...], cannot be extended",
               "write each of them as an [[effect]] table");
 }
 
@@ -116,7 +116,7 @@ Expected<void> check_form(std::string_view text) {
 
 namespace {
 
-// A whole file, ready for more lines.
+// A whole file to which lines can be added.
 std::string begun_file(std::string_view text) {
   const bool blank = text.find_first_not_of(" \t\r\n") == std::string_view::npos;
   std::string result(text);

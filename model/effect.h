@@ -1,7 +1,7 @@
 #pragma once
 
-// One effect of the model file: something that makes a gyro read other than the true rate. Kinds,
-// parameters and equations are described in model/catalogue.h; an Effect is only their values.
+// One effect of the model file: a cause why a gyro reads other than the true rate.
+// model/catalogue.h describes kinds, parameters and equations; an Effect holds only their values.
 
 #include <array>
 #include <cstddef>
@@ -51,8 +51,9 @@ enum class Kind : std::uint8_t {
 };
 inline constexpr std::size_t kKindCount = 36;
 
-/// Effects of kind gauss_markov for one gyro. Three, a decade apart, are flicker noise over the
-/// times that a gyro is used for (docs/allan.md); each is a state of every filter of the gateway.
+/// Effects of kind gauss_markov for one gyro. Three, a decade apart, represent flicker noise over
+/// the times for which a gyro is used (docs/allan.md); each is a state of every filter of the
+/// gateway.
 inline constexpr std::size_t kGaussMarkovMax = 3;
 
 inline constexpr std::size_t kParametersMax = 3;
@@ -63,34 +64,36 @@ struct Effect {
   std::size_t gyro = 0;  ///< 0 or 1
   Kind kind = Kind::kBias;
   Parameters parameters{};
-  unsigned line = 0;       ///< of its table in the model file; 0 when it comes from elsewhere
+  unsigned line = 0;       ///< of its table in the model file; 0 without one
   Parameters sigma{};      ///< 1σ of each parameter; 0: not stated
-  bool ambiguous = false;  ///< another reading is as good: the whole effect may not be this gyro's
-  /// Of a unit of several axes: of this one of its sensor's (0 … 2); nothing: of each of them.
+  bool ambiguous = false;  ///< another explanation is as good: the whole effect may not be this
+                           ///< gyro's
+  /// For a unit of several axes: the sensor axis (0 … 2) that has the effect; nothing: each of
+  /// them.
   std::optional<std::size_t> of_axis = {};
 
   friend bool operator==(const Effect&, const Effect&) = default;
 };
 
-/// It says how far it may be wrong.
+/// The effect states a σ, or is ambiguous.
 inline bool is_doubted(const Effect& effect) {
   return effect.ambiguous || effect.sigma != Parameters{};
 }
 
 class TemperaturePast;
 
-/// What a gyro's error depends on besides the true rate, at one instant. NaN: not known.
+/// What a gyro's error depends on besides the true rate, at one instant. NaN: unknown.
 struct Surroundings {
   static constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
   double t_s = 0.0;  ///< since the first frame of the recording
   double temperature_c = kUnknown;
   double temperature_slope_c_s = kUnknown;
-  const TemperaturePast* temperature_past = nullptr;  ///< up to now; null: not known
+  const TemperaturePast* temperature_past = nullptr;  ///< up to now; null: unknown
   std::array<double, 3> acceleration_g{kUnknown, kUnknown, kUnknown};
   double vibration_g2 = kUnknown;  ///< variance of |a| over the last second
   double supply_v = kUnknown;      ///< at the gyro
-  /// About x, y and z of the same unit, as it sends them: as late as its own reading.
+  /// About x, y and z of the same unit, as it sends them: with the same lag as its own reading.
   std::array<double, 3> other_rate_dps{kUnknown, kUnknown, kUnknown};
   double angle_rad = 0.0;  ///< ∫Ω dt, up to whole turns
 };

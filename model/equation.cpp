@@ -12,8 +12,8 @@ namespace {
 
 constexpr double kPerPpm = 1e-6;
 
-// In turn: another order of summing has other last digits, and the same model must give the same
-// bytes.
+// Adds one by one: another order of summing would change the last digits, and the same model must
+// give the same bytes.
 double plus_each_dps(double sum_dps, std::span<const Effect> effects, double late_dps,
                      const Surroundings& surroundings) {
   for (const Effect& effect : effects)
@@ -24,12 +24,12 @@ double plus_each_dps(double sum_dps, std::span<const Effect> effects, double lat
 }  // namespace
 
 std::array<std::complex<double>, 2> SecondOrder::poles() const {
-  // Two that are equal are moved apart, for the sake of whoever divides by their difference.
+  // Equal poles are moved apart, because callers divide by their difference.
   constexpr double kApart = 1e-3;
   std::complex<double> root = std::sqrt(std::complex<double>(damping * damping - 1.0, 0.0));
   if (std::abs(root) < kApart) root = kApart;
   const double w = 2.0 * std::numbers::pi * cutoff_hz;
-  // The smaller one by the product of both: a difference would lose its digits.
+  // The smaller pole follows from the product of both: a difference would lose digits.
   const std::complex<double> larger = w * (damping + root);
   return {w * w / larger, larger};
 }
@@ -41,7 +41,7 @@ bool moves_in_time(Kind kind) {
 Equation::Equation(std::span<const Effect> effects) {
   for (const Effect& effect : effects)
     take(effect);
-  // Saturation, dead band, quantisation: the order of Kind.
+  // The order of Kind: saturation, dead band, quantisation.
   std::stable_sort(clips_.begin(), clips_.end(),
                    [](const Effect& a, const Effect& b) { return a.kind < b.kind; });
 }

@@ -1,13 +1,14 @@
 #pragma once
 
-// How one gyro comes to read what it reads, said once, in the order of docs/model-file.md:
+// How a gyro's reading follows from the true rate, defined once, in the order of
+// docs/model-file.md:
 //   late rate  Ω' = low-passes( Ω(t − Σ delay) )
 //   reading    = quantised( dead band( saturated( Ω' + offsets + responses(Ω') )))
 //   stamp      = t · (1 + Σ skew)
-// The simulator plays it, the gateway takes it back (fusion/compensation.h), the gap workflow asks
-// what it foretells. Here stands what is the same each time: noise, spikes, stuck values, jitter
-// and lost frames are drawn by the simulator. Rates in deg/s, times in seconds since the first
-// frame of the recording.
+// The simulator applies it, the gateway inverts it (fusion/compensation.h), the gap workflow
+// predicts readings with it. It covers what is deterministic; the simulator draws noise, spikes,
+// stuck values, jitter and lost frames. Rates in deg/s, times in seconds since the first frame of
+// the recording.
 
 #include <array>
 #include <complex>
@@ -20,7 +21,7 @@
 
 namespace vgyro::model {
 
-/// True of lags and clock_skew: with them the reading is of another instant than its stamp.
+/// True for lags and clock_skew: with them the reading belongs to another instant than its stamp.
 bool moves_in_time(Kind kind);
 
 /// Ω'' / w² + 2·damping·Ω' / w + Ω = input, w = 2π·cutoff.
@@ -28,50 +29,50 @@ struct SecondOrder {
   double cutoff_hz = 0.0;
   double damping = 0.0;
 
-  /// Of the two first-order low-passes, real or not, that it is when they are one behind the other:
+  /// The two first-order low-passes in series, real or complex, that it is equal to:
   /// y' = pole·(u − y).
   [[nodiscard]] std::array<std::complex<double>, 2> poles() const;
 };
 
 class Equation {
  public:
-  /// A gyro that reads the rate.
+  /// A gyro that reads the true rate.
   Equation() = default;
-  /// `effects` of one gyro, of any kind; those outside the equation are ignored. Of one
-  /// kind they act in the order given.
+  /// `effects` belong to one gyro and may be of any kind; those outside the equation are ignored.
+  /// Effects of one kind act in the given order.
   explicit Equation(std::span<const Effect> effects);
 
-  // When.
+  // --- time
 
   /// 1 + Σ skew: seconds of the stamps in one second of the truth.
   [[nodiscard]] double clock_rate() const { return clock_rate_; }
   [[nodiscard]] double stamp_s(double true_s) const { return true_s * clock_rate_; }
   [[nodiscard]] double true_time_s(double stamp_s) const { return stamp_s / clock_rate_; }
-  /// Σ delay, without the low-passes.
+  /// Σ delay, without the low-passes' lag.
   [[nodiscard]] double delay_s() const { return delay_s_; }
-  /// Whose rate the low-passes are given at this true time.
+  /// The true time of the rate that enters the low-passes at this true time.
   [[nodiscard]] double felt_at_s(double true_s) const { return true_s - delay_s_; }
-  /// Of the low-passes of first order, one behind the other, in Hz.
+  /// Cut-offs of the first-order low-passes in series, Hz.
   [[nodiscard]] std::span<const double> cutoffs_hz() const { return cutoffs_hz_; }
-  /// Behind those, of second order.
+  /// Second-order low-passes, which follow those.
   [[nodiscard]] std::span<const SecondOrder> second_orders() const { return second_orders_; }
-  /// How much later than the rate the reading comes, for rates that change slowly: Σ delay and the
-  /// low-passes' group delays.
+  /// How much later than the rate the reading is, for rates that change slowly: Σ delay and the
+  /// group delays of the low-passes.
   [[nodiscard]] double lag_s() const { return lag_s_; }
-  /// Whether anything moves it in time.
+  /// Whether any effect moves the reading in time.
   [[nodiscard]] bool is_late() const { return is_late_; }
 
-  /// Ω' at this true time. `low_passed(t_s)` is the rate behind all low-passes;
-  /// the caller computes it from the rate over time.
+  /// Ω' at this true time. `low_passed(t_s)` is the rate after all low-passes, which the caller
+  /// computes from the rate over time.
   template <std::invocable<double> LowPassed>
   [[nodiscard]] double late_rate_dps(LowPassed&& low_passed, double true_s) const {
     return std::forward<LowPassed>(low_passed)(felt_at_s(true_s));
   }
 
-  // What. Surroundings are those of the true instant, which no delay moves. An effect whose input
-  // is not known adds nothing.
+  // --- value. Surroundings are those of the true instant, independent of delays. An effect whose
+  // input is unknown adds nothing.
 
-  /// Offsets or responses are there.
+  /// Are there offsets or responses?
   [[nodiscard]] bool adds() const { return !added_.empty(); }
   [[nodiscard]] bool responds() const { return !responses_.empty(); }
   /// Ω' + offsets + responses(Ω'), before any noise and clip.
@@ -79,10 +80,10 @@ class Equation {
   /// Offsets + responses(Ω').
   [[nodiscard]] double added_dps(double late_dps, const Surroundings& surroundings) const;
   [[nodiscard]] double offset_dps(const Surroundings& surroundings) const;
-  /// What a clip makes of the finished reading.
+  /// The finished reading after all clips.
   [[nodiscard]] double clipped_dps(double reading_dps) const;
 
-  // Back.
+  // --- inverse
 
   /// A reading less its offsets: Ω' + responses(Ω').
   [[nodiscard]] double without_offsets_dps(double reading_dps,
@@ -96,7 +97,8 @@ class Equation {
  private:
   void take(const Effect& effect);
 
-  std::vector<Effect> added_;  ///< offsets and responses as they were given: sums keep their digits
+  std::vector<Effect> added_;  ///< offsets and responses in the given order, which keeps sums bit
+                               ///< for bit
   std::vector<Effect> offsets_;
   std::vector<Effect> responses_;
   std::vector<Effect> clips_;

@@ -1,7 +1,7 @@
 #pragma once
 
-// What a recording must hold for an effect to show, and what it may be taken for where it does not
-// hold enough.
+// What a recording must hold for an effect to show, and what the effect may be mistaken for if it
+// does not hold enough.
 
 #include <string_view>
 
@@ -11,7 +11,7 @@ namespace vgyro::model {
 
 struct Evidence {
   Kind kind;
-  std::string_view shown_by;   ///< the excitation or the trace that gives it away
+  std::string_view shown_by;   ///< the excitation or the trace that reveals the effect
   std::string_view taken_for;  ///< names of kinds, separated by ", "; empty: for none
 };
 

@@ -45,7 +45,7 @@ std::optional<double> read_number(TomlReader& reader, const Parameter& parameter
   return std::nullopt;
 }
 
-// A missing one after a complaint of its own.
+// Nothing after an error, which has been reported.
 std::optional<double> read_parameter(TomlReader& reader, const KindInfo& kind,
                                      const Parameter& parameter, bool has_unit_axis) {
   if (parameter.form == Parameter::Form::kAxis && has_unit_axis) {
@@ -64,8 +64,8 @@ std::optional<double> read_parameter(TomlReader& reader, const KindInfo& kind,
   return axis ? std::optional(static_cast<double>(*axis)) : std::nullopt;
 }
 
-// The key `axis` is the unit's, unless it is a parameter: of g_sensitivity it is the
-// acceleration's, as long as `from` does not say that.
+// The key `axis` is the unit's, unless it is a parameter: in g_sensitivity it is the acceleration's
+// axis unless `from` is present.
 bool has_unit_axis(const TomlReader& reader, const KindInfo& kind) {
   const bool is_parameter =
       std::any_of(kind.parameters.begin(), kind.parameters.end(),
@@ -73,7 +73,7 @@ bool has_unit_axis(const TomlReader& reader, const KindInfo& kind) {
   return reader.has(kAxisKey) && (!is_parameter || reader.has(kFromKey));
 }
 
-// Two values within the limits are no further apart.
+// Two values within the limits are no further apart than this.
 std::optional<double> checked_sigma(TomlReader& reader, const Parameter& parameter,
                                     std::string_view key) {
   const auto sigma = reader.number(key);
@@ -91,7 +91,7 @@ std::string sigma_example(const KindInfo& kind) {
                          : fmt::format("sigma = 1e-3, or sigma = {{ {} = 1e-3 }}", size->name);
 }
 
-// One number is of the effect's size; a table names parameters.
+// A single number is the σ of the effect's size; a table names parameters.
 void read_sigma_table(const toml::table& table, TomlReader& effect_reader, const std::string& file,
                       std::vector<Error>& errors, Effect& effect) {
   TomlReader reader(table, file, "sigma", errors);
@@ -186,7 +186,7 @@ void check_together(TomlReader& reader, const Effect& effect) {
   }
 }
 
-// Without a good kind nobody can say which other keys are right.
+// Without a valid kind the other keys cannot be checked.
 std::optional<Effect> read_effect(const toml::table& table, const std::string& file,
                                   const GyroNames& gyros, std::vector<Error>& errors) {
   TomlReader reader(table, file, "[[effect]]", errors);
@@ -232,7 +232,7 @@ void check_count(TomlReader& root, Kind kind, std::size_t most, const Model& mod
     const std::size_t axis = place % kAxes.size();
     std::size_t count = 0;
     for (const Effect& effect : model.effects) {
-      // What is of all axes is told of with the first.
+      // An effect of all axes is reported with the first axis only.
       const bool of_axis = effect.of_axis.value_or(axis) == axis;
       if (effect.gyro != gyro || effect.kind != kind || !of_axis || ++count != most + 1) continue;
       if (!effect.of_axis && axis > 0) continue;
@@ -243,7 +243,7 @@ void check_count(TomlReader& root, Kind kind, std::size_t most, const Model& mod
   }
 }
 
-// Flicker noise becomes correlated drifts, of which there must be room for one.
+// Flicker noise needs a free correlated drift: it is represented by at least one.
 void check_flicker(TomlReader& root, const Model& model) {
   for (std::size_t gyro = 0; gyro < 2; ++gyro) {
     const auto of_kind = [&](Kind kind) {
@@ -268,7 +268,7 @@ std::string_view key_of(const Parameter& parameter, bool has_unit_axis) {
 }
 
 ModelResult parse_model(std::string_view text, const std::string& file, const GyroNames& gyros) {
-  const auto parsed = parse_toml(text, file, "strings stand in quotes, effects in [[effect]]");
+  const auto parsed = parse_toml(text, file, "write strings in quotes and effects in [[effect]]");
   if (!parsed) return tl::unexpected(std::vector<Error>{parsed.error()});
   std::vector<Error> errors;
   Model model{.file = file, .effects = {}};
@@ -280,7 +280,7 @@ ModelResult parse_model(std::string_view text, const std::string& file, const Gy
     root.complain(root.where("effect"), fmt::format("there are {} effects", count),
                   fmt::format("at most {}", kEffectsMax));
   }
-  bool is_named = false;  // by a name that may be anybody's
+  bool is_named = false;  // by a name that may belong to either gyro
   for (std::size_t i = 0; i < std::min(count, kEffectsMax); ++i) {
     const toml::table* table = tables->get(i)->as_table();
     if (table == nullptr) {

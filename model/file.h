@@ -1,7 +1,7 @@
 #pragma once
 
-// The model file (TOML): a list of effects. docs/model-file.md describes it. All complaints of a
-// file are reported at once, each with its line and what would be right.
+// The model file (TOML): a list of effects. docs/model-file.md describes it. All errors of a file
+// are reported at once, each with its line and a remedy.
 
 #include <array>
 #include <string>
@@ -27,13 +27,13 @@ using ModelResult = tl::expected<Model, std::vector<Error>>;
 
 inline constexpr std::size_t kEffectsMax = 256;
 
-/// Of a unit of several axes: which of them an effect is of.
+/// Key for the axis of a unit that has the effect.
 inline constexpr std::string_view kAxisKey = "axis";
-/// A parameter's key in the file. Where `axis` is the unit's, the axis of what g_sensitivity
+/// A parameter's key in the file. If `axis` names the unit's axis, the axis that g_sensitivity
 /// depends on is called `from`, as that of cross_axis always is.
 std::string_view key_of(const Parameter& parameter, bool has_unit_axis);
 
-/// What an effect may call its gyro besides 1 and 2.
+/// The names of gyros that an effect may use besides 1 and 2.
 struct GyroNames {
   std::array<std::string, 2> names{};  ///< in the configuration; empty: no name
   /// Any name is accepted and read as gyro 1, and effects are not counted per gyro: for an edit or
@@ -42,7 +42,7 @@ struct GyroNames {
 };
 
 ModelResult load_model(const std::string& path, const GyroNames& names = {});
-/// `file` names the text in complaints.
+/// `file` names the text in errors.
 ModelResult parse_model(std::string_view text, const std::string& file,
                         const GyroNames& names = {});
 

@@ -1,8 +1,8 @@
 #pragma once
 
-// Flicker noise as a sum of exponentially correlated terms, whose times stand in even steps of the
-// logarithm: each has the same variance, and together they have the spectrum B²/(2πf), two-sided,
-// from 1/(2π·to_s) to 1/(2π·from_s). With a step of four the sum is within 0.3 % of it, with ten
+// Flicker noise as a sum of exponentially correlated terms with equal variance, whose times are
+// evenly spaced on a logarithmic scale: together they have the two-sided spectrum B²/(2πf) from
+// 1/(2π·to_s) to 1/(2π·from_s). With a spacing of four the sum is within 0.3 % of it, with ten
 // within 6 %.
 
 #include <cmath>

@@ -30,7 +30,7 @@ Effect mirrored(const Effect& effect) {
     case Kind::kScaleFactorQuadratic:
       p[0] = -p[0];
       break;
-    // Behind the axis of what it depends on, which keeps its own sign.
+    // The parameter after the axis of the input, which keeps its own sign.
     case Kind::kGSensitivity:
     case Kind::kCrossAxis:
       p[1] = -p[1];
@@ -56,7 +56,7 @@ Effect mirrored(const Effect& effect) {
     case Kind::kGaussMarkov:
     case Kind::kRateNoise:
     case Kind::kBiasInstability:
-    case Kind::kSpikes:  // of either sign
+    case Kind::kSpikes:  // of either sign already
     case Kind::kStuck:
     case Kind::kDroppedFrames:
     case Kind::kClockSkew:

@@ -9,12 +9,12 @@ namespace vgyro::model {
 
 namespace {
 
-// Other reference values are other biases or scale factors.
+// Other reference values differ from these by a bias or a scale factor.
 constexpr double kReference_c = 25.0;
 constexpr double kReference_v = 5.0;
 
-// Times, cut-offs and plays are four times as far from each other as that shapes between two of
-// them are met to a tenth. Units: a hundredth of a consumer gyro's data sheet, or less.
+// Times, cut-offs and plays are a factor of four apart, so that a shape between two of them is
+// represented to a tenth. Units are a hundredth of a consumer gyro's data sheet, or less.
 constexpr Shape kShapes[] = {
     {"bias_ramp", Kind::kBiasRamp, {}, 0, false, 1e-6},
     {"warm_up:15", Kind::kWarmUp, {0.0, 15.0}, 0, false, 1e-2},

@@ -8,7 +8,7 @@
 namespace vgyro::model {
 
 // Followers with little play are dragged to the straight line temperature ∓ play; those with more
-// stay. The two meet at the bend that is new.
+// stay. The two parts meet at the new bend.
 void TemperaturePast::add(double temperature_c) {
   assert(std::isfinite(temperature_c));
   if (count_ == 0) {
@@ -47,7 +47,7 @@ void TemperaturePast::add(double temperature_c) {
   std::copy_n(bends.begin(), count_, bends_.begin());
 }
 
-// The bend that is the least missed: what is straight between its neighbours hardly differs.
+// The least important bend: the straight line between its neighbours hardly differs.
 std::size_t TemperaturePast::least_of(const std::array<Bend, kBendsMax + 1>& bends) {
   std::size_t least = 1;
   double least_c = std::numeric_limits<double>::max();

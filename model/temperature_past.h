@@ -1,13 +1,13 @@
 #pragma once
 
-// The part of a gyro's temperature history that still acts: enough to compute, for any play, the
-// position of a follower with that play. The follower begins at the first temperature, stays where
-// it is while the temperature is within the play to both sides of it, and is dragged along beyond
-// that.
+// The part of a gyro's temperature history that still has an effect: enough to compute, for any
+// play, the position of a follower with that play. The follower begins at the first temperature,
+// stays where it is while the temperature is within the play on both sides of it, and is dragged
+// along beyond that.
 //
-// Of all temperatures only the extremes count that no larger swing has erased. They are kept as
-// the follower's position over the play, which bends at each of them. A fixed number of bends is
-// kept; of more, the one that matters least goes. Adding allocates nothing.
+// Only those extremes of the temperature matter that no larger swing has erased. They are kept as
+// the follower's position over the play, which bends at each of them. The number of bends is
+// limited; if there are more, the least important one is dropped. Adding allocates nothing.
 
 #include <array>
 #include <cstddef>
@@ -16,7 +16,7 @@ namespace vgyro::model {
 
 class TemperaturePast {
  public:
-  /// Swings that are kept, each smaller than the one before it. A road leaves three or four.
+  /// Number of swings kept, each smaller than the one before. A drive leaves three or four.
   static constexpr std::size_t kBendsMax = 16;
 
   [[nodiscard]] bool empty() const { return count_ == 0; }
@@ -24,7 +24,7 @@ class TemperaturePast {
   /// Precondition: finite.
   void add(double temperature_c);
 
-  /// Where the follower stands once the temperature has gone on from the newest to `now_c`, in
+  /// The follower's position once the temperature has moved from the newest one to `now_c`, in
   /// degC. Preconditions: not empty; play_k >= 0.
   [[nodiscard]] double followed_c(double play_k, double now_c) const;
 
@@ -35,7 +35,8 @@ class TemperaturePast {
   };
   static std::size_t least_of(const std::array<Bend, kBendsMax + 1>& bends);
 
-  /// The first is the newest temperature; plays rise; beyond the last it is where it began.
+  /// The first is the newest temperature; plays increase; beyond the last the follower has not
+  /// moved.
   std::array<Bend, kBendsMax> bends_{};
   std::size_t count_ = 0;
 };

@@ -10,11 +10,11 @@ namespace vgyro::simulation {
 namespace {
 
 constexpr std::size_t kPointsMin = 6;
-// A polynomial through points much less even swings between the sparse ones.
+// A polynomial through much less even points swings between sparse ones.
 constexpr double kUnevenMax = 1.5;
-// How far a polynomial through 6, 8, 10, 12 points may bulge otherwise than the curvature at both
-// ends of its piece says. Just below what a kink makes of it (0.19, 0.27, 0.31, 0.34); a step is
-// twice as odd, a sine of ten samples a period 0.08, of six 0.24.
+// How far the bulge of a polynomial through 6, 8, 10, 12 points may deviate from the curvature at
+// both ends of its piece. The limits are just below the deviation at a kink (0.19, 0.27, 0.31,
+// 0.34); a step has twice that, a sine of ten samples a period 0.08, of six 0.24.
 constexpr std::array<double, 4> kOddMax{0.17, 0.24, 0.28, 0.30};
 
 struct Polynomial {
@@ -38,7 +38,7 @@ double evaluate_slope(std::span<const double> c, double x) {
   return value;
 }
 
-// From -1/2, the piece's beginning.
+// Integral from -1/2, the beginning of the piece.
 double evaluate_integral(std::span<const double> c, double x) {
   double here = 0.0;
   double begin = 0.0;
@@ -50,7 +50,7 @@ double evaluate_integral(std::span<const double> c, double x) {
   return here * x + begin * 0.5;
 }
 
-// Newton's divided differences, multiplied out.
+// Newton's divided differences, expanded into powers.
 Polynomial through(std::span<const double> x, std::span<const double> y) {
   const std::size_t n = x.size();
   std::array<double, Curve::kPointsMax> divided{};
@@ -72,7 +72,7 @@ double chord(std::span<const double> t, std::span<const double> y, std::size_t i
   return (y[i + 1] - y[i]) / (t[i + 1] - t[i]);
 }
 
-// At an end: of the parabola through three points, unless it turns back there.
+// At an end: the slope of the parabola through three points, limited so that it does not turn back.
 double end_tangent(double near_length, double far_length, double near, double far) {
   const double tangent =
       ((2.0 * near_length + far_length) * near - near_length * far) / (near_length + far_length);
@@ -126,8 +126,8 @@ double curvature(std::span<const double> t, std::span<const double> y, std::size
   return 2.0 * (chord(t, y, i) - chord(t, y, i - 1)) / (t[i + 1] - t[i - 1]);
 }
 
-// The polynomial of piece i through as many points as are there; none where they are too few or not
-// smooth.
+// The polynomial of piece i through as many points as are available; empty if they are too few or
+// not smooth.
 Polynomial smooth_piece(std::span<const double> t, std::span<const double> y, std::size_t i,
                         std::size_t points_max) {
   std::size_t half = std::min({points_max / 2, i + 1, t.size() - 1 - i});
@@ -181,7 +181,7 @@ void Curve::add_piece(std::size_t i, std::span<const double> values,
   integrals_.push_back(integrals_.back() + length * evaluate_integral(piece.used(), 0.5));
 }
 
-// A sum of polynomials of the same piece is one, and so it is as exact as its parts.
+// The sum of polynomials of a piece is a polynomial, so it is as exact as its parts.
 Curve Curve::mixed(const Curve& like, std::span<const std::pair<double, const Curve*>> parts) {
   Curve sum;
   sum.times_s_ = like.times_s_;
@@ -208,7 +208,7 @@ Curve Curve::mixed(const Curve& like, std::span<const std::pair<double, const Cu
   return sum;
 }
 
-// Precondition: first point <= t <= last point, and there are two.
+// Precondition: first point <= t <= last point, and there are at least two points.
 Curve::Place Curve::find(double t_s) const {
   const auto after = std::upper_bound(times_s_.begin() + 1, times_s_.end() - 1, t_s);
   const auto piece = static_cast<std::size_t>(after - times_s_.begin()) - 1;

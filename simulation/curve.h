@@ -1,11 +1,11 @@
 #pragma once
 
-// A smooth curve through points of growing time: value, slope and integral, all of the same pieces,
-// so that a rate, its delayed twin and its angle agree to the last digits. Goes through every
-// point. Where the points are smooth and evenly spaced, a piece is the polynomial through the
-// points on both sides of it; next to steps and kinks, which such a polynomial would let ring, a
+// A smooth curve through points of increasing time: value, slope and integral of the same pieces,
+// so that a rate, its delayed copy and its angle agree to the last digits. Passes through every
+// point. If the points are smooth and evenly spaced, a piece is the polynomial through the points
+// on both sides of it; next to steps and kinks, where such a polynomial would ring, it is a
 // monotone cubic. docs/simulate.md has the figures. Before the first point and after the last the
-// value stands still.
+// value is constant.
 
 #include <cstddef>
 #include <cstdint>
@@ -21,21 +21,21 @@ class Curve {
 
   /// A curve that is 0 everywhere.
   Curve() = default;
-  /// Pieces of up to `piece_points` points, an even number up to kPointsMax. Precondition: as many
-  /// values as times, at least one, finite, times growing.
+  /// Each piece uses up to `piece_points` points, an even number up to kPointsMax. Precondition: as
+  /// many values as times, at least one, finite, times increasing.
   Curve(std::span<const double> times_s, std::span<const double> values,
         std::size_t piece_points = kPointsMax);
 
-  /// The sum of `part.first` times `part.second`, at the points of `like`. Precondition: all have
-  /// the same points.
+  /// The sum of `part.first` times `part.second` over all parts. Precondition: all have the same
+  /// points as `like`.
   static Curve mixed(const Curve& like, std::span<const std::pair<double, const Curve*>> parts);
 
   [[nodiscard]] double value(double t_s) const;
   [[nodiscard]] double slope(double t_s) const;
-  /// From the first point to t; negative before it.
+  /// Integral from the first point to t; negative before it.
   [[nodiscard]] double integral(double t_s) const;
 
-  /// Where one piece ends and the next begins.
+  /// The ends of the pieces.
   [[nodiscard]] std::span<const double> times_s() const { return times_s_; }
 
  private:
@@ -50,7 +50,7 @@ class Curve {
   double last_ = 0.0;
   // Piece i is a polynomial in x = (t - its middle) / its length, lowest power first.
   std::vector<double> coefficients_;
-  std::vector<std::size_t> begins_;  ///< of piece i in coefficients_, and one end
+  std::vector<std::size_t> begins_;  ///< of each piece in coefficients_, and the end of the last
   std::vector<double> integrals_;    ///< from the first point to point i
 };
 

@@ -15,11 +15,11 @@ using model::Effect;
 using model::Kind;
 using model::Nature;
 
-// Of the terms that flicker noise is made of: a factor of four apart, from less than a sample to
-// days. Quicker ones would only fold into white noise, which a sensor's filter keeps out. The same
-// for every length of a recording, so that a longer one begins as a shorter one does.
+// The terms of flicker noise: their times are a factor of four apart, from less than a sample to
+// days. Faster ones would only alias into white noise, which a sensor's filter prevents. The range
+// is the same for every length of a recording, so that a longer one begins like a shorter one.
 constexpr std::size_t kFlickerTerms = 15;
-constexpr double kFlickerFrom = 0.4;  // of a sample
+constexpr double kFlickerFrom = 0.4;  // in samples
 constexpr double kFlickerSpan = 1e9;
 
 bool is_random(const Effect& effect) {
@@ -44,8 +44,8 @@ GyroChain::GyroChain(std::span<const Effect> effects, double interval_s, std::ui
   }
 }
 
-// Exact between samples, however far apart. A stationary process begins as it goes on; a walk
-// begins at 0, because where it begins is a bias.
+// Exact from sample to sample, however far apart. A stationary process begins in its steady state;
+// a walk begins at 0, because its initial value is a bias.
 double GyroChain::noise_dps(Random& random, double late_dps, double since_s) {
   const model::Parameters& p = random.effect.parameters;
   switch (random.effect.kind) {

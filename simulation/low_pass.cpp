@@ -11,16 +11,16 @@ namespace vgyro::simulation {
 
 namespace {
 
-// Equal stages are moved apart by this, for the partial fractions' sake.
+// Equal stages are moved apart by this for the partial fractions.
 constexpr double kApart = 1e-3;
-// What lies further back has decayed to nothing in double precision.
+// Older input has decayed below double precision.
 constexpr double kMemory = 40.0;
 
 struct Node {
   double x;  ///< in [-1, 1]
   double weight;
 };
-// Gauss and Legendre, eight points: exact for polynomials of degree 15.
+// Gauss-Legendre, eight points: exact for polynomials of degree 15.
 constexpr std::array<Node, 4> kHalfRule{{{0.1834346424956498, 0.3626837833783620},
                                          {0.5255324099163290, 0.3137066458778873},
                                          {0.7966664774136267, 0.2223810344533745},
@@ -50,7 +50,7 @@ LowPass::LowPass(const Curve& input, const model::Equation& equation) : input_(&
   begin(std::move(complex_rates), complex_);
 }
 
-// A cascade is a weighted sum of its stages side by side.
+// A cascade equals a weighted sum of its stages in parallel.
 template <class Number>
 void LowPass::begin(std::vector<Number> rates, std::vector<Stage<Number>>& stages) {
   std::sort(rates.begin(), rates.end(), [](const Number& a, const Number& b) {
@@ -69,7 +69,7 @@ void LowPass::begin(std::vector<Number> rates, std::vector<Stage<Number>>& stage
   }
 }
 
-// The input is smooth between two points of the curve.
+// Integrates between points of the curve, where the input is smooth.
 template <class Number>
 void LowPass::advance(Stage<Number>& stage, double from_s, double to_s) const {
   const double begin_s = std::max(from_s, to_s - kMemory / std::real(stage.rate_rad_s));

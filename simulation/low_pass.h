@@ -1,8 +1,7 @@
 #pragma once
 
-// What low-passes, one behind the other, make of a curve: the exact response, by quadrature over
-// pieces so short that it is as good as the arithmetic. Before the curve's first point the input
-// stood still.
+// The response of low-passes in series to a curve, exact: quadrature over pieces so short that its
+// error is that of the arithmetic. Before the curve's first point the input is constant.
 
 #include <complex>
 #include <span>
@@ -15,16 +14,16 @@ namespace vgyro::simulation {
 
 class LowPass {
  public:
-  /// One behind the other, of second order for two; more would not be told apart in double
-  /// precision.
+  /// Number of low-passes in series; one of second order counts as two. More cannot be separated in
+  /// double precision.
   static constexpr std::size_t kStagesMax = 3;
   static std::size_t stages_of(const model::Equation& equation);
 
-  /// Those of the equation; without any the curve itself. Precondition: at most kStagesMax stages.
-  /// The curve outlives this.
+  /// Uses the low-passes of the equation; without any, returns the curve itself. Preconditions: at
+  /// most kStagesMax stages; the curve outlives this object.
   LowPass(const Curve& input, const model::Equation& equation);
 
-  /// Precondition: t never goes back.
+  /// Precondition: t never decreases.
   double at(double t_s);
 
  private:
@@ -43,7 +42,8 @@ class LowPass {
 
   const Curve* input_;
   std::vector<Stage<double>> stages_;
-  std::vector<Stage<std::complex<double>>> complex_;  ///< instead, where any is of second order
+  std::vector<Stage<std::complex<double>>> complex_;  ///< used instead if any low-pass is of second
+                                                      ///< order
   double at_s_ = 0.0;
 };
 

@@ -1,10 +1,10 @@
 #pragma once
 
 // Random numbers that are the same on every machine and in every version: the standard's mt19937_64
-// and seed_seq, whose output is laid down, and a transform of our own, because
-// std::normal_distribution's is not. Every purpose has a stream of its own, so that one more effect
-// leaves the others' noise as it is; and a stream is known by names, so that one more kind of
-// effect does.
+// and seed_seq, whose output is specified, and a transform of its own, because that of
+// std::normal_distribution is not. Every purpose has a stream of its own, so that one more effect
+// leaves the noise of the others unchanged; streams are identified by names, so that one more kind
+// does too.
 
 #include <array>
 #include <cstdint>
@@ -13,13 +13,13 @@
 
 namespace vgyro::simulation {
 
-/// Whose streams they are, in their names: as the model file counts the gyros.
+/// Senders in the names of streams; the gyros are numbered as in the model file.
 inline constexpr std::array<std::string_view, 2> kGyroSenders{"gyro 1", "gyro 2"};
 
 class NoiseSource {
  public:
-  /// `sender`, `purpose` (a kind's name in the catalogue, where it is one) and `ordinal`, how many
-  /// the sender has before it for the same purpose, name the stream.
+  /// The stream is identified by `sender`, `purpose` (the kind's name in the catalogue, if it is a
+  /// kind) and `ordinal`, the number of earlier streams of the same sender and purpose.
   NoiseSource(std::uint64_t seed, std::string_view sender, std::string_view purpose,
               std::uint32_t ordinal);
 

@@ -43,7 +43,7 @@ static_assert(kColumns[kTemperature].name == "temperature_c" &&
 constexpr const char* kHeaderForm =
     "t_s,rate_dps[,temperature_c][,acc_x_g,acc_y_g,acc_z_g][,supply_v]"
     "[,rate_x_dps,rate_y_dps,rate_z_dps]";
-// Temperature, acceleration and voltage come from sensors with noise of their own.
+// Temperature, acceleration and voltage are from sensors with noise of their own.
 constexpr std::size_t kSlowPoints = 6;
 
 std::string_view trimmed(std::string_view text) {
@@ -53,7 +53,7 @@ std::string_view trimmed(std::string_view text) {
   return text.substr(begin, text.find_last_not_of(kBlank) + 1 - begin);
 }
 
-// Splits off what stands before the next `separator`.
+// Splits off the text before the next `separator`.
 std::string_view take(std::string_view& rest, char separator) {
   const std::size_t end = std::min(rest.find(separator), rest.size());
   const std::string_view part = rest.substr(0, end);
@@ -101,7 +101,7 @@ class Table {
   std::array<std::vector<double>, kColumns.size()> values_;
 };
 
-// Passes over blank lines and comments.
+// Skips blank lines and comments.
 bool Table::next_line(std::string_view& line) {
   while (!rest_.empty()) {
     ++line_;

@@ -1,8 +1,8 @@
 #pragma once
 
-// A motion as a table: time, true rate, and, where they are known, temperature, acceleration,
-// supply voltage and the rates about other axes.
-// Its text is CSV with a header line; docs/simulate.md describes it.
+// A motion as a table: time, true rate, and, if known, temperature, acceleration, supply voltage
+// and the rates about other axes. Its text is CSV with a header line; docs/simulate.md describes
+// it.
 
 #include <array>
 #include <optional>
@@ -14,15 +14,15 @@
 
 namespace vgyro::simulation {
 
-/// Rows; a longer profile is refused.
+/// Limit of rows; a longer profile is refused.
 inline constexpr std::size_t kProfileRowsMax = 2'000'000;
 
 /// Seconds count from the first row.
 struct Profile {
   std::string file;
   double length_s = 0.0;
-  bool has_rate = true;  ///< the column rate_dps is there
-  Curve rate_dps;        ///< where the profile has no column rate_dps: about z
+  bool has_rate = true;  ///< the column rate_dps is present
+  Curve rate_dps;        ///< without the column rate_dps: the rate about z
   std::optional<Curve> temperature_c;
   std::array<std::optional<Curve>, 3> acceleration_g;
   std::optional<Curve> supply_v;
@@ -31,14 +31,14 @@ struct Profile {
   [[nodiscard]] bool has_acceleration() const;
 };
 
-/// The motion as a gyro about one axis of a turned sensor feels it. `rate` holds the shares of the
-/// rates about the vehicle's x, y and z in its own; `others` holds those for the three axes of its
-/// unit. An axis that the profile does not have is 0.
+/// The motion about one axis of a turned sensor. `rate` holds the shares of the rates about the
+/// vehicle's x, y and z in the sensor's rate; `others` holds those for the three axes of its unit.
+/// An axis that the profile lacks counts as 0.
 Profile turned(const Profile& profile, const std::array<double, 3>& rate,
                const std::array<std::array<double, 3>, 3>& others);
 
 Expected<Profile> load_profile(const std::string& path);
-/// `file` names the text in complaints.
+/// `file` names the text in errors.
 Expected<Profile> parse_profile(std::string_view text, const std::string& file);
 
 }  // namespace vgyro::simulation

@@ -23,14 +23,14 @@ using model::Effect;
 using model::Kind;
 
 constexpr double kVibrationWindow_s = 1.0;
-// A bus keeps the order of a sender's frames; a log tells them apart by a microsecond.
+// A bus keeps the order of a sender's frames; in a log they are at least a microsecond apart.
 constexpr double kStampStep_s = 1e-6;
-// Names of streams of random numbers, beside the gyros and the kinds; docs/simulate.md has them.
+// Names of random number streams besides the gyros and kinds; docs/simulate.md lists them.
 constexpr std::string_view kJitterOfAll = "jitter";
 constexpr std::string_view kReferenceSender = "reference";
 constexpr std::string_view kAccelerometerSender = "accelerometer";
 
-// A sample at the very end of the motion still belongs to it.
+// Includes a sample at the very end of the motion.
 std::size_t sample_count(const Timing& timing, double length_s) {
   const double intervals = (length_s - timing.offset_s) * timing.rate_hz;
   return intervals < 0.0 ? 0 : static_cast<std::size_t>(std::floor(intervals + 1e-6)) + 1;
@@ -40,7 +40,7 @@ double sample_time_s(const Timing& timing, std::size_t n) {
   return timing.offset_s + static_cast<double>(n) / timing.rate_hz;
 }
 
-// When the log says that a frame came: the sender's clock, then what held it up.
+// The stamp of a frame in the log: the sender's clock, then delays.
 class Stamps {
  public:
   Stamps(std::span<const Effect> effects, const Settings& settings, std::string_view sender)
@@ -73,7 +73,7 @@ class Stamps {
   double last_s_ = -1.0;
 };
 
-// Each dropped_frames loses its own share.
+// Each effect dropped_frames loses its own share.
 class Losses {
  public:
   Losses(std::span<const Effect> effects, std::uint64_t seed) {
@@ -111,7 +111,7 @@ std::string missing_temperature(const Effect& /*effect*/, const Profile& profile
   return profile.temperature_c ? "" : "temperature_c";
 }
 
-// Of the axis of a kind that has one, or of any.
+// Checks the axis of a kind that has one, or any axis.
 std::string missing_acceleration(const Effect& effect, const Profile& profile) {
   const std::span<const model::Parameter> parameters = model::info(effect.kind).parameters;
   for (std::size_t i = 0; i < parameters.size(); ++i) {
@@ -133,7 +133,7 @@ std::string missing_other_rate(const Effect& effect, const Profile& profile) {
 
 struct InputColumn {
   model::Need need;
-  /// Nothing where it is there.
+  /// Returns the missing column; empty if it is present.
   std::string (*missing)(const Effect& effect, const Profile& profile);
 };
 constexpr InputColumn kInputColumns[] = {{model::kNeedsTemperature, missing_temperature},
@@ -200,8 +200,8 @@ std::array<double, 3> Simulator::acceleration_at(double t_s) const {
   return acceleration_g;
 }
 
-// As the gateway sees it: the variance of the accelerometer's samples in the second that ends with
-// the newest. Sums begin at a middling value and so keep their digits.
+// Measured as the gateway does: the variance of the accelerometer's samples in the second that ends
+// with the newest. Sums are relative to the first value to keep their digits.
 void Simulator::measure_vibration() {
   if (!profile_.has_acceleration()) return;
   const Timing& timing = settings_.accelerometer;
@@ -254,7 +254,7 @@ model::Surroundings Simulator::surroundings(double t_s) const {
 
 namespace {
 
-// The rates about other axes behind one gyro's delays and low-passes.
+// The rates about other axes after one gyro's delays and low-passes.
 class OtherAxes {
  public:
   OtherAxes(const Profile& profile, const model::Equation& equation) : equation_(equation) {
@@ -264,7 +264,7 @@ class OtherAxes {
     }
   }
 
-  /// Unknown where the profile does not have it. Precondition: t never goes back.
+  /// Unknown if the profile lacks the axis. Precondition: t never decreases.
   std::array<double, 3> at(double t_s) {
     std::array<double, 3> rate_dps{};
     for (std::size_t axis = 0; axis < 3; ++axis) {

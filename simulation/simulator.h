@@ -1,8 +1,8 @@
 #pragma once
 
-// A motion through the model of two gyros → what each of them, a reference and an accelerometer
-// say, and when. Values and stamps only: no frame, no bus. The same seed gives the same samples,
-// and each effect has its own random numbers: adding one leaves the others' as they are.
+// Applies the model of two gyros to a motion: the values and stamps of each gyro, a reference and
+// an accelerometer. No frames, no bus. The same seed gives the same samples, and each effect has
+// its own random numbers: adding one leaves those of the others unchanged.
 
 #include <array>
 #include <cstdint>
@@ -15,7 +15,7 @@
 
 namespace vgyro::simulation {
 
-/// Samples of one stream at most.
+/// Limit of samples in one stream.
 inline constexpr double kSamplesMax = 1e7;
 
 struct Timing {
@@ -33,13 +33,13 @@ struct Settings {
 };
 
 struct GyroSample {
-  double t_s = 0.0;      ///< when it was taken, from the beginning of the motion
-  double stamp_s = 0.0;  ///< what the log says of it; grows from sample to sample
+  double t_s = 0.0;      ///< time of the sample since the beginning of the motion
+  double stamp_s = 0.0;  ///< its stamp in the log; increases from sample to sample
   double reading_dps = 0.0;
-  /// About the other axes of the unit, as it feels them: as late as the reading, without its
-  /// errors. An axis that the profile does not have is 0.
+  /// About the unit's other axes as the gyro senses them: with the same lag as the reading, without
+  /// its errors. 0 for an axis that the profile lacks.
   std::array<double, 3> other_rate_dps{};
-  bool lost = false;  ///< taken and counted, but its frame is not there
+  bool lost = false;  ///< the sample was taken and counted, but its frame is lost
 };
 
 struct RateSample {
@@ -54,24 +54,23 @@ struct AccelerationSample {
 
 class Simulator {
  public:
-  /// An error when an effect needs what the profile does not have, or when there would be too many
+  /// Error if an effect needs a column that the profile lacks, or if there would be too many
   /// samples.
   static Expected<Simulator> make(model::Model model, Profile profile, const Settings& settings);
 
   /// 0 or 1.
   [[nodiscard]] std::vector<GyroSample> gyro(std::size_t index) const;
-  /// The true rate; with `axis` that about x, y or z, which is 0 where the profile does not have
-  /// it.
+  /// The true rate; with `axis` that about x, y or z, which is 0 if the profile lacks it.
   [[nodiscard]] std::vector<RateSample> reference(std::optional<std::size_t> axis = {}) const;
-  /// An axis that the profile does not have is 0.
+  /// 0 for an axis that the profile lacks.
   [[nodiscard]] std::vector<AccelerationSample> acceleration() const;
 
   [[nodiscard]] const Profile& profile() const { return profile_; }
-  /// Without the gyros' effects, at any time of the motion. Where the profile says nothing of it,
-  /// the temperature is kTemperature_c.
+  /// Without the gyros' effects, at any time of the motion; kTemperature_c if the profile has no
+  /// temperature.
   [[nodiscard]] double temperature_c(double t_s) const;
   static constexpr double kTemperature_c = 25.0;
-  /// At any time of the motion. Where the profile says nothing of it, the supply is kSupply_v.
+  /// At any time of the motion; kSupply_v if the profile has no supply voltage.
   [[nodiscard]] double supply_v(double t_s) const;
   static constexpr double kSupply_v = 5.0;
 

@@ -17,24 +17,24 @@ namespace vgyro::cli {
 namespace {
 
 constexpr std::size_t kFramesLeast = 32;
-constexpr double kRateLeast_hz = 5.0;     // below it no motion can be followed
+constexpr double kRateLeast_hz = 5.0;     // motion cannot be followed below it
 constexpr double kPeakMost_dps = 3000.0;  // more is an engine, not a platform
 
-/// The bit that says negative, where the rate is a magnitude.
+/// The sign bit, if the rate is a magnitude.
 const dbc::Signal* sign_of(const dbc::Message& message, const dbc::Signal& rate) {
   if (rate.type != dbc::ValueType::kUnsigned || rate.offset < 0.0) return nullptr;
   const dbc::Signal* sign = nullptr;
   for (const dbc::Signal& other : message.signals) {
     if (other.length_bits != 1 || !has_any(lower(other.name), {"sign", "vorz", "_vz", "direction"}))
       continue;
-    // The nearest name, where a message has several.
+    // If a message has several, prefer the nearest name.
     const bool nearer = sign == nullptr || other.name.find(rate.name.substr(0, 4)) == 0;
     if (nearer) sign = &other;
   }
   return sign;
 }
 
-/// Without a unit: by its name, unless it is what goes beside a rate and bears its name
+/// For a signal without a unit: judges by the name, unless that belongs to a companion of a rate
 /// ("YawRateCrc").
 bool is_rate_by_name(const dbc::Signal& signal) {
   constexpr unsigned kBitsLeast = 8;
@@ -69,7 +69,7 @@ std::optional<Candidate> candidate_of(const Found& found, const dbc::Signal& sig
   } else if (level > kPeakMost_dps) {
     candidate.why_not = fmt::format("reaches {:.0f} deg/s: no platform turns so fast", level);
   } else if (score <= -2.0) {
-    candidate.why_not = "by its name another thing turns";
+    candidate.why_not = "its name is that of another rotating part";
   }
   return candidate;
 }
@@ -83,7 +83,7 @@ double name_score(std::string_view signal, std::string_view message) {
     return -2.0;
   if (has_any(both, {"steer", "lenk", "engine", "wheel"})) return -2.0;
   if (has_any(name, {"roll", "pitch", "wank", "nick"})) return -1.0;
-  // Made of other sensors: fit to judge gyros, no gyro itself.
+  // Computed from other sensors: suitable to judge gyros, but not a gyro.
   if (has_any(both, {"pose", "gnss", "gps", "camera", "table", "reference"})) return -0.6;
   if (has_any(name, {"yaw", "gier", "turn", "omega_z", "wz"})) return 1.0;
   if (name.ends_with("z")) return 0.8;
@@ -141,14 +141,14 @@ analysis::StampedSignal series_of(const Found& found, const dbc::Signal& signal,
   const auto& kept = found.stream->kept;
   for (std::size_t i = 0; i < kept.size(); ++i) {
     const Stream::Kept& frame = kept[i];
-    // A stamp that the next one falls behind was too late; all others up to it would be too early.
+    // A stamp above the next one was too late; it would make all others up to it seem too early.
     if (i + 1 < kept.size() && kept[i + 1].t_ns < frame.t_ns) continue;
     const auto payload = found.stream->payload(frame);
     if (!codec->fits(payload.size()) || !presence->holds(payload)) continue;
     const dbc::Reading reading = codec->decode(payload);
     if (!std::isfinite(reading.value) || no_values.contains(reading.raw)) continue;
     if (limited && (reading.value < signal.minimum || reading.value > signal.maximum)) continue;
-    // Of the epoch a double keeps a quarter of a microsecond.
+    // A double holds stamps since the epoch to a quarter of a microsecond.
     const double t_s = static_cast<double>(frame.t_ns) * 1e-9;
     if (t_s <= newest_s) continue;
     newest_s = t_s;

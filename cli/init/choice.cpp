@@ -11,15 +11,14 @@ namespace vgyro::cli {
 
 namespace {
 
-constexpr double kCorrelationLeast = 0.6;   // coarse or noisy ones on a straight road
-constexpr double kSignificanceLeast = 6.0;  // hundreds of pairs and lags are looked at
+constexpr double kCorrelationLeast = 0.6;   // coarse or noisy gyros on a straight road
+constexpr double kSignificanceLeast = 6.0;  // hundreds of pairs and lags are compared
 constexpr double kCopyCorrelation = 0.9;
 constexpr std::size_t kJudgedMost = 300;
-constexpr std::size_t kAllCompared =
-    12;  // beyond it only pairs of which a quick look says so much:
+constexpr std::size_t kAllCompared = 12;  // with more, only pairs with at least kQuickLeast:
 constexpr double kQuickLeast = 0.4;
 
-/// A signal that repeats another one is later, or is what cannot be undone: filtered, rounded.
+/// A copy of another signal is late, or has been filtered or rounded, which cannot be undone.
 void mark_copies(std::vector<Candidate>& candidates, const std::vector<PairFigures>& pairs) {
   for (const PairFigures& pair : pairs) {
     Candidate& a = candidates[pair.first];
@@ -56,7 +55,7 @@ bool usable(const Candidate& candidate) {
   return candidate.why_not.empty();
 }
 
-/// The likeliest by their names, where there are too many; in the candidates' order.
+/// If there are too many candidates, the likeliest by name; in the candidates' order.
 std::vector<std::size_t> to_judge(const std::vector<Candidate>& candidates) {
   std::vector<std::size_t> judged;
   for (std::size_t i = 0; i < candidates.size(); ++i) {
@@ -87,7 +86,7 @@ std::vector<analysis::ChangeShape> shapes_of(const std::vector<Candidate>& candi
   return shapes;
 }
 
-/// Figures of all pairs; of many signals only where a quick look shows that it is worth it.
+/// Figures of all pairs; with many signals, only of those that a quick comparison finds promising.
 std::vector<PairFigures> compare(const std::vector<Candidate>& candidates,
                                  const std::vector<std::size_t>& judged) {
   std::vector<analysis::ChangeShape> shapes;
@@ -128,7 +127,7 @@ Choice choose(std::vector<Candidate>& candidates) {
     const Candidate& a = candidates[pair.first];
     const Candidate& b = candidates[pair.second];
     if (!pair.alike() || !usable(a) || !usable(b)) continue;
-    if (a.found.stream == b.found.stream) continue;  // one frame is one sensor's
+    if (a.found.stream == b.found.stream) continue;  // both are from one sensor
     alike.emplace_back(score(candidates, pair), pair);
   }
   std::stable_sort(alike.begin(), alike.end(),

@@ -1,6 +1,6 @@
 #pragma once
 
-// Of the signals that could be rates, the two gyros: different sensors that feel one rotation.
+// Chooses the two gyros among the signals that could be rates: different sensors of one rotation.
 
 #include <cstddef>
 #include <optional>
@@ -12,18 +12,19 @@
 namespace vgyro::cli {
 
 struct PairFigures {
-  std::size_t first = 0;  ///< into the candidates
+  std::size_t first = 0;  ///< index in the candidates
   std::size_t second = 0;
   analysis::Likeness likeness;
   [[nodiscard]] bool alike() const;
 };
 
 struct Choice {
-  std::vector<PairFigures> pairs;  ///< of all that could be judged
+  std::vector<PairFigures> pairs;  ///< all that could be judged
   std::optional<PairFigures> pair;
-  std::optional<std::size_t> alone;    ///< where there is no pair: the one gyro that is there
-  std::vector<PairFigures> others;     ///< that move alike too, likelier ones first
-  std::vector<std::size_t> followers;  ///< neither chosen nor copies, but of the same rotation
+  std::optional<std::size_t> alone;    ///< if there is no pair: the only gyro
+  std::vector<PairFigures> others;     ///< other pairs that move alike, likelier ones first
+  std::vector<std::size_t> followers;  ///< neither chosen nor copies, but they follow the same
+                                       ///< rotation
 };
 
 /// Marks copies in `why_not` of the candidates.

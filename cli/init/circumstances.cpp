@@ -18,11 +18,11 @@ namespace {
 
 using gateway::Dimension;
 
-constexpr double kGapMost_s = 0.5;          // nothing is interpolated across more
-constexpr double kSpeedRateLeast_hz = 2.0;  // the gateway forgets a speed after 1 s
+constexpr double kGapMost_s = 0.5;          // longer gaps are not interpolated
+constexpr double kSpeedRateLeast_hz = 2.0;  // the gateway ignores a speed after 1 s
 constexpr double kAccRateLeast_hz = 5.0;
 constexpr double kSpeedMost_m_s = 150.0;
-constexpr double kSameSpeed = 0.03;  // the wheels of a car in bends
+constexpr double kSameSpeed = 0.03;  // wheels of a car differ by this in bends
 constexpr double kStanding_m_s = gateway::Surroundings::kStandingBelow_m_s;
 
 double median(std::vector<double> values) {
@@ -98,8 +98,8 @@ std::optional<double> resting_speed(const Speed& speed, const analysis::Stretch&
   return median(std::move(values));
 }
 
-/// The one that most others agree with; of equals a wheel's or the vehicle's by name, the one that
-/// stands when the gyros do, then the faster one.
+/// The speed that most others agree with; of equal ones, a wheel's or the vehicle's by name, then
+/// the one that is zero when the gyros rest, then the faster one.
 std::optional<SpeedFound> find_speed(const std::vector<Found>& messages,
                                      const std::optional<analysis::Stretch>& rest, double begin_s) {
   std::vector<Speed> speeds;
@@ -129,7 +129,7 @@ std::optional<SpeedFound> find_speed(const std::vector<Found>& messages,
 
 // --- accelerations -------------------------------------------------------------------------------
 
-/// 0, 1, 2 for x, y, z; nothing where the name has no axis.
+/// 0, 1, 2 for x, y, z; nothing if the name has no axis.
 std::optional<std::size_t> axis_of(const dbc::Signal& signal) {
   const std::string name = lower(signal.name);
   constexpr std::array kAxes{'x', 'y', 'z'};

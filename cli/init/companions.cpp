@@ -1,4 +1,4 @@
-// What stands in a gyro's message beside its rate.
+// Finds the companions of the rate in a gyro's message.
 
 #include <algorithm>
 #include <array>
@@ -35,15 +35,15 @@ std::vector<std::int64_t> raw_values(const Found& found, const dbc::Signal& sign
   return values;
 }
 
-/// Where a counter counts one more with every frame: its highest value, as far as the log shows it
-/// (its bits' where it never began anew). Nothing where it does not count.
+/// For a counter that increments with every frame: its highest value in the log, or that of its
+/// bits if it never wrapped. Nothing if it does not count.
 std::optional<std::int64_t> counts_to(const Found& found, const dbc::Signal& signal) {
   if (!signal.is_integer() || signal.length_bits < 2 || signal.length_bits > 31) return {};
   if (signal.condition || signal.is_multiplexor) return {};
   const auto values = raw_values(found, signal);
   if (values.size() < 16) return {};
   std::size_t right = 0;
-  std::map<std::int64_t, std::size_t> ends;  // a value → how often 0 came next
+  std::map<std::int64_t, std::size_t> ends;  // value → how often 0 followed it
   for (std::size_t i = 1; i < values.size(); ++i) {
     right += values[i] == values[i - 1] + 1 ? 1U : 0U;
     if (values[i] == 0 && values[i - 1] > 0) ++ends[values[i - 1]];
@@ -60,7 +60,7 @@ std::optional<std::int64_t> counts_to(const Found& found, const dbc::Signal& sig
   return most;
 }
 
-/// What the gateway takes for the highest value by itself.
+/// The highest value that the gateway assumes by default.
 std::int64_t counter_max_of(const dbc::Signal& signal) {
   const std::int64_t bits_most = (std::int64_t{1} << signal.length_bits) - 1;
   return signal.maximum == static_cast<double>(bits_most - 1) ? bits_most - 1 : bits_most;
@@ -80,13 +80,13 @@ bool is_ok(const std::string& label) {
   return kWords.contains(lower(label));
 }
 
-/// "Status == 0", where a labelled signal says so and mostly did.
+/// "Status == 0", if a label of the signal means valid and the signal mostly had that value.
 void find_valid(const Found& found, const dbc::Signal& rate, Companions& companions) {
   const dbc::Signal* best = nullptr;
   std::int64_t value = 0;
   for (const dbc::Signal& signal : found.message->signals) {
     if (&signal == &rate || signal.condition || !signal.is_integer()) continue;
-    // Another rate's own flag stands nearer to that one's name.
+    // The flag of another rate has a name closer to that rate's.
     const bool others = std::any_of(found.message->signals.begin(), found.message->signals.end(),
                                     [&](const dbc::Signal& other) {
                                       return &other != &rate && &other != &signal &&
@@ -142,7 +142,7 @@ void find_temperature(const Found& found, Companions& companions) {
 
 using Payloads = std::vector<std::span<const std::uint8_t>>;
 
-/// Frames of full length, no two the same.
+/// Distinct frames of full length.
 Payloads distinct(const Found& found) {
   std::set<std::vector<std::uint8_t>> seen;
   Payloads payloads;
@@ -157,11 +157,11 @@ Payloads distinct(const Found& found) {
 struct Trial {
   dbc::E2eKind kind;
   std::string_view name;
-  std::uint32_t ids;  ///< data IDs to try; 1: it has none
+  std::uint32_t ids;  ///< number of data IDs to try; 1: the kind has none
 };
 
-// Profile 1C's low byte before 1A: both make the same value of the same frame, and 1C is what its
-// constant nibble says.
+// Profile 1C comes before 1A: for its IDs both give the same value, and the constant nibble shows
+// that it is 1C.
 constexpr std::array kTrials{Trial{dbc::E2eKind::kCrc8J1850, "crc8_j1850", 1},
                              Trial{dbc::E2eKind::kToyota, "toyota", 1},
                              Trial{dbc::E2eKind::kProfile1C, "profile_1c", 0x1000},
@@ -184,7 +184,7 @@ std::optional<E2eFound> try_kind(const Found& found, const Trial& trial, std::si
                                     .bytes = found.message->size_bytes,
                                     .data_ids = {},
                                     .can_id = found.message->id};
-  // The identifier itself is what senders take most often.
+  // Most senders use the identifier itself.
   for (std::uint32_t k = 0; k <= trial.ids; ++k) {
     const std::uint32_t id = k == 0 ? found.message->id & (trial.ids - 1) : k - 1;
     layout.data_ids[0] = static_cast<std::uint16_t>(id);
@@ -240,7 +240,7 @@ std::optional<E2eFound> find_e2e(const Found& found) {
     std::set<std::uint8_t> values;
     for (const auto payload : payloads)
       values.insert(payload[byte]);
-    if (values.size() < 12) continue;  // a check value takes nearly as many as there are frames
+    if (values.size() < 12) continue;  // check values hardly repeat
     for (const Trial& trial : kTrials) {
       if (byte + dbc::E2eProtection::header_bytes(trial.kind) > payloads[0].size()) continue;
       if (auto result = try_kind(found, trial, byte, payloads)) return result;

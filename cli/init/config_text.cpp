@@ -14,7 +14,7 @@ namespace vgyro::cli {
 
 namespace {
 
-/// A TOML string. Names of DBC files and buses come from elsewhere.
+/// A TOML string. Names of DBC files and buses are not under our control.
 std::string toml_string(std::string_view text) {
   std::string result = "\"";
   for (const char c : printable(text)) {
@@ -38,14 +38,14 @@ std::string head_text(const Proposal& proposal, const Found& found) {
                      toml_string(dbc_path(proposal, found)), toml_string(found.message->name));
 }
 
-/// A key, and behind it in a column of its own why.
+/// A key with its value, and the reason as a comment in a column of its own.
 std::string line(std::string_view key, const std::string& value, std::string_view why = {}) {
   const std::string text = fmt::format("{} = {}", key, value);
   if (why.empty()) return text + "\n";
   return fmt::format("{:<31} # {}\n", text, printable(why));
 }
 
-/// A comment, folded; a line of it that begins with a blank stays whole.
+/// A comment, folded; lines that begin with a blank are not folded.
 std::string comment(std::string_view text) {
   constexpr std::size_t kColumns = 98;
   std::string result;
@@ -63,7 +63,7 @@ std::string comment(std::string_view text) {
   return result;
 }
 
-/// Counter and check value, of any input.
+/// Counter and check value of any input.
 std::string e2e_text(const Companions& with) {
   std::string text;
   if (!with.counter.empty())
@@ -86,7 +86,7 @@ std::string sender_text(const Found& found) {
   return line("source_address", std::to_string(found.stream->id & 0xFFU), "the sender in this log");
 }
 
-/// `flipped`: why its sign is -1; empty: it is not.
+/// `flipped` is the reason for sign = -1; empty: the sign is 1.
 std::string gyro_text(const Proposal& proposal, const Candidate& candidate, const char* name,
                       const std::string& flipped) {
   const Companions with = find_companions(candidate.found, *candidate.signal);
@@ -127,7 +127,7 @@ std::string followers_text(const Proposal& proposal) {
   std::string text;
   for (const std::size_t i : proposal.choice.followers) {
     const Candidate& other = proposal.candidates[i];
-    if (other.guessed) continue;  // told above
+    if (other.guessed) continue;  // listed above
     text += comment(
         fmt::format("{} follows the same rotation. If it can be trusted more than a gyro (rate "
                     "table, dual-antenna GNSS), it may be the reference:",
@@ -142,7 +142,7 @@ std::string speed_text(const Proposal& proposal) {
   if (!proposal.circumstances.speed) return "";
   const SpeedFound& speed = *proposal.circumstances.speed;
   constexpr double kStanding_m_s = gateway::Surroundings::kStandingBelow_m_s;
-  std::string why = "CHECK: is it 0 when the vehicle stands? This log has no rest";
+  std::string why = "CHECK: is it 0 while the vehicle stands still? This log has no rest";
   if (speed.resting_m_s && *speed.resting_m_s < kStanding_m_s) {
     why = "0 while the gyros rest in this log";
   } else if (speed.resting_m_s) {
@@ -151,7 +151,7 @@ std::string speed_text(const Proposal& proposal) {
   std::string text = "[speed]\n" + head_text(proposal, *speed.found);
   text += line("signal", toml_string(speed.signal->name), why);
   text += sender_text(*speed.found) + e2e_text(find_companions(*speed.found, *speed.signal));
-  // What stands still in a rest would tell the corrector that the vehicle rolls.
+  // A speed above zero during the rest would make the corrector assume that the vehicle rolls.
   const bool wrong = speed.resting_m_s && *speed.resting_m_s >= kStanding_m_s;
   return (wrong ? commented(text) : text) + "\n";
 }
@@ -172,7 +172,7 @@ std::string accelerometer_text(const Proposal& proposal) {
 
 std::string calibration_text(const Proposal& proposal) {
   constexpr double kRest_s = 60.0;
-  constexpr double kMargin_s = 2.0;  // a second at each end may be cut
+  constexpr double kMargin_s = 2.0;  // up to a second at each end may be cut
   const auto& rest = proposal.circumstances.rest;
   const bool paired = proposal.choice.pair.has_value();
   std::string seconds = "60";
@@ -211,7 +211,7 @@ std::string turn_text(const Turn& turn) {
       turn.told_deg, off ? " Is the log's beginning a rest of 3 s, and the unit right?" : ""));
 }
 
-/// Where layouts were tried: which other fields may be the gyros instead, and how to say so.
+/// For guessed layouts: other fields that may be the gyros, and how to choose them.
 std::string others_text(const Proposal& proposal) {
   constexpr std::size_t kTold = 4;
   std::string text;
@@ -233,7 +233,7 @@ std::string others_text(const Proposal& proposal) {
       text);
 }
 
-/// What is known of the pair, and what a log cannot tell.
+/// What is known of the pair, and what a log cannot show.
 std::string pair_text(const Proposal& proposal) {
   const analysis::Likeness& alike = proposal.choice.pair->likeness;
   std::string text;

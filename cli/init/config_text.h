@@ -1,6 +1,6 @@
 #pragma once
 
-// The proposal as vgyro.toml. Every doubt is a comment.
+// The proposal as the text of vgyro.toml. Every doubt is a comment.
 
 #include <optional>
 #include <string>
@@ -11,10 +11,10 @@
 
 namespace vgyro::cli {
 
-/// What --turned says, and what the first gyro says to that.
+/// The turn stated by --turned, and the turn that the first gyro measured.
 struct Turn {
   double told_deg = 0.0;
-  std::optional<double> seen_deg;  ///< nothing where samples are missing
+  std::optional<double> seen_deg;  ///< nothing if samples are missing
   [[nodiscard]] bool is_backward() const { return seen_deg && *seen_deg * told_deg < 0.0; }
 };
 
@@ -24,12 +24,12 @@ struct Proposal {
   const std::vector<Found>& messages;
   const Circumstances& circumstances;
   const Traffic& traffic;
-  std::string folder;  ///< of the file, for the paths in it
+  std::string folder;  ///< folder of the file, for the paths in it
   std::optional<Turn> turn;
-  std::vector<std::string> remarks;  ///< what stands above all
+  std::vector<std::string> remarks;  ///< comments at the top
 };
 
-/// With one gyro only, the second's table is a comment.
+/// With a single gyro, the table of the second one is a comment.
 std::string config_text(const Proposal& proposal);
 
 }  // namespace vgyro::cli

@@ -20,10 +20,10 @@ namespace vgyro::cli {
 
 namespace {
 
-constexpr double kRateLeast_hz = 5.0;     // below it no motion can be followed
-constexpr std::size_t kFieldsMost = 400;  // the quick comparison is of each with each
-constexpr std::size_t kGuessedMost = 30;  // whose figures are worked out
-constexpr double kQuickLeast = 0.5;       // a little below what a pair needs
+constexpr double kRateLeast_hz = 5.0;     // motion cannot be followed below it
+constexpr std::size_t kFieldsMost = 400;  // the quick comparison compares each with each
+constexpr std::size_t kGuessedMost = 30;  // for these the figures are computed
+constexpr double kQuickLeast = 0.5;       // slightly below what a pair needs
 constexpr double kGapMost_s = 0.5;
 constexpr double kZero_s = 3.0;
 
@@ -39,7 +39,7 @@ std::string name_of(const Stream& stream, std::set<std::string>& names) {
   return name;
 }
 
-/// Mean of the 64 samples that differ least: of a rest, where there is one.
+/// Mean of the 64 consecutive samples that differ least, which are from a rest if there is one.
 double quietest_value(const analysis::StampedSignal& series) {
   constexpr std::size_t kBlock = 64;
   double quietest = std::numeric_limits<double>::infinity();
@@ -61,7 +61,7 @@ double quietest_value(const analysis::StampedSignal& series) {
   return value;
 }
 
-/// To so many digits, as the shortest number that has them.
+/// Rounded to this many digits, as the nearest double to that decimal number.
 double rounded(double value, int digits) {
   const std::string text = fmt::format("{:.{}e}", value, digits - 1);
   double result = value;
@@ -69,7 +69,7 @@ double rounded(double value, int digits) {
   return result;
 }
 
-/// 0, or where there is no sign the middle of the bits, or of those that change.
+/// 0; without a sign, the middle of the range of the bits, or of those that change.
 std::vector<double> usual_zeros(const dbc::Signal& signal, double near) {
   std::vector<double> zeros{0.0};
   if (signal.type == dbc::ValueType::kUnsigned) {
@@ -82,8 +82,8 @@ std::vector<double> usual_zeros(const dbc::Signal& signal, double near) {
   return zeros;
 }
 
-/// As a name's score: a rate lies on both sides of what stands for none. Speeds, temperatures and
-/// levels of something keep to one side.
+/// A score like that of a name: a rate lies on both sides of its zero, while speeds, temperatures
+/// and levels stay on one side.
 double shape_score(const Candidate& candidate) {
   constexpr double kShareLeast = 0.02;
   const auto size = static_cast<double>(candidate.series.value.size());
@@ -104,7 +104,7 @@ struct TypicalScale {
   const char* name;
 };
 
-/// Of sensors and vehicles on the market, the more usual ones first.
+/// Scales of sensors and vehicles on the market, the more usual ones first.
 constexpr std::array kIntegerScales{
     TypicalScale{0.01, "0.01 deg/s"},
     TypicalScale{0.005, "0.005 deg/s"},
@@ -137,7 +137,7 @@ std::vector<TypicalScale> typical_scales(const Candidate& candidate) {
   return {kIntegerScales.begin(), kIntegerScales.end()};
 }
 
-// A platform with wheels or wings turns as fast as this in a log that is worth looking at.
+// In a useful log, a platform with wheels or wings turns at rates in this range.
 constexpr double kPeakLeast_dps = 2.0;
 constexpr double kPeakMost_dps = 400.0;
 constexpr double kScaleTolerance = 0.03;  // scale factor errors of two cheap gyros together
@@ -147,12 +147,13 @@ double tolerance_of(const analysis::Likeness& likeness) {
 }
 
 struct Scales {
-  double first = 1.0;  ///< deg/s a raw number
+  double first = 1.0;  ///< deg/s per raw number
   double second = 1.0;
   std::string why;
 };
 
-/// The raw number's scale by a gyro whose scale is known: a usual one, where it is that.
+/// The scale of a raw number by comparison with a gyro of known scale; a usual scale if one is
+/// close.
 double by_the_other(const Candidate& guessed, double measured_dps, double tolerance,
                     std::string& why) {
   double best = rounded(measured_dps, 6);
@@ -172,7 +173,7 @@ double by_the_other(const Candidate& guessed, double measured_dps, double tolera
   return best;
 }
 
-/// Both in raw numbers: only their ratio is known.
+/// Both gyros are in raw numbers, so only the ratio of their scales is known.
 Scales by_usual_pairs(const Candidate& first, const Candidate& second,
                       const analysis::Likeness& likeness) {
   using Option = std::tuple<double, TypicalScale, TypicalScale>;
@@ -186,7 +187,7 @@ Scales by_usual_pairs(const Candidate& first, const Candidate& second,
     for (std::size_t k = 0; k < seconds.size(); ++k) {
       const double off = std::abs(std::log(seconds[k].dps * ratio / firsts[i].dps));
       if (off > tolerance_of(likeness)) continue;
-      // A hundredth of difference in scale weighs as much as ten places among the usual ones.
+      // 1 % of difference in scale costs as much as ten places in the list of usual scales.
       const double cost = static_cast<double>(i + k) + (odd ? 100.0 : 0.0) + 1000.0 * off;
       options.emplace_back(cost, firsts[i], seconds[k]);
     }
@@ -235,8 +236,8 @@ Scales scales_of(const Candidate& first, const Candidate& second,
   return scales;
 }
 
-/// What raw number stands for no rotation: one that is usual, where the log rests near it as
-/// against its motion. The scale has no say, for it may be wrong.
+/// The raw number of no rotation: a usual zero if the log's rest is close to it compared with its
+/// motion. Independent of the scale, which may be wrong.
 double zero_of(const Candidate& candidate) {
   const dbc::Signal& signal = *candidate.signal;
   const double rest = quietest_value(candidate.series);
@@ -287,7 +288,7 @@ void point_into(Candidate& candidate, const dbc::Database& database, const dbc::
 
 // --- which fields are worth a closer look --------------------------------------------------------
 
-/// Their series are made when they are needed: all at once would be many times the log.
+/// Makes the series on demand: all at once would take many times the log's size.
 analysis::StampedSignal series_of(const Candidate& candidate) {
   return candidate.guessed ? series_of(candidate.found, *candidate.signal, 1.0) : candidate.series;
 }
@@ -310,7 +311,7 @@ Span span_of(const std::vector<Candidate>& candidates) {
   return all;
 }
 
-/// Each candidate's best quick correlation with one of another message.
+/// The best quick correlation of each candidate with one of another message.
 std::vector<double> best_correlations(const std::vector<Candidate>& candidates) {
   const Span span = span_of(candidates);
   std::vector<analysis::ChangeShape> shapes;

@@ -1,4 +1,4 @@
-// vgyro init: a log and DBC files → a proposal for vgyro.toml.
+// vgyro init: makes a proposal for vgyro.toml from a log and DBC files.
 
 #include <algorithm>
 #include <cmath>
@@ -34,13 +34,13 @@ Expected<void> check_inputs(const InitOptions& options) {
   return check_new(options.output, options.force);
 }
 
-/// Where layouts that were guessed are described: vgyro.toml → vgyro-guess.dbc.
+/// The DBC file for guessed layouts: vgyro.toml → vgyro-guess.dbc.
 std::string guess_path(const std::string& output) {
   const std::filesystem::path path(output);
   return (path.parent_path() / (path.stem().string() + "-guess.dbc")).string();
 }
 
-/// All that is known of the logs before a pair is chosen.
+/// What is known of the logs before a pair is chosen.
 struct Material {
   Traffic traffic;
   std::vector<dbc::Database> databases;
@@ -66,7 +66,7 @@ Expected<void> read(const InitOptions& options, Material& all) {
   return {};
 }
 
-/// By the DBC files, and where they do not know two gyros by trial of layouts.
+/// Uses the DBC files, and if these do not describe two gyros, trial of layouts.
 void find_pair(Material& all) {
   all.messages = find_messages(all.traffic, all.databases);
   all.candidates = find_candidates(all.messages);
@@ -75,7 +75,7 @@ void find_pair(Material& all) {
   all.guess = guess_messages(all.traffic, all.messages);
   const bool none = all.databases.empty();
   tell("{}; the layouts of {}{} identifiers are tried.\n",
-       none ? "No DBC file is given" : "The DBC files know no two gyros of this log",
+       none ? "No DBC file is given" : "The DBC files describe no two gyros in this log",
        all.guess->streams, none ? "" : " other");
   add_guessed(all.candidates, *all.guess);
   all.choice = choose(all.candidates);
@@ -138,11 +138,12 @@ int one_found(const std::string& name, const Material& all) {
                   all.candidates[*all.choice.alone].place()),
       "a log in which the platform turns and both sensors send, and a DBC file of each; a "
       "gateway's "
-      "copy of a gyro is no second one. Is the second sensor on another bus, in a log of its own? "
+      "copy of a gyro is not a second gyro. Is the second sensor on another bus, in a log of its "
+      "own? "
       "Then name both logs"});
 }
 
-/// The proposal, and the DBC file of what was guessed.
+/// Writes the proposal, and the DBC file of guessed layouts.
 Expected<void> write_all(const InitOptions& options, Material& all) {
   const std::string path = guess_path(options.output);
   const bool turned = options.turned_deg != 0.0;

@@ -17,8 +17,8 @@ namespace {
 
 constexpr std::size_t kFramesLooked = 65536;
 constexpr std::size_t kFramesLeast = 64;
-constexpr double kFloatMost = 1e4;    // deg/s; what was no float is beyond, or
-constexpr double kFloatLeast = 1e-3;  // hardly more than 0
+constexpr double kFloatMost = 1e4;    // deg/s; bytes that are not a float give values beyond it, or
+constexpr double kFloatLeast = 1e-3;  // hardly above 0
 constexpr double kFloatFinest = 1e-12;
 
 struct Layout {
@@ -66,8 +66,8 @@ std::vector<double> values_of(const std::vector<dbc::Reading>& readings) {
   return values;
 }
 
-/// Of a platform that turns to and fro a float has several exponents; what was no float has most of
-/// its exponents beyond all bounds, or keeps to one.
+/// A float of a platform that turns to and fro has several exponents; bytes that are not a float
+/// have most exponents out of bounds, or a single one.
 bool is_float(const std::vector<double>& values) {
   double most = 0.0;
   std::set<int> exponents;
@@ -81,7 +81,7 @@ bool is_float(const std::vector<double>& values) {
   return most >= kFloatLeast && exponents.size() >= kExponentsLeast;
 }
 
-/// A byte that does not change may stand above a small number, but only of the shortest.
+/// A constant byte may be above a small number, but only in the shortest layout.
 bool is_one_number(const std::vector<dbc::Reading>& readings, const Layout& layout) {
   std::vector<std::int64_t> raw;
   raw.reserve(readings.size());
@@ -111,8 +111,8 @@ std::optional<Judged> judge(const Stream& stream, const Layout& layout, std::siz
   return judged;
 }
 
-/// With a sign, unless only without one it does not leap, or the values keep to the middle of those
-/// that have no sign.
+/// Signed, unless the values leap only with a sign, or stay around the middle of the unsigned
+/// range.
 std::optional<Judged> judge_signs(const Stream& stream, Layout layout, std::size_t length) {
   const auto with = judge(stream, layout, length);
   layout.type = dbc::ValueType::kUnsigned;
@@ -129,7 +129,7 @@ bool overlap(const Layout& a, const Layout& b) {
   return a.byte < b.byte + b.bytes && b.byte < a.byte + a.bytes;
 }
 
-/// Counts through at least twice, or for ever.
+/// Increments with nearly every frame and wraps at its highest value, if at all.
 bool counts(const std::vector<dbc::Reading>& readings, std::int64_t modulus) {
   constexpr double kMostly = 0.95;
   if (readings.size() < kFramesLeast) return false;
@@ -173,7 +173,7 @@ std::vector<dbc::Signal> find_fields(const Stream& stream) {
       }
     }
   }
-  // Floats are hardly met by chance; a longer number holds the shorter ones that are part of it.
+  // Floats hardly occur by chance; a longer number includes the shorter ones that are part of it.
   const auto rank = [](const Judged& one) {
     const bool floating = one.layout.type == dbc::ValueType::kFloat32;
     return std::tuple(!floating, -static_cast<int>(one.layout.bytes), one.roughness);
@@ -206,7 +206,7 @@ std::vector<dbc::Signal> find_counters(const Stream& stream) {
         signal.name = fmt::format("Counter_{}", signal.start_bit);
         if (!counts(readings_of(stream, signal, length), std::int64_t{1} << bits)) continue;
         found.push_back(signal);
-        from = 8;  // a counter of eight bits has one of four in it
+        from = 8;  // skip the 4-bit counter inside an 8-bit one
       }
       if (!found.empty() && found.back().start_bit / 8U == byte) break;
     }

@@ -1,9 +1,8 @@
 #pragma once
 
-// Where no DBC file says what the bytes of a message are: which of them move as a rate of rotation
-// could, by trial of every place, 16, 24 and 32 bits, both byte orders, with and without sign, and
-// floats. Fields that do not begin at a byte are found as far as their bytes hold nothing else that
-// moves.
+// For messages without a DBC file: finds bytes that could be a rate of rotation by trial of every
+// place, with 16, 24 and 32 bits, both byte orders, with and without sign, and as floats. A field
+// that does not begin at a byte is found if its bytes hold nothing else that changes.
 
 #include <vector>
 
@@ -12,13 +11,13 @@
 
 namespace vgyro::cli {
 
-/// Signals with factor 1 and no unit, no two of which share a byte.
+/// Signals with factor 1 and no unit that share no byte.
 std::vector<dbc::Signal> find_fields(const Stream& stream);
 
-/// Bytes and nibbles that count with every frame.
+/// Bytes and nibbles that increment with every frame.
 std::vector<dbc::Signal> find_counters(const Stream& stream);
 
-/// Bytes of a message: of most of its frames.
+/// The payload length of most frames.
 std::size_t usual_length(const Stream& stream);
 
 }  // namespace vgyro::cli

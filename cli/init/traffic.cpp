@@ -53,7 +53,7 @@ void Traffic::add(const std::string& bus, const canlog::LogRecord& record) {
   }
   Stream& stream = found->second;
   ++stream.frames;
-  stream.last_ns = t_ns;  // not the latest: one stamp from nowhere must not stretch the log
+  stream.last_ns = t_ns;  // not the maximum: a single wrong stamp must not stretch the log
   if (!wanted(t_ns) || (!only_.empty() && !only_.contains(stream.id))) return;
   const auto payload = record.frame.payload();
   stream.kept.push_back({t_ns, stream.bytes.size(), record.frame.length});

@@ -1,7 +1,7 @@
 #pragma once
 
-// The frames of a log, by bus and identifier, as many as a bound allows: of a longer log every
-// second, fourth … block of seconds is kept. What is counted is counted over the whole log.
+// The frames of a log by bus and identifier, within a limit of memory: of a longer log every
+// second, fourth … block of seconds is kept. Counts cover the whole log.
 
 #include <cstddef>
 #include <cstdint>
@@ -23,7 +23,7 @@ struct Stream {
   bool extended = false;
   std::uint64_t frames = 0;  ///< in the whole log
   std::int64_t first_ns = 0;
-  std::int64_t last_ns = 0;  ///< of its last frame
+  std::int64_t last_ns = 0;  ///< stamp of its last frame
 
   struct Kept {
     std::int64_t t_ns = 0;
@@ -47,9 +47,9 @@ class Traffic {
 
   explicit Traffic(std::size_t bytes_most = kBytesMost) : bytes_most_(bytes_most) {}
 
-  /// From now on frames of other identifiers are counted alone; empty: all are kept.
+  /// From now on, frames of other identifiers are counted but not kept; empty: all are kept.
   void only(const std::vector<std::uint32_t>& ids) { only_ = {ids.begin(), ids.end()}; }
-  /// Several logs are merged by stamp. Error when one cannot be read, or none holds a frame.
+  /// Merges several logs by stamp. Error if one cannot be read, or if none holds a frame.
   Expected<void> read(const std::vector<std::string>& logs);
   void add(const std::string& bus, const canlog::LogRecord& record);
 
@@ -58,7 +58,7 @@ class Traffic {
   [[nodiscard]] bool thinned() const { return every_ > 1; }
   [[nodiscard]] double seconds() const;
   [[nodiscard]] double begin_s() const { return static_cast<double>(begin_ns_) * 1e-9; }
-  /// What in the logs was no frame, for people; empty where all was.
+  /// Text about what in the logs was not a frame; empty if everything was.
   [[nodiscard]] const std::string& notes() const { return notes_; }
   [[nodiscard]] bool has(const std::string& bus, std::uint32_t id) const;
 

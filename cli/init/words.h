@@ -1,6 +1,6 @@
 #pragma once
 
-// Names of signals, as a person reads them.
+// Words in the names of signals.
 
 #include <initializer_list>
 #include <string>
@@ -8,7 +8,7 @@
 
 namespace vgyro::cli {
 
-/// Does one of the words stand in the text?
+/// Does the text contain one of the words?
 bool has_any(std::string_view text, std::initializer_list<std::string_view> words);
 
 }  // namespace vgyro::cli

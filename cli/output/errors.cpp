@@ -13,7 +13,7 @@ int report(const Error& error) {
 }
 
 int report(const std::vector<Error>& errors) {
-  // A wrong file can have a complaint for every line; nobody reads them.
+  // A wrong file can cause an error for every line.
   constexpr std::size_t kMost = 40;
   for (std::size_t i = 0; i < std::min(errors.size(), kMost); ++i)
     report(errors[i]);

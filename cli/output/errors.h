@@ -10,7 +10,7 @@ namespace vgyro::cli {
 
 /// "error: where: what; remedy"; returns kBadInput.
 int report(const Error& error);
-/// The first of them, and how many more there are.
+/// Reports the first errors, and the number of others.
 int report(const std::vector<Error>& errors);
 /// "warning: where: what; remedy"
 void warn(const Error& warning);

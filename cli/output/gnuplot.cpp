@@ -47,7 +47,8 @@ struct Descriptor {
   int fd;
 };
 
-// A file without a name rather than a pipe, whose reader could end early and this program with it.
+// Writes to a nameless file rather than a pipe: a reader that ends early would end this program
+// too.
 bool write_script(int fd, std::string_view script) {
   while (!script.empty()) {
     const ssize_t written = ::write(fd, script.data(), script.size());
@@ -64,7 +65,7 @@ Expected<pid_t> start_gnuplot(int input, int output) {
   ::posix_spawn_file_actions_adddup2(&actions, input, STDIN_FILENO);
   ::posix_spawn_file_actions_adddup2(&actions, output, STDOUT_FILENO);
   std::string name = "gnuplot";
-  std::string settings = "--default-settings";  // not the user's own
+  std::string settings = "--default-settings";  // ignore the user's settings
   std::string from_input = "-";
   const std::array<char*, 4> words{name.data(), settings.data(), from_input.data(), nullptr};
   pid_t child = 0;
@@ -80,12 +81,12 @@ std::string read_to_end(int fd) {
   while (true) {
     const ssize_t got = ::read(fd, block.data(), block.size());
     if (got < 0 && errno == EINTR) continue;
-    if (got <= 0) return text;  // what gnuplot could not finish, its exit status says
+    if (got <= 0) return text;  // the exit status shows whether gnuplot has finished
     text.append(block.data(), static_cast<std::size_t>(got));
   }
 }
 
-// What gnuplot prints for the script.
+// The output of gnuplot for the script.
 Expected<std::string> picture_of(const std::string& script) {
   const Descriptor input(::memfd_create("vgyro-script", MFD_CLOEXEC));
   if (input.fd < 0 || !write_script(input.fd, script)) {
@@ -102,7 +103,7 @@ Expected<std::string> picture_of(const std::string& script) {
   int status = 0;
   while (::waitpid(*child, &status, 0) < 0 && errno == EINTR) {
   }
-  if (status != 0) return fail({}, "gnuplot failed, as it says above");
+  if (status != 0) return fail({}, "gnuplot failed; see its message above");
   return picture;
 }
 
@@ -117,7 +118,7 @@ Expected<void> check_picture_path(const std::string& path) {
   if (::access(folder.empty() ? "." : folder.c_str(), W_OK) != 0) {
     return fail(path, "cannot be written: " + system_reason());
   }
-  // Not by trying: a pipe to a program that is not there ends this one.
+  // Not by trying to start it: a pipe to a missing program would end this one.
   // NOLINTNEXTLINE(concurrency-mt-unsafe): the program has one thread
   if (::system("command -v gnuplot >/dev/null 2>&1") != 0) {
     return fail(path, "cannot be drawn: there is no gnuplot", "apt-get install gnuplot-nox");
@@ -142,7 +143,7 @@ Expected<void> run_gnuplot(const std::string& path, const std::string& script) {
   if (auto good = check_picture_path(path); !good) return good;
   const auto picture = picture_of(script);
   if (!picture) return fail(path, "was not drawn: " + picture.error().what);
-  // gnuplot would not notice when its picture cannot be written.
+  // gnuplot does not notice if its picture cannot be written.
   auto file = OutputFile::open(path);
   if (!file) return tl::unexpected(file.error());
   file->write(*picture);

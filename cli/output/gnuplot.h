@@ -1,6 +1,6 @@
 #pragma once
 
-// Pictures are drawn by gnuplot; the file's ending says the format: .svg, .png or .pdf.
+// Draws pictures with gnuplot; the file's ending selects the format: .svg, .png or .pdf.
 
 #include <iterator>
 #include <string>
@@ -12,15 +12,15 @@
 
 namespace vgyro::cli {
 
-/// For a check before the long work: the ending, the folder, and whether there is a gnuplot.
+/// Checks before the long work: the ending, the folder, and whether gnuplot is installed.
 Expected<void> check_picture_path(const std::string& path);
 
-/// "set terminal …" for a picture of that size; pdf is one page, upright or not. There is no "set
-/// output": gnuplot takes a name that begins with "|" for a command.
+/// "set terminal …" for a picture of this size; a pdf is one page, portrait or landscape. There is
+/// no "set output", because gnuplot runs a name that begins with "|" as a command.
 std::string picture_script(const std::string& path, int width, int height);
 
-/// Quoted for a gnuplot script, where it is text and nothing else: in single quotes gnuplot knows
-/// neither commands nor variables.
+/// Quotes a text for a gnuplot script: in single quotes gnuplot expands neither commands nor
+/// variables.
 std::string gnuplot_text(const std::string& text);
 
 /// Adds to a script.
@@ -29,8 +29,8 @@ void put(std::string& script, fmt::format_string<T...> form, T&&... values) {
   fmt::format_to(std::back_inserter(script), form, std::forward<T>(values)...);
 }
 
-/// Runs the script; what gnuplot prints is the picture, and goes into the file that is opened here,
-/// by a name that can be nothing else. Error when gnuplot is missing or fails.
+/// Runs the script. gnuplot prints the picture, which is written to a file opened here, so that
+/// `path` can only be a file name. Error if gnuplot is missing or fails.
 Expected<void> run_gnuplot(const std::string& path, const std::string& script);
 
 }  // namespace vgyro::cli

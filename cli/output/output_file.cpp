@@ -15,9 +15,9 @@ constexpr int kDiscard = -1;
 
 namespace fs = std::filesystem;
 
-// Where a file of this name is, or will be, through symbolic links. Empty for what a new file must
-// not replace: what is no file, what only names an open one, such as /dev/stdout, and a file that
-// may not be written to.
+// The place of a file of this name, present or future, after symbolic links. Empty if a new file
+// must not replace it: a device or pipe, a name of an open file such as /dev/stdout, or a file
+// without write permission.
 std::string replaceable_place(const std::string& path) {
   std::error_code code;
   const fs::path place = fs::weakly_canonical(path, code);

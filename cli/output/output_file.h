@@ -1,9 +1,9 @@
 #pragma once
 
-// Bytes to a file or to standard output through one buffer. The first failure is kept and told at
-// the end; later writes are dropped. A named file is there whole or not at all: it takes its name
-// when it is closed without a failure (cli/output/unfinished). What is no file, a device or a pipe,
-// is written to as it is, and so is a file in a folder that takes no new one.
+// Writes bytes to a file or to standard output through one buffer. The first failure is kept and
+// reported at the end; later writes are dropped. A named file appears whole or not at all: it gets
+// its name when it is closed without a failure (cli/output/unfinished). Devices and pipes are
+// written to directly, and so is a file in a folder in which none can be created.
 
 #include <cstddef>
 #include <cstdint>
@@ -23,10 +23,10 @@ class OutputFile {
   static Expected<OutputFile> open(const std::string& path);
   OutputFile(OutputFile&& other) noexcept;
   OutputFile& operator=(OutputFile&&) = delete;
-  /// Without close() nothing is kept.
+  /// Without close() the output is discarded.
   ~OutputFile();
 
-  /// Room for at least `size` bytes; commit() what was used of it. size ≤ kRoomMax.
+  /// Returns room for at least `size` bytes; commit() the part used. size ≤ kRoomMax.
   static constexpr std::size_t kRoomMax = 16'384;
   char* room(std::size_t size) {
     if (kBufferBytes - used_ < size) flush();
@@ -35,7 +35,7 @@ class OutputFile {
   void commit(std::size_t size) { used_ += size; }
   void write(std::string_view text);
   void flush();
-  /// Writes over bytes that were written before. Only where can_rewrite(): into a file.
+  /// Overwrites bytes written earlier. Precondition: can_rewrite(), which holds for a file.
   void rewrite(std::uint64_t offset, std::string_view text);
   [[nodiscard]] bool can_rewrite() const;
   /// Flushes, closes, and gives the file its name; the error names the file and the reason.

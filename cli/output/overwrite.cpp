@@ -11,16 +11,16 @@ namespace vgyro::cli {
 
 namespace {
 
-/// Where a file lies. `name` is empty for one that is there: its inode says it all.
+/// Where a file is. `name` is empty for an existing file, which its inode identifies.
 struct Place {
   dev_t device = 0;
-  ino_t inode = 0;  ///< of the file, or of the folder that it will be in
+  ino_t inode = 0;  ///< of the file, or of its future folder
   std::string name;
 
   friend bool operator==(const Place&, const Place&) = default;
 };
 
-// Nothing for what holds nothing: devices, pipes, no file at all.
+// Nothing for devices, pipes and the empty name, which hold nothing.
 std::optional<Place> place_of(const std::string& path, int descriptor_of_dash) {
   if (path.empty()) return std::nullopt;
   struct stat info {};

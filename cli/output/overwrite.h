@@ -1,9 +1,8 @@
 #pragma once
 
-// The one guard against writing over what is read: every command asks it once, before anything is
-// opened for writing. Files are compared by device and inode, so another name, a link or "./" does
-// not help; a file that is not there yet by its folder and name. Devices and pipes hold nothing
-// that could be lost.
+// The guard against overwriting an input: every command calls it once, before it opens anything for
+// writing. Compares existing files by device and inode, so that another name, a link or "./" makes
+// no difference; other files by folder and name. Devices and pipes hold nothing that could be lost.
 
 #include <string>
 #include <vector>
@@ -12,8 +11,8 @@
 
 namespace vgyro::cli {
 
-/// Error when an output is also an input, or two outputs are one file. "-" is standard input among
-/// the inputs, standard output among the outputs; an empty name is no file.
+/// Error if an output is also an input, or if two outputs are one file. "-" is standard input among
+/// the inputs and standard output among the outputs; an empty name is no file.
 Expected<void> check_outputs(const std::vector<std::string>& inputs,
                              const std::vector<std::string>& outputs);
 

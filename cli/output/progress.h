@@ -1,6 +1,7 @@
 #pragma once
 
-// One line on a terminal that says how far a long command is. Silent where stderr is no terminal.
+// Shows the progress of a long command in one line on a terminal. Silent if stderr is not a
+// terminal.
 
 #include <chrono>
 #include <cstdint>
@@ -18,13 +19,13 @@ class Progress {
 
   /// Draws at most ten times a second. `total` 0: unknown.
   void update(std::uint64_t done, std::uint64_t total, std::uint64_t frames);
-  /// Of work that knows its share, 0 to 1; `doing` says what is done now. What is left is as long
-  /// as what is done was, in proportion.
+  /// For work with a known share, 0 to 1; `doing` names the present step. The remaining time is
+  /// extrapolated from the elapsed one.
   void update(std::string_view doing, double share);
   void clear();
 
  private:
-  /// False when the last line is too young.
+  /// False if the last line is too recent.
   bool due();
 
   std::string what_;
@@ -34,8 +35,8 @@ class Progress {
   std::chrono::steady_clock::time_point last_;
 };
 
-/// ", some 40 s left", of work that has taken `elapsed_s` for this share; empty as long as that
-/// would be a guess.
+/// ", some 40 s left", for work that took `elapsed_s` for this share; empty while it would be a
+/// guess.
 std::string remaining_text(double elapsed_s, double share);
 
 /// "1.2 M"

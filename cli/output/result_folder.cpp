@@ -17,7 +17,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Through symbolic links and without a slash at the end: its neighbours have names then.
+// Resolves symbolic links and removes a slash at the end, so that a path beside it can be formed.
 fs::path real_path(const std::string& folder) {
   std::error_code ignored;
   const fs::path absolute = fs::absolute(folder, ignored);
@@ -31,7 +31,7 @@ Error system_error(const std::string& folder, const std::error_code& code) {
   return {folder, "cannot be written: " + code.message(), {}};
 }
 
-// The nearest that is there must be a folder that may be written into.
+// The nearest existing parent must be a writable folder.
 Expected<void> check_parents(const std::string& folder, fs::path path) {
   std::error_code ignored;
   while (!fs::exists(path, ignored) && path.has_relative_path())
@@ -45,7 +45,7 @@ Expected<void> check_parents(const std::string& folder, fs::path path) {
   return {};
 }
 
-// A folder that goes away again unless it is kept.
+// A folder that is removed unless it is kept.
 class Temporary {
  public:
   static Expected<Temporary> beside(const std::string& folder, const fs::path& path) {
@@ -96,7 +96,7 @@ Expected<void> check_result_folder(const std::string& folder,
   for (const fs::directory_entry& entry : fs::directory_iterator(path, code)) {
     const std::string name = entry.path().filename();
     if (std::find(names.begin(), names.end(), name) != names.end()) continue;
-    return fail(folder, fmt::format("holds \"{}\", which is no part of a result", name),
+    return fail(folder, fmt::format("holds \"{}\", which is not part of a result", name),
                 "an earlier result is replaced, anything else is kept: choose another folder");
   }
   if (code) return tl::unexpected(system_error(folder, code));
@@ -120,7 +120,7 @@ Expected<void> write_result_folder(const std::string& folder, const std::vector<
   std::error_code code;
   fs::permissions(fresh->path(), fs::perms(0755), code);
   if (fs::exists(path)) {
-    // The earlier result steps aside and goes only when the new one is in place.
+    // Moves the earlier result aside; it is removed only when the new one is in place.
     auto earlier = Temporary::beside(folder, path);
     if (!earlier) return tl::unexpected(earlier.error());
     fs::rename(path, earlier->path(), code);

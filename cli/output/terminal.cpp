@@ -10,7 +10,7 @@ namespace vgyro::cli {
 
 namespace {
 
-// The first cause: stdio only remembers that there was one. One thread.
+// The first cause; stdio only records that there was an error. Used by one thread.
 int output_errno = 0;
 
 void note(bool good) {
@@ -22,7 +22,7 @@ void note(bool good) {
 void keep_standard_streams() {
   for (const int fd : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
     if (::fcntl(fd, F_GETFD) >= 0) continue;
-    // The wrong way round: what is read from it or written to it fails, as if it were closed.
+    // Opened in the wrong direction, so that reading or writing fails as on a closed stream.
     const int placed = ::open("/dev/null", fd == STDIN_FILENO ? O_WRONLY : O_RDONLY);
     if (placed > STDERR_FILENO) ::close(placed);
   }

@@ -1,8 +1,8 @@
 #pragma once
 
-// Texts for people: the one way to standard output and to stderr. Control characters in them are
-// shown, not obeyed (base/printable.h). A text that cannot be written ends nothing; that standard
-// output lost something is told at the end, by finish_output().
+// Prints texts for people, to standard output and to stderr. Control characters in them are shown,
+// not executed (base/printable.h). A text that cannot be written does not end the program;
+// finish_output() reports at the end that standard output lost something.
 
 #include <cstdio>
 #include <string>
@@ -15,8 +15,8 @@
 
 namespace vgyro::cli {
 
-/// Where the caller has closed one of the three standard streams, its number must not go to a file
-/// that is opened later. First of all.
+/// Call first: if the caller has closed a standard stream, a file opened later must not get its
+/// number.
 void keep_standard_streams();
 
 void put_text(std::FILE* to, std::string_view text);
@@ -26,19 +26,19 @@ void say(fmt::format_string<T...> form, T&&... values) {
   put_text(stdout, fmt::format(form, std::forward<T>(values)...));
 }
 
-/// On stderr.
+/// Prints to stderr.
 template <class... T>
 void tell(fmt::format_string<T...> form, T&&... values) {
   put_text(stderr, fmt::format(form, std::forward<T>(values)...));
 }
 
-/// Raw, for a text that holds sequences of our own for the terminal; names in it are printable().
+/// Prints raw text that holds the program's own control sequences; names in it must be printable().
 void draw(std::FILE* to, std::string_view text);
 
-/// Flushes standard output; false when any of it was lost so far.
+/// Flushes standard output; false if any of it has been lost.
 bool flush_output();
 
-/// Flushes standard output. Error: some of it was lost so far, and why.
+/// Flushes standard output. Error, with the cause, if any of it has been lost.
 Expected<void> finish_output();
 
 }  // namespace vgyro::cli

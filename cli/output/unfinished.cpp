@@ -19,7 +19,7 @@ namespace vgyro::cli {
 
 namespace {
 
-// What the handler may touch: no memory that could be moving under it.
+// What the handler may access: memory that never moves.
 struct Slot {
   std::atomic<bool> used{false};
   std::array<char, PATH_MAX> temporary{};
@@ -30,7 +30,7 @@ std::atomic<bool> finish_on_interrupt{false};
 constexpr std::array<int, 4> kSignals{SIGHUP, SIGINT, SIGPIPE, SIGTERM};
 static_assert(std::atomic<bool>::is_always_lock_free, "a handler may not wait for a lock");
 
-// Standard error may be gone; nothing can be done about it here.
+// If standard error is closed, nothing can be done here.
 void say_in_handler(const char* text) {
   [[maybe_unused]] const ssize_t written = ::write(STDERR_FILENO, text, std::strlen(text));
 }
@@ -54,7 +54,7 @@ void end(int signal_number) {
     errno = before;
     return;
   }
-  // Who closed the pipe knows why.
+  // SIGPIPE needs no message: the reader has closed the pipe itself.
   remove_unfinished(signal_number != SIGPIPE);
   ::signal(signal_number, SIG_DFL);
   ::raise(signal_number);
@@ -63,7 +63,7 @@ void end(int signal_number) {
 mode_t permissions_at(const std::string& path) {
   struct stat info {};
   if (::stat(path.c_str(), &info) == 0) return info.st_mode & 07777U;
-  const mode_t mask = ::umask(0);  // there is no other way to read it; one thread opens files
+  const mode_t mask = ::umask(0);  // the only way to read it; a single thread opens files
   ::umask(mask);
   return 0666U & ~mask;
 }
@@ -142,7 +142,7 @@ Expected<Unfinished> Unfinished::beside(const std::string& path, const std::stri
     ::unlink(temporary.c_str());
     return fail(shown, "cannot be written: too many files at once");
   }
-  // A file system without permissions has the same for all.
+  // A file system without permissions gives all files the same ones.
   [[maybe_unused]] const int ignored = ::fchmod(fd, permissions);
   return Unfinished(fd, slot, path, shown);
 }

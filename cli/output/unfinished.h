@@ -1,8 +1,8 @@
 #pragma once
 
-// Files that are being written under a temporary name beside their place: each takes its own name
-// when it is whole. Whatever ends before (an error, a signal) leaves the earlier file as it was, or
-// none.
+// Files that are written under a temporary name beside their place; each gets its own name when it
+// is complete. If the program ends before that (an error, a signal), the earlier file, or none,
+// remains.
 
 #include <csignal>
 #include <cstddef>
@@ -12,13 +12,13 @@
 
 namespace vgyro::cli {
 
-/// First of all: SIGHUP, SIGINT, SIGPIPE and SIGTERM remove what is unfinished, say what was not
-/// written, and end the program as they would without this. A signal that the caller ignores stays
-/// ignored.
+/// Call first: SIGHUP, SIGINT, SIGPIPE and SIGTERM then remove unfinished files, report what was
+/// not written, and end the program as by default. A signal that the caller ignores stays ignored.
 void guard_unfinished();
 
-/// Until its end the first SIGINT only says that what has arrived is being finished: the writer of
-/// a pipe gets the same signal from the terminal, and its end is the end of the input.
+/// During its lifetime the first SIGINT only prints that the data received so far is being
+/// finished: the terminal sends the same signal to the writer of the pipe, and its end ends the
+/// input.
 class FinishOnInterrupt {
  public:
   explicit FinishOnInterrupt(bool wanted);
@@ -27,7 +27,7 @@ class FinishOnInterrupt {
   FinishOnInterrupt& operator=(const FinishOnInterrupt&) = delete;
 };
 
-/// While it lives these signals wait: for a few steps that must be done together.
+/// Delays these signals during its lifetime, for a few steps that must happen together.
 class HoldSignals {
  public:
   HoldSignals();
@@ -39,30 +39,30 @@ class HoldSignals {
   sigset_t before_{};
 };
 
-/// A file that is not whole yet.
+/// A file that is not complete yet.
 class Unfinished {
  public:
-  /// More at once than any command writes.
+  /// More than any command writes at once.
   static constexpr std::size_t kMost = 8;
 
-  /// Creates it beside `path`, with the permissions that the file at `path` has, or those of a new
-  /// one. Error with the system's reason, also where kMost are open. `shown` is its name for
-  /// people.
+  /// Creates it beside `path`, with the permissions of the file at `path`, or of a new one. Error
+  /// with the system's reason, also if kMost are open. `shown` is its name in messages.
   static Expected<Unfinished> beside(const std::string& path, const std::string& shown);
   Unfinished(Unfinished&& other) noexcept;
   Unfinished& operator=(Unfinished&&) = delete;
-  /// Removes what was not kept.
+  /// Removes the file unless it was kept.
   ~Unfinished();
 
   [[nodiscard]] int descriptor() const { return fd_; }
-  /// Gives it its own name, after all is written and closed. Error with the system's reason.
+  /// Gives the file its own name, after everything is written and closed. Error with the system's
+  /// reason.
   Expected<void> keep();
 
  private:
   Unfinished(int fd, std::size_t slot, std::string path, std::string shown);
   static constexpr std::size_t kNone = kMost;
   int fd_;
-  std::size_t slot_;  ///< what the signal handler knows of it; kNone: nothing to remove
+  std::size_t slot_;  ///< its entry for the signal handler; kNone: nothing to remove
   std::string path_;
   std::string shown_;
 };

@@ -63,7 +63,7 @@ TEST_F(ReadRegularFile, SaysWhatElseIsInTheWay) {
   EXPECT_EQ(read_regular_file(folder_, kMost).error().what, "is a directory, not a file");
 }
 
-// A file of /proc says that it is empty.
+// A file in /proc reports size 0.
 TEST_F(ReadRegularFile, BelievesTheBytesAndNotTheSizeThatTheFileTells) {
   const auto status = read_regular_file("/proc/self/status", 65'536);
   ASSERT_TRUE(status);

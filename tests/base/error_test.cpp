@@ -11,20 +11,20 @@ TEST(Error, TellsWhereWhatAndWhatWouldBeRight) {
   EXPECT_EQ(error.message(), "vgyro.toml:7: \"windw_s\" is no key; did you mean \"window_s\"?");
 }
 
-// Parts that are missing leave no punctuation behind.
+// Missing parts leave no punctuation behind.
 TEST(Error, LeavesOutWhatIsEmpty) {
   EXPECT_EQ((Error{"", "no gyro", ""}.message()), "no gyro");
   EXPECT_EQ((Error{"", "no gyro", "add [[gyro]]"}.message()), "no gyro; add [[gyro]]");
   EXPECT_EQ((Error{"can0", "is down", ""}.message()), "can0: is down");
 }
 
-// A line number stands behind the file as compilers write it, also beyond 16 bits.
+// A line number follows the file name as in compilers' errors, also beyond 16 bits.
 TEST(Error, NamesALineAsCompilersDo) {
   EXPECT_EQ(at_line("a/b.dbc", 1), "a/b.dbc:1");
   EXPECT_EQ(at_line("b.dbc", 4'000'000'000), "b.dbc:4000000000");
 }
 
-// fail() makes an Expected of any type, and the value type plays no part in the error.
+// fail() makes an Expected of any type; the type does not matter for the error.
 TEST(Error, TravelsInsideExpectedOfAnyType) {
   const Expected<int> number = fail("here", "wrong", "right");
   const Expected<std::string> text = fail("here", "wrong");

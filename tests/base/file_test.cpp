@@ -29,7 +29,7 @@ class ReadFile : public ::testing::Test {
   std::string folder_;
 };
 
-// DBC files come with any bytes: nothing is translated, dropped or taken for an end.
+// DBC files contain any bytes: none is translated, dropped or taken for an end.
 TEST_F(ReadFile, ReturnsTheBytesAsTheyAre) {
   std::string bytes;
   for (int i = 0; i < 100'000; ++i)
@@ -43,7 +43,7 @@ TEST_F(ReadFile, ReadsAnEmptyFile) {
   EXPECT_EQ(read_file(file_with("")).value(), "");
 }
 
-// Who mistyped a path must see the path and why.
+// For a mistyped path the error names the path and the cause.
 TEST_F(ReadFile, NamesTheFileThatIsMissing) {
   const std::string path = folder_ + "/missing.toml";
   const auto missing = read_file(path);
@@ -58,8 +58,8 @@ TEST_F(ReadFile, RefusesADirectory) {
   EXPECT_EQ(directory.error().message(), folder_ + ": is a directory, not a file");
 }
 
-// The first pages of a process's memory belong to nobody: the system opens the file and then fails
-// in the middle of it. What was read until then is not the file.
+// The first pages of a process's memory are unmapped: the system opens the file and then fails in
+// the middle of it. The bytes read until then are not the file.
 TEST_F(ReadFile, TakesNoErrorForTheEnd) {
   const auto broken = read_file("/proc/self/mem");
   ASSERT_FALSE(broken);
@@ -67,7 +67,7 @@ TEST_F(ReadFile, TakesNoErrorForTheEnd) {
             "/proc/self/mem: cannot be read to its end: Input/output error");
 }
 
-// `vgyro check <(generate)`: what has no size is read to its end, and no further than a file.
+// `vgyro check <(generate)`: a file without a size is read to its end, but not beyond the limit.
 TEST_F(ReadFile, ReadsPipesAndRefusesEndlessOnes) {
   std::array<int, 2> ends{};
   ASSERT_EQ(::pipe(ends.data()), 0);
@@ -81,7 +81,7 @@ TEST_F(ReadFile, ReadsPipesAndRefusesEndlessOnes) {
   EXPECT_EQ(endless.error().message(), "/dev/zero: is larger than 64 MiB");
 }
 
-// A recording given by mistake in place of a config must not fill the memory.
+// A recording given by mistake instead of a configuration must not fill the memory.
 TEST_F(ReadFile, RefusesMoreThan64MiBAndTakesExactlyThat) {
   constexpr std::uintmax_t kLimit = 64U << 20U;
   const std::string path = file_with("");

@@ -5,7 +5,7 @@
 namespace vgyro {
 namespace {
 
-// Of the test vectors that come with the algorithm.
+// From the test vectors published with the algorithm.
 static_assert(fnv1a("") == 0x811c9dc5U);
 static_assert(fnv1a("a") == 0xe40c292cU);
 static_assert(fnv1a("foobar") == 0xbf9cf968U);

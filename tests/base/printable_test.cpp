@@ -36,7 +36,7 @@ TEST(Printable, KeepsLinesApartWhereThereAreSeveral) {
   EXPECT_EQ(printable_lines("a\nb\x1b\n"), "a\nb\\x1b\n");
 }
 
-// A file's name or a word of a file cannot add lines to what the programs say.
+// A file's name or a word in it cannot add lines to the programs' output.
 TEST(Printable, MessagesOfErrorsAreOneLine) {
   const Error error{"evil\nerror: x:3", "there is no \x1b[31mred", "try\r\"blue\""};
   EXPECT_EQ(error.message(), "evil\\x0aerror: x:3: there is no \\x1b[31mred; try\\x0d\"blue\"");

@@ -12,7 +12,7 @@ namespace {
 const std::vector<std::string> kKeys = {"bus",  "dbc",   "message",     "rate",
                                         "name", "valid", "temperature", "counter"};
 
-// Straight from the definition; exponential, so for short words only.
+// Directly from the definition; exponential, so for short words only.
 std::size_t distance_by_definition(std::string_view a, std::string_view b) {
   if (a.empty() || b.empty()) return std::max(a.size(), b.size());
   const std::string_view a1 = a.substr(0, a.size() - 1);
@@ -26,7 +26,7 @@ std::size_t distance_by_definition(std::string_view a, std::string_view b) {
   return best;
 }
 
-// The fingers' usual slips each count one.
+// Usual typing errors count as one edit each.
 TEST(EditDistance, CountsInsertedDeletedReplacedAndSwappedLettersOnce) {
   EXPECT_EQ(edit_distance("window", "window"), 0U);
   EXPECT_EQ(edit_distance("windw", "window"), 1U);
@@ -37,13 +37,13 @@ TEST(EditDistance, CountsInsertedDeletedReplacedAndSwappedLettersOnce) {
   EXPECT_EQ(edit_distance("window", ""), 6U);
 }
 
-// Signal names are CamelCase in one file and capitals in the next: that is no typing error.
+// Signal names may be CamelCase in one file and capitals in the next: that is no typing error.
 TEST(EditDistance, IgnoresLetterCase) {
   EXPECT_EQ(edit_distance("ratez", "RateZ"), 0U);
   EXPECT_EQ(edit_distance("RTAEZ", "ratez"), 1U);
 }
 
-// The table of rows gives what the definition gives, whichever word comes first.
+// The table of rows agrees with the definition, in either order of the words.
 TEST(EditDistance, AgreesWithItsDefinitionOnRandomWords) {
   constexpr std::uint32_t kSeed = 20'240'601;
   SCOPED_TRACE(::testing::Message() << "seed " << kSeed);
@@ -62,7 +62,7 @@ TEST(EditDistance, AgreesWithItsDefinitionOnRandomWords) {
   }
 }
 
-// Of several near names the nearest is meant; of equally near ones the first.
+// Of several near names the nearest is suggested; of equally near ones the first.
 TEST(NearestName, FindsTheNearest) {
   EXPECT_EQ(nearest_name("mesage", kKeys), "message");
   EXPECT_EQ(nearest_name("TEMPERTURE", kKeys), "temperature");
@@ -70,14 +70,14 @@ TEST(NearestName, FindsTheNearest) {
   EXPECT_EQ(nearest_name("rate", {"rated", "rate"}), "rate");
 }
 
-// A far-fetched suggestion misleads more than none.
+// A far-fetched suggestion is worse than none.
 TEST(NearestName, FindsNothingWhereNothingIsNear) {
   EXPECT_EQ(nearest_name("quaternion", kKeys), std::nullopt);
   EXPECT_EQ(nearest_name("abc", {"xyz"}), std::nullopt);
   EXPECT_EQ(nearest_name("anything", {}), std::nullopt);
 }
 
-// Two slips are forgiven in short names, a third of the letters in long ones, and no more.
+// Two errors are accepted in short names, a third of the letters in long ones, and no more.
 TEST(NearestName, ForgivesAThirdOfALongName) {
   EXPECT_EQ(nearest_name("axxd", {"abcd"}), "abcd");
   EXPECT_EQ(nearest_name("axxx", {"abcd"}), std::nullopt);
@@ -85,14 +85,14 @@ TEST(NearestName, ForgivesAThirdOfALongName) {
   EXPECT_EQ(nearest_name("temperxxxxx1", {"temperature1"}), std::nullopt);
 }
 
-// The error's remedy: one name where one is meant, else the choice there is.
+// The error's remedy: one name if one is near, otherwise the list.
 TEST(SuggestName, SuggestsOneNameOrListsThemAll) {
   EXPECT_EQ(suggest_name("dbz", kKeys), "did you mean \"dbc\"?");
   EXPECT_EQ(suggest_name("zzzzzz", {"mean", "mutual"}), "one of: mean, mutual");
   EXPECT_EQ(suggest_name("zzzzzz", {}), "");
 }
 
-// A DBC file may hold hundreds of messages; the list stays readable and says that it goes on.
+// A DBC file may hold hundreds of messages; the list stays short and ends with "…".
 TEST(SuggestName, ListsAtMostTwelveNames) {
   std::vector<std::string> names(12, "N");
   EXPECT_EQ(suggest_name("zzzzzz", names), "one of: N, N, N, N, N, N, N, N, N, N, N, N");

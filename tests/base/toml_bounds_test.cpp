@@ -30,7 +30,7 @@ void expect_broken(const std::string& text, unsigned line, const std::string& wh
   EXPECT_FALSE(table.error().remedy.empty());
 }
 
-// The library's own bound is 256 values; keys it bounds by nothing.
+// The library's own limit is 256 nested values; it has none for keys.
 TEST(TomlBounds, RefuseNestingFarBelowWhatTheLibraryBears) {
   static_assert(kTomlNestingMax * 10 < 256 && kTomlKeyPartsMax * 10 < 256);
   const std::string deep = "nests deeper than 16 brackets";
@@ -59,7 +59,7 @@ TEST(TomlBounds, RefuseLongLinesManyLinesAndMuchText) {
   EXPECT_EQ(large.error().message().substr(0, 32), "a.toml: is larger than 1024 KiB;");
 }
 
-// Brackets and dots of texts and comments are only text, however the text ends.
+// Brackets and dots in strings and comments are only text, however the string ends.
 TEST(TomlBounds, LookIntoNoStringAndNoComment) {
   const std::string many = repeated("[", 40) + repeated(".", 40);
   for (const std::string& text :
@@ -72,7 +72,7 @@ TEST(TomlBounds, LookIntoNoStringAndNoComment) {
   }
 }
 
-// What ends a comment or a string for the library ends it here.
+// Everything that ends a comment or a string for the library ends it here.
 TEST(TomlBounds, LookBehindWhateverEndsALine) {
   const std::string deep = repeated("[", kTomlNestingMax + 1);
   for (const char* before :

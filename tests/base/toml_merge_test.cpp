@@ -1,4 +1,4 @@
-// What a later TOML file does to an earlier one, and where each value then says it was written.
+// The effect of a later TOML file on an earlier one, and the recorded origin of each value.
 
 #include "base/toml_merge.h"
 

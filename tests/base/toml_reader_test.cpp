@@ -8,7 +8,7 @@
 namespace vgyro {
 namespace {
 
-// People write °C and their own language beside the keys, and in names.
+// Comments and names contain °C and any language.
 TEST(ParseToml, TakesAnyLetterInCommentsAndStrings) {
   const auto table = parse_toml(
       "# Кут: °/s, Ω — 😀\n"
@@ -41,12 +41,12 @@ std::string utf8(unsigned c) {
   return {static_cast<char>(0xE0U | c >> 12U), tail(c >> 6U), tail(c)};
 }
 
-// At every kind of place; the sanitizers see what the parser makes of it.
+// At every kind of place; the sanitizers watch the parser.
 TEST(ParseToml, MeetsEveryLetterEverywhere) {
   for (unsigned c = 0x80; c < 0x10000; c += c < 0x500 ? 1 : 7) {
     if (c >= 0xD800 && c < 0xE000) continue;  // surrogates are no characters
     const std::string letter = utf8(c);
-    // These end a line for the parser, though not in TOML.
+    // These end a line for the parser, but not in TOML.
     const bool ends_line = c == 0x85 || c == 0x2028 || c == 0x2029;
     EXPECT_TRUE(ends_line || parse_toml("a = 1 # " + letter, "a.toml")) << std::hex << c;
     EXPECT_TRUE(parse_toml("a = '" + letter + "'", "a.toml")) << std::hex << c;
@@ -55,7 +55,7 @@ TEST(ParseToml, MeetsEveryLetterEverywhere) {
   }
 }
 
-// Damaged UTF-8 and odd pieces side by side.
+// Damaged UTF-8 and odd pieces in sequence.
 TEST(ParseToml, SurvivesAnyText) {
   const std::string pieces[] = {
       "°",    "я", "\xFF", "\xC3",   "\n",   "\"",  "'", "\"\"\"",  "'''", "#",
@@ -71,7 +71,7 @@ TEST(ParseToml, SurvivesAnyText) {
   }
 }
 
-// The wrong file has thousands of them.
+// A wrong file has thousands of unknown keys.
 TEST(TomlReader, NamesTheFirstUnknownKeysAndCountsTheRest) {
   std::string text = "known = 1\n";
   for (int i = 0; i < 47; ++i)
@@ -86,7 +86,7 @@ TEST(TomlReader, NamesTheFirstUnknownKeysAndCountsTheRest) {
   EXPECT_EQ(errors[10].what, "… and 37 more unknown keys in [a]");
 }
 
-// The library gives nothing for it, and a default would take its place without a word.
+// The library returns nothing for such an integer, and a default would silently replace it.
 TEST(TomlReader, ComplainsOfAnIntegerThatNoNumberHolds) {
   const auto table = parse_toml("a = 9007199254740993\nb = 9007199254740992\n", "a.toml");
   ASSERT_TRUE(table);

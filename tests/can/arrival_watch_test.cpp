@@ -1,4 +1,4 @@
-// Which stamps can be the time of an arrival: after waits, stops and set clocks too.
+// Which stamps can be the time of an arrival, also after waits, stops and set clocks.
 
 #include "can/arrival_watch.h"
 
@@ -21,7 +21,7 @@ TimePoint wall_at(Duration since) {
   return clocks_at(since).wall;
 }
 
-/// Looked at each second up to the tenth.
+/// The queue is checked every second up to the tenth.
 class ArrivalWatchTest : public testing::Test {
  protected:
   ArrivalWatchTest() {
@@ -59,8 +59,7 @@ TEST_F(ArrivalWatchTest, WhatWaitedWhileTheProcessWasStoppedHasComeWhenItsStampS
 }
 
 TEST_F(ArrivalWatchTest, WhatIsLeftOfALongQueueIsJudgedByWhenTheQueueWasLastEmpty) {
-  // Stopped for a minute; seconds later the queue still holds frames, so nobody says that it is
-  // empty.
+  // Stopped for a minute; seconds later the queue still holds frames, so it was not seen empty.
   const ArrivalWatch::Clocks now = clocks_at(73s);
   EXPECT_TRUE(watch.may_be_arrival(wall_at(12s), now));
 }
@@ -77,7 +76,7 @@ TEST_F(ArrivalWatchTest, AClockThatIsSetIsNoSendersFault) {
     EXPECT_TRUE(watch.may_be_arrival(now.wall - 1ms, now)) << "came after the clock was set";
     EXPECT_TRUE(watch.may_be_arrival(wall_at(10'100ms), now)) << "came before";
     EXPECT_FALSE(watch.may_be_arrival(now.wall - set_by / 2, now));
-    // The next looks are on the new clock.
+    // The next checks are on the new clock.
     ArrivalWatch later = watch;
     later.seen_empty(clocks_at(11s, set_by));
     EXPECT_TRUE(later.is_near(clocks_at(11'500ms, set_by).wall));
@@ -85,7 +84,7 @@ TEST_F(ArrivalWatchTest, AClockThatIsSetIsNoSendersFault) {
 }
 
 TEST_F(ArrivalWatchTest, ASuspendedHostsClockIsOneThatWasSet) {
-  // The steady clock stands still meanwhile.
+  // The steady clock stops during the suspension.
   const ArrivalWatch::Clocks now = clocks_at(10'400ms, 5h);
   EXPECT_TRUE(watch.may_be_arrival(wall_at(10'200ms), now));
   EXPECT_TRUE(watch.may_be_arrival(now.wall, now));

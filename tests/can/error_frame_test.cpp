@@ -51,7 +51,7 @@ TEST(ControllerWatch, CountsEveryCauseThatAFrameNames) {
   EXPECT_EQ(watch.state(), ControllerState::kActive) << "none of them says how it stands";
 }
 
-// Whoever may open a socket may write such frames.
+// Any program that may open a socket can write such frames.
 TEST(ControllerWatch, IsNotMovedByFramesOfAnotherKindOrCutShort) {
   ControllerWatch watch;
   Frame data = error_frame(kBusOff);

@@ -16,7 +16,7 @@ Frame frame_of(std::uint32_t id, std::uint8_t length) {
   return frame;
 }
 
-// Two frames are equal when the bus could not tell them apart: each thing it carries counts.
+// Two frames are equal if they are indistinguishable on the bus: every field of theirs counts.
 TEST(Frame, DiffersInEverythingThatTheBusCarries) {
   const Frame frame = frame_of(0x123, 8);
   EXPECT_EQ(frame, frame_of(0x123, 8));
@@ -39,7 +39,7 @@ TEST(Frame, DiffersInEverythingThatTheBusCarries) {
   }
 }
 
-// Buffers are used again: what an earlier, longer frame left behind the payload means nothing.
+// Buffers are reused: bytes of an earlier, longer frame after the payload have no meaning.
 TEST(Frame, IgnoresBytesBehindThePayload) {
   const Frame frame = frame_of(0x123, 3);
   Frame other = frame;
@@ -49,7 +49,7 @@ TEST(Frame, IgnoresBytesBehindThePayload) {
   EXPECT_EQ(frame.payload().size(), 3U);
 }
 
-// A remote frame asks for bytes and carries none, so only the number asked for counts.
+// A remote frame requests bytes and carries none, so only the requested number counts.
 TEST(Frame, OfRemoteFramesComparesOnlyTheLengthAskedFor) {
   Frame frame = frame_of(0x123, 5);
   frame.flags = kRemote;
@@ -60,7 +60,7 @@ TEST(Frame, OfRemoteFramesComparesOnlyTheLengthAskedFor) {
   EXPECT_NE(frame, other);
 }
 
-// A signal is only looked for where there is a payload.
+// Signals are read only from frames with a payload.
 TEST(Frame, CarriesDataUnlessRemoteOrError) {
   Frame frame = frame_of(0x123, 8);
   EXPECT_TRUE(frame.is_data());
@@ -72,7 +72,7 @@ TEST(Frame, CarriesDataUnlessRemoteOrError) {
   EXPECT_FALSE(frame.is_data());
 }
 
-// FD has sizes for 0 to 8 bytes and seven above; any payload goes into the smallest that holds it.
+// FD has sizes of 0 to 8 bytes and seven larger ones; a payload gets the smallest that holds it.
 TEST(FdPaddedLength, IsTheSmallestSizeThatHoldsThePayload) {
   const std::vector<std::size_t> sizes = {0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64};
   for (std::size_t bytes = 0; bytes <= kFdBytesMax; ++bytes) {
@@ -81,7 +81,7 @@ TEST(FdPaddedLength, IsTheSmallestSizeThatHoldsThePayload) {
   }
 }
 
-// Nothing larger than an FD frame can come out, whatever goes in.
+// The result never exceeds an FD frame, whatever the argument.
 TEST(FdPaddedLength, EndsAt64) {
   EXPECT_EQ(fd_padded_length(65), kFdBytesMax);
   EXPECT_EQ(fd_padded_length(SIZE_MAX), kFdBytesMax);

@@ -20,7 +20,7 @@ Frame numbered(std::uint32_t id) {
   return frame;
 }
 
-/// Answers with the scripted results, then with kSent; keeps the ids that it took.
+/// Returns the scripted results, then kSent; keeps the ids of the frames that it took.
 class FakeTransmitter final : public Transmitter {
  public:
   std::deque<SendResult> answers;
@@ -71,7 +71,7 @@ TEST(TransmitQueue, SendsNothingPastWhatWaits) {
   EXPECT_EQ(transmitter.attempts, 0);
 }
 
-// A refusal is met in one place, with its reason: the frame is kept and tried again in its time.
+// Refusals are handled in one place with their cause: the frame is kept and tried again when due.
 TEST(TransmitQueue, WhatIsRefusedAtOnceIsPushed) {
   TransmitQueue queue;
   FakeTransmitter transmitter;

@@ -1,6 +1,6 @@
 #!/usr/bin/python3
-"""Holds the BLF reader and writer against python-can's: each log is read back equal to its candump twin, to its stamps'
-resolution.
+"""Compares the BLF reader and writer with python-can's: each log reads back equal to its candump twin, to the
+resolution of its stamps.
 
 usage: blf_oracle_test.py LOG_TOOL VGYRO"""
 
@@ -21,7 +21,7 @@ from can.io.blf import BLFReader, BLFWriter
 import forms_oracle_test as forms
 from forms_oracle_test import LOG_TOOL, VGYRO, as_message, candump_line, random_records, run
 
-# python-can 4.1 takes dates for local time, as Vector's tools do.
+# python-can 4.1 reads dates as local time, like Vector's tools.
 os.environ["TZ"] = "UTC"
 time.tzset()
 
@@ -31,7 +31,7 @@ FD_SIZES = forms.FD_SIZES
 
 
 def objects_in(path):
-    """The objects of a file one behind the other, unpacked by zlib alone."""
+    """The objects of a file in sequence, unpacked by zlib alone."""
     data, content = path.read_bytes(), b""
     at = struct.unpack_from("<L", data, 4)[0]
     while at < len(data):
@@ -47,7 +47,7 @@ def objects_in(path):
 
 
 class Log:
-    """A BLF file put together by hand, in the variants that python-can reads and does not write."""
+    """A BLF file made by hand, in the variants that python-can reads but does not write."""
 
     def __init__(self, unit, head_version):
         self.unit = unit
@@ -80,7 +80,7 @@ class Log:
 
 class Reader(forms.Bench):
     def expect_python_can(self, path, records, resolution_ns=1000):
-        # python-can rounds its file's date to a millisecond; its intervals are those of floats.
+        # python-can rounds the file's date to a millisecond; its intervals have the rounding of floats.
         offset_ns = self.read(path)[0]["ns"] - records[0]["ns"]
         self.assertLessEqual(abs(offset_ns), 500_000)
         self.expect(path, records, offset_ns=offset_ns, resolution_ns=resolution_ns)
@@ -100,7 +100,7 @@ class Reader(forms.Bench):
                 self.expect_python_can(self.written(records, **options), records)
 
     def test_a_golden_file(self):
-        # Objects go on from container to container.
+        # Objects continue from container to container.
         golden = Path(__file__).resolve().parent / "golden"
         found, twin = self.read(golden / "python_can.blf"), self.read(golden / "python_can_mf4.log")
         self.assertEqual(len(found), len(twin))
@@ -133,7 +133,7 @@ class Reader(forms.Bench):
         self.assertEqual(records[1]["ns"], 1_000_000_000_500_000_000)
 
     def test_a_writer_that_was_killed(self):
-        # Whatever was whole is read, and where the log ends is said.
+        # Complete objects are read, and the place where the log ends is reported.
         records = random_records(SEED + 2)
         data = self.written(records, max_container_size=5000).read_bytes()
         rng = random.Random(SEED + 2)
@@ -148,7 +148,7 @@ class Reader(forms.Bench):
             self.assertGreaterEqual(len(found), int((cut - 5000) / len(data) * len(twins)) - 200)
 
     def random_objects(self, rng, log):
-        """Objects of all kinds; returns what is in them, python-can's reader being the judge."""
+        """Adds random objects of all kinds to the log."""
         ticks = 0
         for _ in range(2000):
             ticks += rng.choice((0, 1, 1000, 123_456))

@@ -1,4 +1,4 @@
-// BLF files put together byte by byte, odd and damaged ones; tests/canlog/blf_oracle_test.py has
+// BLF files made byte by byte, odd and damaged ones; tests/canlog/blf_oracle_test.py uses
 // python-can's.
 
 #include <cstdlib>
@@ -89,7 +89,7 @@ std::string stored(const std::string& plain) {
   return container(plain, 0, plain.size());
 }
 
-/// Of 14 November 2023, 22:13:20 in UTC, or without a date.
+/// A head dated 14 November 2023, 22:13:20 UTC, or without a date.
 std::string file_head(bool dated = true, std::uint32_t objects = 1) {
   std::string head = "LOGG" + little(std::uint32_t{144}) + std::string(24, '\0') + little(objects) +
                      std::string(4, '\0');
@@ -217,15 +217,15 @@ TEST_F(Blf, ErrorFramesOfEveryKind) {
 
 TEST_F(Blf, OddObjectsAreCountedAndThoseBehindThemRead) {
   const std::vector<std::string> odd{
-      event(1, 0, message(1, 0, 16, 1, "")),                   // a length code
-      event(1, 0, message(1, 0, 1, 0x800, "")),                // an identifier
-      event(1, 0, "short"),                                    // fields
-      event(1, UINT64_MAX, message(1, 0, 1, 1, "")),           // a stamp
+      event(1, 0, message(1, 0, 16, 1, "")),                   // wrong length code
+      event(1, 0, message(1, 0, 1, 0x800, "")),                // wrong identifier
+      event(1, 0, "short"),                                    // too short for its fields
+      event(1, UINT64_MAX, message(1, 0, 1, 1, "")),           // wrong stamp
       event(100, 0, fd_message(0x80, 5, 1, 5, "")),            // FD has no remote frames
       event(100, 0, fd_message(0, 15, 1, 65, "")),             // more than 64 bytes
-      object_head(16, 1, 40, 1) + std::string(24, 'x'),        // no stamp
-      object_head(15, 1, 40, 1) + std::string(24, 'x'),        // a head
-      object_head(32, 1, 5'000, 1) + std::string(4'984, 'x'),  // a size
+      object_head(16, 1, 40, 1) + std::string(24, 'x'),        // no room for a stamp
+      object_head(15, 1, 40, 1) + std::string(24, 'x'),        // wrong size of the head
+      object_head(32, 1, 5'000, 1) + std::string(4'984, 'x'),  // wrong size
   };
   for (const std::string& object : odd) {
     const auto log = read(file_head() + packed(frame(1, 'a') + object + frame(2, 'b')));

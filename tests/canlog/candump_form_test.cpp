@@ -1,4 +1,4 @@
-// What one line of a log means, form by form.
+// The meaning of one line of a log, form by form.
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -27,7 +27,7 @@ ParsedLine parse(std::string_view line) {
   return parsed;
 }
 
-/// The frame of "ID#..." alone; the line must be in order.
+/// The frame in "ID#..." alone; the line must be valid.
 can::Frame frame_in(const std::string& text) {
   const ParsedLine parsed = parse("(1700000000.123456) can0 " + text);
   EXPECT_EQ(parsed.kind, LineKind::kFrame) << text << ": " << parsed.why;
@@ -53,7 +53,7 @@ std::string why_malformed_frame(const std::string& text) {
   return why_malformed("(1700000000.123456) can0 " + text);
 }
 
-// The number of digits tells standard from extended, not the number's size.
+// The number of digits decides between standard and extended, not the number's size.
 TEST(CandumpForm, ReadsStandardAndExtendedFrames) {
   EXPECT_EQ(frame_in("123#DEADBEEF"), frame_with(0x123, 0, {0xDE, 0xAD, 0xBE, 0xEF}));
   EXPECT_EQ(frame_in("000#"), frame_with(0, 0));
@@ -62,7 +62,7 @@ TEST(CandumpForm, ReadsStandardAndExtendedFrames) {
   EXPECT_EQ(frame_in("1FFFFFFF#"), frame_with(0x1FFFFFFF, can::kExtended));
 }
 
-// can-utils' players read small letters and dots between bytes, so logs contain them.
+// can-utils' players accept lower case and dots between bytes, so logs contain them.
 TEST(CandumpForm, ReadsSmallLettersAndDotsBetweenBytes) {
   EXPECT_EQ(frame_in("12a#deadbeef"), frame_with(0x12A, 0, {0xDE, 0xAD, 0xBE, 0xEF}));
   EXPECT_EQ(frame_in("12A#DE.AD.BEEF"), frame_with(0x12A, 0, {0xDE, 0xAD, 0xBE, 0xEF}));
@@ -78,7 +78,7 @@ TEST(CandumpForm, ReadsErrorFrames) {
             frame_with(0x4, can::kError, {0, 4, 0, 0, 0, 0, 0, 0}));
 }
 
-// Remote frames say how much they ask for, where the log's writer knew it.
+// Remote frames state the requested length, if the log's writer knew it.
 TEST(CandumpForm, ReadsRemoteFrames) {
   EXPECT_EQ(frame_in("123#R"), remote_frame(0x123, 0, 0, 0));
   EXPECT_EQ(frame_in("123#r"), remote_frame(0x123, 0, 0, 0));
@@ -89,7 +89,7 @@ TEST(CandumpForm, ReadsRemoteFrames) {
   EXPECT_EQ(frame_in("123#R8_F"), remote_frame(0x123, 0, 8, 15));
 }
 
-// A classic frame may claim 9 to 15 in its DLC and still carries 8 bytes.
+// A classic frame may have 9 to 15 in its DLC but still carries 8 bytes.
 TEST(CandumpForm, ReadsRawDlcAboveEight) {
   for (unsigned dlc = 9; dlc <= 15; ++dlc) {
     can::Frame frame = frame_with(0x123, 0, {0x11, 0x22, 0x33, 0x44, 0x55, 0x66, 0x77, 0x88});
@@ -99,7 +99,8 @@ TEST(CandumpForm, ReadsRawDlcAboveEight) {
   }
 }
 
-// Nibble 1 is the bit-rate switch and 2 the error state; 4 says FD once more, or not in old logs.
+// Bit 0 is the bit-rate switch and bit 1 the error state; bit 2 repeats that the frame is FD,
+// except in old logs.
 TEST(CandumpForm, ReadsFdFlagsWithAndWithoutTheFdfBit) {
   for (unsigned nibble = 0; nibble < 16; ++nibble) {
     unsigned flags = can::kFd;
@@ -112,7 +113,7 @@ TEST(CandumpForm, ReadsFdFlagsWithAndWithoutTheFdfBit) {
             frame_with(0x12345678, can::kExtended | can::kFd | can::kBitRateSwitch));
 }
 
-// An FD frame holds up to 64 bytes; every length up to there is taken, none is padded.
+// An FD frame holds up to 64 bytes; every length up to that is accepted, none is padded.
 TEST(CandumpForm, ReadsFdPayloadsOfEveryLength) {
   std::string text = "123##0";
   std::vector<std::uint8_t> bytes;
@@ -124,7 +125,7 @@ TEST(CandumpForm, ReadsFdPayloadsOfEveryLength) {
   EXPECT_EQ(why_malformed_frame(text), "payload: more bytes than the frame can hold");
 }
 
-// XL frames are none of the product's business, but a log with them loses no line.
+// The product does not use XL frames, but a log with them loses no line.
 TEST(CandumpForm, ReadsXlFrames) {
   const ParsedLine parsed = parse("(1700000000.123456) can0 45123#81:00:12345678#11223344AA");
   EXPECT_EQ(parsed.kind, LineKind::kXl) << parsed.why;
@@ -141,7 +142,7 @@ TEST(CandumpForm, ReadsXlFrames) {
   EXPECT_EQ(parse("(1.0) can0 007FF#FF:EE:FFFFFFFF#").xl.sdt, 0xEE);
 }
 
-// 2048 bytes are an XL frame, 2049 are none.
+// 2048 bytes are an XL frame, 2049 are not.
 TEST(CandumpForm, ReadsTheLongestXlFrameAndNothingLonger) {
   std::string text = "00123#80:00:00000000#";
   for (std::size_t i = 0; i < kXlBytesMax; ++i)
@@ -153,7 +154,7 @@ TEST(CandumpForm, ReadsTheLongestXlFrameAndNothingLonger) {
   EXPECT_EQ(why_malformed_frame(text + "5A"), "payload: more bytes than the frame can hold");
 }
 
-// Microseconds and nanoseconds both come out exact; the writer can then write what it read.
+// Microseconds and nanoseconds are both exact, so the writer can reproduce them.
 TEST(CandumpForm, ReadsStampsOfSixAndNineDigits) {
   const ParsedLine micro = parse("(1700000000.123456) can0 123#");
   EXPECT_EQ(to_ns(micro.record.stamp), 1'700'000'000'123'456'000);
@@ -163,7 +164,7 @@ TEST(CandumpForm, ReadsStampsOfSixAndNineDigits) {
   EXPECT_EQ(nano.record.fraction_digits, 9);
 }
 
-// Logs may begin at zero, and hand-made ones spare digits.
+// Logs may begin at zero, and hand-made ones may have fewer digits.
 TEST(CandumpForm, ReadsStampsFromZeroAndOfAnyWidth) {
   EXPECT_EQ(to_ns(parse("(0.000000) can0 123#").record.stamp), 0);
   EXPECT_EQ(to_ns(parse("(0000000000.000001) can0 123#").record.stamp), 1'000);
@@ -196,7 +197,7 @@ TEST(CandumpForm, ReadsLinesThatEndInCarriageReturn) {
   EXPECT_EQ(parse("\r").kind, LineKind::kOther);
 }
 
-// What does not begin with "(" is no frame, and players pass over it without a word.
+// A line that does not begin with "(" is no frame; players ignore it silently.
 TEST(CandumpForm, TakesLinesWithoutAParenthesisForRemarks) {
   for (const char* line :
        {"", "DROPCOUNT: dropped 3 CAN frames on 'can0' socket (total drops 3)", "# a remark",
@@ -205,12 +206,12 @@ TEST(CandumpForm, TakesLinesWithoutAParenthesisForRemarks) {
   }
 }
 
-// The cause stands in the summary; it must name the part of the line that is wrong.
+// The cause appears in the summary, so it must name the wrong part of the line.
 TEST(CandumpForm, TellsWhatIsWrongWithAStamp) {
-  EXPECT_EQ(why_malformed("("), "stamp: the seconds are no number");
-  EXPECT_EQ(why_malformed("(-1.000000) can0 123#"), "stamp: the seconds are no number");
-  EXPECT_EQ(why_malformed("(nan) can0 123#"), "stamp: the seconds are no number");
-  EXPECT_EQ(why_malformed("(12345678901.0) can0 123#"), "stamp: the seconds are no number");
+  EXPECT_EQ(why_malformed("("), "stamp: the seconds are not a number");
+  EXPECT_EQ(why_malformed("(-1.000000) can0 123#"), "stamp: the seconds are not a number");
+  EXPECT_EQ(why_malformed("(nan) can0 123#"), "stamp: the seconds are not a number");
+  EXPECT_EQ(why_malformed("(12345678901.0) can0 123#"), "stamp: the seconds are not a number");
   EXPECT_EQ(why_malformed("(9000000001.0) can0 123#"), "stamp: beyond the year 2255");
   EXPECT_EQ(why_malformed("(17) can0 123#"), "stamp: no decimal point");
   EXPECT_EQ(why_malformed("(1,5) can0 123#"), "stamp: no decimal point");
@@ -220,8 +221,8 @@ TEST(CandumpForm, TellsWhatIsWrongWithAStamp) {
   EXPECT_EQ(why_malformed("(1.5e3) can0 123#"), "stamp: no closing parenthesis");
 }
 
-// asc2log of can-utils 2020.11, which Debian 12 has, prints a whole million of microseconds where
-// two stamps add up to exactly that: taken for a fraction, the line would be 0.9 s too early.
+// asc2log of can-utils 2020.11, which Debian 12 has, prints a whole million of microseconds if two
+// stamps add up to exactly that: read as a fraction, the line would be 0.9 s too early.
 TEST(CandumpForm, CarriesAMillionMicrosecondsIntoTheNextSecond) {
   EXPECT_EQ(parse("(1795884748.1000000) can0 123#01 R").record.stamp,
             parse("(1795884749.000000) can0 123#01 R").record.stamp);
@@ -229,7 +230,7 @@ TEST(CandumpForm, CarriesAMillionMicrosecondsIntoTheNextSecond) {
   EXPECT_EQ(parse("(1.1000001) can0 123#01").record.stamp, time_from_ns(1'100'000'100));
 }
 
-// A line that lost its interface shifts everything; the frame must not become the name.
+// In a line without its interface every field is shifted; the frame must not become the name.
 TEST(CandumpForm, TellsWhatIsWrongWithAnInterface) {
   EXPECT_EQ(why_malformed("(1.5)"), "no interface name");
   EXPECT_EQ(why_malformed("(1.5) "), "no interface name");
@@ -239,11 +240,11 @@ TEST(CandumpForm, TellsWhatIsWrongWithAnInterface) {
   EXPECT_EQ(parse("(1.5) " + std::string(31, 'c') + " 123#11").interface, std::string(31, 'c'));
 }
 
-// A digit more or less would be another message: no identifier is guessed.
+// One digit more or less would be another message: identifiers are never guessed.
 TEST(CandumpForm, TellsWhatIsWrongWithAnIdentifier) {
-  EXPECT_EQ(why_malformed("(1.5) can0"), "no \"#\" behind the identifier");
-  EXPECT_EQ(why_malformed_frame("123"), "no \"#\" behind the identifier");
-  EXPECT_EQ(why_malformed_frame("12G#11"), "no \"#\" behind the identifier");
+  EXPECT_EQ(why_malformed("(1.5) can0"), "no \"#\" after the identifier");
+  EXPECT_EQ(why_malformed_frame("123"), "no \"#\" after the identifier");
+  EXPECT_EQ(why_malformed_frame("12G#11"), "no \"#\" after the identifier");
   EXPECT_EQ(why_malformed_frame("#11"), "identifier: neither 3 nor 8 hex digits");
   EXPECT_EQ(why_malformed_frame("12#11"), "identifier: neither 3 nor 8 hex digits");
   EXPECT_EQ(why_malformed_frame("1234#11"), "identifier: neither 3 nor 8 hex digits");
@@ -254,23 +255,25 @@ TEST(CandumpForm, TellsWhatIsWrongWithAnIdentifier) {
   EXPECT_EQ(why_malformed_frame("80000123#11"), "identifier: above 1FFFFFFF");
 }
 
-// A payload that is not whole would be decoded to a wrong rate.
+// An incomplete payload would be decoded to a wrong rate.
 TEST(CandumpForm, TellsWhatIsWrongWithAPayload) {
   EXPECT_EQ(why_malformed_frame("123#112"), "payload: an odd number of hex digits");
   EXPECT_EQ(why_malformed_frame("123#1.1"), "payload: an odd number of hex digits");
   EXPECT_EQ(why_malformed_frame("123##1112"), "payload: an odd number of hex digits");
   EXPECT_EQ(why_malformed_frame("123#112233445566778899"),
             "payload: more bytes than the frame can hold");
-  EXPECT_EQ(why_malformed_frame("123##"), "FD frame: no flags behind \"##\"");
-  EXPECT_EQ(why_malformed_frame("123##G"), "FD frame: no flags behind \"##\"");
+  EXPECT_EQ(why_malformed_frame("123##"), "FD frame: no flags after \"##\"");
+  EXPECT_EQ(why_malformed_frame("123##G"), "FD frame: no flags after \"##\"");
   EXPECT_EQ(why_malformed_frame("123#R9"), "remote frame: length above 8");
-  EXPECT_EQ(why_malformed_frame("123#1122334455667788_"), "raw DLC: \"_\" needs 9 to F behind it");
-  EXPECT_EQ(why_malformed_frame("123#1122334455667788_8"), "raw DLC: \"_\" needs 9 to F behind it");
+  EXPECT_EQ(why_malformed_frame("123#1122334455667788_"),
+            "raw DLC: \"_\" must be followed by 9 to F");
+  EXPECT_EQ(why_malformed_frame("123#1122334455667788_8"),
+            "raw DLC: \"_\" must be followed by 9 to F");
   EXPECT_EQ(why_malformed_frame("123#11223344556677_9"), "raw DLC: only with 8 bytes");
   EXPECT_EQ(why_malformed_frame("123#R7_9"), "raw DLC: only with 8 bytes");
 }
 
-// Five digits promise an XL frame; what does not keep the promise is told as such.
+// Five digits begin an XL frame; errors after them are reported as those of an XL frame.
 TEST(CandumpForm, TellsWhatIsWrongWithAnXlFrame) {
   const std::string form = "XL frame: not VVPPP#FF:SS:AAAAAAAA#";
   EXPECT_EQ(why_malformed_frame("45123#"), form);
@@ -283,22 +286,22 @@ TEST(CandumpForm, TellsWhatIsWrongWithAnXlFrame) {
   EXPECT_EQ(why_malformed_frame("45123#81:00:12345678#1"), "payload: an odd number of hex digits");
 }
 
-// Letters that stick to the payload, or stand there twice, are damage and no direction.
+// Letters attached to the payload, or two of them, are damage and not a direction.
 TEST(CandumpForm, TellsThatSomethingStandsBehindTheFrame) {
   for (const char* text : {"123#11G", "123#11 X", "123#11 R T", "123#11 RT", "123#11R", "123#T",
                            "123##1R", "123#R T5", "123#R5T", "123#1122334455667788_9A", "123#R55",
                            "123#11 22", "123#11\r", "123#11-22", "45123#81:00:12345678#11T"}) {
     const std::string line =
         std::string(text) + (std::string_view(text).back() == '\r' ? "\r" : "");
-    EXPECT_EQ(why_malformed_frame(line), "something stands behind the frame") << text;
+    EXPECT_EQ(why_malformed_frame(line), "unexpected text after the frame") << text;
   }
 }
 
-// NUL bytes come from disks that lost power; they end no string here.
+// NUL bytes come from disks that lost power; they do not end a string here.
 TEST(CandumpForm, TakesNulBytesForDamage) {
   EXPECT_EQ(why_malformed(std::string("(1.5) can0 123#11\0\0", 19)),
-            "something stands behind the frame");
-  EXPECT_EQ(why_malformed(std::string("(\0\0\0", 4)), "stamp: the seconds are no number");
+            "unexpected text after the frame");
+  EXPECT_EQ(why_malformed(std::string("(\0\0\0", 4)), "stamp: the seconds are not a number");
   EXPECT_EQ(parse(std::string(20, '\0')).kind, LineKind::kOther);
 }
 

@@ -1,6 +1,6 @@
 #!/usr/bin/python3
-"""Holds the log reader and writer against independent ones: python-can's, and the parser and printer of can-utils
-itself, which sit in log2asc (log in) and asc2log (log out).
+"""Compares the log reader and writer with independent ones: python-can's, and the parser and printer of can-utils
+itself, which are in log2asc (log in) and asc2log (log out).
 
 usage: candump_oracle_test.py LOG_TOOL"""
 
@@ -22,7 +22,7 @@ SEED = 20240605
 FRAMES = 5000
 FD_SIZES = (0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64)
 START_NS = 1_700_000_000_999_000_000
-# python-can keeps seconds as a float, whose step at this date is 0.24 µs.
+# python-can keeps seconds as a float, with a step of 0.24 µs at this date.
 PYTHON_CAN_NS = 300
 
 
@@ -155,7 +155,7 @@ class PythonCan(unittest.TestCase):
             self.assertLess(abs(message.timestamp - record["ns"] / 1e9), PYTHON_CAN_NS * 1e-9)
 
     def test_the_product_reads_python_cans_error_frames_and_numbered_channels(self):
-        # python-can keeps nothing of an error frame but that it was one, and writes no direction for it.
+        # python-can keeps nothing of an error frame but its kind, and writes no direction for it.
         text = written_by_python_can([Message(timestamp=1.5, channel=2, is_error_frame=True)])
         self.assertEqual(text, "(1.500000) can2 20000080#\n")
         ours, _ = read_with_product(text)
@@ -171,14 +171,14 @@ class PythonCan(unittest.TestCase):
         text = write_with_product([record])
         self.assertTrue(read_by_python_can(text)[0].is_error_frame)
         self.assertEqual(read_with_product(text)[0], [record])
-        # Of every other class python-can makes a data frame with an extended identifier; can-utils and the product do
-        # not: an error frame must never reach a signal.
+        # python-can turns error frames of every other class into data frames with an extended identifier; can-utils
+        # and the product do not: an error frame must never reach a signal.
         text = write_with_product([record | {"id": 0x4}])
         self.assertFalse(read_by_python_can(text)[0].is_error_frame)
         self.assertTrue(read_with_product(text)[0][0]["error"])
 
     def test_the_product_reads_what_python_can_chokes_on(self):
-        # Forms of newer can-utils that python-can 4.1 does not know.
+        # Forms of newer can-utils that python-can 4.1 does not support.
         for text in ("(1.000000) can0 123#1122334455667788_B\n", "DROPCOUNT: dropped 1 CAN frame\n",
                      "(1.000000) can0 123##AAABB\n"):
             with self.subTest(text), self.assertRaises(ValueError):
@@ -187,7 +187,7 @@ class PythonCan(unittest.TestCase):
 
 
 def through_can_utils(text):
-    """The log as log2asc reads and asc2log prints it again; its date is another, its intervals are the same."""
+    """The log after log2asc and asc2log, which change its date but not its intervals."""
     with tempfile.TemporaryDirectory() as folder:
         log, asc, back = (Path(folder) / name for name in ("in.log", "mid.asc", "out.log"))
         log.write_text(text)
@@ -227,7 +227,7 @@ class CanUtils(unittest.TestCase):
         ours, counts = read_with_product(odd)
         self.assertEqual(counts["frames"], 5)
         self.assertEqual(ours[3]["raw_dlc"], 11)
-        ours[3]["raw_dlc"] = 0  # the ASC format between the two tools has no place for it
+        ours[3]["raw_dlc"] = 0  # the ASC format between the two tools cannot hold it
         shift = theirs[0]["ns"] - ours[0]["ns"]
         self.assertEqual(theirs, [r | {"ns": r["ns"] + shift} for r in ours])
 

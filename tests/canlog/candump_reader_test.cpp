@@ -1,4 +1,4 @@
-// Whole logs: nothing lost around damage, and never a difference by how the bytes arrive.
+// Whole logs: nothing is lost around damage, and the result is independent of how the bytes arrive.
 
 #include <array>
 #include <random>
@@ -39,7 +39,7 @@ void expect_same(const ReadLog& a, const ReadLog& b) {
     ASSERT_EQ(a.records[i], b.records[i]) << "record " << i;
 }
 
-/// A line as some writer may have written it, sometimes with one byte or more gone wrong.
+/// Makes lines as various writers write them, sometimes with one or more bytes corrupted.
 class LineMaker {
  public:
   explicit LineMaker(std::uint64_t seed) : random_(seed) {}
@@ -114,7 +114,7 @@ class LineMaker {
   std::int64_t stamp_ns_ = 1'700'000'000'000'000'000;
 };
 
-// An empty log is no error here; that nothing was in it is for the caller to say.
+// An empty log is no error here; the caller reports that it was empty.
 TEST(CandumpReader, ReadsAnEmptyLog) {
   const ReadLog log = read_text("");
   EXPECT_TRUE(log.records.empty());
@@ -123,7 +123,7 @@ TEST(CandumpReader, ReadsAnEmptyLog) {
   EXPECT_EQ(log.error, "");
 }
 
-// A damaged line costs itself: its neighbours are read, and its number leads the user to it.
+// A damaged line affects only itself: its neighbours are read, and the error holds its number.
 TEST(CandumpReader, LosesNothingAroundAMalformedLine) {
   const ReadLog log = read_text(
       "(1.000000) can0 101#11\n"
@@ -142,7 +142,7 @@ TEST(CandumpReader, LosesNothingAroundAMalformedLine) {
             "2: payload: an odd number of hex digits; 6: stamp: no closing parenthesis");
 }
 
-// A damaged line among thousands of usual ones, which take the quick path.
+// A damaged line among thousands of usual ones, which take the fast path.
 TEST(CandumpReader, LosesNothingAroundAMalformedLineInTheMiddleOfALongLog) {
   const ReadLog log = read_text(numbered_lines(0, 5000) + "(1700000000.00500 can0 123#11\n" +
                                 numbered_lines(5000, 9000));
@@ -152,7 +152,7 @@ TEST(CandumpReader, LosesNothingAroundAMalformedLineInTheMiddleOfALongLog) {
   EXPECT_EQ(malformed(log.counts), std::vector<std::string>{"5001: stamp: no closing parenthesis"});
 }
 
-// A garbage file must not fill the memory with complaints.
+// A garbage file must not fill the memory with errors.
 TEST(CandumpReader, KeepsTheFirstFiveMalformedLinesAndCountsAll) {
   std::string text;
   for (int i = 0; i < 100; ++i)
@@ -160,13 +160,13 @@ TEST(CandumpReader, KeepsTheFirstFiveMalformedLinesAndCountsAll) {
   const ReadLog log = read_text(text);
   EXPECT_EQ(log.counts.malformed_lines, 50U);
   EXPECT_EQ(log.counts.frames, 50U);
-  const std::string why = ": stamp: the seconds are no number";
+  const std::string why = ": stamp: the seconds are not a number";
   EXPECT_EQ(malformed(log.counts),
             (std::vector<std::string>{"1" + why, "3" + why, "5" + why, "7" + why, "9" + why}));
 }
 
-// The last line of a log that is still written, or was cut, may lack half of its payload and still
-// look like a frame.
+// The last line of a log that is still being written, or was cut, may lack half of its payload and
+// still look like a frame.
 TEST(CandumpReader, DoesNotUseACutOffLastLine) {
   const ReadLog log = read_text(numbered_lines(0, 3) + "(1700000000.000003) can0 123#1122");
   EXPECT_EQ(ids(log), (std::vector<std::uint32_t>{0, 1, 2}));
@@ -175,7 +175,7 @@ TEST(CandumpReader, DoesNotUseACutOffLastLine) {
   EXPECT_EQ(read_text("(1700000000.000003) can0 123#1122").counts.cut_off_lines, 1U);
 }
 
-// The buffer ends somewhere; a line that does not fit can be no frame, and the next ones are read.
+// A line that does not fit into the buffer can be no frame; the next ones are read.
 TEST(CandumpReader, CountsALineLongerThanTheBufferAndGoesOn) {
   for (const std::size_t length : {LogSource::kBufferBytes - 1, LogSource::kBufferBytes,
                                    LogSource::kBufferBytes + 1, 3 * LogSource::kBufferBytes}) {
@@ -190,7 +190,7 @@ TEST(CandumpReader, CountsALineLongerThanTheBufferAndGoesOn) {
   }
 }
 
-// The same at the end of the log, where no newline will ever come.
+// The same at the end of the log, where no newline follows.
 TEST(CandumpReader, CountsAnOverlongLastLineOnce) {
   const ReadLog log = read_text(
       fmt::format("{}({}", numbered_lines(0, 2), std::string(2 * LogSource::kBufferBytes, '1')));
@@ -198,7 +198,7 @@ TEST(CandumpReader, CountsAnOverlongLastLineOnce) {
   EXPECT_EQ(log.counts.malformed_lines + log.counts.cut_off_lines, 1U);
 }
 
-// Interfaces are numbered in order of appearance, however long and similar their names are.
+// Interfaces are numbered in order of appearance, however long and similar their names.
 TEST(CandumpReader, TellsInterfacesApart) {
   std::vector<std::string> names = {"a_long_interface", "can0",    "can", "can00", "CAN0", "vcan0",
                                     "sevenxx",          "eightxxx"};
@@ -214,7 +214,8 @@ TEST(CandumpReader, TellsInterfacesApart) {
     ASSERT_EQ(log.records[i].interface, names[i % names.size()]);
 }
 
-// The table is bounded: frames of a 65th interface are counted, those of the first 64 still read.
+// The table is bounded: frames of a 65th interface are counted, those of the first 64 are still
+// read.
 TEST(CandumpReader, RefusesMoreThan64Interfaces) {
   std::string text;
   for (int round = 0; round < 2; ++round) {
@@ -228,7 +229,7 @@ TEST(CandumpReader, RefusesMoreThan64Interfaces) {
   EXPECT_EQ(malformed(log.counts)[0], "65: more than 64 different interfaces");
 }
 
-// Order is the log's: whether time may go back is for the pipeline to judge.
+// The log's order is kept: the pipeline decides whether time may go back.
 TEST(CandumpReader, PassesOnStampsThatGoBack) {
   const ReadLog log = read_text(
       "(1700000000.999999) can0 101#\n(1700000001.000000) can0 102#\n(1700000000.999998) can0 "
@@ -242,7 +243,7 @@ TEST(CandumpReader, PassesOnStampsThatGoBack) {
                                        1'700'000'000'999'998'000, 0, 1'700'000'001'000'001'000}));
 }
 
-// Reading must not depend on where read() happened to stop.
+// The result must not depend on where read() stopped.
 TEST(CandumpReader, ReadsTheSameInChunksOfAnySize) {
   SCOPED_TRACE(::testing::Message() << "seed " << kSeed);
   LineMaker lines(kSeed);
@@ -261,7 +262,7 @@ TEST(CandumpReader, ReadsTheSameInChunksOfAnySize) {
   }
 }
 
-// However many records are asked for at once, and wherever a block ends among them.
+// However many records are requested at once, and wherever a block ends among them.
 TEST(CandumpReader, HandsOutTheSameRecordsInBatches) {
   SCOPED_TRACE(::testing::Message() << "seed " << kSeed);
   LineMaker lines(kSeed);
@@ -293,8 +294,8 @@ TEST(CandumpReader, HandsOutTheSameRecordsInBatches) {
   }
 }
 
-// Who follows a live log writes out what a line has brought before the next one is waited for: a
-// batch holds no more than has arrived.
+// A program that follows a live log prints each line before it waits for the next: a batch holds no
+// more than has arrived.
 TEST(CandumpReader, NeverWaitsForTheRestOfABatch) {
   const std::string line = "(1700000000.000000) can0 123#11\n";
   CandumpReader reader(log_from_text(line + line + line, line.size()));
@@ -308,7 +309,7 @@ TEST(CandumpReader, NeverWaitsForTheRestOfABatch) {
   EXPECT_EQ(reader.next_batch(room), 0U);
 }
 
-// The quick path judges usual lines by other means than parse_line(); they may never disagree.
+// The fast path judges usual lines differently from parse_line(); the two must always agree.
 TEST(CandumpReader, AgreesWithParseLineOnRandomAndDamagedLines) {
   for (std::uint64_t seed = kSeed; seed < kSeed + 10; ++seed) {
     SCOPED_TRACE(::testing::Message() << "seed " << seed);
@@ -324,8 +325,8 @@ TEST(CandumpReader, AgreesWithParseLineOnRandomAndDamagedLines) {
   }
 }
 
-// Every single changed byte of a usual line, between lines that have taught the reader its second
-// and its interface.
+// Every change of a single byte in a usual line, between lines from which the reader has learned
+// second and interface.
 TEST(CandumpReader, AgreesWithParseLineOnEveryChangeOfOneByte) {
   for (const std::string line : {"(1700000000.123456) can0 1A3#0123456789ABCDEF\n",
                                  "(1700000000.123456) can0 1ABCDEF3#0123456789abcdef\n",
@@ -342,7 +343,7 @@ TEST(CandumpReader, AgreesWithParseLineOnEveryChangeOfOneByte) {
   }
 }
 
-// Few names are compared quickly, and one may begin as another one does.
+// The fast path compares few names, and one may be the beginning of another.
 TEST(CandumpReader, TellsManyInterfacesApart) {
   SCOPED_TRACE(::testing::Message() << "seed " << kSeed);
   constexpr std::array kNames{"c",       "can",      "can0",  "can01", "can1",
@@ -362,9 +363,9 @@ TEST(CandumpReader, TellsManyInterfacesApart) {
   }
 }
 
-// Before any second was read, ten NUL bytes must not pass for a second that is already known.
+// Before any second was read, ten NUL bytes must not match a known second.
 TEST(CandumpReader, TakesNulBytesForNoSecond) {
-  // Blank lines behind it: the quick path only looks where there is room to look.
+  // Blank lines follow, because the fast path needs bytes to look ahead.
   const ReadLog log = read_text(fmt::format("(1.5) can0 123#\n({}.123456) can0 123#11\n{}",
                                             std::string(10, '\0'), std::string(200, '\n')));
   EXPECT_EQ(log.counts.frames, 1U);
@@ -375,8 +376,8 @@ TEST(CandumpReader, TakesNulBytesForNoSecond) {
   EXPECT_EQ(bare.counts.frames, 1U);
 }
 
-// A power cut leaves NUL bytes where a file had grown but its bytes were not written: the frame
-// behind them is whole, and what was skipped is counted.
+// After a power cut, NUL bytes fill the part of the file that was not written: the frame after them
+// is whole, and the skipped bytes are counted.
 TEST(CandumpReader, FindsTheFrameBehindNulBytes) {
   const std::string good = "(1700000000.000001) can0 123#11\n";
   const ReadLog log = read_text(good + "(17000000" + std::string(4096, '\0') + good + good);
@@ -385,7 +386,7 @@ TEST(CandumpReader, FindsTheFrameBehindNulBytes) {
   EXPECT_EQ(log.counts.malformed_lines, 0U);
 }
 
-// Editors of one system put it before a text, and files that were put together have it inside.
+// Some editors put a byte-order mark before a text, and joined files also have it inside.
 TEST(CandumpReader, ReadsOverByteOrderMarks) {
   const std::string text = "\xEF\xBB\xBF(1.5) can0 123#11\n(2.5) can0 123#22\n";
   const ReadLog log = read_text(text + text);

@@ -1,4 +1,4 @@
-// What is written is read back as it was, whatever the frame's form.
+// Written lines read back exactly, whatever the frame's form.
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -19,7 +19,7 @@ std::string line_of(TimePoint stamp, std::string_view interface, const can::Fram
 
 constexpr TimePoint kStamp = time_from_ns(1'700'000'000'123'456'789);
 
-// The text is can-utils' own, down to capitals and leading zeros: other tools read it.
+// The text is that of can-utils, down to capitals and leading zeros, since other tools read it.
 TEST(CandumpWriter, WritesWhatCandumpWrites) {
   EXPECT_EQ(line_of(kStamp, "can0", frame_with(0x12, 0, {0xDE, 0xAD, 0x0F})),
             "(1700000000.123456) can0 012#DEAD0F\n");
@@ -38,7 +38,7 @@ TEST(CandumpWriter, WritesWhatCandumpWrites) {
   EXPECT_EQ(line_of(kStamp, "can0", remote), "(1700000000.123456) can0 123#R8_9\n");
 }
 
-// Stamps have their place in every second: no digit is lost or carried wrongly.
+// Stamps at the boundaries of seconds: no digit is lost or carried wrongly.
 TEST(CandumpWriter, WritesStampsAtTheBoundariesOfSeconds) {
   const can::Frame frame = frame_with(0x123, 0);
   EXPECT_EQ(line_of(time_from_ns(0), "c", frame), "(0000000000.000000) c 123#\n");
@@ -51,7 +51,7 @@ TEST(CandumpWriter, WritesStampsAtTheBoundariesOfSeconds) {
   EXPECT_EQ(line_of(time_from_ns(-5), "c", frame), "(0000000000.000000) c 123#\n");
 }
 
-// Every form comes back from the reader as it was given to the writer.
+// Every form reads back as it was written.
 TEST(CandumpWriter, WritesRandomFramesSoThatTheyReadBackTheSame) {
   SCOPED_TRACE(::testing::Message() << "seed " << kSeed);
   std::mt19937_64 random(kSeed);
@@ -83,7 +83,8 @@ TEST(CandumpWriter, WritesRandomFramesSoThatTheyReadBackTheSame) {
     ASSERT_EQ(log.records[i], written[i]) << i;
 }
 
-// The formatter of many lines remembers the second; going on, over and back it must write the same.
+// LineFormatter keeps the text of the second; its lines must be the same as single ones, forwards
+// and back.
 TEST(CandumpWriter, WritesManyLinesAsItWritesEachAlone) {
   SCOPED_TRACE(::testing::Message() << "seed " << kSeed);
   std::mt19937_64 random(kSeed);
@@ -111,7 +112,7 @@ TEST(CandumpWriter, WritesManyLinesAsItWritesEachAlone) {
   }
 }
 
-// The longest line that there can be fits into the room that callers are told to have.
+// The longest possible line fits into the documented buffer.
 TEST(CandumpWriter, FitsTheLongestLineIntoItsBuffer) {
   const std::string name(40, 'n');
   const can::Frame frame =
@@ -127,7 +128,7 @@ TEST(CandumpWriter, FitsTheLongestLineIntoItsBuffer) {
   EXPECT_EQ(log.records[0].frame, frame);
 }
 
-// A frame whose length lies, as a bug elsewhere could make one, writes no byte that is not its own.
+// A frame with a wrong length, as from a bug elsewhere, must write no bytes beyond its data.
 TEST(CandumpWriter, WritesNoMoreThanAFrameHolds) {
   can::Frame frame = frame_with(0x123, 0);
   frame.length = 200;

@@ -1,6 +1,6 @@
 #!/usr/bin/python3
-"""Holds the readers of pcap and pcapng against files that tcpdump, dumpcap and tshark wrote (golden/README.md), and against
-captures in all variants, put together here from the formats' own documents: each is read back equal to its candump twin.
+"""Checks the readers of pcap and pcapng with files that tcpdump, dumpcap and tshark wrote (golden/README.md), and with
+captures in all variants, made here from the formats' own documents: each reads back equal to its candump twin.
 
 usage: capture_oracle_test.py LOG_TOOL VGYRO"""
 
@@ -18,7 +18,7 @@ SEED = 20261201
 GOLDEN = Path(__file__).resolve().parent / "golden"
 SOCKETCAN, COOKED, COOKED2 = 227, 113, 276
 
-# As `candump -L` told them, less the flags that libpcap lost on FD frames of the CAN interface itself.
+# As `candump -L` printed them, without the flags that libpcap lost on FD frames of the CAN interface itself.
 ON_VCAN0 = ["123#DEADBEEF", "7FF#R5", "1FFFFFFF##{0}", "001#", "20000004#0001000000000000", "321#1122334455667788"]
 ON_VCAN1 = ["12345678#1122334455667788", "123##{1}AABBCCDDEEFF00112233445566000000", "12345678##0112233"]
 SENT = [(0, 0), (1, 0), (0, 1), (1, 1), (0, 2), (0, 3), (1, 2), (0, 4), (0, 5)]  # bus, which of its frames
@@ -50,17 +50,17 @@ class Golden(forms.Bench):
         self.assertEqual(self.lines("tcpdump_cooked2.pcap"), golden_lines(("can0", "can1"), "13"))
 
     def test_dumpcap(self):
-        # It writes vcan0's fifth frame before vcan1's first.
+        # dumpcap writes vcan0's fifth frame before vcan1's first.
         self.assertEqual(self.lines("dumpcap_two.pcapng"), golden_lines(("vcan0", "vcan1"), "00"))
         self.assertEqual(self.lines("dumpcap_any.pcapng"), golden_lines(("any", "any"), "13"))
 
     def test_tshark_on_a_candump_log(self):
-        # The log held six of the frames; its buses have no place in this form.
+        # The log held six of the frames; this form cannot hold its buses.
         lines = golden_lines(("can0", "can0"), "13")
         self.assertEqual(self.lines("tshark_from_candump.pcap"), lines[:5] + lines[7:8])
 
     def test_tshark_on_a_blf_file(self):
-        # It drops error frames, what says FD, and bytes behind the payload.
+        # tshark drops error frames, the FD flags, and bytes after the payload.
         expected = [line + " T" for line in golden_lines(("CAN-1", "CAN-2"), "00") if "#0001" not in line]
         expected = [line.replace("1FFFFFFF##0", "1FFFFFFF#").replace("12345678##0", "12345678#") for line in expected]
         self.assertEqual(self.lines("tshark_from_blf.pcapng"), expected)
@@ -146,7 +146,7 @@ class Made(forms.Bench):
                             self.assertEqual([r["direction"] == "T" for r in self.read(path)], [not r["rx"] for r in records])
 
     def test_every_kind_of_pcapng(self):
-        # Resolutions that hold microseconds exactly; what a binary one leaves is below its step.
+        # Resolutions that hold microseconds exactly; the remainder of a binary one is below its step.
         for order, resolution, per_s, named in (("<", None, 10**6, True), (">", b"\x09", 10**9, False),
                                                 ("<", b"\x0c", 10**12, True), (">", b"\xa0", 2**32, True)):
             with self.subTest((order, resolution)):
@@ -168,7 +168,7 @@ class Made(forms.Bench):
                         file.enhanced(record["bus"], ticks, socketcan(record, ">"), (2, struct.pack(order + "L", 1 if record["rx"] else 2)))
                 path = self.put(file.out)
                 self.expect(path, records, resolution_ns=1 if resolution == b"\xa0" else 0)
-                # A reader that is cut off has read what came before.
+                # From a file that is cut off, the reader has returned all earlier packets.
                 *found, counts = map(json.loads, run([LOG_TOOL, "read", self.put(file.out[:-100])]).splitlines())
                 self.assertGreater(len(found), len(records) - 4)
                 self.assertEqual(counts["malformed"], 0)
@@ -187,7 +187,7 @@ class Made(forms.Bench):
             ns += rng.choice((1000, 250_000, 1_000_000))
             record["ns"] = ns
         while at < len(records):
-            # What came within half a second: one bus, then the other.
+            # The frames of half a second: one bus, then the other.
             batch = [r for r in records[at:] if r["ns"] - records[at]["ns"] < 500_000_000]
             for bus in rng.sample((0, 1), 2):
                 for record in batch:

@@ -1,5 +1,5 @@
-// Captures put together byte by byte, odd and damaged ones; tests/canlog/capture_oracle_test.py has
-// those of tcpdump and Wireshark, and every variant of the forms.
+// Captures made byte by byte, odd and damaged ones; tests/canlog/capture_oracle_test.py uses those
+// of tcpdump and Wireshark, and every variant of the forms.
 
 #include <string>
 #include <vector>
@@ -114,8 +114,8 @@ TEST(Pcap, CanXlHasItsIdentifierAndItsLengthInDifferentOrders) {
 TEST(Pcap, OddPacketsAreCountedAndThoseBehindThemRead) {
   const std::vector<std::string> odd{
       can_frame(0x123, "12345678").substr(0, 12),  // cut off by the capture's limit
-      can_frame(0x123, "").substr(0, 7),           // less than a head
-      can_frame(0x800, ""),                        // an identifier
+      can_frame(0x123, "").substr(0, 7),           // less than a frame's head
+      can_frame(0x800, ""),                        // wrong identifier
       big32(0x40000123U) + "\0\4\0\0"s,            // FD has no remote frames
       can_frame(0x20000001U, "123456789"),         // an error frame of nine bytes
       can_frame(0x123, std::string(65, 'x')),      // more than 64 bytes
@@ -211,7 +211,7 @@ TEST(StampOrder, EachBusKeepsItsOwnOrderThoughItsClockIsSetBack) {
   push(0, 10'100);
   push(1, 10'050);
   EXPECT_FALSE(order.is_ready()) << "more of a bus may come late";
-  push(0, 5'000);  // set back
+  push(0, 5'000);  // the clock was set back
   std::vector<std::uint32_t> out;
   while (order.is_ready())
     out.push_back(order.pop().record.frame.id);

@@ -1,6 +1,6 @@
 #!/usr/bin/python3
-"""Holds the readers of text forms, and the ASC writer, against independent ones: python-can's writers and readers, and
-log2asc, log2long and asc2log of can-utils. Each log is read back equal to its candump twin, to its stamps' resolution.
+"""Compares the readers of text forms, and the ASC writer, with independent ones: python-can's writers and readers, and
+log2asc, log2long and asc2log of can-utils. Each log reads back equal to its candump twin, to the resolution of its stamps.
 
 usage: forms_oracle_test.py LOG_TOOL VGYRO"""
 
@@ -96,7 +96,7 @@ class Bench(unittest.TestCase):
         return path
 
     def expect(self, path, records, but=(), offset_ns=0, resolution_ns=0):
-        """What the product reads in `path` is what it reads in the candump twin, but for these fields."""
+        """Expects the product to read the same in `path` as in the candump twin, except for the fields in `but`."""
         ours, twins = self.read(path), self.read(self.twin(records))
         self.assertEqual(len(ours), len(twins))
         for found, expected in zip(ours, twins):
@@ -109,7 +109,7 @@ class Bench(unittest.TestCase):
 
 class Readers(Bench):
     def test_asc_of_python_can(self):
-        # It cuts the date of the first frame to a millisecond; what follows counts from there in microseconds.
+        # python-can cuts the date of the first frame to a millisecond; later stamps count from there in microseconds.
         records = random_records(SEED)
         path = self.written_by(ASCWriter, "a.asc", records)
         offset_ns = self.read(path)[0]["ns"] - records[0]["ns"]
@@ -117,7 +117,7 @@ class Readers(Bench):
         self.expect(path, records, offset_ns=offset_ns, resolution_ns=1000)
 
     def test_csv_of_python_can(self):
-        # It has neither buses nor directions, and does not say what is FD; stamps are floats of 0.24 µs.
+        # This form has neither buses nor directions, and does not mark FD; stamps are floats with a step of 0.24 µs.
         records = random_records(SEED + 1)
         for record in records:
             record["bus"] = 0
@@ -127,14 +127,14 @@ class Readers(Bench):
         self.expect(self.written_by(CSVWriter, "a.csv", records), records, ("direction",), resolution_ns=300)
 
     def test_trc_of_python_can(self):
-        # Version 4.1 writes classic data frames only, and a date decades ahead.
+        # Version 4.1 writes classic data frames only, and a date that is decades ahead.
         records = random_records(SEED + 2, fd=False, remote=False)
         path = self.written_by(TRCWriter, "a.trc", records)
         offset_ns = self.read(path)[0]["ns"] - records[0]["ns"]
         self.expect(path, records, offset_ns=offset_ns, resolution_ns=600)
 
     def test_asc_of_log2asc_in_all_its_variants(self):
-        # It drops what is below a second of the first stamp: START_NS less 0.25 s.
+        # log2asc drops the part of the first stamp below a second: START_NS less 0.25 s.
         records = random_records(SEED + 3)
         for record in records:
             record["rx"] = True  # it has no other direction
@@ -147,7 +147,7 @@ class Readers(Bench):
                 self.expect(path, records, offset_ns=-250_000_000, resolution_ns=resolution_ns)
 
     def test_screen_text_of_log2long(self):
-        # It prints frames by the function that candump's screen text comes from.
+        # log2long prints frames with the function that makes candump's screen text.
         records = random_records(SEED + 4)
         for record in records:
             record["brs"] = record["esi"] = False  # only candump -x shows them
@@ -170,14 +170,14 @@ class Writer(Bench):
         for message, record in zip(messages, records):
             expected = as_message(record)
             self.assertLess(abs(message.timestamp - record["ns"] / 1e9), 0.6e-6)
-            # python-can 4.1 takes FD frames without bytes for remote frames.
+            # python-can 4.1 reads FD frames without bytes as remote frames.
             if record["fd"] and record["length"] == 0:
                 continue
             message.timestamp = expected.timestamp
             self.assertTrue(message.equals(expected), f"{message} is not {expected}")
 
     def test_asc2log_reads_our_asc(self):
-        # Without an English locale it takes the present for the date; intervals stay.
+        # Without an English locale asc2log uses the present date; intervals are kept.
         records = random_records(SEED + 6)
         path, back = self.converted(records, "a.asc"), self.folder / "back.log"
         run(["asc2log", "-I", path, "-O", back])

@@ -1,6 +1,6 @@
-// Text forms against what other tools' files mean: lines of files made with these tools (named at
-// each), and of the makers' own descriptions. The program runs in UTC (set below), so local dates
-// can be worked out by hand.
+// Text forms against files of other tools: lines from files made with these tools (named at each),
+// and from the makers' own descriptions. The program runs in UTC (set below), so that local dates
+// can be computed by hand.
 
 #include <cstdlib>
 #include <ctime>
@@ -58,7 +58,7 @@ TEST_F(Forms, ReadLog2asc) {
                    "(1700000001.070007) can0 12345678##0 R"}));
 }
 
-// python-can 4.1.0: the date is that of the writing, the block's that of the first frame.
+// python-can 4.1.0: the date is the time of writing, the block's is that of the first frame.
 TEST_F(Forms, ReadAscOfPythonCan) {
   EXPECT_EQ(read("date Sun Nov 29 05:49:37.083 AM 2026\nbase hex  timestamps absolute\n"
                  "internal events logged\nBegin Triggerblock Tue Nov 14 10:13:20.5 PM 2023\n"
@@ -75,7 +75,7 @@ TEST_F(Forms, ReadAscOfPythonCan) {
                    "(1700000000.540004) can0 123##1000102030405060708090A0B R"}));
 }
 
-// As CANoe and CANalyzer write it, with a German date, names, other events and their additions.
+// As written by CANoe and CANalyzer, with a German date, names, other events and their additions.
 TEST_F(Forms, ReadAscOfVector) {
   const std::string text =
       "date Die M\xE4r 14 22:13:20.250 2023\r\n"
@@ -108,7 +108,7 @@ TEST_F(Forms, ReadAscOfVector) {
             "15 lines, 5 frames, 0 XL, 3 other, 0 malformed, 0 cut off, 0 skipped; ");
 }
 
-// Each stamp counts from the event before it, whatever that was.
+// Each stamp counts from the event before it, of whatever kind.
 TEST_F(Forms, AddUpRelativeStampsOfAsc) {
   EXPECT_EQ(
       read("date Tue Nov 14 10:13:20 pm 2023\nbase hex timestamps relative\n"
@@ -116,7 +116,8 @@ TEST_F(Forms, AddUpRelativeStampsOfAsc) {
       (Lines{"(1700000000.500000) can0 123#01 R", "(1700000001.000000) can0 123#02 R"}));
 }
 
-// A block behind a trigger has stamps since the file's date; its own is when the trigger came.
+// In a block that begins with a trigger, stamps count from the file's date; its own date is that of
+// the trigger.
 TEST_F(Forms, CountTriggeredBlocksOfAscFromTheFilesDate) {
   EXPECT_EQ(read("date Tue Nov 14 22:13:20 2023\nbase hex timestamps absolute\n"
                  "Begin Triggerblock Tue Nov 14 22:13:25.125 2023\n   5.125000 log trigger event\n"
@@ -126,7 +127,7 @@ TEST_F(Forms, CountTriggeredBlocksOfAscFromTheFilesDate) {
             (Lines{"(1700000005.250000) can0 123#01 R", "(1700000009.000000) can0 123#02 R"}));
 }
 
-// Dates are local time: the zone of the reader is taken for that of the writer.
+// Dates are local time: the reader's zone is assumed for the writer.
 TEST_F(Forms, TakeDatesForLocalTime) {
   set_zone("UTC-1");  // POSIX: one hour east
   EXPECT_EQ(read("date Tue Nov 14 23:13:20 2023\n0.5 1 123 Rx d 1 01\n"),
@@ -141,13 +142,13 @@ TEST_F(Forms, TellWhatIsWrongInAsc) {
       "0.2 1 123 Rx d 4 01 02\n0.3 CANFD 1 Rx 123 1 1 9 65 00\n0.4 1 123 Rx d 1 01\n0.5 1 12");
   EXPECT_EQ(malformed(log.counts), (Lines{"2: date: not understood; the stamps count from zero",
                                           "3: identifier: larger than its kind can be",
-                                          "4: payload: fewer bytes than the length says",
+                                          "4: payload: shorter than its length",
                                           "5: length: more bytes than the frame can hold"}));
   EXPECT_EQ(as_candump(log), Lines{"(0000000000.400000) can0 123#01 R"});
   EXPECT_EQ(log.counts.cut_off_lines, 1U);
 }
 
-// The example of PEAK's description of the format, version 1.1: the date there is 24.03.2003
+// The example in PEAK's description of the format, version 1.1, which gives its date as 24.03.2003
 // 12:52:32.484.
 TEST_F(Forms, ReadTrc11) {
   const ReadLog log = open_and_read(
@@ -195,7 +196,7 @@ TEST_F(Forms, ReadTrc21) {
   EXPECT_EQ(log.counts.other_lines, 1U);
 }
 
-// Version 2.0 has no bus, and loggers choose lengths instead of codes.
+// Version 2.0 has no bus, and some loggers write lengths instead of codes.
 TEST_F(Forms, ReadTheColumnsOfTrcThatTheFileNames) {
   EXPECT_EQ(
       read(";$FILEVERSION=2.0\n;$STARTTIME=45244.9259259259\n;$COLUMNS=N,O,T,I,d,l,D\n"
@@ -218,7 +219,7 @@ TEST_F(Forms, ReadCsvOfPythonCan) {
       "1700000000.020002,0x123,0,1,0,5,\n1700000000.040004,0x123,0,0,0,12,AAECAwQFBgcICQoL\n"
       "1700000000.050005,0x7ff,0,0,0,0,\n1700000001.060006,0x0,1,0,1,0,\n";
   EXPECT_EQ(read("timestamp,arbitration_id,extended,remote,error,dlc,data\n" + rows), expected);
-  // A log that is added to has no head.
+  // A log that was appended to has no head.
   EXPECT_EQ(read(rows), expected);
   EXPECT_EQ(read("1e-05,0x123,0,0,0,1,AA==\n"), Lines{"(0000000000.000010000) can0 123#00"});
 }
@@ -229,13 +230,13 @@ TEST_F(Forms, ReadCsvOfSavvyCan) {
                  "1700000000123460,18DAF110,true,Tx,1,2,02,3E,\r\n"),
             (Lines{"(1700000000.123456) can0 21A#FE3612FE690507AD R",
                    "(1700000000.123460) can1 18DAF110#023E T"}));
-  // Before 2018.
+  // The form before 2018.
   EXPECT_EQ(read("Time Stamp,ID,Extended,Bus,LEN,D1,D2,D3,D4,D5,D6,D7,D8\n"
                  "166064000,0000021A,false,0,3,FE,36,12,,,,,,\n"),
             Lines{"(0000000166.064000) can0 21A#FE3612"});
 }
 
-// candump -ta, -tA, with -x, with colours and with -i; the newest frames of FD.
+// candump -ta, -tA, with -x, with colours and with -i; FD frames of the newest version.
 TEST_F(Forms, ReadScreenTextOfCandump) {
   EXPECT_EQ(
       read(" (1700000000.123456)  can0  123   [8]  11 22 33 44 55 66 77 88\n"
@@ -255,7 +256,8 @@ TEST_F(Forms, ReadScreenTextOfCandump) {
           "(1700000000.123464) can0 123#1122334455667788_B"}));
 }
 
-// -td: each stamp counts from the frame before it. -tz: from the first one. They look alike.
+// With -td each stamp counts from the frame before it, with -tz from the first one. They look
+// alike.
 TEST_F(Forms, TellDeltasFromTimeSinceTheBeginning) {
   const std::string tail = "  can0  123   [1]  00\n";
   EXPECT_EQ(read(" (000.000000)" + tail + " (000.010003)" + tail + " (000.009998)" + tail),
@@ -266,7 +268,7 @@ TEST_F(Forms, TellDeltasFromTimeSinceTheBeginning) {
                    "(0000000000.019998) can0 123#00"}));
 }
 
-// What cannot be read is called by its name, with the way out.
+// For forms that are not read, the error names the form and a remedy.
 TEST_F(Forms, NameWhatIsNotRead) {
   const auto error = [](const std::string& text) { return open_and_read(text).error; };
   EXPECT_EQ(error("  can0  123   [1]  00\n").find("text: is what candump prints without stamps"),
@@ -280,7 +282,7 @@ TEST_F(Forms, NameWhatIsNotRead) {
   EXPECT_EQ(error("\x01\x02\x03").find("text: is no log of CAN frames"), 0U);
 }
 
-// Remarks, NUL bytes and byte-order marks before the first frame do not hide the form.
+// Comments, NUL bytes and byte-order marks before the first frame do not hide the form.
 TEST_F(Forms, AreFoundBehindOtherLines) {
   const std::string frame = "(1.500000) can0 123#01\n";
   for (const std::string before : {"", "# drive of May\n\n", "\xEF\xBB\xBF", "DROPCOUNT: 3\n"})
@@ -290,7 +292,7 @@ TEST_F(Forms, AreFoundBehindOtherLines) {
   EXPECT_EQ(open_and_read("\xEF\xBB\xBF" + std::string(kLog2asc)).records.size(), 8U);
 }
 
-// Whatever pieces a log arrives in, and with each end that a killed writer may leave.
+// In any pieces, and with any end that a killed writer may leave.
 TEST_F(Forms, ReadTheSameInAnyPieces) {
   const std::string whole(kLog2asc);
   const ReadLog log = open_and_read(whole);

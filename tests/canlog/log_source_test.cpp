@@ -13,7 +13,7 @@
 namespace vgyro::canlog {
 namespace {
 
-/// Payloads that pack badly, so that the packed file has many parts to damage.
+/// Incompressible payloads, so that the packed file has many parts to damage.
 std::string log_text(unsigned lines) {
   std::mt19937_64 random(20'240'604);
   std::string text;
@@ -68,7 +68,7 @@ class OpenLog : public ::testing::Test {
   std::string folder_;
 };
 
-// A file larger than the buffer arrives whole, and tells how far reading has come.
+// A file larger than the buffer is read whole, and the progress is known.
 TEST_F(OpenLog, ReadsAFileToItsEnd) {
   const std::string text = log_text(20'000);
   ASSERT_GT(text.size(), 3 * LogSource::kBufferBytes);
@@ -84,7 +84,7 @@ TEST_F(OpenLog, ReadsAFileToItsEnd) {
   EXPECT_EQ((*source)->bytes_read(), text.size());
 }
 
-// Blocks hold whole lines only, and together they are the file.
+// Blocks hold only whole lines, and together they are the file.
 TEST_F(OpenLog, HandsOutWholeLines) {
   const std::string text = log_text(20'000) + "the end is cut";
   for (const std::size_t chunk : {999U, 65'536U, 1'000'000U}) {
@@ -107,7 +107,7 @@ TEST_F(OpenLog, HandsOutWholeLines) {
   }
 }
 
-// Who mistyped a path must see the path and why.
+// For a mistyped path the error names the path and the cause.
 TEST_F(OpenLog, NamesTheFileThatItCannotOpen) {
   const auto missing = open_source(folder_ + "/missing.log");
   ASSERT_FALSE(missing);
@@ -118,7 +118,7 @@ TEST_F(OpenLog, NamesTheFileThatItCannotOpen) {
   EXPECT_EQ(directory.error().message(), folder_ + ": is a directory, not a log");
 }
 
-// A driver that prints for people must flush before it may have to wait for the next frame.
+// A program that prints for people must flush before it may have to wait for the next frame.
 TEST_F(OpenLog, CallsBeforeEveryWait) {
   const auto source = log_from_text("(1.0) can0 123#\n(2.0) can0 123#\n", 16);
   int waits = 0;
@@ -130,7 +130,7 @@ TEST_F(OpenLog, CallsBeforeEveryWait) {
   EXPECT_EQ(waits, 3);
 }
 
-// Recordings are kept packed; unpacking on the way changes nothing.
+// Recordings are kept packed; unpacking them on the way changes nothing.
 TEST_F(OpenLog, UnpacksXz) {
   const std::string text = log_text(20'000);
   const std::string xz = packed(text);
@@ -142,7 +142,7 @@ TEST_F(OpenLog, UnpacksXz) {
   EXPECT_EQ((*source)->bytes_total(), xz.size()) << "progress is counted in packed bytes";
 }
 
-// `cat a.xz b.xz` is a valid xz file; so is one with an empty stream in it.
+// `cat a.xz b.xz` is a valid xz file, also with an empty stream in it.
 TEST_F(OpenLog, UnpacksXzStreamsOneBehindTheOther) {
   const std::string a = log_text(100);
   const std::string b = log_text(50);
@@ -151,7 +151,8 @@ TEST_F(OpenLog, UnpacksXzStreamsOneBehindTheOther) {
   EXPECT_EQ(log.error, "");
 }
 
-// A download that broke off: what came is used, and the user is told that it is not all.
+// After an incomplete download the available part is used, and the error reports that it is
+// incomplete.
 TEST_F(OpenLog, DeliversWhatATruncatedXzHolds) {
   const std::string text = log_text(20'000);
   const std::string xz = packed(text);
@@ -162,12 +163,12 @@ TEST_F(OpenLog, DeliversWhatATruncatedXzHolds) {
     const std::string path = file_with("cut.log.xz", xz.substr(0, size));
     const ReadLog log = read(path);
     EXPECT_EQ(log.error, path + ": ends in the middle of its packed data");
-    // The packer works in blocks of 64 KiB and less; what lies before the last one is all there.
+    // The packer works in blocks of at most 64 KiB; everything before the last one is there.
     expect_beginning(log, whole, static_cast<std::size_t>(20'000 * (share - 0.15)));
   }
 }
 
-// A flipped bit on a disk: what lies before it is used; behind it nothing can be trusted.
+// After a flipped bit on a disk, the data before it are used; those after it cannot be trusted.
 TEST_F(OpenLog, DeliversWhatIsBeforeTheDamageOfAnXz) {
   const std::string text = log_text(20'000);
   const ReadLog whole = read_by_parse_line(text);
@@ -187,8 +188,8 @@ TEST_F(OpenLog, DeliversWhatIsBeforeTheDamageOfAnXz) {
   }
 }
 
-// The block says in its header how large its dictionary is; the byte behind filter and size of the
-// filter's properties (xz file format 5.3.1). The header's own check value is made anew.
+// A block's header holds the size of its dictionary in the byte after the filter's ID and the size
+// of its properties (xz file format 5.3.1). The header's own check value is recomputed.
 std::string with_dictionary(std::string xz, std::uint8_t size_code) {
   constexpr std::size_t kBlock = LZMA_STREAM_HEADER_SIZE;
   const std::size_t filter = xz.find("\x21\x01", kBlock + 2);  // LZMA2, one byte of properties
@@ -202,7 +203,7 @@ std::string with_dictionary(std::string xz, std::uint8_t size_code) {
   return xz;
 }
 
-// `xz --lzma2=dict=1GiB` is no damage, and its user can do something about it.
+// `xz --lzma2=dict=1GiB` is not damage, and the user can change it.
 TEST_F(OpenLog, TellsADictionaryThatIsTooLargeFromDamage) {
   constexpr std::uint8_t k64MiB = 28;
   constexpr std::uint8_t k1GiB = 36;
@@ -215,12 +216,12 @@ TEST_F(OpenLog, TellsADictionaryThatIsTooLargeFromDamage) {
                 "limit; `xz -dc FILE.xz | vgyro … -` unpacks it outside");
 }
 
-// An error in the middle is none of the log's ends.
+// An error in the middle is not the end of a log.
 TEST_F(OpenLog, TellsAnErrorFromTheEnd) {
   EXPECT_EQ(read("/proc/self/mem").error, "/proc/self/mem: cannot be read: Input/output error");
 }
 
-// The content decides: people rename files.
+// The content decides, since people rename files.
 TEST_F(OpenLog, GoesByTheContentAndNotByTheName) {
   const std::string text = log_text(10);
   EXPECT_EQ(read(file_with("plain.log.xz", text)).records, read_by_parse_line(text).records);

@@ -52,7 +52,7 @@ ReadLog read_all(std::unique_ptr<LogSource> source) {
   LogRecord record;
   while (reader.next(record))
     log.records.push_back(with_name(record, reader.interfaces(), reader.xl()));
-  // The end stays the end.
+  // next() must stay false at the end.
   if (reader.next(record)) log.error = "next() went on behind the end";
   log.counts = reader.counts();
   log.interfaces = reader.interfaces().names();

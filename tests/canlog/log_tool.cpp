@@ -1,4 +1,4 @@
-// What the product reads in a log, and writes, for tests in other languages.
+// Runs the product's log reader and writer for tests in other languages.
 // log_tool read FILE      one JSON object per record; the counts as the last line
 // log_tool write < JSON   objects of that form in, lines of a log out
 

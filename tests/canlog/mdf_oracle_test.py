@@ -1,6 +1,6 @@
 #!/usr/bin/python3
-"""Holds the MF4 reader against files that python-can and asammdf wrote (golden/README.md), and against the forms that
-loggers write, put together here block by block: each is read back equal to its candump twin.
+"""Checks the MF4 reader with files that python-can and asammdf wrote (golden/README.md), and with the forms that loggers
+write, made here block by block: each reads back equal to its candump twin.
 
 usage: mdf_oracle_test.py LOG_TOOL VGYRO"""
 
@@ -29,7 +29,7 @@ FIXED, VARIABLE, MASTER, VIRTUAL = 0, 1, 2, 6
 
 
 class Mdf:
-    """Blocks one behind the other; links are set when their targets are there."""
+    """Blocks in sequence; links are set once their targets exist."""
 
     def __init__(self, start_ns, unfinished=0, local=False):
         name = b"UnFinMF " if unfinished else b"MDF     "
@@ -88,7 +88,7 @@ class Mdf:
 
 
 def channels_of_one_layout(mdf, payload_in=None, prefix="CAN_DataFrame"):
-    """Bits as a CANedge packs them, in 14 bytes behind the time; the payload elsewhere, or 64 bytes behind."""
+    """Bits packed as by a CANedge, in 14 bytes including the time; the payload is elsewhere, or in 64 bytes after them."""
     def part(name, byte, bits, bit=0):
         return mdf.channel(f"{prefix}.{name}", FIXED, UINT, byte, bits, bit)
     parts = [part("BusChannel", 8, 2, 1), part("ID", 8, 29, 3), part("IDE", 8, 1), part("DLC", 13, 4, 4), part("DataLength", 12, 7, 1),
@@ -102,7 +102,8 @@ def channels_of_one_layout(mdf, payload_in=None, prefix="CAN_DataFrame"):
 
 
 def packed_record(record, start_ns, payload):
-    # The channel and the identifier overlap in byte 8: IDE is bit 0, the channel bits 1 and 2, the identifier from bit 3 on.
+    # The channel and the identifier overlap in byte 8: bit 0 is IDE, bits 1 and 2 the channel, the identifier is from
+    # bit 3 on.
     head = int(record["extended"]) | record["bus"] << 1 | record["id"] << 3
     code = LENGTHS.index(record["length"]) if record["fd"] else record["length"]
     return (struct.pack("<d", record["ns"] - start_ns) + struct.pack("<L", head)
@@ -111,7 +112,7 @@ def packed_record(record, start_ns, payload):
 
 class Golden(forms.Bench):
     def test_what_python_can_writes(self):
-        # Stamps are differences of two numbers of seconds since 1970, of which doubles hold a quarter of a microsecond.
+        # Stamps are differences of seconds since 1970, which doubles hold to a quarter of a microsecond.
         twin = self.read(GOLDEN / "python_can_mf4.log")
         for name in ("python_can_stored.mf4", "python_can_deflated.mf4", "python_can_columns.mf4"):
             with self.subTest(name):
@@ -124,7 +125,7 @@ class Golden(forms.Bench):
 
 
     def test_what_asammdf_writes(self):
-        # The log without its remote frames, from an unfinalised one as Made has them.
+        # The log without its remote frames, made from an unfinalised file like those in Made.
         twin = [record for record in self.read(GOLDEN / "python_can_mf4.log") if not record["remote"]]
         self.assertEqual(self.read(GOLDEN / "asammdf_sorted.mf4"), twin)
 
@@ -167,7 +168,7 @@ class Made(forms.Bench):
             self.expect(mdf.save(self.folder / "a.mf4", [mdf.data_group(0, group, mdf.block("DT", [], held))]), records)
 
     def unfinished(self, records, payload_first, cut=0):
-        """As a CANedge leaves it: numbered records, payloads among them, no counts, and data without a size."""
+        """A file as a CANedge leaves it: numbered records, payloads among them, no counts, and data without a size."""
         mdf = Mdf(self.start(records), unfinished=0x25)
         payload_group = mdf.group(2, 0, 0, 0, flags=1)
         frames = mdf.group(1, channels_of_one_layout(mdf, payload_group), 22, 0)
@@ -204,7 +205,8 @@ class Made(forms.Bench):
             self.assertLessEqual(counts["malformed"], 1)
 
     def test_groups_of_kinds_come_by_stamp(self):
-        # As a CANedge of firmware 1.7 has them: what is the same in a group is no data, and groups are flushed apart.
+        # As from a CANedge with firmware 1.7: constant fields of a group are not stored, and groups are flushed
+        # separately.
         records = self.records(SEED + 4, remote=True)
         start = self.start(records)
         mdf = Mdf(start, unfinished=0x25)

@@ -43,7 +43,7 @@ TEST(MergedReader, GoesByStampsAndThenByTheOrderOfTheArguments) {
                    "(0000000009.000000) can1 006#"}));
 }
 
-// Forms and names of buses may differ from log to log.
+// Logs may differ in their forms and in the names of their buses.
 TEST(MergedReader, MergesLogsOfAnyForm) {
   EXPECT_EQ(merged({"(0000000001.000000) can1 001#\n(0000000003.000000) can0 002#\n",
                     "0.500000 1 003 Rx d 0\n2.500000 2 004 Rx d 0\n"}),
@@ -51,8 +51,7 @@ TEST(MergedReader, MergesLogsOfAnyForm) {
                    "(0000000002.500000) can1 004# R", "(0000000003.000000) can0 002#"}));
 }
 
-// A stamp from nowhere, or a clock that was set back, holds up no log; within a log the order
-// stays.
+// A wrong stamp, or a clock that was set back, delays no log; the order within a log is kept.
 TEST(MergedReader, ReordersNothingWithinALog) {
   EXPECT_EQ(merged({line(1, "can0 001#") + line(8e9, "can0 002#") + line(3, "can0 003#") +
                         line(2, "can0 004#"),
@@ -62,7 +61,7 @@ TEST(MergedReader, ReordersNothingWithinALog) {
                    "(0000000002.000000) can0 004#", "(0000000003.500000) can1 006#"}));
 }
 
-// One of them counts from its own beginning.
+// One of the logs counts from its own beginning.
 TEST(MergedReader, RefusesStampsOfTwoClocks) {
   EXPECT_EQ(
       merged({line(1'700'000'000, "can0 001#"), line(0.5, "can1 002#")}),
@@ -80,7 +79,7 @@ TEST(MergedReader, RefusesLogsThatAreYearsApart) {
   EXPECT_EQ(merged({line(1.6e9, "can0 001#"), line(1.6e9 + 100 * kDay, "can0 002#")}).size(), 2U);
 }
 
-// What was read before the damage of one log is handed out, then its error.
+// The records before the damage of one log are returned, then its error.
 TEST(MergedReader, EndsWhereOneLogIsDamaged) {
   class Damaged final : public ByteSource {
    public:
@@ -123,13 +122,13 @@ TEST(MergedReader, CountsEachLogApart) {
   const auto parts = (*reader)->parts();
   EXPECT_EQ(told(*parts[0]),
             "2 lines, 1 frames, 0 XL, 0 other, 1 malformed, 0 cut off, 0 skipped; 2: "
-            "stamp: the seconds are no number");
+            "stamp: the seconds are not a number");
   EXPECT_EQ(told(*parts[1]),
             "2 lines, 0 frames, 1 XL, 1 other, 0 malformed, 0 cut off, 0 skipped; ");
   EXPECT_EQ(log.counts.frames + log.counts.xl_frames, 2U);
 }
 
-// 40 interfaces in each of two logs are more than a table holds: the rest is counted.
+// 40 interfaces in each of two logs exceed the table: frames of the others are counted.
 TEST(MergedReader, CountsTheFramesOfTooManyInterfaces) {
   Lines texts(2);
   for (unsigned i = 0; i < 40; ++i) {

@@ -8,7 +8,7 @@
 
 namespace vgyro::canlog {
 
-/// `error` also holds why it could not be opened.
+/// `error` also holds the error of opening.
 ReadLog open_and_read(const std::string& bytes, std::size_t chunk = SIZE_MAX);
 ReadLog read_whole(LogReader& reader);
 

@@ -12,7 +12,7 @@
 namespace vgyro::canlog {
 namespace {
 
-// Text that packs badly, so that a packed file has many parts to cut and to damage.
+// Incompressible text, so that a packed file has many parts to cut and to damage.
 std::string some_text(std::size_t bytes) {
   std::mt19937_64 random(20'261'129);
   std::string text;
@@ -49,7 +49,7 @@ std::string xz(const std::string& text) {
 std::string zstd(const std::string& text) {
   std::string out(::ZSTD_compressBound(text.size()) + 4, '\0');
   ZSTD_CCtx* context = ::ZSTD_createCCtx();
-  ::ZSTD_CCtx_setParameter(context, ZSTD_c_checksumFlag, 1);  // as the program zstd does
+  ::ZSTD_CCtx_setParameter(context, ZSTD_c_checksumFlag, 1);  // like the program zstd
   out.resize(::ZSTD_compress2(context, out.data(), out.size(), text.data(), text.size()));
   ::ZSTD_freeCCtx(context);
   return out;
@@ -81,7 +81,7 @@ Unpacked read_all(const std::string& bytes, std::size_t chunk = SIZE_MAX, std::s
     if (!got || *got == 0) break;
     result.text.append(buffer, 0, *got);
   }
-  // The end stays the end, and damage stays damage.
+  // The end and an error must both be final.
   const auto again = (*source)->read(buffer.data(), buffer.size());
   EXPECT_EQ(again ? "" : again.error().message(), result.error);
   return result;
@@ -116,7 +116,7 @@ TEST_P(Packed, HoldsNothing) {
   EXPECT_EQ(result.text, "");
 }
 
-// `cat a.gz b.gz` is a packed file of all these tools; tapes pad with zeros.
+// `cat a.gz b.gz` is a valid file for all these tools; tapes pad with zeros.
 TEST_P(Packed, MembersComeOutOneBehindTheOther) {
   const std::string a = some_text(1000);
   const std::string b = some_text(70'000);
@@ -127,7 +127,8 @@ TEST_P(Packed, MembersComeOutOneBehindTheOther) {
   }
 }
 
-// The writer was killed, or a download broke off: what came is used, and it is said.
+// The writer was killed, or a download is incomplete: the available part is used, and the error
+// says so.
 TEST_P(Packed, ComesOutAsFarAsItGoes) {
   const std::string text = some_text(2'000'000);
   const std::string bytes = pack(text);
@@ -160,14 +161,14 @@ TEST_P(Packed, IsFollowedBySomethingElse) {
   EXPECT_NE(result.error, "");
 }
 
-// By mistake, as when a browser packs what it takes for plain.
+// Packed twice by mistake, as when a browser packs a file that it takes for plain.
 TEST_P(Packed, IsPackedTwice) {
   const std::string text = some_text(1000);
   EXPECT_EQ(read_all(gzip(pack(text))).text, text);
   EXPECT_EQ(read_all(gzip(gzip(pack(text)))).error, "text: is packed more than twice");
 }
 
-// A small file that unpacks to much more than there is memory comes out piece by piece.
+// A small file that unpacks to more than the memory holds is unpacked piece by piece.
 TEST_P(Packed, IsABomb) {
   const std::string megabyte(1U << 20U, 'x');
   std::string bytes;
@@ -189,7 +190,7 @@ TEST(Unpack, LeavesPlainBytesAlone) {
     EXPECT_EQ(read_all(text).text, text);
 }
 
-// `zstd --long=31` wants two gigabytes.
+// `zstd --long=31` needs two gigabytes.
 TEST(Unpack, RefusesAWindowThatIsTooLarge) {
   // RFC 8878: magic number, frame header (window descriptor follows, no checksum), exponent 21.
   const std::string bytes("\x28\xB5\x2F\xFD\x00\xA8\x01\x00\x00", 9);

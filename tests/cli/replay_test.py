@@ -575,7 +575,7 @@ class BadInput(Replay):
         self.write("empty.log", "")
         self.write("prose.log", "Dear diary,\nno frames today.\n")
         for log, what in (("empty.log", "holds no CAN frame"), ("/dev/null", "holds no CAN frame"),
-                          ("prose.log", "is text, but no log of CAN frames that is known")):
+                          ("prose.log", "is text, but not a known log of CAN frames")):
             said = self.refuse("-q", log)
             self.assertIn(what, said)
             self.assertIn("candump -L", said)

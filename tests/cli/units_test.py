@@ -412,9 +412,9 @@ class BadInput(Units):
         self.refused(config(more_a="mount = [1, 0, 0, 0, 1, 0, 0, 0, -1]"), "mount mirrors: its determinant is -1", "wrong sign, or two are exchanged")
 
     def test_a_mount_that_is_no_rotation(self):
-        self.refused(config(more_a="mount = [1, 0.2, 0, 0, 1, 0, 0, 0, 1]"), "mount is no rotation", "right angles")
-        self.refused(config(more_a="mount = [0.7, 0, 0, 0, 0.7, 0, 0, 0, 0.7]"), "mount is no rotation: the nearest one differs by 0.3 in an element")
-        self.refused(config(more_a="mount = [0, 0, 0, 0, 0, 0, 0, 0, 0]"), "mount is no rotation: its determinant is 0")
+        self.refused(config(more_a="mount = [1, 0.2, 0, 0, 1, 0, 0, 0, 1]"), "mount is not a rotation", "right angles")
+        self.refused(config(more_a="mount = [0.7, 0, 0, 0, 0.7, 0, 0, 0, 0.7]"), "mount is not a rotation: the nearest one differs by 0.3 in an element")
+        self.refused(config(more_a="mount = [0, 0, 0, 0, 0, 0, 0, 0, 0]"), "mount is not a rotation: its determinant is 0")
         self.refused(config(more_a="mount = [1, 2]"), "neither three numbers nor nine")
         self.refused(config(more_a="mount = [0, 0, 900]"), "an angle of 900 deg", "-360 to 360")
 
@@ -491,7 +491,7 @@ class BadInput(Units):
     def test_keys_of_the_calibration(self):
         self.refused(config(calibration="rate_dps = 0.1"), "rate_dps must be a list of 3 numbers, one for each axis")
         self.refused(config(calibration="rate_dps = [0.1]"), "rate_dps is not a list of 3 numbers")
-        self.refused(config(calibration="heading_deg = 12"), "heading_deg stands without latitude_deg")
+        self.refused(config(calibration="heading_deg = 12"), "heading_deg needs latitude_deg")
 
     def test_axes_of_the_model_file(self):
         self.write("u.toml", config())

@@ -17,7 +17,7 @@ from contextlib import redirect_stdout
 from pathlib import Path
 
 logging.disable(logging.CRITICAL)
-with redirect_stdout(io.StringIO()):  # canmatrix tells on stdout which other formats it lacks
+with redirect_stdout(io.StringIO()):  # canmatrix prints on stdout which other formats it lacks
     import canmatrix.formats
 
 DECODE_TOOL = sys.argv[1] if len(sys.argv) > 2 else ""
@@ -87,7 +87,7 @@ class RandomDatabase:
         self.signal(file_id, size, "Always", "")
         if not extended:
             return
-        # canmatrix follows one inner multiplexor per value of the outer one, so there is one.
+        # canmatrix supports one inner multiplexor for each value of the outer one, so there is only one.
         self.lines.append(' SG_ Inner m2M : 3|2@1+ (1,0) [0|0] "" ECU')
         self.late.append(f"SG_MUL_VAL_ {file_id} Inner Outer 2-3, 6-6;")
         for value in range(3):

@@ -38,7 +38,7 @@ std::size_t bit_position(const Signal& signal, std::size_t weight) {
   return place / 8 * 8 + 7 - place % 8;
 }
 
-/// Bit by bit, as the definition of a DBC signal says it.
+/// Reads bit by bit, following the definition of a DBC signal.
 std::uint64_t bits_of(const Signal& signal, const Bytes& payload) {
   std::uint64_t bits = 0;
   for (std::size_t weight = 0; weight < signal.length_bits; ++weight) {
@@ -65,8 +65,8 @@ Bytes random_bytes(std::mt19937& rng, std::size_t size) {
   return bytes;
 }
 
-// Every signal of every position, length and byte order that a payload of this size can hold reads
-// as its definition says, from a payload of exactly the bytes that it needs and from longer ones.
+// A signal of every position, length and byte order that a payload of this size can hold reads as
+// its definition says, from a payload of exactly the bytes it needs and from longer ones.
 void check_all_positions(std::size_t size) {
   std::mt19937 rng(7);
   const Bytes payload = random_bytes(rng, size);
@@ -98,7 +98,7 @@ TEST(SignalCodec, ReadsEveryPositionOfAShortPayload) {
   check_all_positions(3);
 }
 
-// Writing raw bits and reading them again gives them back, and no other bit of the payload changes.
+// Raw bits that are written read back the same, and no other bit of the payload changes.
 TEST(SignalCodec, WritesOnlyItsOwnBits) {
   std::mt19937 rng(11);
   for (int round = 0; round < 20000; ++round) {
@@ -147,7 +147,7 @@ Bytes with_float(float value, bool motorola) {
   return {bytes.begin(), bytes.end()};
 }
 
-// Floats are read in both byte orders; not-a-number and infinity arrive as what they are.
+// Floats are read in both byte orders; NaN and infinity stay what they are.
 TEST(SignalCodec, ReadsFloatsWithNanAndInfinity) {
   const auto intel = codec_of(signal_of(0, 32, ByteOrder::kIntel, ValueType::kFloat32), 4);
   const auto motorola = codec_of(signal_of(7, 32, ByteOrder::kMotorola, ValueType::kFloat32, 2), 4);
@@ -163,7 +163,7 @@ TEST(SignalCodec, ReadsFloatsWithNanAndInfinity) {
   EXPECT_EQ(wide.decode(payload).value, -1e300);
 }
 
-// Encoding takes the nearest raw value, halves away from zero.
+// Encoding rounds to the nearest raw value, halves away from zero.
 TEST(SignalCodec, EncodesTheNearestRawValue) {
   const auto codec = codec_of(signal_of(0, 16, ByteOrder::kIntel, ValueType::kSigned, 0.5, 10), 2);
   Bytes payload(2);
@@ -185,7 +185,7 @@ struct Limits {
   std::int64_t highest;
 };
 
-// Values beyond the range become the range's end, for every width including 1 and 64 bits.
+// Values beyond the range become its end, for every width including 1 and 64 bits.
 TEST(SignalCodec, SaturatesAtTheRangeOfRawValues) {
   const std::int64_t max64 = std::numeric_limits<std::int64_t>::max();
   const std::array<Limits, 6> cases = {{{1, ValueType::kUnsigned, 0, 1},
@@ -208,7 +208,7 @@ TEST(SignalCodec, SaturatesAtTheRangeOfRawValues) {
   }
 }
 
-// A float32 signal holds no infinity for a finite value.
+// For a finite value a float32 signal never becomes infinite.
 TEST(SignalCodec, SaturatesFloatsAtTheLargestFiniteValue) {
   const auto codec = codec_of(signal_of(0, 32, ByteOrder::kIntel, ValueType::kFloat32), 4);
   Bytes payload(4);
@@ -218,14 +218,15 @@ TEST(SignalCodec, SaturatesFloatsAtTheLargestFiniteValue) {
   EXPECT_EQ(codec.decode(payload).value, std::numeric_limits<float>::lowest());
 }
 
-// The representable range is in physical units and the right way round for a negative scale.
+// The representable range is in physical units, with the smaller value first for a negative scale,
+// too.
 TEST(SignalCodec, TellsItsRepresentableRange) {
   const auto codec = codec_of(signal_of(0, 8, ByteOrder::kIntel, ValueType::kSigned, -0.5, 1), 1);
   EXPECT_EQ(codec.representable_min(), -62.5);
   EXPECT_EQ(codec.representable_max(), 65.0);
 }
 
-// What cannot be read is refused when the codec is made, with the place and the reason.
+// Unreadable signals are refused when the codec is made, with place and cause.
 TEST(SignalCodec, RefusesSignalsThatCannotBeRead) {
   const auto refused = [](const Signal& signal, std::size_t bytes) {
     const auto codec = SignalCodec::make(signal, bytes, "a.dbc:3");
@@ -243,7 +244,7 @@ TEST(SignalCodec, RefusesSignalsThatCannotBeRead) {
   EXPECT_FALSE(refused(signal_of(56, 8, kIntel, ValueType::kUnsigned), 8));
 }
 
-// A payload that ends before the signal does is told by fits(), to the byte.
+// fits() is exact to the byte for a payload that ends before the signal does.
 TEST(SignalCodec, TellsWhetherATruncatedPayloadHoldsIt) {
   const auto codec = codec_of(signal_of(12, 10, ByteOrder::kIntel, ValueType::kUnsigned), 8);
   EXPECT_EQ(codec.bytes_needed(), 3U);

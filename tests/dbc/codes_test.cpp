@@ -1,4 +1,4 @@
-// Raw values that are no measurement, against the tables of the protocols worked out by hand.
+// Raw values that are not measurements, against the protocols' tables, computed by hand.
 
 #include "dbc/codes.h"
 
@@ -34,7 +34,7 @@ TEST(Codes, OfJ1939BeginWhereTheTopByteIsFb) {
   }
 }
 
-// Fields of some bits are states. Of a signed number -1 has all bits set, and is a measurement.
+// Short fields are states. A signed -1 has all bits set, but is a measurement.
 TEST(Codes, OfJ1939AreNoneInShortOrSignedSignalsAndFloats) {
   for (std::uint16_t bits = 1; bits < 8; ++bits)
     EXPECT_TRUE(codes_of(signal_of(bits), CodeRules::kJ1939).empty()) << bits;
@@ -43,7 +43,7 @@ TEST(Codes, OfJ1939AreNoneInShortOrSignedSignalsAndFloats) {
   EXPECT_TRUE(codes_of(signal_of(16), CodeRules::kNone).empty());
 }
 
-// The topmost values: of a signed number those below 0x80…, and no negative one.
+// The topmost values: in a signed number those below 0x80…, and no negative one.
 TEST(Codes, OfNmea2000AreTheTopmostValues) {
   struct Case {
     std::uint16_t bits;
@@ -82,7 +82,7 @@ TEST(Codes, SayWhatTheyMean) {
   EXPECT_EQ(code_text(turn, CodeRules::kNmea2000, 0x7FFFFFFF), "not available");
 }
 
-// 127251 rate of turn, 130306 wind; 61482 angular rate, 65280 proprietary of both.
+// 127251 rate of turn, 130306 wind; 61482 angular rate, 65280 proprietary in both protocols.
 TEST(Codes, GoByTheParameterGroupOrWhatTheFileSays) {
   EXPECT_EQ(code_rules_of(0x09F113FE, true, ""), CodeRules::kNmea2000);
   EXPECT_EQ(code_rules_of(0x09FD02FE, true, "J1939"), CodeRules::kNmea2000);
@@ -161,7 +161,7 @@ TEST(Labels, SayOtherThings) {
   }
 }
 
-// "invalid" beside "valid" is what a status says, not the lack of it.
+// "invalid" beside "valid" is the meaning of a status, not a missing value.
 TEST(Labels, OfAStatusAreItsValues) {
   Signal status = signal_of(2);
   status.labels = {{0, "valid"}, {1, "invalid"}, {3, "not available"}};
@@ -179,7 +179,7 @@ TEST(Labels, OfAStatusAreItsValues) {
   EXPECT_FALSE(labelled_no_value(fitted, 0));
 }
 
-// A counter of 8 bits runs through the codes; a file that ends its range before them knows better.
+// A counter of 8 bits uses the codes as values; a file whose range ends before them excludes them.
 TEST(NoValues, LeavePlainNumbersAlone) {
   Signal counter = signal_of(8);
   counter.factor = 1.0;

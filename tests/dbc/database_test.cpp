@@ -38,7 +38,7 @@ TEST(Message, MatchesBroadcastGroupFromAnySource) {
   EXPECT_EQ(ari.id_mask(), 0x03FFFF00U);
 }
 
-// In addressed groups (PF below 240) the byte after PF is the destination and names no content.
+// In addressed groups (PF below 240) the byte after PF is the destination, not part of the group.
 TEST(Message, MatchesAddressedGroupToAnyDestination) {
   const Message request = message_of(0x18EAFFFE, true, true);
   EXPECT_TRUE(request.matches(0x18EA2103, true));
@@ -46,7 +46,7 @@ TEST(Message, MatchesAddressedGroupToAnyDestination) {
   EXPECT_EQ(request.id_mask(), 0x03FF0000U);
 }
 
-// Names find the first of their kind; what is not there is null.
+// Finds the first element of a name; null if there is none.
 TEST(Database, FindsByName) {
   Database database;
   database.messages = {message_of(1, false, false), message_of(2, false, false)};
@@ -69,7 +69,7 @@ TEST(Database, FindsByName) {
   EXPECT_EQ(found->label(7), nullptr);
 }
 
-// The sender is the last byte; in addressed groups the receiver stands before it.
+// The sender is the last byte; in addressed groups the receiver precedes it.
 TEST(Message, KnowsTheSameSenderWhateverItsPriority) {
   EXPECT_TRUE(same_sender(0x0CF02A13, 0x18F02A13));
   EXPECT_FALSE(same_sender(0x0CF02A13, 0x0CF02A14));

@@ -1,4 +1,4 @@
-// What the product reads in a DBC file and in frames, for tests written in other languages.
+// Prints what the product reads in a DBC file and in frames, for tests in other languages.
 // decode_tool FILE --layout         the messages as JSON
 // decode_tool FILE < ID#HEX lines   one JSON object a line: signal -> [raw, value as text]
 

@@ -15,7 +15,7 @@ constexpr std::uint64_t kSeed = 20'261'129;
 
 using Bytes8 = std::array<std::uint8_t, 8>;
 
-/// `is_right` of a payload that is, and of none that differs from it in one bit.
+/// Expects `is_right` for this payload, and not for any that differs from it in one bit.
 template <class Bytes, class Check>
 void expect_every_wrong_bit_noticed(const Bytes& payload, Check is_right) {
   ASSERT_TRUE(is_right(payload));
@@ -26,7 +26,7 @@ void expect_every_wrong_bit_noticed(const Bytes& payload, Check is_right) {
   }
 }
 
-// The published vectors of the nibble variant: data ID 0x123, eight zero bytes, two frames.
+// The published test vectors of the nibble variant: data ID 0x123, eight zero bytes, two frames.
 TEST(E2eProfile11C, AgreesWithThePublishedVectors) {
   E2eProfile11C profile(0x123);
   Bytes8 payload{};
@@ -37,7 +37,7 @@ TEST(E2eProfile11C, AgreesWithThePublishedVectors) {
   EXPECT_EQ(payload, (Bytes8{0x77, 0x11}));
 }
 
-// What the sender writes is what a receiver with the general check expects.
+// A receiver with the general check accepts what the sender writes.
 TEST(E2eProfile11C, WritesWhatTheGeneralProtectionExpects) {
   std::mt19937_64 random(kSeed);
   SCOPED_TRACE(::testing::Message() << "seed " << kSeed);
@@ -55,7 +55,7 @@ TEST(E2eProfile11C, WritesWhatTheGeneralProtectionExpects) {
   }
 }
 
-// The counter runs from 0 to 14: 15 would mean an error and never appears.
+// The counter runs from 0 to 14: 15 would mean an error and is never sent.
 TEST(E2eProfile11C, CountsTo14AndStartsAgain) {
   E2eProfile11C profile(0x610);
   for (unsigned frame = 0; frame < 40; ++frame) {
@@ -76,7 +76,7 @@ TEST(E2eProfile11C, NoticesEverySingleWrongBit) {
   EXPECT_FALSE(E2eProfile11C(0x710).check(payload));
 }
 
-// A right CRC over a counter that no sender has is still not a right frame.
+// A frame with a right CRC but a counter that no sender has is refused.
 TEST(E2eProfile11C, RefusesCounter15) {
   const E2eProfile11C profile(0x610);
   Bytes8 payload = {0, 0x6F};
@@ -92,7 +92,7 @@ TEST(E2eProfile5, AgreesWithThePublishedVector) {
   EXPECT_EQ(payload, (Bytes8{0x1C, 0xCA, 0x00}));
 }
 
-// The counter uses all 256 values, and neighbours never share a CRC.
+// The counter uses all 256 values, and consecutive frames never share a CRC.
 TEST(E2eProfile5, CountsTo255AndStartsAgain) {
   E2eProfile5 profile(0x610);
   std::set<std::uint16_t> crcs;
@@ -116,7 +116,7 @@ TEST(E2eProfile5, NoticesEverySingleWrongBit) {
   EXPECT_FALSE(E2eProfile5(0x710).check(payload));
 }
 
-// A payload without room for the header is wrong, not read beyond its end.
+// A payload without room for the header is refused, and not read beyond its end.
 TEST(E2eProfile5, RefusesPayloadsShorterThanItsHeader) {
   const std::vector<std::uint8_t> payload(2);
   EXPECT_FALSE(E2eProfile5(0).check(payload));
@@ -147,8 +147,8 @@ Payload sealed(const E2eProtection& how, Payload payload) {
   return payload;
 }
 
-// Data ID 0x123, eight zero bytes and the counter: what others' implementations of profile 1
-// publish for both bytes of the data ID, for one after the other, and for the nibble.
+// Data ID 0x123, eight zero bytes and the counter: test vectors published by other implementations
+// of profile 1, for both bytes of the data ID, for alternating bytes, and for the nibble.
 TEST(E2eProtection, AgreesWithPublishedVectorsOfProfile1) {
   const E2eProtection both = protection(E2eKind::kProfile1A, {0x123});
   EXPECT_EQ(sealed(both, {0, 0, 0, 0, 0, 0, 0, 0}), (Payload{0xCC, 0, 0, 0, 0, 0, 0, 0}));
@@ -161,7 +161,7 @@ TEST(E2eProtection, AgreesWithPublishedVectorsOfProfile1) {
   EXPECT_EQ(sealed(nibble, {0, 1, 0, 0, 0, 0, 0, 0}), (Payload{0x77, 0x11, 0, 0, 0, 0, 0, 0}));
 }
 
-// Likewise of profile 2, whose data ID changes with the counter.
+// Published test vectors of profile 2, whose data ID changes with the counter.
 TEST(E2eProtection, AgreesWithPublishedVectorsOfProfile2) {
   const E2eProtection zeros = protection(E2eKind::kProfile2, sixteen_ids(0));
   EXPECT_EQ(sealed(zeros, {0, 1, 0, 0, 0, 0, 0, 0}), (Payload{0x45, 1, 0, 0, 0, 0, 0, 0}));
@@ -170,14 +170,13 @@ TEST(E2eProtection, AgreesWithPublishedVectorsOfProfile2) {
   EXPECT_EQ(sealed(rising, {0, 1, 2, 3, 4, 5, 6, 7}), (Payload{0x61, 1, 2, 3, 4, 5, 6, 7}));
 }
 
-// Its check value of CRC-8/SAE-J1850 over "123456789" is 0x4B.
+// CRC-8/SAE-J1850 of "123456789" is 0x4B in the catalogue of CRCs.
 TEST(E2eProtection, AgreesWithTheCatalogueOfCrcs) {
   const Payload digits = {0, '1', '2', '3', '4', '5', '6', '7', '8', '9'};
   EXPECT_EQ(protection(E2eKind::kCrc8J1850, {}, 0, 10).value(digits), 0x4B);
 }
 
-// By hand: 0x24 + 8 + 1 + 2 + … + 7 = 0x48, and a carry falls away.
-// Bit by bit, as SAE J1850 has it, for every length and place of the check value.
+// Against a bit-by-bit SAE J1850, for every length and place of the check value.
 TEST(E2eProtection, DividesPayloadsOfAnyLength) {
   std::mt19937_64 random(kSeed);
   SCOPED_TRACE(::testing::Message() << "seed " << kSeed);
@@ -200,6 +199,7 @@ TEST(E2eProtection, DividesPayloadsOfAnyLength) {
   }
 }
 
+// By hand: 0x24 + 8 + 1 + 2 + … + 7 = 0x48; a carry out of the byte is dropped.
 TEST(E2eProtection, AddsUpAsToyotaDoes) {
   const E2eProtection how = protection(E2eKind::kToyota, {}, 7, 8, 0x024);
   EXPECT_EQ(how.value(Payload{1, 2, 3, 4, 5, 6, 7, 0}), 0x48);
@@ -207,8 +207,8 @@ TEST(E2eProtection, AddsUpAsToyotaDoes) {
   EXPECT_EQ(protection(E2eKind::kToyota, {}, 7, 8, 0x2C1).value(Payload(8, 0)), 0xCB);
 }
 
-// Wherever the check value stands, every kind takes what it has made itself and no wrong bit of
-// what it protects.
+// With the check value at any place, every kind accepts what it has sealed, and no frame with a
+// wrong bit in the protected data.
 TEST(E2eProtection, NoticesEverySingleWrongBitWhereverTheCheckValueStands) {
   for (const E2eKind kind :
        {E2eKind::kProfile1A, E2eKind::kProfile1B, E2eKind::kProfile1C, E2eKind::kProfile2,
@@ -223,7 +223,7 @@ TEST(E2eProtection, NoticesEverySingleWrongBitWhereverTheCheckValueStands) {
   }
 }
 
-// What lies behind the protected bytes is not asked: a frame padded by a gateway is the same frame.
+// Bytes after the protected ones are ignored: a frame padded by a gateway is the same frame.
 TEST(E2eProtection, PassesOverBytesBehindTheMessage) {
   const E2eProtection how = protection(E2eKind::kProfile1A, {0x123}, 0, 5);
   Payload payload = {0, 1, 2, 3, 4, 0, 0, 0};
@@ -232,7 +232,7 @@ TEST(E2eProtection, PassesOverBytesBehindTheMessage) {
   EXPECT_TRUE(how.check(payload));
 }
 
-// Every name of a kind is known, and nothing else is.
+// Every name of a kind is accepted, and nothing else.
 TEST(E2eProtection, KnowsTheNamesOfTheKinds) {
   for (const std::string_view name : e2e_kind_names())
     EXPECT_TRUE(e2e_kind_from(name)) << name;

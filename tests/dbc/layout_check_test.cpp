@@ -20,7 +20,7 @@ std::string told(const std::string& signals, unsigned size = 8) {
   return text;
 }
 
-// A signal outside of its frame is told and kept, and no codec reads it.
+// A signal outside of its frame is reported and kept, but no codec can be made for it.
 TEST(LayoutCheck, TellsSignalsOutsideOfTheFrame) {
   const Database database = parse(
       "BO_ 1 M: 2 E\n SG_ A : 8|9@1+ (1,0) [0|0] \"\" E\n SG_ B : 0|8@1+ (1,0) [0|0] \"\" E\n",
@@ -33,7 +33,7 @@ TEST(LayoutCheck, TellsSignalsOutsideOfTheFrame) {
   EXPECT_TRUE(SignalCodec::make(database.messages[0].signals[1], 2, "here"));
 }
 
-// Lengths and scales that no value survives are told.
+// Reports lengths and scales that lose every value.
 TEST(LayoutCheck, TellsUnreadableLengthsAndScales) {
   EXPECT_EQ(told(" SG_ A : 0|0@1+ (1,0) [0|0] \"\" E\n"),
             "2: signal A of message M is 0 bits long; 1 to 64 can be read\n");
@@ -45,7 +45,7 @@ TEST(LayoutCheck, TellsUnreadableLengthsAndScales) {
             "2: signal A of message M is a float of 16 bits; 32 or 64 can be read\n");
 }
 
-// A negative scale is nothing odd; a minimum above the maximum is, and then there is no range.
+// A negative scale is normal; a minimum above the maximum is reported, and then there is no range.
 TEST(LayoutCheck, TellsRangesTheWrongWayRound) {
   EXPECT_EQ(told(" SG_ A : 0|8@1+ (-1,0) [-255|0] \"\" E\n"), "");
   EXPECT_EQ(
@@ -53,7 +53,7 @@ TEST(LayoutCheck, TellsRangesTheWrongWayRound) {
       "2: signal A of message M has a minimum 0 above its maximum -255; the range is ignored\n");
 }
 
-// Signals on top of each other are told once each, in both byte orders.
+// Each pair of overlapping signals is reported once, in both byte orders.
 TEST(LayoutCheck, TellsOverlaps) {
   EXPECT_EQ(told(" SG_ A : 0|12@1+ (1,0) [0|0] \"\" E\n SG_ B : 15|4@0+ (1,0) [0|0] \"\" E\n"), "");
   EXPECT_EQ(told(" SG_ A : 0|13@1+ (1,0) [0|0] \"\" E\n SG_ B : 15|4@0+ (1,0) [0|0] \"\" E\n"),
@@ -64,7 +64,7 @@ TEST(LayoutCheck, TellsOverlaps) {
       "3: signal B of message M overlaps A\n");
 }
 
-// Multiplexed signals may share bits, unless they are there at the same time.
+// Multiplexed signals may share bits, unless they are present at the same time.
 TEST(LayoutCheck, LetsMultiplexedSignalsShareBits) {
   const std::string multiplexor = " SG_ X M : 0|8@1+ (1,0) [0|0] \"\" E\n";
   EXPECT_EQ(told(multiplexor + " SG_ A m0 : 8|8@1+ (1,0) [0|0] \"\" E\n"

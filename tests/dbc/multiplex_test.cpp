@@ -29,13 +29,13 @@ std::string line(const std::string& name_and_role, unsigned start, unsigned leng
   return fmt::format(" SG_ {} : {}|{}@1+ (1,0) [0|0] \"\" E\n", name_and_role, start, length);
 }
 
-// Without multiplexing every signal is there, in the file's order.
+// Without multiplexing every signal is present, in the file's order.
 TEST(MessageCodec, ReadsAllSignals) {
   const Database database = parsed(line("A", 8) + line("B", 0));
   EXPECT_EQ(seen(database.messages[0], {1, 2, 3, 4, 5, 6, 7, 8}), "A=2 B=1 ");
 }
 
-// The multiplexor's value selects the signals; its own value is always there.
+// The multiplexor's value selects the signals; the multiplexor itself is always present.
 TEST(MessageCodec, FollowsTheMultiplexor) {
   const Database database =
       parsed(line("X M", 0) + line("A m0", 8) + line("B m1", 8) + line("C", 16));
@@ -44,7 +44,7 @@ TEST(MessageCodec, FollowsTheMultiplexor) {
   EXPECT_EQ(seen(database.messages[0], {2, 7, 9, 0, 0, 0, 0, 0}), "X=2 C=9 ");
 }
 
-// A multiplexor that is itself not there takes its signals with it.
+// If a multiplexor is absent, so are its signals.
 TEST(MessageCodec, FollowsMultiplexorsOfMultiplexors) {
   const Database database = parsed(line("X M", 0) + line("Y m1M", 8) + line("A m5", 16) +
                                    "SG_MUL_VAL_ 1 Y X 1-1, 3-4;\nSG_MUL_VAL_ 1 A Y 5-6;\n");
@@ -54,7 +54,7 @@ TEST(MessageCodec, FollowsMultiplexorsOfMultiplexors) {
   EXPECT_EQ(seen(database.messages[0], {2, 5, 9, 0, 0, 0, 0, 0}), "X=2 ");
 }
 
-// Two readings of one file mean the same; another page is another thing.
+// Presences from two readings of one file are equal; that of another page is not.
 TEST(Presence, IsTheSameWhereItsConditionsAre) {
   const auto presence_of_a = [](const std::string& page, unsigned multiplexor_bit) {
     const Database database =
@@ -75,7 +75,7 @@ TEST(MessageCodec, ComparesTheBitsOfASignedMultiplexor) {
   EXPECT_EQ(seen(database.messages[0], {255, 3, 0, 0, 0, 0, 0, 0}), "X=-1 A=3 ");
 }
 
-// A truncated payload shows the signals that it holds whole.
+// With a truncated payload the signals that it holds completely are read.
 TEST(MessageCodec, SkipsSignalsBeyondATruncatedPayload) {
   const Database database =
       parsed(line("A", 0) + line("B", 8, 12) + line("X M", 24) + line("C m0", 0));
@@ -85,7 +85,7 @@ TEST(MessageCodec, SkipsSignalsBeyondATruncatedPayload) {
   EXPECT_EQ(seen(database.messages[0], {}), "");
 }
 
-// Multiplexors that depend on each other never hold; it is told and the rest is read.
+// Multiplexors that depend on each other never hold; this is reported and the rest is read.
 TEST(MessageCodec, LeavesOutCircles) {
   const Database database =
       parsed(line("A", 0) + line("B", 8) + line("C", 16) + line("D", 24) +
@@ -96,7 +96,7 @@ TEST(MessageCodec, LeavesOutCircles) {
   EXPECT_EQ(codec.left_out()[0].where, "test.dbc:2");
 }
 
-// A chain is followed for sixteen multiplexors and not further, in whichever order it is written.
+// A chain is followed for sixteen multiplexors and no further, in whichever order it is written.
 TEST(MessageCodec, BoundsTheDepthOfChains) {
   for (const bool reversed : {false, true}) {
     std::string signals;
@@ -112,7 +112,7 @@ TEST(MessageCodec, BoundsTheDepthOfChains) {
   }
 }
 
-// A condition can be asked for one signal alone, and outlives the database.
+// A presence can be made for one signal alone, and outlives the database.
 TEST(Presence, TellsOfOneSignal) {
   Expected<Presence> presence = fail("", "not made");
   Expected<Presence> always = fail("", "not made");
@@ -132,7 +132,7 @@ TEST(Presence, TellsOfOneSignal) {
   EXPECT_TRUE(always->holds(Bytes{}));
 }
 
-// A condition on what is not there, or cannot be read, is an error with its place.
+// A condition on a missing or unreadable multiplexor is an error with its place.
 TEST(Presence, RefusesUnreadableMultiplexors) {
   Database database = parsed(line("X M", 60, 8) + line("A m2", 8));
   Message& message = database.messages[0];

@@ -37,7 +37,7 @@ const Signal& signal_in(const Database& database, std::string_view message, std:
   return signal == nullptr ? kNone : *signal;
 }
 
-// A message and its signals arrive with everything that their lines say.
+// A message and its signals are read with everything in their lines.
 TEST(DbcParser, ReadsMessagesAndSignals) {
   const Database database =
       parse_clean("VERSION \"\"\n\nNS_ :\n\tCM_\n\tBA_\n\nBS_:\n\nBU_: ECU\n" + kGyro);
@@ -67,7 +67,7 @@ TEST(DbcParser, ReadsMessagesAndSignals) {
   EXPECT_FALSE(rate.condition);
 }
 
-// Windows line ends, a byte order mark and cp1252 bytes leave no trace.
+// Windows line ends, a byte order mark and cp1252 bytes are converted.
 TEST(DbcParser, ReadsFilesOfWindowsTools) {
   const Database database = parse_clean(
       "\xEF\xBB\xBFVERSION \"1\"\r\n\r\nBO_ 1 M: 8 E\r\n SG_ S : 7|8@0+ (1,0) [0|0] \"\xC2\xB0/s\" "
@@ -82,7 +82,7 @@ TEST(DbcParser, ReadsFilesOfWindowsTools) {
   EXPECT_EQ(signal_in(cp1252, "M", "S").byte_order, ByteOrder::kMotorola);
 }
 
-// Texts may hold newlines, escaped quotes, semicolons and what looks like statements.
+// Texts may hold newlines, escaped quotes, semicolons and text that looks like statements.
 TEST(DbcParser, ReadsTextsOverSeveralLines) {
   const Database database = parse_clean(
       kGyro + "CM_ BO_ 291 \"first; \\\"second\\\"\nBO_ 5 X: 8 Y\nSG_ no statement\";\n" +
@@ -92,7 +92,7 @@ TEST(DbcParser, ReadsTextsOverSeveralLines) {
   EXPECT_EQ(signal_in(database, "GYRO", "Rate").comment, "ends in a backslash \\\\");
 }
 
-// Comments, labels and float types may come before the message that they are about.
+// Comments, labels and float types may precede the message that they refer to.
 TEST(DbcParser, ReadsSectionsOutOfOrder) {
   const Database database = parse_clean(
       "CM_ SG_ 291 Status \"of the unit\";\nVAL_ 291 Status 0 \"ok\" 1 \"bad\" ;\n"
@@ -107,7 +107,7 @@ TEST(DbcParser, ReadsSectionsOutOfOrder) {
   EXPECT_EQ(signal_in(database, "X", "F").condition->ranges[0].second, 2U);
 }
 
-// Numbers are read as all writers spell them; names may begin with a digit.
+// Numbers are read in all writers' spellings; names may begin with a digit.
 TEST(DbcParser, ReadsOddNumbersAndNames) {
   const Database database = parse_clean(
       "BO_ 1 2nd_Message: 8 3rdEcu\n SG_ 4x4 : 0|8@1+ (.25,-.5) [-1E+002|+1e2] \"\" E\n"
@@ -120,7 +120,7 @@ TEST(DbcParser, ReadsOddNumbersAndNames) {
   EXPECT_EQ(signal_in(database, "2nd_Message", "B").offset, 1.0);
 }
 
-// A range beyond all doubles is no range; a scale beyond them loses the signal.
+// A range beyond all doubles counts as none; a scale beyond them removes the signal.
 TEST(DbcParser, ReadsNumbersBeyondAllDoubles) {
   const Database database = parse(
       "BO_ 1 M: 8 E\n SG_ A : 0|8@1+ (1,0) [-1E999|1E999] \"\" E\n"
@@ -132,7 +132,7 @@ TEST(DbcParser, ReadsNumbersBeyondAllDoubles) {
   EXPECT_EQ(told(database), "3: the scaling of signal B is beyond all numbers\n");
 }
 
-// Infinity and not-a-number are words, not numbers.
+// Infinity and NaN are words, not numbers.
 TEST(DbcParser, RefusesInfinityAndNanAsNumbers) {
   for (const char* const number : {"inf", "-inf", "nan", "-nan", "+", "-", "--1", "0x"}) {
     const Database database = parse(
@@ -142,7 +142,8 @@ TEST(DbcParser, RefusesInfinityAndNanAsNumbers) {
   }
 }
 
-// Identifiers with bit 31 have 29 bits. Above 0x7FF without it they are taken so, and it is told.
+// Identifiers with bit 31 have 29 bits. Larger ones than 0x7FF without it are read so too, and
+// reported.
 TEST(DbcParser, ReadsIdentifiers) {
   const Database database = parse(
       "BO_ 2364549858 A: 8 E\nBO_ 2048 B: 8 E\nBO_ 2047 C: 8 E\nBO_ 2147483649 D: 8 E\n"
@@ -163,7 +164,7 @@ TEST(DbcParser, ReadsIdentifiers) {
             "5: message E has the identifier of message D\n");
 }
 
-// The pseudo-message for signals without message is passed over with all that refers to it.
+// The pseudo-message for signals without a message is skipped with everything that refers to it.
 TEST(DbcParser, PassesOverThePseudoMessage) {
   const Database database = parse_clean(
       "BO_ 3221225472 VECTOR__INDEPENDENT_SIG_MSG: 0 Vector__XXX\n"
@@ -174,7 +175,7 @@ TEST(DbcParser, PassesOverThePseudoMessage) {
   EXPECT_EQ(database.message_names(), std::vector<std::string>{"GYRO"});
 }
 
-// An odd line costs itself and is told with its number; everything else is kept.
+// An odd line is skipped and reported with its number; everything else is kept.
 TEST(DbcParser, KeepsTheRestAfterAnOddLine) {
   const Database database = parse(
       "BO_ 1 M: 8 E\n"
@@ -203,15 +204,15 @@ TEST(DbcParser, KeepsTheRestAfterAnOddLine) {
             "11: expected ';' after the statement, found 'inner'\n");
 }
 
-// A comment about a signal that does not say which one is told and ignored.
+// A comment on a signal without its name is reported and ignored.
 TEST(DbcParser, TellsCommentsWithoutSignalName) {
   const Database database =
       parse(kGyro + "CM_ SG_ 291 \"about what?\";\nCM_ BO_ 291 \"kept\";\n", "test.dbc");
   EXPECT_EQ(database.messages[0].comment, "kept");
-  EXPECT_EQ(told(database), "4: this comment does not say which signal it is about; ignored\n");
+  EXPECT_EQ(told(database), "4: this comment names no signal; ignored\n");
 }
 
-// References to what is not in the file are told, not followed.
+// References to missing elements are reported and ignored.
 TEST(DbcParser, TellsReferencesToNothing) {
   const Database database = parse(kGyro +
                                       "VAL_ 291 Rat 0 \"x\" ;\nVAL_ 292 Rate 0 \"x\" ;\n"
@@ -224,8 +225,8 @@ TEST(DbcParser, TellsReferencesToNothing) {
             "7: message GYRO has no signal Mux\n");
 }
 
-// Doubles are told. Messages are both kept, for frames differ by more than names; a second signal
-// of one name in one message is not.
+// Duplicates are reported. Two messages of one name are both kept, because their frames differ in
+// more than the name; the second signal of a name in one message is dropped.
 TEST(DbcParser, TellsDuplicates) {
   const Database database = parse(
       "BO_ 1 M: 8 E\n SG_ A : 0|8@1+ (1,0) [0|0] \"\" E\n SG_ A : 8|8@1+ (2,0) [0|0] \"\" E\n"
@@ -240,8 +241,8 @@ TEST(DbcParser, TellsDuplicates) {
             "7: there is a value table T already; this one is ignored\n");
 }
 
-// Labels come from the statement itself or from a table; environment variables' labels are
-// nobody's.
+// Labels come from the statement itself or from a table; labels of environment variables are
+// ignored.
 TEST(DbcParser, ReadsLabels) {
   const Database database = parse_clean("VAL_TABLE_ OnOff 1 \"on\" 0 \"off\" ;\n" + kGyro +
                                         "VAL_ 291 Status OnOff ;\nVAL_ 291 Rate -32768 "
@@ -273,7 +274,7 @@ TEST(DbcParser, ReadsFloatTypes) {
   EXPECT_EQ(signal_in(database, "M", "C").type, ValueType::kSigned);
 }
 
-// m0 refers to the signal marked M, wherever in the message that one stands.
+// m0 refers to the signal marked M, wherever that is in the message.
 TEST(DbcParser, ReadsSimpleMultiplexing) {
   const Database database = parse_clean(
       "BO_ 1 M: 8 E\n SG_ A m0 : 8|8@1+ (1,0) [0|0] \"\" E\n"
@@ -304,7 +305,8 @@ TEST(DbcParser, ReadsExtendedMultiplexing) {
   EXPECT_EQ(a->ranges, (decltype(a->ranges){{0, 0}, {7, 8}}));
 }
 
-// Nobody can tell when a multiplexed signal without multiplexor is there: it is left out and told.
+// A multiplexed signal without a multiplexor is left out and reported, since its presence is
+// unknown.
 TEST(DbcParser, LeavesOutSignalsWithoutMultiplexor) {
   const Database database = parse(
       "BO_ 1 M: 8 E\n SG_ A m0 : 8|8@1+ (1,0) [0|0] \"\" E\n SG_ B : 16|8@1+ (1,0) [0|0] \"\" E\n"
@@ -318,7 +320,7 @@ TEST(DbcParser, LeavesOutSignalsWithoutMultiplexor) {
             "7: signal A is multiplexed but message N has several multiplexors; left out\n");
 }
 
-// Odd multiplexing marks and ranges are odd lines.
+// Odd multiplexing marks and ranges are reported as odd lines.
 TEST(DbcParser, TellsOddMultiplexing) {
   const Database database = parse(
       "BO_ 1 M: 8 E\n SG_ A mx : 8|8@1+ (1,0) [0|0] \"\" E\n SG_ B X : 8|8@1+ (1,0) [0|0] \"\" E\n"
@@ -330,7 +332,8 @@ TEST(DbcParser, TellsOddMultiplexing) {
   EXPECT_FALSE(signal_in(database, "M", "E").condition);
 }
 
-// J1939 groups are known by the message's format, as number or label, or by the file's protocol.
+// J1939 groups are recognised by the message's format, as number or label, or by the file's
+// protocol.
 TEST(DbcParser, KnowsJ1939Groups) {
   const std::string messages = "BO_ 2364549858 A: 8 E\nBO_ 2364550626 B: 8 E\nBO_ 5 C: 8 E\n";
   const std::string format =
@@ -361,7 +364,7 @@ TEST(DbcParser, KnowsJ1939Groups) {
       << "the file's own labels count more than the usual numbers";
 }
 
-// CAN FD stands in the same attribute, with 11 and with 29 bits.
+// The same attribute marks CAN FD, with 11 and with 29 bits.
 TEST(DbcParser, KnowsCanFdFrames) {
   const std::string messages = "BO_ 2364549858 A: 8 E\nBO_ 5 B: 8 E\nBO_ 6 C: 64 E\n";
   const std::string format =
@@ -383,7 +386,7 @@ TEST(DbcParser, KnowsCanFdFrames) {
             "101");
 }
 
-// Sections that the product has no use for are passed over without a word.
+// Sections that the product does not use are skipped silently.
 TEST(DbcParser, PassesOverUnusedSections) {
   const Database database = parse_clean(
       "VERSION \"x\"\nNS_ :\n\tNS_DESC_\n\tCM_\n\tBA_DEF_\n\tSG_MUL_VAL_\n\nBS_: 500000 : "
@@ -399,7 +402,7 @@ TEST(DbcParser, PassesOverUnusedSections) {
   EXPECT_EQ(database.messages.size(), 1U);
 }
 
-// A forgotten semicolon before the next statement is told and costs nothing.
+// A missing semicolon before the next statement is reported and has no other effect.
 TEST(DbcParser, ForgivesAForgottenSemicolon) {
   const Database database = parse(kGyro + "CM_ BO_ 291 \"text\"\nVAL_ 291 Status 0 \"ok\"\n", "t");
   EXPECT_EQ(database.messages[0].comment, "text");
@@ -408,7 +411,7 @@ TEST(DbcParser, ForgivesAForgottenSemicolon) {
             "4: the statement does not end in ';'\n5: the statement does not end in ';'\n");
 }
 
-// A thousand odd lines are a hundred diagnostics and a number.
+// A thousand odd lines give a hundred diagnostics and the number of the others.
 TEST(DbcParser, CountsDiagnosticsBeyondTheFirstHundred) {
   std::string text = kGyro;
   for (int i = 0; i < 1000; ++i)
@@ -419,7 +422,7 @@ TEST(DbcParser, CountsDiagnosticsBeyondTheFirstHundred) {
   EXPECT_EQ(database.diagnostics.back().line, 104U);
 }
 
-// Any cut of a file is read without harm: what stands before the cut is kept.
+// A file can be cut anywhere without harm: statements before the cut are kept.
 TEST(DbcParser, SurvivesEveryTruncation) {
   const std::string text = kGyro +
                            "CM_ SG_ 291 Rate \"te\\\"xt\nmore\";\nVAL_ 291 Status 0 \"ok\" ;\n"
@@ -432,7 +435,7 @@ TEST(DbcParser, SurvivesEveryTruncation) {
   }
 }
 
-/// Processor time, which other programs on the machine do not lengthen.
+/// Processor time, which does not depend on the load of the machine.
 double seconds_to_parse(const std::string& text) {
   const std::clock_t start = std::clock();
   static_cast<void>(parse(text, "test.dbc"));
@@ -447,7 +450,7 @@ std::string repeated(const std::string& part, std::size_t times) {
 }
 
 // Texts made to be slow: eight times the text may take somewhat more than eight times as long
-// (maps, caches), but nowhere near the 64 times of a quadratic reader.
+// (maps, caches), but far less than the 64 times of a quadratic reader.
 TEST(DbcParser, ReadsHostileTextInLinearTime) {
   for (const std::string part :
        {"CM_ \"", "CM_ \"\n", "VAL_ 1 A 0 \"\n", "VAL_ 1 A 0 \" 0 \"\n", "SIG_GROUP_\n",
@@ -461,7 +464,7 @@ TEST(DbcParser, ReadsHostileTextInLinearTime) {
   }
 }
 
-// A large value table that very many signals name does not fill the memory.
+// A large value table to which very many signals refer does not fill the memory.
 TEST(DbcParser, BoundsCopiesOfValueTables) {
   std::string text = "VAL_TABLE_ T";
   for (int i = 0; i < 20000; ++i)
@@ -479,7 +482,7 @@ TEST(DbcParser, BoundsCopiesOfValueTables) {
   EXPECT_LT(labels, 2000000U);
 }
 
-// A file without messages is an error that says where reading went wrong first.
+// A file without messages is an error that names the first place where reading failed.
 TEST(DbcLoad, RefusesFilesWithoutMessages) {
   const auto missing = load("/nonexistent/a.dbc");
   ASSERT_FALSE(missing);
@@ -494,8 +497,8 @@ TEST(DbcLoad, RefusesFilesWithoutMessages) {
   EXPECT_EQ(empty.error().where, path + ":2");
 }
 
-// The value before anybody knows better: the signal's own, or the default of the file. Values of
-// signals that were taken out of the file are nothing odd.
+// The start value is the signal's own, or the default of the file. Values of signals that were
+// removed from the file are not reported.
 TEST(DbcParser, ReadsStartValues) {
   const std::string defined =
       "BA_DEF_ SG_ \"GenSigStartValue\" FLOAT -1E9 1E9;\n"
@@ -515,8 +518,8 @@ TEST(DbcParser, ReadsStartValues) {
 
 // --- Shift JIS -----------------------------------------------------------------------------------
 
-// The second byte of some characters is a backslash, and ends the text before the quote does: 表 is
-// 0x95 0x5C, 能 is 0x94 0x5C.
+// The second byte of some characters is a backslash, which seems to escape the quote after it: 表
+// is 0x95 0x5C, 能 is 0x94 0x5C.
 TEST(DbcParser, ReadsTextsThatEndInABackslashOfShiftJis) {
   const Database database =
       parse_clean(kGyro +
@@ -546,7 +549,8 @@ TEST(DbcParser, StillTakesEscapedQuotesForQuotes) {
   EXPECT_EQ(status.labels[1].text, "say \"on\"");
 }
 
-// A unit in Shift JIS costs no signal; what parses neither way is told once, as it was first.
+// A unit in Shift JIS loses no signal; a statement that parses neither way is reported once, with
+// its first error.
 TEST(DbcParser, TriesTheOtherMeaningOfABackslashOnce) {
   const Database unit = parse_clean(
       "BO_ 291 GYRO: 8 ECU\n SG_ Rate : 0|16@1- (1,0) [0|0] \"\x95\\\" ECU\n"
@@ -581,7 +585,7 @@ TEST(DbcParser, FindsMessagesAndSignalsByTheirLongNamesToo) {
             (std::vector<std::string>{"Rate", "Status", "RateAroundTheVerticalAxisFiltered"}));
 }
 
-// The name that the file itself gives goes before the long name of another one.
+// A name in the file takes precedence over the long name of another signal.
 TEST(DbcParser, PrefersNamesToLongNames) {
   const Database database =
       parse_clean(kGyro + "BA_ \"SystemSignalLongSymbol\" SG_ 291 Rate \"Status\";\n");

@@ -1,4 +1,4 @@
-// The DBC files that come with the product, against frames whose meaning is known.
+// The DBC files of the product, against frames of known meaning.
 
 #include <cstdint>
 #include <filesystem>
@@ -87,7 +87,7 @@ TEST(Profiles, ReadRacelogicImu04) {
   EXPECT_EQ(value_of(imu04, 0x602, false, "PitchRate", frame), -12.5);
 }
 
-// Magnitude with a sign bit of its own; Motorola with an offset; angle increments as a rate.
+// A magnitude with a separate sign bit; Motorola with an offset; angle increments as a rate.
 TEST(Profiles, ReadVehicleAndIncrementFrames) {
   const Database vw = loaded("profiles/vw_esp_02.dbc");
   const Bytes esp = {0, 0, 0, 0, 0, 0x10, 0x67, 0};
@@ -99,7 +99,7 @@ TEST(Profiles, ReadVehicleAndIncrementFrames) {
   EXPECT_DOUBLE_EQ(value_of(hg1120, 0x125, false, "RateZ", {0, 0, 0, 0x80, 0, 0, 0, 0}), -25.0);
 }
 
-// The product's own frames: every byte is somebody's, invalid values have labels.
+// The product's own frames: signals cover every bit, invalid values have labels.
 TEST(Profiles, DescribeTheOutputFrames) {
   const Database classic = loaded("vgyro.dbc");
   for (const Message& message : classic.messages) {
@@ -141,8 +141,8 @@ TEST(Profiles, DescribeTheFdOutputFrame) {
   }
 }
 
-// PGN 127251 of a boat that turns to starboard by 1 deg/s: 0.01745329 rad/s are 558505 steps. And
-// the three codes, which the file labels.
+// PGN 127251 of a boat that turns to starboard by 1 deg/s: 0.01745329 rad/s are 558505 steps. The
+// file labels the three codes.
 TEST(Profiles, ReadTheRateOfTurnOfNmea2000) {
   const Database boat = loaded("profiles/nmea2000_rate_of_turn.dbc");
   const Bytes turning = {0x05, 0xA9, 0x85, 0x08, 0x00, 0xFF, 0xFF, 0xFF};
@@ -157,7 +157,7 @@ TEST(Profiles, ReadTheRateOfTurnOfNmea2000) {
   EXPECT_GT(0x7FFFFFFC * rate.factor, rate.maximum - 1e-6);
 }
 
-// Readers of others drop signals whose factor has an exponent.
+// Some other readers drop signals whose factor has an exponent.
 TEST(Profiles, WriteTheirNumbersAsPlainDecimals) {
   for (const auto& entry : std::filesystem::recursive_directory_iterator(VGYRO_DBC_DIR)) {
     if (entry.path().extension() != ".dbc") continue;

@@ -12,13 +12,13 @@ TEST(NormalisedText, TurnsCp1252IntoUtf8) {
   EXPECT_EQ(normalised("\x81"), "\xEF\xBF\xBD");
 }
 
-// Text that is UTF-8 already stays as it is.
+// UTF-8 text is unchanged.
 TEST(NormalisedText, LeavesUtf8Alone) {
   EXPECT_EQ(normalised("°/s €"), "°/s €");
   EXPECT_EQ(normalised("\xF0\x9F\x8E\xA1"), "\xF0\x9F\x8E\xA1");
 }
 
-// The mark and the carriage returns of Windows go; a lone carriage return ends a line too.
+// The byte-order mark and carriage returns are removed; a lone carriage return also ends a line.
 TEST(NormalisedText, DropsByteOrderMarkAndCarriageReturns) {
   EXPECT_EQ(normalised("\xEF\xBB\xBF"
                        "a\r\nb\rc\n"),
@@ -27,7 +27,7 @@ TEST(NormalisedText, DropsByteOrderMarkAndCarriageReturns) {
   EXPECT_EQ(normalised("\r"), "\n");
 }
 
-// Overlong forms, surrogates, stray and missing continuation bytes are no UTF-8.
+// Overlong forms, surrogates, stray and missing continuation bytes are not UTF-8.
 TEST(NormalisedText, KnowsMalformedUtf8) {
   for (const char* const bad : {"\xC0\x80", "\xE0\x80\x80", "\xED\xA0\x80", "\xF4\x90\x80\x80",
                                 "\xF5\x80\x80\x80", "\x80", "\xC3", "\xE2\x82", "\xC3("}) {

@@ -1,4 +1,4 @@
-// What is written reads back as it was: the product's own files, and what is odd.
+// Written files read back unchanged: the product's own, and odd ones.
 
 #include "dbc/writer.h"
 

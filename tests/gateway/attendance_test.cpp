@@ -1,5 +1,5 @@
-// Who is in use: time-outs that follow the gyros' paces, silence told once, and when one gyro may
-// speak alone.
+// Which gyros are in use: time-outs follow the gyros' paces, silence is reported once, and one gyro
+// is used alone only when the other is missing.
 
 #include "gateway/attendance.h"
 
@@ -15,7 +15,7 @@ using rig::ms;
 
 class AttendanceTest : public ::testing::Test {
  protected:
-  /// Samples of both gyros, so that the aligner knows their paces.
+  /// Samples of both gyros, from which the aligner measures their intervals.
   void teach_pace(Duration pace, std::int64_t samples = 40) {
     fusion::AlignedPair pair;
     for (std::int64_t i = 0; i < samples; ++i) {
@@ -53,13 +53,13 @@ TEST_F(AttendanceTest, TimeOutFollowsThePaceWithinItsLimits) {
   }
 }
 
-// Before the paces are known a gyro has a second.
+// Before the intervals are known, the time-out is a second.
 TEST_F(AttendanceTest, UnknownPaceIsGivenASecond) {
   EXPECT_EQ(attendance.time_out(0), ms(1000));
   EXPECT_EQ(attendance.pair_interval(), Duration::zero());
 }
 
-// Silence is told once, by gyro, with the instant when the next one would be missing.
+// Silence is reported once, for each gyro, with the time at which the next one would be missing.
 TEST_F(AttendanceTest, SilenceIsToldOnceAndByGyro) {
   attendance.hear(0, at_ms(5000));
   attendance.hear(1, at_ms(5300));
@@ -82,8 +82,8 @@ TEST_F(AttendanceTest, SilenceIsToldOnceAndByGyro) {
   EXPECT_EQ(attendance.look_for_silence(at_ms(9000)).next, TimePoint::max());
 }
 
-// A gyro speaks alone when the other one has gone, and until it is paired again; at the start only
-// when the other one had a second to come.
+// A gyro is used alone once the other has dropped out, and until both are paired again; at the
+// start only after the other had a second to appear.
 TEST_F(AttendanceTest, GyroSpeaksAloneOnlyWhereTheOtherHasGone) {
   attendance.begin_waiting(at_ms(1000));
   attendance.hear(0, at_ms(1000));
@@ -97,8 +97,8 @@ TEST_F(AttendanceTest, GyroSpeaksAloneOnlyWhereTheOtherHasGone) {
   EXPECT_FALSE(attendance.may_speak_alone(0, at_ms(2004), true));
 }
 
-// A frame that may not be used sets its gyro aside once, where its health says so, and keeps it
-// from falling silent.
+// An unusable frame takes its gyro out of use once, if the health says so, and the gyro does not
+// become silent.
 TEST_F(AttendanceTest, SickGyroIsSetAsideAndNotMissing) {
   attendance.hear(0, at_ms(1000));
   attendance.hear(1, at_ms(1000));

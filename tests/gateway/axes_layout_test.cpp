@@ -1,5 +1,5 @@
-// The rates about all axes in one message that somebody else made: bytes worked out by hand from
-// what the makers publish, when a frame is due, and what is refused.
+// The rates about all axes in one foreign message: bytes computed by hand from what the makers
+// publish, when a frame is due, and what is refused.
 
 #include <array>
 #include <chrono>
@@ -91,7 +91,7 @@ OutputPlan output_of(const std::string& layout) {
   std::abort();
 }
 
-/// Exactly one complaint, with its line, that says all of these.
+/// Exactly one error, with its line, that contains all of these parts.
 void expect_error(const std::string& layout, const std::vector<std::string>& parts,
                   const std::string& axes = kThree) {
   const auto loaded = load(layout, axes);
@@ -154,7 +154,7 @@ TEST(AxesLayout, J1939AngularRate) {
   EXPECT_EQ(encoder.counts(), (LayoutCounts{.frames = 4, .valid = 1, .out_of_range = 1}));
 }
 
-// x forward, y to the right, z down: two axes the other way round than the vehicle's. 0.25 rad/s is
+// x forward, y to the right, z down: two axes are reversed against the vehicle's. 0.25 rad/s is
 // 250, 0.1 is 100.
 TEST(AxesLayout, SbgEllipseCountsTwoAxesTheOtherWay) {
   const OutputPlan plan = output_of(fmt::format(
@@ -168,7 +168,7 @@ TEST(AxesLayout, SbgEllipseCountsTwoAxesTheOtherWay) {
   EXPECT_EQ(once(encoder, {rate_of(0.25 * rad), invalid(), rate_of(-rad)}), "122#FA000080E803");
 }
 
-// `sign` is of all, and a sign of one axis turns that once more.
+// `sign` applies to all axes; the sign of an axis is multiplied with it.
 TEST(AxesLayout, OneSignForAll) {
   const OutputPlan plan = output_of(
       fmt::format("dbc = \"{}oxts_rt.dbc\"\nmessage = \"RT_RateVehicle\"\nsign = -1\nsign_x = -1\n"
@@ -176,15 +176,15 @@ TEST(AxesLayout, OneSignForAll) {
                   kProfiles));
   LayoutEncoder encoder(plan.layouts.at(0));
   EXPECT_EQ(once(encoder, {rate_of(0.01), rate_of(0.02), rate_of(0.03)}), "608#0100FEFFFDFF0000");
-  // It has no word for a rate that is not valid, and so for no rate.
+  // The layout has no code for an invalid rate, and so none for a missing one.
   EXPECT_EQ(once(encoder, {rate_of(0.01), invalid(), rate_of(0.03)}), "");
   EXPECT_EQ(once(encoder, {rate_of(0.01), rate_of(0.02), rate_of(400.0)}), "");
   EXPECT_EQ(encoder.counts(),
             (LayoutCounts{.frames = 1, .valid = 1, .out_of_range = 1, .withheld = 2}));
 }
 
-// One status for the frame: good only where all rates are. 1 deg/s is 10, -2 is 0xFEC of 12 bits, 3
-// is 0x1E; σ of 0.004 is rounded up to a step. Toyota's sum: 1 + 3 + 8 + the bytes.
+// One status for the frame: good only if all rates are. 1 deg/s is 10, -2 is 0xFEC of 12 bits, 3 is
+// 0x1E; σ of 0.004 is rounded up to a step. Toyota's sum: 1 + 3 + 8 + the bytes.
 TEST(AxesLayout, OneStatusOneCounterOneCheckValueForAll) {
   const OutputPlan plan =
       output_of(std::string(kWhole) +
@@ -195,7 +195,7 @@ TEST(AxesLayout, OneStatusOneCounterOneCheckValueForAll) {
   EXPECT_EQ(once(encoder, {rate_of(1.0), rate_of(-2.0), invalid()}), "103#0AC0FE00F02F01F4");
 }
 
-// A layout of two of three axes, and one of a single one, which goes out with that.
+// A layout of two of three axes, and one of a single axis, which is sent with that rate.
 TEST(AxesLayout, SomeOfTheAxes) {
   const OutputPlan two = output_of(
       "dbc = \"rig.dbc\"\nmessage = \"IMU_B\"\nid = 0x300\n"
@@ -214,7 +214,8 @@ TEST(AxesLayout, SomeOfTheAxes) {
 
 // --- when ----------------------------------------------------------------------------------------
 
-/// What goes out, and of which instant each rate of it is: the rate says so, in steps of 0.1 deg/s.
+/// Records each frame with the instants of its rates: the rate encodes the instant, in steps of 0.1
+/// deg/s.
 class Reader final : public FrameSink {
  public:
   void put(const can::Frame&, TimePoint) override { ADD_FAILURE() << "not on this bus"; }
@@ -231,7 +232,7 @@ class Reader final : public FrameSink {
 
 class AxesLayoutTime : public ::testing::Test {
  protected:
-  /// Axes that have a new rate of this instant, in ms, from one frame of a gyro.
+  /// Gives these axes a new rate of one instant, in ms, as from one frame of a gyro.
   void hear(double t_ms, const std::vector<std::size_t>& axes) {
     const TimePoint t =
         TimePoint{std::chrono::microseconds(static_cast<std::int64_t>(1000.0 * t_ms))};
@@ -255,7 +256,7 @@ TEST_F(AxesLayoutTime, AxesOfOneInstantStandInOneFrame) {
   EXPECT_EQ(reader.frames, (Frames{"10: 10 10 10", "20: 20 20 20"}));
 }
 
-// The frame goes out with the last of them; which that is is known after the first pause.
+// The frame is sent with the last of the axes, which is known after the first pause.
 TEST_F(AxesLayoutTime, AxesInMessagesOfTheirOwnStandInOneFrame) {
   for (int t = 10; t < 40; t += 10) {
     hear(t, {1});
@@ -265,7 +266,7 @@ TEST_F(AxesLayoutTime, AxesInMessagesOfTheirOwnStandInOneFrame) {
   EXPECT_EQ(reader.frames, (Frames{"10: - 10 -", "22: 22 20 21", "32: 32 30 31"}));
 }
 
-// An axis that is silent holds up nobody for longer than its rate may be old.
+// A silent axis delays the frame no longer than its rate may be old.
 TEST_F(AxesLayoutTime, AnAxisThatFallsSilentIsNotAvailable) {
   hear(10, {0, 1, 2});
   for (int t = 20; t < 80; t += 10)
@@ -275,7 +276,7 @@ TEST_F(AxesLayoutTime, AnAxisThatFallsSilentIsNotAvailable) {
                                    "50: 50 - 50", "60: 60 - 60", "70: 70 - 70", "80: 80 80 80"}));
 }
 
-// Where one unit carries on alone about an axis, its instants are others than those of the pairs.
+// While an axis has a single gyro, its instants differ from those of the pairs.
 TEST_F(AxesLayoutTime, AnAxisOfAnotherPhaseStandsInTheSameFrame) {
   hear(10, {0, 1, 2});
   for (int t = 20; t < 50; t += 10) {

@@ -1,4 +1,5 @@
-// What the corrector thinks, in words: the exact sentences, and nothing where there is nothing.
+// The corrector's findings as text: the exact sentences, and an empty text if there is nothing to
+// report.
 
 #include "gateway/condition_text.h"
 
@@ -73,7 +74,7 @@ TEST(ConditionText, SaysThatSigmaSpansBothReadings) {
             "what the gyros show can be read in two ways, and σ spans both");
 }
 
-// 1 deg/h an hour is 1/3600² deg/s a second.
+// 1 deg/h an hour is 1/3600² (deg/s)/s.
 TEST(ConditionText, TellsSlopesToTheSecondDigitOfTheirDoubt) {
   constexpr double kUnit = 1.0 / 3600.0 / 3600.0;
   EXPECT_EQ(slopes_text({3.14159 * kUnit, -2100.0 * kUnit}, {0.41 * kUnit, 312.0 * kUnit}, kNames),

@@ -161,8 +161,8 @@ class Config : public ::testing::Test {
     return messages;
   }
 
-  /// The good config with one mistake gives exactly one error: at the line of `at`, saying each of
-  /// `parts`.
+  /// The good configuration with one mistake gives exactly one error: at the line of `at`,
+  /// containing each of `parts`.
   void expect_error(const std::string& from, const std::string& to, const std::string& at,
                     const std::vector<std::string>& parts) const {
     const std::string text = replaced(kGood, from, to);
@@ -182,7 +182,7 @@ class Config : public ::testing::Test {
 
 // --- what is right -------------------------------------------------------------------------------
 
-// Everything that the file says arrives in the plan.
+// Every key of the file reaches the plan.
 TEST_F(Config, ResolvesAGoodFile) {
   const auto loaded = load(kGood);
   ASSERT_TRUE(loaded) << loaded.error().front().message();
@@ -232,7 +232,7 @@ TEST_F(Config, ResolvesSignals) {
   EXPECT_FALSE(right.temperature || right.valid);
 }
 
-// In the product's unit; without the key there is none.
+// In the product's unit; nothing without the key.
 TEST_F(Config, ResolvesTheSupplyVoltage) {
   EXPECT_FALSE(plan_of(kGood).gyros[1].supply_voltage);
   const Plan plan = plan_of(replaced(kGood, "sign_signal = \"Flag\"", "supply_voltage = \"Volt\""));
@@ -257,7 +257,7 @@ TEST_F(Config, ResolvesReferenceAccelerometerAndSpeed) {
   EXPECT_EQ(plan.speed->match.bus, 2);
 }
 
-// A file with only what is needed takes the defaults of the documentation.
+// A file with the required keys alone gets the documented defaults.
 TEST_F(Config, TakesDefaults) {
   const Plan plan = plan_of(
       "[[gyro]]\nbus = \"can0\"\ndbc = \"bench.dbc\"\nmessage = \"GYRO_A\"\nrate = \"RateZ\"\n"
@@ -276,8 +276,8 @@ TEST_F(Config, TakesDefaults) {
   EXPECT_FALSE(plan.output.fd);
 }
 
-// What a data sheet says of the bias reaches the corrector; 0, a negative value, one that no gyro
-// has and one that is no number are mistakes.
+// The bias limit from the file reaches the corrector; 0, a negative value, an impossible one and
+// NaN are errors.
 TEST_F(Config, BoundsABiasByWhatTheFileSays) {
   const Plan plan = plan_of(kGood);
   ASSERT_EQ(plan.gyros.size(), 2U);
@@ -292,7 +292,7 @@ TEST_F(Config, BoundsABiasByWhatTheFileSays) {
   }
 }
 
-// What the Earth turns along the vertical of Kyiv, by the sidereal day.
+// The Earth's rate about the vertical of Kyiv, from the sidereal day.
 TEST_F(Config, TurnsLatitudeIntoTheEarthsRate) {
   EXPECT_NEAR(plan_of(kGood).calibration.rate_dps, 0.0032216, 1e-7);
   EXPECT_NEAR(plan_of(replaced(kGood, "50.45", "-90")).calibration.rate_dps, -0.0041781, 1e-7);
@@ -315,7 +315,7 @@ TEST_F(Config, ReadsEveryComparison) {
                    4.5);
 }
 
-// Where the DBC file's unit is wrong, the configuration's word counts.
+// If the DBC file's unit is wrong, the configuration's takes precedence.
 TEST_F(Config, UnitOfTheConfigOverridesTheFiles) {
   const Plan plan = plan_of(replaced(replaced(kGood, "sign = -1\n", "unit = \"deg/h\"\n"),
                                      "sign_signal = \"Flag\"\n", ""));
@@ -323,7 +323,7 @@ TEST_F(Config, UnitOfTheConfigOverridesTheFiles) {
   EXPECT_DOUBLE_EQ(plan.gyros[1].rate.scale, 1.0 / 3600.0);
 }
 
-// --method of a replay stands above the file, even above a method that this version does not have.
+// The --method of a replay overrides the file, even a method that this version does not have.
 TEST_F(Config, OverrideOfTheMethodWins) {
   for (const char* text : {"mutual", "mean", "optimal"}) {
     const auto loaded =
@@ -350,7 +350,7 @@ TEST_F(Config, J1939MatchesAnySourceUnlessToldOtherwise) {
   EXPECT_EQ(one.gyros[1].match.mask & 0xFFU, 0xFFU);
 }
 
-// Two units of the same kind on one J1939 bus differ in nothing but their source address.
+// Two units of the same kind on one J1939 bus differ in their source address alone.
 TEST_F(Config, J1939GyrosAreToldApartBySource) {
   write("bench.dbc", std::string(kBench) + kJ1939);
   const auto gyro = [](const char* extra) {
@@ -367,8 +367,8 @@ TEST_F(Config, J1939GyrosAreToldApartBySource) {
   EXPECT_EQ(plan.gyros.size(), 2U);
 }
 
-// A range that the signal's own scale cannot reach is a slip of the file's author: [0|250] was
-// meant without the offset. Believing it would throw away every turn to the left.
+// A range that the signal's own scale cannot reach is a mistake of the file's author, who forgot
+// the offset in [0|250]. Using it would discard every turn to the left.
 TEST_F(Config, IgnoresAnImplausibleRangeWithAWarning) {
   const std::string text =
       replaced(replaced(kGood, "rate = \"RateZ\"\nsign = -1", "rate = \"Odd\"\nsign = -1"),
@@ -384,8 +384,9 @@ TEST_F(Config, IgnoresAnImplausibleRangeWithAWarning) {
   EXPECT_DOUBLE_EQ(loaded->plan.gyros[1].rate.maximum, 1e5);
 }
 
-// A gyro turns both ways: public files say [0|100] or [0|1] of a signed rate, and half of its noise
-// would be thrown away. An unsigned magnitude beside a sign, and other quantities, keep theirs.
+// A gyro turns both ways: public files give a signed rate the range [0|100] or [0|1], which would
+// discard half of its noise. An unsigned magnitude beside a sign, and other quantities, keep their
+// range.
 TEST_F(Config, IgnoresARangeThatLeavesOutOneDirectionOfARate) {
   for (const char* range : {"[0|1]", "[0|100]", "[-255|0]", "[5|2000]"}) {
     const std::string dbc = replaced(kBench, "[-2000|2000]", range);
@@ -430,7 +431,7 @@ std::string input_of(const std::string& table, const std::string& message,
 }
 const std::string kToCan1 = "[output]\nbus = \"can1\"\n";
 
-// The protocol's codes bound what is accepted, whatever the file says; the key has the last word.
+// The protocol's codes limit the accepted values, whatever the file says; the key overrides both.
 TEST_F(Config, AcceptsNoCodesOfAProtocol) {
   write("boat.dbc", kBoat);
   const std::string text = input_of("[[gyro]]", "TURN") + input_of("[[gyro]]", "LEFT") + kToCan1;
@@ -452,7 +453,7 @@ TEST_F(Config, AcceptsNoCodesOfAProtocol) {
   EXPECT_NE(bad[0].find("j1939, nmea2000, none"), std::string::npos) << bad[0];
 }
 
-// Every input has a sender.
+// Every input accepts a source address.
 TEST_F(Config, TakesASourceAddressForEveryInput) {
   write("boat.dbc", kBoat);
   const std::string axes = "x = \"Ax\"\ny = \"Ax\"\nz = \"Ax\"\n";
@@ -471,7 +472,7 @@ TEST_F(Config, TakesASourceAddressForEveryInput) {
   EXPECT_EQ(plan.speed->match.id & 0xFFU, 9U);
 }
 
-// The identifier of another message of the same PGN is that one's alone.
+// An identifier that belongs to another message of the same PGN is not accepted.
 TEST_F(Config, PassesOverTheIdentifiersOfOtherMessages) {
   write("boat.dbc", kBoat);
   const Plan plan = plan_of(input_of("[[gyro]]", "LEFT") + input_of("[[gyro]]", "MEMS") + kToCan1);
@@ -505,7 +506,7 @@ TEST_F(Config, RefusesInputsThatCannotBeToldApart) {
 
 // --- counters ------------------------------------------------------------------------------------
 
-// AUTOSAR's profile 1 leaves 15 out, whatever the file says of the signal.
+// AUTOSAR's profile 1 skips 15, whatever the file says of the signal.
 TEST_F(Config, CountsProfile1To14) {
   write("bench.dbc", replaced(kBench, "48|4@1+ (1,0) [0|14]", "48|4@1+ (1,0) [0|15]"));
   EXPECT_EQ(plan_of(kGood).gyros[0].e2e.counter->modulus, 16U);
@@ -546,8 +547,8 @@ TEST_F(Config, WarnsOfOneNameForBothGyros) {
             std::string::npos);
 }
 
-// Somebody on the output's bus has our identifier; on another bus that does not matter, and the
-// gateway's own messages may stand in a file of all messages.
+// A message on the output's bus has an identifier of the output; on another bus that does not
+// matter, and the gateway's own messages may be in the file.
 TEST_F(Config, WarnsOfMessagesThatHaveAnIdentifierOfOurs) {
   write("bench.dbc", std::string(kBench) + "BO_ 1568 RADAR: 8 RIG\nBO_ 1569 VG_Bias: 8 RIG\n");
   const auto loaded = load(kGood);
@@ -565,7 +566,7 @@ TEST_F(Config, WarnsOfMessagesThatHaveAnIdentifierOfOurs) {
 
 // --- what is wrong -------------------------------------------------------------------------------
 
-// A mistyped key in any table: the nearest name that the table knows.
+// A mistyped key in any table: the error names the nearest key of the table.
 TEST_F(Config, NamesTheNearestKeyOfEveryTable) {
   expect_error("temperature = ", "temprature = ", "temprature",
                {"unknown key \"temprature\"", "[[gyro]]", "did you mean \"temperature\"?"});
@@ -582,13 +583,13 @@ TEST_F(Config, NamesTheNearestKeyOfEveryTable) {
   expect_error("[speed]", "[sped]", "[sped]", {"did you mean \"speed\"?"});
 }
 
-// Nothing near: what the table knows.
+// If no key is near, the error lists the table's keys.
 TEST_F(Config, ListsTheKeysWhenNothingIsNear) {
   expect_error("fd = true", "colour = \"blue\"", "colour",
                {"unknown key \"colour\" in [output]", "one of: bus, rate_id"});
 }
 
-// A key that is needed and not there: the table's line, and an example.
+// A required key is missing: the error names the table's line and gives an example.
 TEST_F(Config, AsksForMissingKeys) {
   expect_error("bus = \"can1\"\n", "", "[[gyro]]\nname = \"right\"",
                {"[[gyro]] needs bus", "for example bus = \"can0\""});
@@ -602,7 +603,7 @@ TEST_F(Config, AsksForMissingKeys) {
                {"[[gyro]] needs bus"});
 }
 
-// A table that is needed and not there.
+// A required table is missing.
 TEST_F(Config, AsksForMissingTables) {
   const std::string text = kGood;
   const auto messages = messages_of(text.substr(0, text.find("[output]")));
@@ -610,7 +611,7 @@ TEST_F(Config, AsksForMissingTables) {
   EXPECT_NE(messages[0].find("there is no [output] table"), std::string::npos) << messages[0];
 }
 
-// A string where a number should be, and the like.
+// Wrong types, such as a string instead of a number.
 TEST_F(Config, TellsWrongTypes) {
   expect_error("rest_s = 30.0", "rest_s = \"30\"", "rest_s", {"rest_s must be a number"});
   expect_error("order = 2", "order = 2.0", "order", {"order must be a whole number"});
@@ -622,7 +623,7 @@ TEST_F(Config, TellsWrongTypes) {
   expect_error("sign = -1", "sign = \"-1\"", "sign = ", {"sign must be a whole number"});
 }
 
-// A table of another shape.
+// Tables of another shape.
 TEST_F(Config, TellsTablesOfTheWrongShape) {
   const auto single = messages_of("[gyro]\nbus = \"can0\"\n[output]\nbus = \"can0\"\n");
   ASSERT_EQ(single.size(), 1U);
@@ -653,7 +654,7 @@ TEST_F(Config, NeedsExactlyTwoGyros) {
   }
 }
 
-// A DBC file that is not there is told once, though two gyros name it.
+// A missing DBC file is reported once, although two gyros name it.
 TEST_F(Config, TellsAMissingDbcFileOnce) {
   std::filesystem::remove(folder_ / "bench.dbc");
   const auto messages = messages_of(kGood);
@@ -664,7 +665,7 @@ TEST_F(Config, TellsAMissingDbcFileOnce) {
       << messages[0];
 }
 
-// The nearest message of the file, the nearest signal of the message.
+// The error names the nearest message of the file, or the nearest signal of the message.
 TEST_F(Config, NamesTheNearestMessageAndSignal) {
   expect_error("message = \"GYRO_A\"", "message = \"GYRO_1\"", "GYRO_1",
                {"bench.dbc has no message \"GYRO_1\"", "did you mean \"GYRO_A\"?"});
@@ -678,7 +679,7 @@ TEST_F(Config, NamesTheNearestMessageAndSignal) {
                {"has no signal \"Stats\"", "did you mean \"Status\"?"});
 }
 
-// One frame cannot be two gyros, whatever their names are.
+// One frame cannot be read as two gyros, whatever their names.
 TEST_F(Config, RefusesTwoGyrosInOneFrame) {
   const std::string text = replaced(replaced(replaced(kGood, "bus = \"can1\"", "bus = \"can0\""),
                                              "message = \"GYRO_B\"", "message = \"GYRO_A\""),
@@ -690,7 +691,7 @@ TEST_F(Config, RefusesTwoGyrosInOneFrame) {
       << messages[0];
 }
 
-// A voltage is no rate; the message says which units are, and how to correct a wrong file.
+// A voltage is not a rate; the error lists the accepted units and how to correct a wrong file.
 TEST_F(Config, RefusesUnitsThatAreNoRates) {
   expect_error("message = \"GYRO_B\"\nrate = \"RateZ\"", "message = \"GYRO_B\"\nrate = \"Volt\"",
                "rate = \"Volt\"",
@@ -714,7 +715,7 @@ TEST_F(Config, RefusesOtherSigns) {
   expect_error("sign = -1", "sign = 0", "sign = 0", {"sign is 0"});
 }
 
-// What is no comparison is shown one.
+// For a text that is not a comparison, the error shows an example.
 TEST_F(Config, RefusesConditionsThatAreNoComparison) {
   for (const char* text : {"Status", "Status = 0", "== 0", "Status == ", "Status == zero",
                            "Status == nan", "Status == 0 1", ""}) {
@@ -723,7 +724,7 @@ TEST_F(Config, RefusesConditionsThatAreNoComparison) {
   }
 }
 
-// A counter of one bit, or one that is a float, counts nothing.
+// A counter of one bit, or a float, cannot count.
 TEST_F(Config, RefusesCountersThatCannotCount) {
   expect_error("sign = -1\ncounter = \"Counter\"", "sign = -1\ncounter = \"Flag\"",
                "counter = \"Flag\"", {"Flag is no alive counter", "2 to 31 bits"});
@@ -736,7 +737,7 @@ std::string right_with(const std::string& keys) {
   return kRightCounter + std::string("\n") + keys;
 }
 
-// Check values and counters of every input arrive in the plan, each at its byte.
+// Check values and counters of every input reach the plan, each at its byte.
 TEST_F(Config, ReadsHowMessagesProveThemselves) {
   std::string text = replaced(kGood, kRightCounter,
                               right_with("max_delta_counter = 3\ncrc = \"Crc\"\n"
@@ -764,7 +765,7 @@ TEST_F(Config, ReadsHowMessagesProveThemselves) {
   EXPECT_FALSE(plan.accelerometer->e2e.crc || plan.accelerometer->e2e.counter);
 }
 
-// A protection that is only half said is an error that asks for the other half.
+// If only half of a protection is configured, the error asks for the other half.
 TEST_F(Config, RefusesProtectionsThatAreHalfSaid) {
   expect_error(kRightCounter, right_with("crc = \"Crc\""),
                "crc = ", {"nothing says how", "profile_1a", "toyota"});
@@ -777,7 +778,7 @@ TEST_F(Config, RefusesProtectionsThatAreHalfSaid) {
                "max_delta_counter", {"without a counter"});
 }
 
-// Names, places and numbers that a protection cannot have.
+// Names, places and numbers that no protection can have.
 TEST_F(Config, RefusesProtectionsThatCannotBe) {
   const auto with = [](const std::string& kind, const std::string& crc, const std::string& id) {
     return right_with("e2e = \"" + kind + "\"\ncrc = \"" + crc + "\"" +
@@ -805,10 +806,10 @@ TEST_F(Config, RefusesProtectionsThatCannotBe) {
                {"max_delta_counter is 255", "1 (none may be lost) to 254"});
 }
 
-// The truth of the calibration is said once.
+// The true rate of the calibration may be stated only once.
 TEST_F(Config, RefusesContradictingCalibrations) {
   expect_error("latitude_deg = 50.45", "latitude_deg = 50.45\nrate_dps = 0.0032", "latitude_deg",
-               {"both say the true rate", "keep one"});
+               {"both set the true rate", "keep one"});
   expect_error("latitude_deg = 50.45", "latitude_deg = 90.5", "latitude_deg",
                {"latitude_deg is 90.5", "-90 to 90"});
   expect_error("latitude_deg = 50.45", "rate_dps = nan", "rate_dps", {"rate_dps is nan"});
@@ -816,7 +817,7 @@ TEST_F(Config, RefusesContradictingCalibrations) {
                {"did you mean \"reference\"?"});
 }
 
-// What to do when the platform moves is one of two words; with a reference it does not matter.
+// when_moving accepts one of two words; with a reference it has no effect.
 TEST_F(Config, ReadsWhatToDoWhenThePlatformMoves) {
   const auto when_moving = [&](const char* line) {
     return plan_of(replaced(kGood, "latitude_deg = 50.45", line)).calibration.when_moving;
@@ -840,7 +841,7 @@ TEST_F(Config, ReferenceCalibrationNeedsAReference) {
   EXPECT_NE(messages[0].find("needs a [reference] table"), std::string::npos) << messages[0];
 }
 
-// They stand in tables, in pictures and on terminals.
+// Names appear in tables, in pictures and on terminals.
 TEST_F(Config, RefusesNamesThatAreNotPrintable) {
   expect_error("name = \"left\"", "name = \"l\\u001b[2J\"", "name = \"l",
                {"the name \"l\\x1b[2J\" is not printable"});
@@ -848,7 +849,7 @@ TEST_F(Config, RefusesNamesThatAreNotPrintable) {
   expect_error("bus = \"can2\"", "bus = \"can\\t2\"", "bus = \"can\\t", {"no interface name"});
 }
 
-// Numbers outside what can work, each with its limits.
+// Numbers outside their limits: the error states the limits.
 TEST_F(Config, RefusesNumbersOutsideTheirLimits) {
   for (const char* value : {"0", "-1.0", "1e-9", "0.99", "86401", "inf", "nan"}) {
     expect_error("rest_s = 30.0", fmt::format("rest_s = {}", value), "rest_s",
@@ -873,7 +874,7 @@ TEST_F(Config, RefusesMethodsItDoesNotHave) {
                {"there is no method \"mutal\"", "did you mean \"mutual\"?"});
 }
 
-// Output frames must not be mistaken for one another, nor for an input.
+// Output frames must have identifiers of their own, and none of an input.
 TEST_F(Config, RefusesColludingIdentifiers) {
   expect_error("bias_id = 0x621", "bias_id = 0x620", "[output]",
                {"two output frames have the same identifier"});
@@ -883,7 +884,7 @@ TEST_F(Config, RefusesColludingIdentifiers) {
       << "0x102 is an input on the other bus";
 }
 
-// Linux has no longer interface names.
+// Linux limits interface names to 15 characters.
 TEST_F(Config, RefusesInterfaceNamesThatCannotBe) {
   expect_error("bus = \"can1\"", "bus = \"a_name_of_16_chr\"", "a_name_of_16_chr",
                {"no interface name", "15 characters"});
@@ -891,12 +892,12 @@ TEST_F(Config, RefusesInterfaceNamesThatCannotBe) {
                "a_name_of_16_chr", {"no interface name", "15 characters"});
 }
 
-// source_address without J1939 would be silently without effect.
+// Without J1939, source_address would have no effect.
 TEST_F(Config, RefusesSourceAddressesOutsideJ1939) {
   expect_error("sign = -1", "source_address = 3", "source_address", {"for a J1939 message"});
 }
 
-// A signal that does not fit its message is the DBC file's fault, so its line is named.
+// A signal that does not fit its message is a mistake in the DBC file, so the error names its line.
 TEST_F(Config, NamesTheDbcLineOfASignalThatDoesNotFit) {
   write("bench.dbc", replaced(kBench, "RateZ : 0|32@1-", "RateZ : 40|32@1-"));
   const auto messages = messages_of(kGood);
@@ -906,7 +907,7 @@ TEST_F(Config, NamesTheDbcLineOfASignalThatDoesNotFit) {
       << messages[0];
 }
 
-// TOML that is none: the line where it stops making sense.
+// Invalid TOML: the error names the line.
 TEST_F(Config, TellsTheLineOfASyntaxError) {
   for (const auto& [from, to] : {std::pair{"order = 2", "order = = 2"},
                                  {"order = 2", "order = 2\norder = 3"},
@@ -922,7 +923,7 @@ TEST_F(Config, TellsTheLineOfASyntaxError) {
   }
 }
 
-// Files that are no text at all.
+// Files that are not text.
 TEST_F(Config, SurvivesAnythingAsAFile) {
   EXPECT_FALSE(load(""));
   EXPECT_FALSE(load(std::string("\xFF\xFE\0\x80", 4)));
@@ -933,7 +934,7 @@ TEST_F(Config, SurvivesAnythingAsAFile) {
   EXPECT_FALSE(load_config(folder_.string()));
 }
 
-// All mistakes of a file in one go, in the order of its lines, so that one look corrects them all.
+// All mistakes of a file are reported together, in the order of lines.
 TEST_F(Config, ReportsAllMistakesAtOnce) {
   std::string text = kGood;
   for (const auto& [from, to] : {std::pair{"temperature = \"Temp\"", "temperature = \"Tmp\""},
@@ -956,7 +957,7 @@ TEST_F(Config, ReportsAllMistakesAtOnce) {
   }
 }
 
-// A configuration in the present folder has no folder in its name.
+// The path of a configuration in the present folder contains no folder.
 TEST_F(Config, FindsDbcFilesBesideAConfigWithoutAFolder) {
   write("vgyro.toml", kGood);
   const std::filesystem::path before = std::filesystem::current_path();
@@ -966,7 +967,7 @@ TEST_F(Config, FindsDbcFilesBesideAConfigWithoutAFolder) {
   EXPECT_TRUE(loaded) << loaded.error().front().message();
 }
 
-// The configuration that ./run plays by default, and the ready-made profiles, must stay loadable.
+// The default configuration of ./run must remain loadable.
 TEST(ExampleConfig, IsGood) {
   const auto loaded = load_config(std::string(VGYRO_DBC_DIR) + "/../examples/twin.toml");
   ASSERT_TRUE(loaded) << loaded.error().front().message();

@@ -1,6 +1,6 @@
-// Two gyros that cannot be of one platform, as they are configured: no rate is valid from then on,
-// frames, status and state file say so, and motion that fits takes it back. Healthy pairs, and
-// pairs of which one falls sick, never hear of it.
+// Two gyros that cannot be on one platform as configured: no rate is valid from then on, frames,
+// status and state file show it, and motion that fits withdraws it. Healthy pairs, and pairs with
+// one failing gyro, never get this verdict.
 
 #include <cmath>
 #include <string>
@@ -25,7 +25,7 @@ constexpr double kRest_s = 5.0;
 constexpr std::int64_t kTurnsFrom_ms = 8'000;
 constexpr std::int64_t kEnd_ms = 40'000;
 
-/// At rest, and then to and fro.
+/// At rest, then moving to and fro.
 double truth_dps(double t_s) {
   return t_s < 8.0 ? 0.0 : 15.0 * std::sin(0.9 * (t_s - 8.0));
 }
@@ -154,7 +154,7 @@ TEST(ContradictionTest, OutlivesARestartUntilThePairHasMoved) {
       if (rate.valid) return to_seconds(rate.stamp - TimePoint{});
     return std::nullopt;
   };
-  // Its frames go on by the same clock; it rests first.
+  // The frames of the second run continue on the same clock; it begins with a rest.
   const Played still = play(plan, 1.0, kTurnsFrom_ms, &*state);
   EXPECT_EQ(still.pipeline->status().state, State::kContradicted);
   EXPECT_FALSE(first_valid(still));
@@ -185,11 +185,11 @@ TEST(ContradictionTest, IsNoReasonToBelieveOneGyroAlone) {
   EXPECT_FALSE(rig::rates_seen(out).back().valid) << "nothing says that it is the right one";
 }
 
-// --- one falls sick ------------------------------------------------------------------------------
+// --- one gyro fails ------------------------------------------------------------------------------
 
 struct Sickness {
   const char* name;
-  /// What gyro b reads where the platform turns so fast, at this time, having read that before.
+  /// The reading of gyro b at this rate of the platform and this time, after its reading before.
   std::function<double(double rate_dps, double t_s, double before_dps, Noise& noise)> reads;
 };
 

@@ -29,7 +29,7 @@ void* operator new(std::size_t size) {
 void* operator new[](std::size_t size) {
   return ::operator new(size);
 }
-// The standard library's own algorithms take these.
+// The standard library's algorithms use these.
 void* operator new(std::size_t size, const std::nothrow_t& /*tag*/) noexcept {
   return counted(size);
 }

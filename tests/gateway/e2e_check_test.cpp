@@ -64,7 +64,7 @@ TEST(E2eCheck, TakesNoFrameTooShortToBeProtected) {
   EXPECT_EQ(check.judge(frame_of(kId, {0xCC, 0, 0})), Reject::kTruncated);
 }
 
-// Or a spoilt frame would make the good one behind it look repeated.
+// Otherwise a corrupted frame would make the good one after it look repeated.
 TEST(E2eCheck, DoesNotCountAFrameThatIsSpoilt) {
   const E2ePlan plan = plan_of(0, true);
   E2eCheck check(plan);
@@ -79,7 +79,7 @@ TEST(E2eCheck, TakesStepsUpToTheLongestAllowed) {
   E2eCheck check(plan);
   EXPECT_FALSE(judge(check, 13));
   EXPECT_FALSE(judge(check, 14));
-  EXPECT_FALSE(judge(check, 2));  // over the end: 14, 0, 1, 2
+  EXPECT_FALSE(judge(check, 2));  // past the end: 14, 0, 1, 2
   EXPECT_EQ(judge(check, 2), Reject::kCounterRepeated);
   EXPECT_EQ(judge(check, 6), Reject::kWrongSequence);
   EXPECT_FALSE(judge(check, 5));
@@ -96,7 +96,7 @@ TEST(E2eCheck, CountsWhatIsMissingInLongSteps) {
   EXPECT_EQ(missing, 0U);
 }
 
-// Two frames that follow each other are a sender that began anew.
+// Two frames in sequence are a sender that restarted.
 TEST(E2eCheck, FollowsASenderThatBeganAnew) {
   const E2ePlan plan = plan_of(2, false);
   E2eCheck check(plan);
@@ -106,8 +106,8 @@ TEST(E2eCheck, FollowsASenderThatBeganAnew) {
   EXPECT_FALSE(judge(check, 2));
 }
 
-// Somebody else counts on the same identifier: as long as the true sender speaks, none of that is
-// taken and nothing of its own is lost.
+// A second sender counts on the same identifier: while the true sender is active, none of the
+// foreign frames is accepted and none of its own is lost.
 TEST(E2eCheck, ASecondSenderDoesNotPushTheFirstOut) {
   const E2ePlan plan = plan_of(2, false);
   E2eCheck check(plan);
@@ -134,7 +134,7 @@ std::optional<Reject> judge_other(E2eCheck& check, unsigned counter) {
   return check.judge(counted(counter), E2eCheck::Page::kOther);
 }
 
-// Four pages and a counter of 0…3: the own page always carries the same number.
+// Four pages and a counter of 0…3: the own page always has the same count.
 TEST(E2eCheck, FollowsACounterOverAllPages) {
   E2ePlan plan = plan_of(1, false);
   plan.counter->modulus = 4;
@@ -159,7 +159,7 @@ TEST(E2eCheck, CountsWhatIsMissingOnOtherPages) {
   EXPECT_EQ(missing, 0U);
 }
 
-// A counter that counts the rounds stands still within one.
+// A counter of rounds is constant within a round.
 TEST(E2eCheck, TakesACounterOfRounds) {
   const E2ePlan plan = plan_of(1, false);
   E2eCheck check(plan);
@@ -170,7 +170,7 @@ TEST(E2eCheck, TakesACounterOfRounds) {
   }
 }
 
-// All pages go on, the counter does not: nothing is new.
+// All pages arrive, but the counter is constant: nothing is new.
 TEST(E2eCheck, FindsACounterThatStandsOnAllPages) {
   const E2ePlan plan = plan_of(0, false);
   E2eCheck check(plan);
@@ -182,7 +182,7 @@ TEST(E2eCheck, FindsACounterThatStandsOnAllPages) {
   }
 }
 
-// Where the highest value was configured, one beyond it is no number of the sender's.
+// With a configured highest value, a higher one cannot be from the sender.
 TEST(E2eCheck, RefusesNumbersBeyondTheConfiguredHighest) {
   E2ePlan plan = plan_of(0, false);
   plan.counter->modulus = 10;
@@ -196,8 +196,8 @@ TEST(E2eCheck, RefusesNumbersBeyondTheConfiguredHighest) {
   EXPECT_EQ(missing, 0U);
 }
 
-// The next frame in order takes a short way; whatever comes before it, it must be judged as any
-// other. The rules are written out once more, over numbers that only grow.
+// The next frame in order takes a fast path; whatever precedes it, the result must be that of the
+// full check. The rules are implemented once more here, on numbers that only increase.
 TEST(E2eCheck, JudgesEveryOrderOfFramesByTheSameRules) {
   constexpr std::uint64_t kSeed = 20'261'201;
   SCOPED_TRACE(::testing::Message() << "seed " << kSeed);

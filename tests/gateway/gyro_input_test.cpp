@@ -71,7 +71,7 @@ TEST(GyroInput, DecodesTheRateInDegreesPerSecond) {
   EXPECT_DOUBLE_EQ(GyroInput(flipped).decode(frame).rate_dps, 1.0);
 }
 
-// The product's unit is deg/s: the DBC's limits are judged before the conversion, not after it.
+// The DBC's limits apply in its own unit, before the conversion to deg/s.
 TEST(GyroInput, JudgesTheRangeInTheFilesOwnUnit) {
   GyroPlan plan = small_plan();
   plan.rate.scale = 180.0 / M_PI;
@@ -82,7 +82,7 @@ TEST(GyroInput, JudgesTheRangeInTheFilesOwnUnit) {
   EXPECT_EQ(input.decode(frame_of(kIdA, {0xF5, 0x01})).reject, Reject::kOutOfRange);
 }
 
-// A remote frame has a length and no data: what would be read is what another frame left there.
+// A remote frame has a length and no data: its bytes would be those of an earlier frame.
 TEST(GyroInput, RefusesRemoteAndErrorFrames) {
   const GyroPlan plan = small_plan();
   GyroInput input(plan);
@@ -90,7 +90,7 @@ TEST(GyroInput, RefusesRemoteAndErrorFrames) {
   EXPECT_EQ(input.decode(frame_of(kIdA, {1, 2, 3, 4}, can::kError)).reject, Reject::kNotData);
 }
 
-// One byte too few for any of the signals that are read, and the frame is not used.
+// A frame that is one byte too short for any of the signals read is refused.
 TEST(GyroInput, RefusesFramesShorterThanAnySignalItReads) {
   const GyroPlan plain = small_plan();
   const GyroPlan counted_gyro = counted_plan(8, 256);
@@ -114,7 +114,7 @@ TEST(GyroInput, RefusesFramesShorterThanAnySignalItReads) {
   }
 }
 
-// Every operator of `valid`, below, at and above its number; the physical value counts.
+// Every operator of `valid`, below, at and above its number; the physical value is compared.
 TEST(GyroInput, UsesAFrameOnlyWhileItsComparisonHolds) {
   struct Case {
     Comparison comparison;
@@ -150,7 +150,7 @@ TEST(GyroInput, DropsFrameWhenCounterRepeats) {
   EXPECT_FALSE(input.decode(counted(8)).reject);
 }
 
-// The counter is followed through frames that other checks refuse: they did arrive.
+// The counter is followed through frames that other checks refuse, since they did arrive.
 TEST(GyroInput, FollowsTheCounterThroughRefusedFrames) {
   GyroPlan plan = counted_plan(8, 256);
   plan.valid = condition(Comparison::kEqual, 0.0);
@@ -162,7 +162,7 @@ TEST(GyroInput, FollowsTheCounterThroughRefusedFrames) {
   EXPECT_EQ(next.missing, 0U);
 }
 
-// A whole turn of the counter without loss counts nothing as missing, at 256 and at AUTOSAR's 15.
+// A full turn of the counter without loss counts nothing as missing, at 256 and at AUTOSAR's 15.
 TEST(GyroInput, CountsNothingMissingWhenTheCounterTurnsOver) {
   for (const std::uint32_t modulus : {256U, 15U}) {
     const GyroPlan plan = counted_plan(modulus == 15 ? 4 : 8, modulus);
@@ -176,7 +176,7 @@ TEST(GyroInput, CountsNothingMissingWhenTheCounterTurnsOver) {
   }
 }
 
-// A step of n means n − 1 frames lost, over the turn of the counter too.
+// A step of n means n − 1 lost frames, also across the wrap of the counter.
 TEST(GyroInput, CountsMissingFramesByTheCounter) {
   const GyroPlan wide = counted_plan(8, 256);
   GyroInput input(wide);
@@ -189,7 +189,7 @@ TEST(GyroInput, CountsMissingFramesByTheCounter) {
   EXPECT_EQ(autosar.decode(counted(1)).missing, 2U);
 }
 
-// 15 of a counter that runs 0…14 means an error at the sender; it must not break the counting.
+// The value 15 of a counter that runs 0…14 means an error at the sender; counting must survive it.
 TEST(GyroInput, SurvivesACounterValueThatDoesNotExist) {
   const GyroPlan plan = counted_plan(4, 15);
   GyroInput input(plan);
@@ -198,8 +198,8 @@ TEST(GyroInput, SurvivesACounterValueThatDoesNotExist) {
   EXPECT_LT(input.decode(counted(3)).missing, 15U);
 }
 
-// After a silence nobody can say how often the counter turned: the first frame counts nothing. But
-// a sender that hangs and comes back may repeat the frame it had sent last.
+// After a silence the number of turns of the counter is unknown, so the first frame counts nothing
+// as missing. But a sender that hangs and recovers may repeat its last frame.
 TEST(GyroInput, CountsNothingAcrossASilenceAndStillRefusesTheLastFrame) {
   const GyroPlan plan = counted_plan(8, 256);
   GyroInput input(plan);
@@ -212,7 +212,7 @@ TEST(GyroInput, CountsNothingAcrossASilenceAndStillRefusesTheLastFrame) {
   EXPECT_EQ(input.decode(counted(13)).missing, 1U);
 }
 
-// Some cars send magnitude and sign apart; 1 is negative.
+// Some cars send magnitude and sign separately; 1 is negative.
 TEST(GyroInput, TakesTheSignFromASignalOfItsOwn) {
   GyroPlan plan = small_plan();
   plan.rate = quantity_of(signal_of(0, 14, 0.01, 0.0, ValueType::kUnsigned));
@@ -222,7 +222,7 @@ TEST(GyroInput, TakesTheSignFromASignalOfItsOwn) {
   EXPECT_DOUBLE_EQ(input.decode(frame_of(kIdA, {0x64, 0x40})).rate_dps, -1.0);
 }
 
-// On another page of a multiplexed message the rate's bits belong to something else.
+// On another page of a multiplexed message the rate's bits have another meaning.
 TEST(GyroInput, ReadsAMultiplexedRateOnItsOwnPageOnly) {
   dbc::Message message;
   message.name = "M";
@@ -247,11 +247,11 @@ TEST(GyroInput, ReadsAMultiplexedRateOnItsOwnPageOnly) {
       EXPECT_EQ(result.reject, Reject::kOtherPage) << unsigned{shown};
     }
   }
-  // Too short to show its page: not the rate's page either, and nothing is read beyond the end.
+  // Too short to hold its page number: refused, and nothing is read beyond the end.
   EXPECT_TRUE(input.decode(frame_of(kIdA, {0x64, 0})).reject);
 }
 
-// J1939: 0xFAFF is the last measurement. What the DBC file's range leaves out is out of range.
+// J1939: 0xFAFF is the last measurement. Values outside the DBC file's range are out of range.
 TEST(GyroInput, RefusesTheCodesOfAProtocol) {
   dbc::Signal signal = signal_of(0, 16, 1.0 / 128, -250.0, ValueType::kUnsigned);
   GyroPlan plan = small_plan();
@@ -275,7 +275,7 @@ TEST(GyroInput, ReadsMotorolaOrder) {
   EXPECT_DOUBLE_EQ(GyroInput(plan).decode(frame_of(kIdA, {0xFF, 0x9C})).rate_dps, -1.0);
 }
 
-// Float signals can carry what no gyro measures; each is named for what it is.
+// Float signals can hold values that no gyro measures; each has its own cause.
 TEST(GyroInput, RefusesFloatsThatAreNoRate) {
   const GyroPlan plan = float_plan();
   GyroInput input(plan);
@@ -288,7 +288,7 @@ TEST(GyroInput, RefusesFloatsThatAreNoRate) {
   EXPECT_EQ(input.decode(float_frame(-1e30F)).reject, Reject::kOutOfRange);
 }
 
-// The limits themselves are still inside.
+// The limits themselves are inside.
 TEST(GyroInput, RefusesRatesOutsideTheRange) {
   const GyroPlan plan = small_plan();  // ± 300 deg/s
   GyroInput input(plan);
@@ -314,7 +314,7 @@ TEST(GyroInput, TellsTheTemperatureOfTheNewestUsedFrame) {
   EXPECT_TRUE(std::isnan(without.temperature_c()));
 }
 
-// Each of what stands beside the rate is of the newest frame that carried it.
+// Each quantity beside the rate is from the newest frame that carried it.
 TEST(GyroInput, TellsTheSupplyVoltageBesideTheTemperature) {
   GyroPlan plan = small_plan();
   plan.temperature = quantity_of(signal_of(16, 8, 1.0, -50.0, ValueType::kUnsigned));
@@ -330,7 +330,7 @@ TEST(GyroInput, TellsTheSupplyVoltageBesideTheTemperature) {
   EXPECT_DOUBLE_EQ(input.temperature_c(), 26.0);
 }
 
-// A temperature that cannot be believed is no temperature, and does not cost the rate.
+// An implausible temperature is unknown, and does not cost the rate.
 TEST(GyroInput, KeepsTheRateWhenTheTemperatureIsOutOfRange) {
   GyroPlan plan = small_plan();
   plan.temperature = quantity_of(signal_of(16, 8, 1.0, 0.0, ValueType::kUnsigned), 100.0);
@@ -339,7 +339,7 @@ TEST(GyroInput, KeepsTheRateWhenTheTemperatureIsOutOfRange) {
   EXPECT_TRUE(std::isnan(input.temperature_c()));
 }
 
-// A spoilt frame gives neither rate nor temperature, and the counter does not notice it.
+// A corrupted frame yields neither rate nor temperature, and does not advance the counter.
 TEST(GyroInput, UsesNothingOfAFrameWithAWrongCheckValue) {
   GyroPlan plan = counted_plan(8, 256);
   plan.temperature = quantity_of(signal_of(24, 8, 1.0), 200.0);

@@ -1,5 +1,5 @@
-// Faults of one gyro, and of both: what is not a measurement is not used, at once, and everybody is
-// told why; what is one again comes back without a step.
+// Faults of one gyro, and of both: a value that is not a measurement is not used, from the first
+// one on, and the status says why; a gyro that recovers is used again without a step.
 
 #include <cmath>
 #include <memory>
@@ -49,7 +49,7 @@ Plan plan_of_gyros() {
   return plan;
 }
 
-/// Each call draws its noise.
+/// Each call draws new noise.
 RateOf noisy(const RateOf& truth, double bias_dps, std::uint32_t seed) {
   auto rng = std::make_shared<std::mt19937>(seed);
   return [truth, bias_dps, rng](double t_s) {
@@ -86,7 +86,7 @@ void put_rate(can::Frame& frame, double rate_dps) {
   std::copy_n(other.data.begin(), 4, frame.data.begin());
 }
 
-/// The instants of the rates, which VG_Age tells only up to 7.5 ms back.
+/// The instants of the rates; VG_Age holds at most 7.5 ms.
 struct Instants final : RateObserver {
   void on_rate(TimePoint t, const std::array<double, 2>& /*raw_dps*/,
                double /*virtual_dps*/) override {
@@ -145,7 +145,7 @@ struct Played {
     }
     return worst;
   }
-  /// Trapezoids over the instants, as a user does who integrates the heading.
+  /// Integrates with trapezoids over the instants, as a receiver that computes the heading does.
   [[nodiscard]] double heading_error(const RateOf& truth, Duration from, Duration to) const {
     double error = 0.0;
     double before = 0.0;
@@ -180,22 +180,22 @@ struct Played {
   std::vector<State> states;
 };
 
-// Rest for the calibration, then a town's turns.
+// Rest for the calibration, then turns as in a town.
 double drive(double t_s) {
   return t_s < 6.0 ? 0.0 : 20.0 * std::sin(0.5 * (t_s - 6.0));
 }
-// One turn whose top is beyond the range of gyro b.
+// One turn whose peak is beyond the range of gyro b.
 double fast_turn(double t_s) {
   const double u = (t_s - 20.0) / 4.0;
   return u < 0.0 || u > 1.0 ? 0.0 : 350.0 * std::pow(std::sin(u * std::numbers::pi), 2.0);
 }
 
-// Six sigma of one gyro alone, and its bias from five seconds.
+// Six σ of one gyro alone, and the error of its bias from five seconds.
 constexpr double kErrorMax_dps = 6.0 * kSigma_dps + 4.0 * kSigma_dps / 22.0 + rig::kRateStep_dps;
 
 // --- resolution ----------------------------------------------------------------------------------
 
-// What the sensor does decides; the frame's step only where it is the coarser one.
+// The sensor's own step decides; the frame's only if it is coarser.
 TEST(GyroHealthStep, IsTheSensorsOwnAndNotThatOfTheFrame) {
   GyroPlan plan = rig::gyro_plan(0, rig::kIdA, "a");
   plan.rate.step = rig::kInputStep_dps;
@@ -217,8 +217,9 @@ TEST(GyroHealthStep, IsTheSensorsOwnAndNotThatOfTheFrame) {
 
 // --- saturated -----------------------------------------------------------------------------------
 
-// A gyro that clips at 200 deg/s in a turn of 350: with both of them the heading would lose half of
-// what it clips, 98 deg; without it the turn is as good as on the other gyro alone.
+// A gyro that clips at 200 deg/s in a turn of 350: using both gyros would lose half of the clipped
+// angle, 98 deg, of the heading; without the clipped one the turn is as good as from the other gyro
+// alone.
 TEST(GyroHealthSaturated, FastTurnKeepsItsHeading) {
   const auto clipped = [](double t_s) { return std::min(fast_turn(t_s), 200.0); };
   const Recording recording =
@@ -233,7 +234,7 @@ TEST(GyroHealthSaturated, FastTurnKeepsItsHeading) {
   Plan plan = plan_of_gyros();
   plan.gyros[1].saturation_dps = 200.0;
   const Played known(plan, recording);
-  // Noise over 4 s, and the bias.
+  // Noise over 4 s, and the error of the bias.
   const double noise_deg = kSigma_dps * std::sqrt(4.0 / 100.0) + 4.0 * kSigma_dps / 22.0;
   EXPECT_NEAR(known.heading_error(fast_turn, ms(19'000), ms(25'000)), 0.0, 4.0 * noise_deg);
   EXPECT_EQ(known.health(ms(20'000), ms(24'000)), kSuspectB);
@@ -244,13 +245,13 @@ TEST(GyroHealthSaturated, FastTurnKeepsItsHeading) {
   EXPECT_GT(rig::rejected(known.pipeline, 1, Reject::kSaturated), 150U);
   known.expect_instants_to_grow();
   known.expect_books_to_balance();
-  // Nobody said where it clips: it is found, eight samples late.
+  // The clip is not configured: it is detected, eight samples late.
   const Played found(plan_of_gyros(), recording);
   EXPECT_LT(std::abs(found.heading_error(fast_turn, ms(19'000), ms(25'000))), 0.05 * lost_deg);
   EXPECT_EQ(found.health(ms(20'000), ms(24'000)), kSuspectB);
 }
 
-// Both at their ends: there is no rate, and no number is made up.
+// Both gyros clip: no rate is valid.
 TEST(GyroHealthSaturated, NothingIsValidWhereBothClip) {
   Plan plan = plan_of_gyros();
   for (GyroPlan& gyro : plan.gyros)
@@ -265,7 +266,7 @@ TEST(GyroHealthSaturated, NothingIsValidWhereBothClip) {
 
 // --- stuck ---------------------------------------------------------------------------------------
 
-// A gyro that freezes in a turn costs what it says wrong until it is found, then nothing.
+// A gyro that freezes in a turn causes an error until it is detected, then none.
 TEST(GyroHealthStuck, IsSetAsideInMotionAndAtRest) {
   for (const std::size_t stuck : {0U, 1U}) {
     for (const std::int64_t at : {40'000, 70'000}) {  // in motion, at rest
@@ -294,7 +295,7 @@ TEST(GyroHealthStuck, IsSetAsideInMotionAndAtRest) {
   }
 }
 
-/// Valid rates that are off by more than any two healthy gyros are.
+/// Counts valid rates with a larger error than two healthy gyros can cause.
 std::size_t wrong_rates(const Played& run, const RateOf& truth, Duration from, Duration to) {
   return static_cast<std::size_t>(
       std::count_if(run.rates.begin(), run.rates.end(), [&](const auto& r) {
@@ -304,8 +305,8 @@ std::size_t wrong_rates(const Played& run, const RateOf& truth, Duration from, D
       }));
 }
 
-// It falls to 0, or freezes, amid a turn: a handful of samples tell, and no more of them than that
-// are in a rate that two healthy gyros would be believed to have made.
+// A gyro falls to 0, or freezes, during a turn: a handful of samples detects it, and no more than
+// these enter rates that are valid.
 TEST(GyroHealthStuck, IsHeldAsideAfterAHandfulOfSamplesInATurn) {
   for (const std::size_t stuck : {0U, 1U}) {
     for (const bool to_zero : {false, true}) {
@@ -321,7 +322,7 @@ TEST(GyroHealthStuck, IsHeldAsideAfterAHandfulOfSamplesInATurn) {
       EXPECT_EQ(wrong_rates(run, truth, ms(41'070), ms(60'000)), 0U);
       EXPECT_EQ(rig::times(run.pipeline, stuck, Fault::kStuck), 1U);
       EXPECT_EQ(rig::times(run.pipeline, 1 - stuck, Fault::kStuck), 0U);
-      // Soon over, soon forgiven.
+      // A short fault has a short recovery.
       EXPECT_EQ(run.rates_in(State::kDegraded, ms(41'300), ms(60'000)), 0U);
       EXPECT_LE(run.longest_hole(ms(6'000), ms(59'900)), ms(20));
       run.expect_instants_to_grow();
@@ -330,8 +331,8 @@ TEST(GyroHealthStuck, IsHeldAsideAfterAHandfulOfSamplesInATurn) {
   }
 }
 
-// Its frames come, its counter runs, and it says 0 from the start: in the first turn the other one
-// is left alone with the rate, and stays so until this one has shown that it sees the same.
+// The frames arrive and the counter runs, but the rate is 0 from the start: in the first turn the
+// other gyro is used alone, until this one has moved with it.
 TEST(GyroHealthStuck, IsSetAsideInItsFirstTurnWhenItWasDeadFromTheStart) {
   for (const std::size_t dead : {0U, 1U}) {
     SCOPED_TRACE(::testing::Message() << "gyro " << dead);
@@ -342,7 +343,7 @@ TEST(GyroHealthStuck, IsSetAsideInItsFirstTurnWhenItWasDeadFromTheStart) {
     Recording recording_b = b(ms(60'000), noisy(truth, dead == 1 ? 0.0 : kBiasB_dps, 4));
     Recording& sick = dead == 0 ? recording_a : recording_b;
     change(sick, ms(0), ms(40'000), [&](can::Frame& f) { put_rate(f, 0.0); });
-    // Then noise that knows nothing of the turn, and at last it is well.
+    // Then noise without the turn, and at last sound values.
     const RateOf noise = noisy([](double) { return 0.0; }, 0.0, 5);
     change(sick, ms(40'000), ms(45'000), [&](can::Frame& f) { put_rate(f, noise(0.0)); });
     const Played run(plan_of_gyros(), merge({recording_a, recording_b}));
@@ -359,7 +360,7 @@ TEST(GyroHealthStuck, IsSetAsideInItsFirstTurnWhenItWasDeadFromTheStart) {
 
 // --- flags and counters --------------------------------------------------------------------------
 
-// The frame says "invalid": the very next rate stands on the other gyro, with no hole in between.
+// The frame is flagged "invalid": the very next rate is from the other gyro, without a gap.
 TEST(GyroHealthFlags, InvalidGyroIsSetAsideWithItsFirstFrame) {
   for (const std::size_t sick : {0U, 1U}) {
     Recording recording_a = a(ms(12'000), noisy(drive, kBiasA_dps, 5));
@@ -384,7 +385,7 @@ TEST(GyroHealthFlags, InvalidGyroIsSetAsideWithItsFirstFrame) {
   }
 }
 
-// A flag that comes and goes with every frame is one long fault, not a hundred short ones.
+// A flag that toggles with every frame is one long fault, not a hundred short ones.
 TEST(GyroHealthFlags, TogglingFlagDoesNotToggleTheState) {
   Recording recording_b = b(ms(12'000), noisy(drive, kBiasB_dps, 6));
   for (std::size_t i = 700; i < 1000; i += 3)
@@ -398,7 +399,7 @@ TEST(GyroHealthFlags, TogglingFlagDoesNotToggleTheState) {
   run.expect_books_to_balance();
 }
 
-// One spoilt frame is a hole like any other: nobody is set aside.
+// One corrupted frame is a hole like any other: no gyro is set aside.
 TEST(GyroHealthFlags, SingleUnreadableFrameIsNoFault) {
   Recording recording_b = b(ms(12'000), noisy(drive, kBiasB_dps, 6));
   for (std::size_t i = 600; i < 1100; i += 20)
@@ -411,7 +412,7 @@ TEST(GyroHealthFlags, SingleUnreadableFrameIsNoFault) {
   EXPECT_EQ(run.health(ms(6'000), ms(12'000)), 0U);
 }
 
-// A sender that repeats its last frame is alive and says nothing: found with the third repetition.
+// A sender that repeats its last frame: detected with the third repetition.
 TEST(GyroHealthFlags, RepeatedCounterIsAFault) {
   Recording recording_b = b(ms(12'000), noisy(drive, kBiasB_dps, 6));
   for (std::size_t i = 801; i < 900; ++i)
@@ -426,7 +427,8 @@ TEST(GyroHealthFlags, RepeatedCounterIsAFault) {
   run.expect_books_to_balance();
 }
 
-// Some gateways say everything twice: that is no fault, and does not keep a gyro from coming back.
+// Some gateways send every frame twice: that is no fault, and does not keep a gyro from coming
+// back.
 TEST(GyroHealthFlags, FramesSaidTwiceAreNoFault) {
   Recording recording_b = b(ms(12'000), noisy(drive, kBiasB_dps, 6));
   recording_b[800].frame.data[4] = 1;
@@ -441,7 +443,7 @@ TEST(GyroHealthFlags, FramesSaidTwiceAreNoFault) {
   EXPECT_EQ(run.states.back(), State::kRunning);
 }
 
-// Its frames end while it is suspect: then it is missing, not both.
+// The frames end while the gyro is suspect: then it is missing, not both.
 TEST(GyroHealthFlags, SuspectThatFallsSilentIsMissing) {
   Recording recording_b = b(ms(9'000), noisy(drive, kBiasB_dps, 6));
   change(recording_b, ms(8'000), ms(9'000), [](can::Frame& f) { f.data[4] = 3; });
@@ -454,8 +456,8 @@ TEST(GyroHealthFlags, SuspectThatFallsSilentIsMissing) {
 
 // --- dead band -----------------------------------------------------------------------------------
 
-// Zeros of a dead band calibrate, since there is nothing better, but are not used while the other
-// gyro carries on, and are no defect.
+// Zeros of a dead band are used in the calibration, where nothing better is available. They are not
+// used while the other gyro continues, and are no defect.
 TEST(GyroHealthDeadBand, ZeroIsNotUsedWhileTheOtherCarriesOn) {
   Plan plan = plan_of_gyros();
   plan.gyros[1].dead_band_dps = 2.0;
@@ -467,7 +469,7 @@ TEST(GyroHealthDeadBand, ZeroIsNotUsedWhileTheOtherCarriesOn) {
   EXPECT_EQ(run.health(ms(6'000), ms(30'000)), 0U);
   EXPECT_LT(run.worst_error(drive, ms(6'000), ms(30'000)), kErrorMax_dps);
   run.expect_instants_to_grow();
-  // Alone it is better than nothing.
+  // Without the other gyro, zeros are better than nothing.
   const Played alone(plan,
                      merge({without(a(ms(30'000), noisy(drive, 0.0, 5)), ms(10'000), ms(30'000)),
                             b(ms(30'000), banded)}));
@@ -475,9 +477,9 @@ TEST(GyroHealthDeadBand, ZeroIsNotUsedWhileTheOtherCarriesOn) {
   EXPECT_LT(alone.worst_error(drive, ms(6'000), ms(30'000)), 2.0 + kErrorMax_dps);
 }
 
-// --- gone and back -------------------------------------------------------------------------------
+// --- a gyro goes and comes back ------------------------------------------------------------------
 
-// Five minutes without one of them, and back: the rate does not step by more than the noise.
+// A gyro returns after five minutes: the rate does not step by more than the noise.
 TEST(GyroHealthReturn, AfterMinutesTheRateDoesNotStep) {
   for (const std::size_t gone : {0U, 1U}) {
     Recording recording_a = a(ms(330'000), noisy(drive, kBiasA_dps, 7));
@@ -495,7 +497,7 @@ TEST(GyroHealthReturn, AfterMinutesTheRateDoesNotStep) {
   }
 }
 
-// There one second, gone the next, both at different times, now and then both at once.
+// Both gyros come and go at different times, now and then both at once.
 TEST(GyroHealthReturn, FlickeringGyrosGiveOneRisingLineOfInstants) {
   Recording recording_a = a(ms(60'000), noisy(drive, kBiasA_dps, 9));
   Recording recording_b = b(ms(60'000), noisy(drive, kBiasB_dps, 10));
@@ -508,7 +510,7 @@ TEST(GyroHealthReturn, FlickeringGyrosGiveOneRisingLineOfInstants) {
   run.expect_books_to_balance();
   EXPECT_EQ(run.states.back(), State::kRunning);
   EXPECT_LT(run.worst_error(drive, ms(6'000), ms(60'000)), 2.0 * kErrorMax_dps);
-  // Alone it speaks from the time-out on, and at the return without any wait.
+  // Alone, a gyro is used from the time-out on; at the return of the other there is no wait.
   EXPECT_LE(run.longest_hole(ms(6'000), ms(30'000)), ms(130));
   EXPECT_EQ(rig::times(run.pipeline, 1, Fault::kSilent), 25U);
 }
@@ -519,7 +521,8 @@ class Mischief {
  public:
   explicit Mischief(std::uint32_t seed) : dice_(seed) {}
 
-  /// One kind of trouble after the other, for up to two seconds each, health between them.
+  /// One kind of fault after another, for up to two seconds each, with healthy stretches between
+  /// them.
   void spoil(Recording& recording) {
     for (std::size_t at = 800; at < recording.size();) {
       const std::size_t end = std::min<std::size_t>(recording.size(), at + 1 + dice_.below(200));
@@ -547,8 +550,8 @@ class Mischief {
   rig::Dice dice_;
 };
 
-// Random mixtures of all faults of which the frames tell, on both gyros: every valid rate is right,
-// instants grow, every frame is counted under its cause.
+// Random mixtures of all faults that frames reveal, on both gyros: every valid rate is right,
+// instants increase, every frame is counted under its cause.
 TEST(GyroHealthHostile, NoMixtureOfToldFaultsMakesAWrongRate) {
   for (std::uint32_t seed = 0; seed < 25; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));

@@ -1,5 +1,5 @@
-// Whatever arrives on a bus, the pipeline stays upright, keeps its books and publishes nothing that
-// was not earned. Each case is a seed; it is printed when one fails.
+// Whatever arrives on a bus, the pipeline does not fail, its counts stay consistent, and no rate is
+// valid without its preconditions. Each case is a seed, which is printed on failure.
 
 #include <gtest/gtest.h>
 
@@ -26,7 +26,7 @@ class Hostile {
     return frame;
   }
 
-  /// Mostly a few milliseconds on, now and then back, far, or anywhere at all.
+  /// Mostly a few milliseconds later, now and then earlier, far ahead, or anywhere.
   TimePoint stamp() {
     now_ns_ += dice_.below(3'000'000);
     if (one_in(200)) now_ns_ -= rig::ms(dice_.below(5'000)).count();
@@ -78,7 +78,7 @@ void expect_books_to_balance(const Pipeline& pipeline, const rig::Collector& out
   EXPECT_LE(status.reference_rejected, status.reference_frames);
 }
 
-// Random frames of all kinds at random times: never a crash, and every frame of a gyro is either a
+// Random frames of all kinds at random times: no crash, and every frame of a gyro is either a
 // sample or counted under its cause.
 TEST(Hostile, RandomFramesAreSurvivedAndAccountedFor) {
   for (std::uint32_t seed = 0; seed < 60; ++seed) {
@@ -97,7 +97,7 @@ TEST(Hostile, RandomFramesAreSurvivedAndAccountedFor) {
   }
 }
 
-// Noise on the bus during a calibration that cannot end earns no valid output.
+// Noise on the bus during a calibration that cannot end makes no output valid.
 TEST(Hostile, NothingIsValidBeforeCalibration) {
   for (std::uint32_t seed = 0; seed < 20; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
@@ -114,7 +114,7 @@ TEST(Hostile, NothingIsValidBeforeCalibration) {
   }
 }
 
-// Two good gyros among hostile frames of everybody else's give what they give alone.
+// Two good gyros among hostile frames of other senders give the same output as alone.
 TEST(Hostile, GoodGyrosAreNotDisturbedByOthers) {
   const rig::Recording good =
       rig::merge({rig::stream_a(rig::ms(0), rig::ms(4000), rig::constant(0.1)),
@@ -149,9 +149,9 @@ Plan protected_plan() {
   return plan;
 }
 
-// Somebody sends on the gyros' own identifiers, at the right time and in the right form, but does
-// not know how the check value is made, or not how the counter runs: every frame of his is counted,
-// and the output is that of the true gyros, byte for byte.
+// An impostor sends on the gyros' own identifiers, at the right time and in the right form, but
+// with wrong check values or counters: every such frame is counted, and the output is that of the
+// true gyros, byte for byte.
 TEST(Hostile, AnImpostorChangesNothingWhereFramesAreProtected) {
   const Plan plan = protected_plan();
   rig::Recording good = rig::merge({rig::stream_a(rig::ms(0), rig::ms(4000), rig::constant(0.1)),

@@ -1,5 +1,5 @@
-// Which biases are kept when a reload calls for a new calibration. The product's own pipelines,
-// from frames.
+// Which biases are kept when a reload requires a new calibration. Uses the product's own pipelines,
+// from frames on.
 
 #include "gateway/inheritance.h"
 
@@ -24,7 +24,7 @@ class InheritanceTest : public testing::Test {
  protected:
   InheritanceTest() { plan.calibration.rest_s = 20.0; }
 
-  /// Both gyros for so many seconds, the platform turning at this rate.
+  /// Both gyros for this many seconds, with the platform turning at this rate.
   rig::Recording recording(std::int64_t from_s, std::int64_t for_s, double rate_dps) {
     const auto noisy = [&](double bias_dps) {
       return [this, value = bias_dps + rate_dps](double) { return value + noise(rng); };
@@ -45,7 +45,7 @@ class InheritanceTest : public testing::Test {
   rig::Collector out;
 };
 
-/// At rest for half a minute; then the rate at rest was configured anew.
+/// At rest for half a minute; then a reload with another configured rate at rest.
 class AfterAReload : public InheritanceTest {
  protected:
   AfterAReload() {
@@ -90,7 +90,7 @@ TEST_F(AfterAReload, ASteadyTurnThatWasCalibratedAsRestDoesNotTakeTheirPlace) {
   EXPECT_TRUE(inheritance.is_contradicted());
 }
 
-// Else the σ of the old biases would grow until anything agreed with them.
+// Otherwise the σ of the old biases would grow until any new ones agreed.
 TEST_F(AfterAReload, AContradictionStaysUntilAStopDecides) {
   SavedState turned = old;
   turned.drift.bias_dps[0] += kTurn_dps;
@@ -123,7 +123,7 @@ TEST_F(AfterAReload, WhatIsForgottenIsNotKept) {
   EXPECT_FALSE(choose(Pipeline(plan)));
 }
 
-// A reload right after the start, and a second one right after the first.
+// A reload right after the start, and another right after that.
 TEST_F(InheritanceTest, BiasesThatNoPairHasTakenUpYetGoOnToTheNextSetup) {
   Pipeline first(plan);
   rig::play(first, recording(0, 30, 0.0), out);

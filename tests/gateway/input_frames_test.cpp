@@ -121,7 +121,7 @@ TEST(InputFrames, TurnToTheQuantitysPage) {
   EXPECT_EQ(bytes_of(other), (std::vector<int>{4, 21, 0, 0}));
 }
 
-// J1939, 1/128 deg/s from -250: 300 deg/s would be a code that says "error".
+// J1939, 1/128 deg/s from -250: 300 deg/s would be the code for "error".
 TEST(InputFrames, StopBelowTheCodesOfAProtocol) {
   GyroPlan plan = small_plan();
   dbc::Signal signal = signal_of(0, 16, 1.0 / 128, -250.0, ValueType::kUnsigned);

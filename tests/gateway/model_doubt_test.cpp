@@ -1,5 +1,5 @@
-// What the model file says of its own doubt must be in the published σ: a wrong compensation makes
-// both gyros agree, and nothing else can tell.
+// The published σ must include the doubt stated in the model file: after a wrong compensation both
+// gyros agree, so nothing else reveals it.
 
 #include <cmath>
 #include <random>
@@ -17,7 +17,7 @@ namespace {
 using model::Kind;
 
 constexpr unsigned kSeed = 1209;
-// Gyro a reads so much too much, and the model puts it on gyro b with the other sign.
+// Gyro a reads too much by this factor, but the model assigns it to gyro b with the other sign.
 constexpr double kScale = 8e-3;
 constexpr double kTurn_dps = 4.0;
 constexpr double kNoise_dps = 2e-3;
@@ -28,7 +28,7 @@ double truth_dps(double t_s) {
   return t_s < kStart_s ? 0.0 : kTurn_dps;
 }
 
-// How far the heading is off after a drive that turns one way, and what ∫σ allows.
+// The heading error after a drive that turns one way, and the limit from ∫σ.
 struct Heading final : OutputObserver {
   void on_output(const RateOutput& output, const std::array<double, 2>& /*bias_dps*/) override {
     if (!output.valid) return;
@@ -93,7 +93,7 @@ TEST(ModelDoubt, OfAnAmbiguousScaleFactorCoversTheHeadingErrorOfAOneWayDrive) {
 }
 
 TEST(ModelDoubt, IsNeededForThat) {
-  // Without it the same drive is far beyond what σ says: the corrector cannot see it.
+  // Without the stated doubt, the same drive is far beyond σ: the corrector cannot see the error.
   const Heading heading = drive(plan_with({scale(-kScale / (1.0 + kScale), 0.0, false)}));
   EXPECT_GT(std::abs(heading.error_deg), 3.0 * heading.allowed_deg);
 }

@@ -50,7 +50,7 @@ TEST(ModelPlan, GivesNoiseToTheCorrector) {
   EXPECT_EQ(b.resolution_dps, 1e-2);
 }
 
-/// After the calibration, whose rates are not valid.
+/// Checks the rates after the calibration; during it they are not valid.
 struct Finite final : RateObserver {
   void on_rate(TimePoint t, const std::array<double, 2>& raw_dps, double virtual_dps) override {
     (void)raw_dps;
@@ -62,7 +62,7 @@ struct Finite final : RateObserver {
   bool all = true;
 };
 
-// The weakest and the strongest noise that a model file may name: of either gyro, of both, in any
+// The weakest and the strongest noise that a model file may state: of either gyro, of both, in any
 // mix.
 TEST(ModelPlan, AnyNoiseOfTheCatalogueGivesFiniteRates) {
   const auto turn = [](double t_s) { return t_s < 5.0 ? 0.0 : 20.0 * std::sin(t_s); };
@@ -128,13 +128,13 @@ TEST(ModelPlan, ComplainsAtTheModelsLineOfAnInputThatIsNotConfigured) {
   EXPECT_NE(errors[1].remedy.find("[accelerometer]"), std::string::npos);
   EXPECT_EQ(errors[2].where, "known.toml:18");
   EXPECT_NE(errors[2].remedy.find("supply_voltage = "), std::string::npos);
-  // The axis counts: it is y that is not there.
+  // The axis matters: only y is missing.
   EXPECT_EQ(errors[3].where, "known.toml:28");
   EXPECT_NE(errors[3].message().find("the rate of gyro a about y"), std::string::npos);
   EXPECT_NE(errors[3].remedy.find("rate_x, rate_y or rate_z = "), std::string::npos);
 }
 
-// Three correlated drifts a decade apart, less where the model has some already.
+// Three correlated drifts a decade apart; fewer if the model has some already.
 TEST(ModelPlan, GivesFlickerToTheCorrectorAsTheDriftsThatItHasRoomFor) {
   Plan plan = rig::two_gyros();
   EXPECT_TRUE(apply(model_of({{0, Kind::kBiasInstability, {3e-3}, 3},
@@ -144,7 +144,7 @@ TEST(ModelPlan, GivesFlickerToTheCorrectorAsTheDriftsThatItHasRoomFor) {
                               {1, Kind::kGaussMarkov, {2e-3, 7.0}, 15}}),
                     plan)
                   .empty());
-  // Independent noises add in squares.
+  // Independent noises add as squares.
   const fusion::GyroParameters& a = plan.corrector.gyros[0];
   ASSERT_EQ(a.gauss_markov_count, 3U);
   for (std::size_t i = 0; i < 3; ++i) {
@@ -168,7 +168,7 @@ TEST(ModelPlan, RefusesMoreLagThanTheBuffersHold) {
   EXPECT_EQ(errors[0].where, "known.toml:7");
 }
 
-// Biases learned under one model mean nothing under another.
+// Biases learned under one model are meaningless under another.
 TEST(ModelPlan, MarksWhatIsTakenOffEachGyro) {
   const auto mark = [](std::initializer_list<model::Effect> effects) {
     Plan plan = rig::two_gyros();

@@ -44,7 +44,7 @@ class FdOutput : public ::testing::Test {
   OutputEncoder encoder{fd_plan()};
 };
 
-// Whatever goes in comes out of the published layout within half a step, field by field.
+// Every value comes back from the published layout within half a step, field by field.
 TEST_F(ClassicOutput, RateComesBackWithinHalfAStep) {
   std::mt19937_64 rng(kSeed);
   std::uniform_real_distribution<double> rate(-419.43, 419.43);
@@ -66,7 +66,7 @@ TEST_F(ClassicOutput, RateComesBackWithinHalfAStep) {
   }
 }
 
-// The largest rates that the field holds are sent, the next step beyond is invalid, never clipped.
+// The largest rates that the field holds are sent; one step beyond is invalid, never clipped.
 TEST_F(ClassicOutput, SendsExtremesAndCallsTheRestInvalid) {
   for (const double sign : {1.0, -1.0}) {
     const double most = sign * 8388607.0 / 20000.0;
@@ -82,7 +82,7 @@ TEST_F(ClassicOutput, SendsExtremesAndCallsTheRestInvalid) {
   }
 }
 
-// NaN is no rate; and an output that says "invalid" carries no number, whatever it was given.
+// NaN is no rate; and an invalid output carries no number, whatever it was given.
 TEST_F(ClassicOutput, InvalidCarriesNothing) {
   RateOutput off = good_rate(1.5);
   off.valid = false;
@@ -96,7 +96,7 @@ TEST_F(ClassicOutput, InvalidCarriesNothing) {
   }
 }
 
-// A sigma that is unknown or too large for its field is "not available", not a smaller one.
+// A σ that is unknown or too large for its field is "not available", not a smaller one.
 TEST_F(ClassicOutput, SigmaBeyondItsFieldIsNotAvailable) {
   RateOutput output = good_rate(1.0);
   for (const double sigma : {kNaN, -1.0, 4095 * 2e-5, 1.0, kInfinity}) {
@@ -107,7 +107,7 @@ TEST_F(ClassicOutput, SigmaBeyondItsFieldIsNotAvailable) {
   EXPECT_EQ(receiver.decode(encoder.rate(output))["VG_Sigma"].raw, 4094);
 }
 
-// The age is rounded to half milliseconds; more than the field holds is told as the most.
+// The age is rounded to half milliseconds; above the field's range it is the largest value.
 TEST_F(ClassicOutput, AgeIsRoundedAndSaturates) {
   const auto raw_age = [&](std::int64_t age_ns) {
     RateOutput output = good_rate(0.0);
@@ -123,7 +123,8 @@ TEST_F(ClassicOutput, AgeIsRoundedAndSaturates) {
   EXPECT_EQ(raw_age(-60'000'000'000), 0);
 }
 
-// Every output frame carries a right E2E header whose counter runs 0…14, each message its own.
+// Every output frame carries a correct E2E header whose counter runs 0…14, separately for each
+// message.
 TEST_F(ClassicOutput, IsProtectedAndCounted) {
   const dbc::E2eProfile11C rate(0x610);
   const dbc::E2eProfile11C bias(0x611);
@@ -144,7 +145,7 @@ TEST_F(ClassicOutput, IsProtectedAndCounted) {
   }
 }
 
-// The identifiers may be changed; the data ID of the protection goes with them.
+// The identifiers can be configured; the data ID of the protection follows them.
 TEST_F(ClassicOutput, ProtectionFollowsTheIdentifier) {
   OutputPlan plan;
   plan.rate_id = 0x123;
@@ -156,7 +157,7 @@ TEST_F(ClassicOutput, ProtectionFollowsTheIdentifier) {
   EXPECT_EQ(frame.data[1] >> 4U, 0x1);
 }
 
-// Both biases, mode and health come back; what the field cannot carry is not available.
+// Both biases, mode and health come back; values beyond their field are not available.
 TEST_F(ClassicOutput, BiasComesBackOrIsNotAvailable) {
   std::mt19937_64 rng(kSeed);
   std::uniform_real_distribution<double> bias(-5.2428, 5.2428);
@@ -178,7 +179,7 @@ TEST_F(ClassicOutput, BiasComesBackOrIsNotAvailable) {
   }
 }
 
-// Modes and health bits mean on the wire what the DBC file's labels say.
+// Modes and health bits on the wire match the DBC file's labels.
 TEST_F(ClassicOutput, ModeAndHealthCarryTheirNames) {
   const auto label = [&](BiasMode mode, std::uint8_t health, const char* signal) {
     return receiver.decode(encoder.bias({{0.0, 0.0}, mode, health}))[signal].label;
@@ -192,7 +193,7 @@ TEST_F(ClassicOutput, ModeAndHealthCarryTheirNames) {
   EXPECT_EQ(label(BiasMode::kNone, kGyro2Missing, "VB_Health"), "gyro_2_missing");
 }
 
-// Slope and sigmas of the drift model come back; NaN and what does not fit are not available.
+// Slope and σ of the drift model come back; NaN and values that do not fit are not available.
 TEST_F(ClassicOutput, ModelComesBackOrIsNotAvailable) {
   std::mt19937_64 rng(kSeed);
   std::uniform_real_distribution<double> slope(-8.388, 8.388);
@@ -241,7 +242,7 @@ TEST_F(FdOutput, RateComesBackWithinHalfAStep) {
   }
 }
 
-// FD in the flags, 32 bytes; bias and model stay classic frames.
+// The rate is an FD frame of 32 bytes; bias and model are classic frames.
 TEST_F(FdOutput, OnlyTheRateIsAnFdFrame) {
   EXPECT_TRUE(encoder.rate(good_rate(0.0)).has(can::kFd));
   EXPECT_EQ(encoder.rate(good_rate(0.0)).length, 32);
@@ -249,7 +250,7 @@ TEST_F(FdOutput, OnlyTheRateIsAnFdFrame) {
   EXPECT_EQ(encoder.model({}).length, 8);
 }
 
-// Beyond the field, NaN, or of one gyro only: invalid or not available, never clipped.
+// Beyond the field, NaN, or from one gyro only: invalid or not available, never clipped.
 TEST_F(FdOutput, OutOfRangeIsInvalid) {
   for (const double beyond : {2147.4837, -2147.4837, 1e300, kNaN, kInfinity}) {
     EXPECT_FALSE(encoder.can_carry(beyond)) << beyond;
@@ -268,7 +269,7 @@ TEST_F(FdOutput, OutOfRangeIsInvalid) {
   EXPECT_EQ(fields["VG_Rate2"].label, "invalid");
 }
 
-// 65.535 ms is the most that the FD age can say.
+// The FD age holds at most 65.535 ms.
 TEST_F(FdOutput, AgeSaturates) {
   RateOutput output = good_rate(0.0);
   output.age = std::chrono::milliseconds(100);

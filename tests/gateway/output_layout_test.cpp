@@ -1,5 +1,5 @@
-// The virtual rate in layouts that somebody else made: bytes worked out by hand from what the
-// makers publish, and what must hold of every layout and every rate.
+// The virtual rate in foreign layouts: bytes computed by hand from what the makers publish, and
+// properties that must hold for every layout and every rate.
 
 #include "gateway/output_layout.h"
 
@@ -129,7 +129,7 @@ RateOutput invalid() {
   return output;
 }
 
-/// "174#0080..." as candump writes it; empty for no frame.
+/// "174#0080..." as candump prints it; empty for no frame.
 std::string text_of(const can::Frame* frame) {
   if (frame == nullptr) return {};
   std::string text = frame->has(can::kExtended) ? fmt::format("{:08X}", frame->id)
@@ -172,7 +172,7 @@ class OutputLayoutTest : public ::testing::Test {
   [[nodiscard]] OutputLayout rig_layout(const std::string& keys) const {
     return layout("dbc = \"rig.dbc\"\n" + keys);
   }
-  /// Exactly one complaint, which says all of these.
+  /// Exactly one error, which contains all of these parts.
   void expect_error(const std::string& keys, const std::vector<std::string>& parts,
                     const std::string& output = {}) const {
     const auto loaded = load("dbc = \"rig.dbc\"\n" + keys, output);
@@ -198,8 +198,8 @@ const std::string kMm7 =
     "message = \"MM7_Yaw\"\nrate = \"YawRate\"\nvalid = \"YawStatus == 0\"\n"
     "counter = \"YawCounter\"\ncrc = \"YawCrc\"\ne2e = \"crc8_j1850\"\n";
 
-// (1 deg/s + 163.84) / 0.005 = 0x80C8; the CRC with a bit-by-bit SAE J1850 that gives 0x4B for
-// "123456789". Not valid: all status bits, the rate that means no rotation.
+// (1 deg/s + 163.84) / 0.005 = 0x80C8; the CRC is from a bit-by-bit SAE J1850 that gives 0x4B for
+// "123456789". Not valid: all status bits set, and the rate that means no rotation.
 TEST_F(OutputLayoutTest, BoschMm7) {
   LayoutEncoder encoder(profile("bosch_mm7.dbc", kMm7));
   EXPECT_EQ(text_of(encoder.rate(rate_of(1.0), at_ms(0))), "174#C880000000000007");
@@ -212,8 +212,8 @@ TEST_F(OutputLayoutTest, BoschMm7) {
 const std::string kAri =
     "message = \"ARI\"\nrate = \"YawRate\"\nvalid = \"YawRateMerit == 0\"\nsource_address = 0xE2\n";
 
-// The yaw rate of the makers' own frame CF02AE2#007D007D007D0005 (0 deg/s); what nobody measures is
-// "not available", bits that nobody defines are 1 (J1939-71).
+// The yaw rate of the makers' own frame CF02AE2#007D007D007D0005 (0 deg/s); unused signals are "not
+// available", undefined bits are 1 (J1939-71).
 TEST_F(OutputLayoutTest, J1939AngularRate) {
   const OutputLayout plan = profile("j1939_ari.dbc", kAri);
   EXPECT_EQ(once(plan, rate_of(0.0)), "0CF02AE2#FFFFFFFF007DCFFF");
@@ -226,7 +226,7 @@ TEST_F(OutputLayoutTest, J1939AngularRate) {
             "0CF02AE2#007D007D007DC0FF");
 }
 
-// Rates end at 0xFAFF, 251.992 deg/s: what stands above means something else.
+// Rates end at 0xFAFF, 251.992 deg/s: higher values have other meanings.
 TEST_F(OutputLayoutTest, J1939KeepsItsCodes) {
   const OutputLayout plan = profile("j1939_ari.dbc", kAri);
   EXPECT_EQ(once(plan, rate_of(251.9921875)), "0CF02AE2#FFFFFFFFFFFACFFF");
@@ -234,8 +234,8 @@ TEST_F(OutputLayoutTest, J1939KeepsItsCodes) {
     EXPECT_EQ(once(plan, rate_of(beyond)), "0CF02AE2#FFFFFFFFFFFFFFFF") << beyond;
 }
 
-// A frame that a boat sent, as canboat publishes it: 127251,36,255,8,7d,0b,7d,02,00,ff,ff,ff with
-// the sequence number 0x7D.
+// A real frame of a boat, as canboat publishes it: 127251,36,255,8,7d,0b,7d,02,00,ff,ff,ff with the
+// sequence number 0x7D.
 TEST_F(OutputLayoutTest, Nmea2000RateOfTurn) {
   const OutputLayout plan = rig_layout(
       "message = \"RateOfTurn\"\nrate = \"Rate\"\ncounter = \"SID\"\nsource_address = 36\n");
@@ -253,7 +253,7 @@ TEST_F(OutputLayoutTest, Nmea2000RateOfTurn) {
       << "253 to 255 are no sequence numbers";
 }
 
-// Magnitude and sign stand apart: -1.23 deg/s is 0x7B from bit 40, and bit 54.
+// Magnitude and sign are separate: -1.23 deg/s is 0x7B from bit 40, and bit 54.
 TEST_F(OutputLayoutTest, VolkswagenEsp02) {
   const OutputLayout plan =
       profile("vw_esp_02.dbc",
@@ -298,7 +298,7 @@ TEST_F(OutputLayoutTest, XsensSbgOxtsRacelogicHoneywell) {
       << "2^33 / 100 = 0x051EB852, Intel";
 }
 
-// AUTOSAR's own vectors: data ID 0x123, eight zero bytes: 2A 10, then 77 11.
+// AUTOSAR's test vectors: data ID 0x123, eight zero bytes: 2A 10, then 77 11.
 TEST_F(OutputLayoutTest, Profile11C) {
   LayoutEncoder encoder(
       rig_layout("message = \"Guarded\"\nrate = \"Rate\"\ncrc = \"Crc\"\ncounter = \"Counter\"\n"
@@ -311,7 +311,7 @@ TEST_F(OutputLayoutTest, Profile11C) {
   EXPECT_EQ(text_of(encoder.rate(rate_of(0.0), at_ms(15))), "123#2A10000000000000") << "modulo 15";
 }
 
-// 20 bytes go as CAN FD; bytes beyond the message's own are zero.
+// 20 bytes are sent as CAN FD; bytes beyond the message's own are zero.
 TEST_F(OutputLayoutTest, CanFd) {
   const OutputLayout plan =
       rig_layout("message = \"Long\"\nrate = \"Rate\"\nvalid = \"Valid == 1\"\n");
@@ -319,7 +319,7 @@ TEST_F(OutputLayoutTest, CanFd) {
   EXPECT_EQ(once(plan, invalid()), "124##" + std::string(40, '0'));
 }
 
-// Eight bytes are CAN FD where the DBC file says so, or the configuration.
+// Eight bytes are sent as CAN FD if the DBC file or the configuration says so.
 TEST_F(OutputLayoutTest, ShortCanFd) {
   EXPECT_EQ(once(rig_layout("message = \"ShortFd\"\nrate = \"Rate\"\n"), rate_of(2.58)),
             "127##0201000000000000");
@@ -329,8 +329,8 @@ TEST_F(OutputLayoutTest, ShortCanFd) {
             "126##0000000000000000");
 }
 
-// The page that carries the rate is turned to; a sum over identifier, length and bytes (Toyota's)
-// takes the identifier that is sent.
+// The frame selects the page of the rate; a sum over identifier, length and bytes (Toyota's) uses
+// the identifier that is sent.
 TEST_F(OutputLayoutTest, PagesAndIdentifiers) {
   EXPECT_EQ(once(rig_layout("message = \"Pages\"\nrate = \"RateZ\"\nvalid = \"Good == 1\"\n"),
                  rate_of(2.58)),
@@ -368,7 +368,7 @@ double decoded_dps(const OutputLayout& plan, const can::Frame& frame) {
   return value * plan.rates[0].rate.scale + plan.rates[0].rate.shift;
 }
 
-// To the nearest step, and in order.
+// To the nearest step, with the order preserved.
 TEST_F(EveryLayout, RoundsToTheNearestStepAndKeepsTheOrder) {
   for (const OutputLayout& plan : layouts()) {
     LayoutEncoder encoder(plan);
@@ -392,7 +392,7 @@ TEST_F(EveryLayout, RoundsToTheNearestStepAndKeepsTheOrder) {
   }
 }
 
-/// A reader that knows the profile: does the frame carry a rate that may be used?
+/// A reader that follows the profile: does the frame carry a usable rate?
 bool readable_as_valid(const OutputLayout& plan, const can::Frame& frame) {
   const std::int64_t raw = plan.rates[0].rate.codec.decode(frame.payload()).raw;
   const auto bits = static_cast<std::uint64_t>(raw);
@@ -404,7 +404,8 @@ bool readable_as_valid(const OutputLayout& plan, const can::Frame& frame) {
   return true;
 }
 
-// Whatever is not valid, or not to be said, is not sent or cannot be read as a rate.
+// A rate that is not valid, or that the signal cannot carry, is not sent or cannot be read as a
+// rate.
 TEST_F(EveryLayout, IsNeverReadAsValidWhenItIsNot) {
   for (const OutputLayout& plan : layouts()) {
     LayoutEncoder encoder(plan);
@@ -434,8 +435,8 @@ TEST_F(EveryLayout, IsNeverReadAsValidWhenItIsNot) {
 
 // --- σ, time, the rest of the frame --------------------------------------------------------------
 
-// Never 0, and never less than it is. What cannot be said is "not available" where the signal has a
-// code for that; where it has none the rate is not valid either, for a reader would trust it too
+// Never 0, and never understated. If the signal cannot carry σ, it is "not available"; if the
+// signal has no code for that, the rate is not valid either, since a reader would trust it too
 // much.
 TEST_F(OutputLayoutTest, SigmaIsNeverUnderstated) {
   LayoutEncoder plain(
@@ -479,7 +480,7 @@ TEST_F(OutputLayoutTest, MethodWithoutSigmaNeedsACode) {
   EXPECT_TRUE(load("dbc = \"rig.dbc\"\n" + keys + "sigma = \"Fine\"\n" + mutual));
 }
 
-// "Quality >= 2": 2 when valid; 0 when not, for all ones would be valid.
+// "Quality >= 2": 2 if valid; 0 if not, because all ones would be valid.
 TEST_F(OutputLayoutTest, FlagThatIsNotEqual) {
   LayoutEncoder encoder(
       rig_layout("message = \"Guarded\"\nrate = \"Rate\"\nvalid = \"Quality >= 2\"\n"));
@@ -491,7 +492,7 @@ TEST_F(OutputLayoutTest, FlagThatIsNotEqual) {
   EXPECT_EQ(rig::signed_bits(*other.rate(invalid(), at_ms(0)), 50, 6), -5) << "its start value";
 }
 
-// The first rate at or after each point of a grid; a clock that is set back takes it along.
+// The first rate at or after each grid point; a clock that is set back moves the grid.
 TEST_F(OutputLayoutTest, EveryKeepsItsDistance) {
   LayoutEncoder encoder(rig_layout(
       "message = \"RateOfTurn\"\nrate = \"Rate\"\nsource_address = 1\nevery_ms = 100\n"));
@@ -505,8 +506,8 @@ TEST_F(OutputLayoutTest, EveryKeepsItsDistance) {
   EXPECT_EQ(encoder.counts().frames, 6U);
 }
 
-// Sensors that speak as often as the frames are wanted, at whatever phase of the grid, a little
-// early and a little late: every rate goes out.
+// Sensors as frequent as the wanted frames, at any phase of the grid, a little early or late: every
+// rate is sent.
 TEST_F(OutputLayoutTest, EveryLosesNothingToJitter) {
   for (int phase_us = 0; phase_us < 10'000; phase_us += 250) {
     LayoutEncoder encoder(rig_layout(
@@ -522,8 +523,8 @@ TEST_F(OutputLayoutTest, EveryLosesNothingToJitter) {
   }
 }
 
-// As many frames as there is time for, whatever the rates' own distance; and after a silence no
-// heap of them.
+// The number of frames follows from the period, whatever the interval of the rates; no burst after
+// a silence.
 TEST_F(OutputLayoutTest, EveryIsKeptOnAverage) {
   for (const int interval_us : {125, 1000, 2000, 3000, 4100, 4999}) {
     LayoutEncoder encoder(rig_layout(
@@ -544,7 +545,7 @@ TEST_F(OutputLayoutTest, EveryIsKeptOnAverage) {
   }
 }
 
-// A new configuration goes on counting where the old one stood, for the same frame.
+// After a reload the counter of the same frame continues.
 TEST_F(OutputLayoutTest, CounterGoesOnForTheSameFrame) {
   const OutputLayout plan = profile("bosch_mm7.dbc", kMm7);
   LayoutEncoder before(plan);
@@ -558,7 +559,7 @@ TEST_F(OutputLayoutTest, CounterGoesOnForTheSameFrame) {
   EXPECT_FALSE(other.sends_same_frame(before));
 }
 
-// PDU 1 carries a receiver: everybody. Priority and number are the DBC file's.
+// PDU 1 has a receiver: here all nodes. Priority and number are from the DBC file.
 TEST_F(OutputLayoutTest, J1939ToEverybody) {
   const OutputLayout plan =
       rig_layout("message = \"ToOne\"\nrate = \"Rate\"\nsource_address = 0x21\n");
@@ -570,7 +571,7 @@ TEST_F(OutputLayoutTest, J1939ToEverybody) {
       << "whoever gives the whole identifier says to whom";
 }
 
-// What our own inputs read of such frames is what the virtual gyro said.
+// An input of the gateway reads such frames as the rate that the virtual gyro sent.
 TEST_F(OutputLayoutTest, GatewayReadsWhatAnotherGatewaySends) {
   write("back.toml", fmt::format(R"([[gyro]]
 name = "a"
@@ -664,7 +665,7 @@ TEST_F(OutputLayoutTest, RefusesToSendNothing) {
   write("vgyro.toml", std::string(kConfig) + "vgyro_frames = false\n");
   const auto loaded = load_config((folder_ / "vgyro.toml").string());
   ASSERT_FALSE(loaded);
-  EXPECT_NE(loaded.error()[0].message().find("nothing would go out"), std::string::npos);
+  EXPECT_NE(loaded.error()[0].message().find("nothing would be sent"), std::string::npos);
 }
 
 TEST_F(OutputLayoutTest, WarnsOfWhatIsCoarseOrNarrow) {
@@ -685,7 +686,7 @@ TEST_F(OutputLayoutTest, WarnsOfWhatIsCoarseOrNarrow) {
   EXPECT_EQ(warnings_of("dbc = \"rig.dbc\"\nmessage = \"Upside\"\nrate = \"Rate\"\n"), "");
 }
 
-// A counter or a check value that nobody makes is a frame that nobody takes.
+// A receiver ignores frames whose counter or check value is not filled in.
 TEST_F(OutputLayoutTest, WarnsOfWhatReadersCheckAndNobodyMakes) {
   const std::string keys = "message = \"Guarded\"\nrate = \"Rate\"\nvalid = \"Quality >= 2\"\n";
   const auto warnings_of = [&](const std::string& more) {
@@ -704,8 +705,8 @@ TEST_F(OutputLayoutTest, WarnsOfWhatReadersCheckAndNobodyMakes) {
   EXPECT_EQ(warnings_of("counter = \"Counter\"\nfill = { Crc = 0 }\n").size(), 0U);
 }
 
-// The identifier of another message of the files that describe the bus; vgyro's own are asked for
-// only where they go out.
+// The identifier belongs to another message of a file that describes the bus; vgyro's own
+// identifiers matter only on the bus on which they are sent.
 TEST_F(OutputLayoutTest, WarnsOfTheIdentifierOfAnotherMessage) {
   const auto warnings_of = [&](const std::string& keys, const std::string& output) {
     const auto loaded =

@@ -30,15 +30,15 @@ std::size_t allocations_over(Pipeline& pipeline, const rig::Recording& recording
   return after - before;
 }
 
-// The count itself must work, or the tests below prove nothing.
+// The counter itself must work, or the tests below prove nothing.
 TEST(PipelineAllocation, IsSeenByTheCounter) {
   const std::size_t before = allocations_so_far();
   auto pipeline = std::make_unique<Pipeline>(rig::two_gyros());
   EXPECT_GT(allocations_so_far(), before);
 }
 
-// After construction the frame path takes no memory: through calibration, windows, a gyro that goes
-// and returns, a step of the clock, frames that are refused.
+// After construction the frame path allocates nothing: through calibration, windows, a gyro that
+// drops out and returns, a step of the clock, refused frames.
 TEST(PipelineAllocation, NeverHappensOnTheFramePath) {
   rig::Recording recording =
       rig::merge({rig::stream_a(ms(0), ms(50'000), rig::constant(0.1)),
@@ -57,7 +57,7 @@ TEST(PipelineAllocation, NeverHappensOnTheFramePath) {
   EXPECT_GT(pipeline.status().windows, 10U);
 }
 
-// The same with a reference and CAN FD output.
+// The same test with a reference and CAN FD output.
 TEST(PipelineAllocation, NeverHappensWithAReferenceAndFd) {
   Plan plan = rig::with_reference();
   plan.output.fd = true;
@@ -72,7 +72,7 @@ TEST(PipelineAllocation, NeverHappensWithAReferenceAndFd) {
   EXPECT_GT(pipeline.status().rates_out_valid, 3'000U);
 }
 
-// The same with the rate in a foreign layout, on a bus of its own.
+// The same test with the rate in a foreign layout, on a bus of its own.
 TEST(PipelineAllocation, NeverHappensWithAForeignLayout) {
   Plan plan = rig::two_gyros();
   plan.output.vgyro_frames = false;

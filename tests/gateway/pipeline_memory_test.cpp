@@ -1,5 +1,5 @@
-// Across a restart: what the pipeline keeps, when it takes it up, and what it says of it. A
-// corrector of the test's own shows exactly what it is given.
+// Across a restart: what the pipeline keeps, when it takes it up, and what its status says. A stub
+// corrector records exactly what it receives.
 
 #include <cmath>
 #include <memory>
@@ -73,7 +73,7 @@ class PipelineMemory : public testing::Test {
  protected:
   Pipeline make(const Plan& the_plan) { return {the_plan, std::make_unique<Stub>(seen)}; }
 
-  /// Of the plan's gyros, as of `ms_count`.
+  /// A state of the plan's gyros, saved at `ms_count`.
   [[nodiscard]] SavedState state_at(std::int64_t ms_count) const {
     SavedState state;
     state.drift.bias_dps = {kBias_dps, kBias_dps};
@@ -83,7 +83,7 @@ class PipelineMemory : public testing::Test {
     return state;
   }
 
-  /// Both gyros from `from_s`, for so many seconds, at rest.
+  /// Both gyros from `from_s` on, for this many seconds, at rest.
   static rig::Recording both(std::int64_t from_s, std::int64_t for_s) {
     const Duration from = std::chrono::seconds(from_s);
     const Duration to = from + std::chrono::seconds(for_s);
@@ -116,8 +116,8 @@ TEST_F(PipelineMemory, FirstPairIsValidAndSaysRestored) {
     EXPECT_NE(rig::bits(output.frame, 56, 3), 1U) << "VB_Mode says calibrating";
 }
 
-// Samples wait for the choice of who paces. A silence in between must not make them rates of now:
-// VG_Age could not say how old they are.
+// Samples wait until the aligner has chosen the pacing gyro. A silence in between must not turn
+// them into present rates, because VG_Age could not hold their age.
 TEST_F(PipelineMemory, WhatWaitedThroughASilenceIsNotSentAsANewRate) {
   constexpr double kBefore_dps = 5.0;
   Pipeline pipeline = make(plan);
@@ -248,7 +248,7 @@ TEST_F(PipelineMemory, KeepsDevicesTemperaturesAndTheStampOfTheLastRate) {
   EXPECT_TRUE(make(plan).resume(*state));
 }
 
-// Motion that was learned as drift must end with the run.
+// Motion that was learned as drift must not outlive the run.
 TEST_F(PipelineMemory, WhatWasLearnedInMotionIsKeptOnlyAfterAStop) {
   plan.calibration.when_moving = fusion::WhenMoving::kAccept;
   plan.calibration.rest_s = 4.0;
@@ -276,7 +276,7 @@ TEST_F(PipelineMemory, StampFollowsAClockThatWasSetBack) {
   EXPECT_NEAR(to_seconds(state->rate_stamp - TimePoint{}), 503.0, 0.05);
 }
 
-// The product's own corrector from end to end: calibrated, kept as text, taken up after an hour.
+// The product's own corrector from end to end: calibrated, saved as text, resumed after an hour.
 TEST_F(PipelineMemory, OptimalGoesOnWithASigmaThatHasGrown) {
   constexpr std::uint32_t kSeed = 11;
   SCOPED_TRACE(kSeed);

@@ -30,7 +30,7 @@ constexpr double kTrue_dps = 2.0;
 constexpr double kBiasA_dps = 0.5;
 constexpr double kBiasB_dps = -0.3;
 
-// At rest for the second of the calibration, then turning.
+// At rest for the calibration, then turning.
 RateOf gyro_with(double bias_dps, Duration begin = Duration{0}) {
   const double from_s = to_seconds(begin) + 1.2;
   return [=](double t_s) { return bias_dps + (t_s < from_s ? 0.0 : kTrue_dps); };
@@ -53,7 +53,7 @@ Recording shifted(Recording recording, Duration by) {
 struct Bench {
   explicit Bench(const Plan& plan = rig::two_gyros()) : pipeline(plan) {}
   void play(const Recording& recording) { rig::play(pipeline, recording, out); }
-  /// With the daemon's timer, and the states that were passed through.
+  /// Uses the daemon's timer, and records the states on the way.
   void play_live(const Recording& recording, TimePoint until) {
     for (const rig::Event& event : recording) {
       step_to(event.stamp);
@@ -100,7 +100,7 @@ std::vector<std::vector<std::uint8_t>> rate_payloads(const Collector& out) {
 
 // --- states --------------------------------------------------------------------------------------
 
-// The life of a gateway: one gyro goes and comes back, then both go and come back one by one.
+// A gateway's life: one gyro drops out and returns, then both do, one after the other.
 TEST(PipelineStates, WalkAsTheirTableSays) {
   Bench run;
   run.play_live(merge({a(ms(0), ms(6000)), a(ms(8000), ms(10000)),  //
@@ -114,7 +114,7 @@ TEST(PipelineStates, WalkAsTheirTableSays) {
   EXPECT_EQ(rig::times(run.pipeline, 1, Fault::kSilent), 2U);
 }
 
-// A gyro that goes while both should be calibrated: not enough is known to run on the other one.
+// A gyro drops out during the calibration: too little is known to continue with the other one.
 TEST(PipelineStates, WaitAgainWhenAGyroGoesDuringCalibration) {
   Bench run;
   run.play_live(merge({a(ms(0), ms(3000)), b(ms(0), ms(500)), b(ms(1500), ms(3000))}), at_ms(3000));
@@ -125,8 +125,7 @@ TEST(PipelineStates, WaitAgainWhenAGyroGoesDuringCalibration) {
   }
 }
 
-// Whoever listens to VG_Bias learns of a change of state at once, not at the next tenth of a
-// second.
+// A change of state appears in VG_Bias at once, not at the next tenth of a second.
 TEST(PipelineStates, AreToldByVgBiasAtOnce) {
   Bench run;
   std::vector<TimePoint> changes;
@@ -144,7 +143,7 @@ TEST(PipelineStates, AreToldByVgBiasAtOnce) {
   EXPECT_EQ(changes.size(), 3U);  // calibrating, running, degraded
 }
 
-// VB_Mode follows: nothing known, calibrating, tracking, hold.
+// VB_Mode follows the states: nothing known, calibrating, tracking, hold.
 TEST(PipelineStates, AreReflectedInTheBiasMode) {
   Bench run;
   run.play_live(merge({a(ms(0), ms(4000)), b(ms(500), ms(3000))}), at_ms(4000));
@@ -157,7 +156,7 @@ TEST(PipelineStates, AreReflectedInTheBiasMode) {
 
 // --- rates ---------------------------------------------------------------------------------------
 
-// With two gyros every aligned pair gives exactly one VG_Rate, and nothing else does.
+// With two gyros every aligned pair gives exactly one VG_Rate, and nothing else causes one.
 TEST(PipelineRates, OneVgRatePerPair) {
   Bench run;
   run.play(both(ms(5000)));
@@ -172,7 +171,7 @@ TEST(PipelineRates, OneVgRatePerPair) {
                 })));
 }
 
-// A receiver must not take a number from a gateway that does not know its biases yet.
+// Without known biases no rate may be valid.
 TEST(PipelineRates, AreInvalidWhileCalibrating) {
   Bench run;
   run.play(both(ms(900)));
@@ -185,8 +184,8 @@ TEST(PipelineRates, AreInvalidWhileCalibrating) {
   }
 }
 
-// Without noise the corrected rate is the true one, to the step of the frame, from the first on.
-// By `mutual`: what `optimal` makes of a world without any noise is not of this world.
+// Without noise the corrected rate is the true one to the step of the frame, from the first on.
+// Uses `mutual`, because `optimal` is not made for a world without any noise.
 TEST(PipelineRates, AreTheTrueRateOnceCalibrated) {
   Plan plan = rig::two_gyros();
   plan.corrector.method = Method::kMutual;
@@ -207,7 +206,7 @@ TEST(PipelineRates, AreTheTrueRateOnceCalibrated) {
   EXPECT_NEAR(run.pipeline.status().gyros[1].bias_dps, kBiasB_dps, 1e-9);
 }
 
-// The Earth turns under a platform at rest: what the configuration says is taken as the truth.
+// The Earth turns under a platform at rest: the configured rate is taken as the truth.
 TEST(PipelineRates, KeepTheRateThatTheCalibrationWasTold) {
   Plan plan = rig::two_gyros();
   plan.calibration.rate_dps = 0.25;
@@ -218,7 +217,7 @@ TEST(PipelineRates, KeepTheRateThatTheCalibrationWasTold) {
 }
 
 // The rate refers to stamp − age; here gyro b completes each pair of gyro a 3 ms later, or gyro a
-// one of gyro b 7 ms later.
+// each one of gyro b 7 ms later.
 TEST(PipelineRates, TellTheirAge) {
   Bench run;
   run.play(both(ms(3000)));
@@ -239,7 +238,7 @@ struct WorstError final : RateObserver {
   double worst_dps = 0.0;
 };
 
-// What a model file says comes late is late, and no reason to keep the rate back.
+// A lag in the model file is no reason to withhold the rate.
 TEST(PipelineRates, OfGyrosThatAreKnownToBeLateAreRightAndComplete) {
   const std::array<double, 2> none{};
   for (const std::array<double, 2> lag_s :
@@ -286,7 +285,7 @@ struct Opinions final : RateObserver {
   fusion::Condition last;
 };
 
-// Whoever draws sees what the corrector thinks at each instant of a rate that it made.
+// An observer gets the corrector's findings at each instant of a rate.
 TEST(PipelineRates, ComeWithWhatTheCorrectorThinksToWhoeverObserves) {
   Bench run;
   Opinions opinions;
@@ -298,7 +297,7 @@ TEST(PipelineRates, ComeWithWhatTheCorrectorThinksToWhoeverObserves) {
   EXPECT_EQ(opinions.last.probability, run.pipeline.status().probability);
 }
 
-// `mean` needs no calibration and has no biases, but it too needs both gyros to begin with.
+// `mean` needs no calibration and has no biases, but it also needs both gyros at the beginning.
 TEST(PipelineRates, OfTheMeanAreValidFromTheFirstPairOn) {
   Plan plan = rig::two_gyros();
   plan.corrector.method = Method::kMean;
@@ -313,7 +312,7 @@ TEST(PipelineRates, OfTheMeanAreValidFromTheFirstPairOn) {
   EXPECT_TRUE(std::isnan(run.pipeline.status().gyros[0].bias_dps));
 }
 
-// Beyond ± 419 deg/s VG_Rate has no number: the frame says so and the summary counts it.
+// Beyond ± 419 deg/s VG_Rate cannot carry the rate: the frame is invalid and the summary counts it.
 TEST(PipelineRates, BeyondTheFrameAreSentInvalidAndCounted) {
   Bench run;
   const auto fast = [](double t_s) { return t_s < 2.0 ? 0.0 : 500.0; };
@@ -330,7 +329,7 @@ TEST(PipelineRates, BeyondTheFrameAreSentInvalidAndCounted) {
   EXPECT_TRUE(std::isnan(status.rate_dps));
 }
 
-// Rest until 2 s, then swaying, then rest again from 5 s on.
+// Rest until 2 s, then swaying, then rest from 5 s on.
 Recording swaying_platform(std::uint32_t seed) {
   auto rng = std::make_shared<std::mt19937>(seed);
   const auto rate = [rng](double bias_dps) {
@@ -343,7 +342,7 @@ Recording swaying_platform(std::uint32_t seed) {
                 stream_b(ms(0), ms(11'000), rate(kBiasB_dps))});
 }
 
-// Motion learnt as drift would be published for ever: the calibration begins again and waits.
+// Motion learned as drift would stay in every rate: the calibration starts again and waits.
 TEST(PipelineRates, WaitForRestWhenThePlatformMoves) {
   Plan plan = rig::two_gyros();
   plan.calibration.rest_s = 4.0;
@@ -363,7 +362,7 @@ TEST(PipelineRates, WaitForRestWhenThePlatformMoves) {
   EXPECT_NEAR(status.gyros[0].bias_dps, kBiasA_dps, 0.006);
 }
 
-// Where the user accepts motion, it is not hidden: quality 8, and a flag.
+// Motion that the user accepts is reported: quality 8, and a flag.
 TEST(PipelineRates, SayWhenMotionWasAccepted) {
   Plan plan = rig::two_gyros();
   plan.calibration.rest_s = 4.0;
@@ -400,7 +399,7 @@ TEST(PipelineBias, ComesTenTimesASecond) {
   EXPECT_EQ(run.pipeline.status().biases_out, run.out.with_id(0x611).size());
 }
 
-// What the frame says is what the status says.
+// The frame and the status agree.
 TEST(PipelineBias, CarriesTheBiasesOfTheStatus) {
   Bench run;
   run.play(both(ms(4000)));
@@ -410,7 +409,7 @@ TEST(PipelineBias, CarriesTheBiasesOfTheStatus) {
   EXPECT_EQ(health_of(bias), 0U);
 }
 
-// A gateway without any gyro still says every tenth of a second that it is there and what is wrong.
+// Without any gyro the gateway still sends its state and health every tenth of a second.
 TEST(PipelineBias, IsAHeartbeatOnASilentBus) {
   Bench run;
   run.play_live(both(ms(2000)), at_ms(2000));
@@ -423,7 +422,7 @@ TEST(PipelineBias, IsAHeartbeatOnASilentBus) {
   EXPECT_EQ(run.pipeline.status().state, State::kLost);
 }
 
-// Before the first frame there is nothing to say but that.
+// Before the first frame it sends that alone.
 TEST(PipelineBias, IsAHeartbeatBeforeTheFirstFrame) {
   Bench run;
   run.pipeline.advance(TimePoint{std::chrono::hours(480'000)}, run.out);
@@ -434,7 +433,7 @@ TEST(PipelineBias, IsAHeartbeatBeforeTheFirstFrame) {
 
 // --- one gyro ------------------------------------------------------------------------------------
 
-// The surviving gyro's rate less its own last bias, with quality and health that say so.
+// The remaining gyro's rate less its own last bias, with matching quality and health.
 TEST(PipelineDegraded, RateIsTheSurvivorsLessItsBias) {
   Plan plan = rig::two_gyros();
   plan.calibration.rate_dps = kTrue_dps;
@@ -459,7 +458,7 @@ TEST(PipelineDegraded, RateIsTheSurvivorsLessItsBias) {
   }
 }
 
-// The rate must not jump when a gyro goes or returns: noise apart, nothing has changed.
+// The rate must not step when a gyro drops out or returns, noise apart.
 TEST(PipelineDegraded, RateDoesNotStepOnTheWayInOrOut) {
   constexpr double kSigma_dps = 0.01;
   std::mt19937 rng(11);
@@ -475,14 +474,15 @@ TEST(PipelineDegraded, RateDoesNotStepOnTheWayInOrOut) {
   for (const RateSeen& rate : run.rates()) {
     if (!rate.valid) continue;
     degraded += rate.state == State::kDegraded ? 1U : 0U;
-    // Six sigma of one gyro's sample, and its bias known from 100 samples, extrapolated.
+    // Six σ of one gyro's sample, and of its bias, which is known from 100 samples and
+    // extrapolated.
     ASSERT_NEAR(rate.rate_dps, 0.0, 6.0 * kSigma_dps * 1.5) << "seed 11";
   }
   EXPECT_GT(degraded, 150U);
   EXPECT_EQ(run.pipeline.status().state, State::kRunning);
 }
 
-// Every instant is sent once, in order, whether one gyro spoke or two.
+// Every instant is sent once, in order, from one gyro or two.
 TEST(PipelineDegraded, InstantsGrowThroughEveryChange) {
   Bench run;
   run.play(merge({a(ms(0), ms(4000)), a(ms(5500), ms(9000)), b(ms(0), ms(3000)),
@@ -498,8 +498,8 @@ TEST(PipelineDegraded, InstantsGrowThroughEveryChange) {
   EXPECT_GE(before, at_ms(8980));
 }
 
-// One gyro alone from the start was never compared with anything: invalid frames after a second of
-// waiting, so that receivers see a live gateway, and never a valid one. Of `mean` too.
+// One gyro alone from the start was never compared: after a second of waiting invalid frames are
+// sent, so that receivers see a live gateway, and never a valid one. `mean` behaves the same.
 TEST(PipelineDegraded, OneGyroFromTheStartIsNeverValid) {
   for (const Method method : {Method::kMutual, Method::kMean}) {
     Plan plan = rig::two_gyros();
@@ -518,7 +518,7 @@ TEST(PipelineDegraded, OneGyroFromTheStartIsNeverValid) {
   }
 }
 
-// Two gyros that never speak at the same time cannot be paired: no pair is made up, no valid rate.
+// Two gyros that are never active at the same time give no pair and no valid rate.
 TEST(PipelineDegraded, GyrosThatNeverMeetAreNeverPaired) {
   Bench run;
   run.play(merge(
@@ -530,7 +530,7 @@ TEST(PipelineDegraded, GyrosThatNeverMeetAreNeverPaired) {
 
 // --- time ----------------------------------------------------------------------------------------
 
-// A host's clock that is set back by seconds costs a few frames, is counted, and nothing else.
+// A host clock that is set back by seconds is counted and costs a few frames, nothing else.
 TEST(PipelineTime, ClockSetBackIsCountedAndSurvived) {
   Bench run;
   Recording recording = both(ms(3000));
@@ -555,14 +555,14 @@ TEST(PipelineTime, ClockSetBackIsCountedAndSurvived) {
             recording.back().stamp - recording.back().stamp.time_since_epoch() % ms(10) + ms(3));
 }
 
-// The clock is set while the gyros go on: what their drifts had become is what they still are.
+// The clock is set while the gyros continue: their drifts stay as they were.
 TEST(PipelineTime, ClockSetForthExtendsNoDriftOfMutual) {
   for (const Duration by : {Duration(std::chrono::seconds(20)), Duration(std::chrono::hours(20)),
                             Duration(std::chrono::hours(24 * 3000))}) {
     Plan plan = rig::two_gyros();
     plan.corrector.method = Method::kMutual;
     Bench run(plan);
-    // Slopes that a second of rest has taught: 0.2 and -0.1 deg/s each second.
+    // Slopes that a second of rest has shown: 0.2 and -0.1 deg/s each second.
     const auto drifting = [](double bias_dps, double slope_dps_s) {
       return [=](double t_s) { return bias_dps + slope_dps_s * t_s; };
     };
@@ -578,15 +578,15 @@ TEST(PipelineTime, ClockSetForthExtendsNoDriftOfMutual) {
               380);
     for (const RateSeen& rate : rates) {
       if (!rate.valid) continue;
-      // Of the bias it goes on to learn nothing from the frames that the guard waited for.
+      // No drift is learned from the frames during which the guard waited for confirmation.
       ASSERT_NEAR(rate.rate_dps, 0.0, 0.2 * 0.05 + rig::kRateStep_dps)
           << to_seconds(rate.stamp - at_ms(0)) << " s, set by " << to_seconds(by);
     }
   }
 }
 
-// The daemon lets time go on while nobody speaks, whatever the clock does; when frames come back
-// with stamps of the clock as it was set, heartbeat and time-outs must not wait for it to catch up.
+// The daemon advances time during a silence, whatever the clock does; when frames return with
+// stamps of the clock as it was set, heartbeat and time-outs must not wait until it catches up.
 TEST(PipelineTime, ClockSetBackInASilenceStopsNothing) {
   constexpr Duration kStart = std::chrono::hours(100);
   for (const Duration by : {Duration{0}, ms(20'000), ms(3'600'000)}) {
@@ -604,7 +604,7 @@ TEST(PipelineTime, ClockSetBackInASilenceStopsNothing) {
   }
 }
 
-// Set back again and again, as far as a log's stamps can go: time stays inside its 64 bits.
+// The clock is set back repeatedly, as far as a log's stamps allow: time stays within 64 bits.
 TEST(PipelineTime, ClockSetBackByCenturiesTwiceIsSurvived) {
   constexpr TimePoint kLatest = time_from_ns(9'000'000'000'000'000'000 - 3'000'000'000);
   Bench run;
@@ -622,7 +622,7 @@ TEST(PipelineTime, ClockSetBackByCenturiesTwiceIsSurvived) {
   EXPECT_GT(run.pipeline.next_deadline(), time_from_ns(-9'000'000'000'000'000'000));
 }
 
-// One stamp of garbage on a gyro's frame is refused and leaves no trace in the rates.
+// One garbage stamp on a gyro's frame is refused and does not affect the rates.
 TEST(PipelineTime, SingleGarbageStampIsRefused) {
   for (const std::int64_t garbage_s : {0L, 1L, 100'000L, 9'000'000'000L}) {
     Bench clean;
@@ -641,8 +641,7 @@ TEST(PipelineTime, SingleGarbageStampIsRefused) {
   }
 }
 
-// A frame of nobody's with a stamp of garbage must not stop the clockwork of the bias frames, nor
-// the watch over the gyros.
+// A foreign frame with a garbage stamp must stop neither the bias frames nor the time-outs.
 TEST(PipelineTime, GarbageStampOfAForeignFrameDoesNotStopTheClockwork) {
   Bench run;
   Recording recording = both(ms(4000));
@@ -659,7 +658,7 @@ TEST(PipelineTime, GarbageStampOfAForeignFrameDoesNotStopTheClockwork) {
   EXPECT_EQ(run.pipeline.status().state, State::kDegraded);
 }
 
-// The same for a gyro's own frame that is refused for another reason before its stamp is judged.
+// The same for a gyro's own frame that is refused for another cause before its stamp is judged.
 TEST(PipelineTime, GarbageStampOfARefusedFrameDoesNotStopTheClockwork) {
   Bench run;
   Recording recording = both(ms(4000));
@@ -671,7 +670,7 @@ TEST(PipelineTime, GarbageStampOfARefusedFrameDoesNotStopTheClockwork) {
   EXPECT_EQ(run.pipeline.status().state, State::kRunning);
 }
 
-// Frames of nobody's only let time pass: they are neither counted nor answered.
+// Foreign frames only advance time: they are neither counted nor answered.
 TEST(PipelineTime, ForeignFramesOnlyAdvanceTime) {
   Bench run;
   run.play(both(ms(2000)));
@@ -684,7 +683,7 @@ TEST(PipelineTime, ForeignFramesOnlyAdvanceTime) {
   EXPECT_EQ(run.pipeline.status().gyros[0].frames, 200U);
 }
 
-// Stamps are used in whole microseconds: what candump would not have written changes nothing.
+// Stamps are used in whole microseconds: digits that candump does not write change nothing.
 TEST(PipelineTime, NoiseBelowAMicrosecondChangesNothing) {
   std::mt19937 rng(17);
   std::uniform_int_distribution<std::int64_t> noise_ns(0, 999);
@@ -717,8 +716,8 @@ Recording jittery(std::uint32_t seed, Duration period_a, Duration period_b) {
   return merge({first, second});
 }
 
-// Two sockets are read one after the other: frames of one bus may come up to `slack` late behind
-// those of the other, while each bus keeps its own order.
+// Two sockets are read one after the other: frames of one bus may be up to `slack` later than those
+// of the other, while each bus keeps its own order.
 Recording reordered(const Recording& recording, std::uint32_t seed, Duration slack) {
   std::mt19937 rng(seed);
   std::array<Recording, 2> by_bus;
@@ -738,7 +737,7 @@ Recording reordered(const Recording& recording, std::uint32_t seed, Duration sla
   return result;
 }
 
-// Twice the same frames, twice the same bytes and stamps.
+// The same frames twice give the same bytes and stamps.
 TEST(PipelineRepeats, ItselfByteForByte) {
   const Recording recording = jittery(1, ms(10), ms(7));
   Bench first;
@@ -749,7 +748,7 @@ TEST(PipelineRepeats, ItselfByteForByte) {
   EXPECT_EQ(first.out.frames, second.out.frames);
 }
 
-// The order in which two buses are read, within 20 ms, does not show in VG_Rate.
+// The order in which two buses are read, within 20 ms, does not affect VG_Rate.
 TEST(PipelineRepeats, ItselfWhenTheBusesAreReadInAnotherOrder) {
   for (const Duration period_b : {ms(10), ms(2), ms(25)}) {
     const Recording recording = jittery(2, ms(10), period_b);
@@ -765,7 +764,7 @@ TEST(PipelineRepeats, ItselfWhenTheBusesAreReadInAnotherOrder) {
   }
 }
 
-// Other traffic on the same buses does not show in VG_Rate, even where a gyro goes and returns.
+// Other traffic on the same buses does not affect VG_Rate, even when a gyro drops out and returns.
 TEST(PipelineRepeats, ItselfAmongForeignFrames) {
   const Recording recording =
       merge({a(ms(0), ms(3000)), a(ms(3700), ms(6000)), b(ms(0), ms(4000)), b(ms(5000), ms(6000))});
@@ -785,7 +784,7 @@ TEST(PipelineRepeats, ItselfAmongForeignFrames) {
   EXPECT_EQ(rate_payloads(alone.out), rate_payloads(among.out));
 }
 
-// A plan is copied in: the pipeline may be moved and outlive the plan it was made from.
+// The plan is copied: the pipeline may be moved and may outlive the original plan.
 TEST(PipelineRepeats, ItselfAfterAMove) {
   Bench run;
   run.play(both(ms(3000)));
@@ -798,7 +797,7 @@ TEST(PipelineRepeats, ItselfAfterAMove) {
   EXPECT_EQ(out.frames, run.out.frames);
 }
 
-// A reload that changes where the rates go, and nothing of what they are made of.
+// A reload that changes only where the rates are sent.
 TEST(PipelineRepeats, ItselfWhereAnotherOneTakesOverInTheMidst) {
   for (const Method method : {Method::kOptimal, Method::kMutual, Method::kMean}) {
     Plan plan = rig::two_gyros();
@@ -854,7 +853,7 @@ TEST(PlanComparison, SeesEveryChangeButTheOutputs) {
   }
 }
 
-// After a reload receivers see one stream.
+// After a reload receivers see one continuous stream.
 TEST(PipelineRepeats, CountsOnFromAnotherOne) {
   Bench first;
   first.play(both(ms(1234)));
@@ -877,7 +876,7 @@ RateOf rocking(double bias_dps) {
   return [bias_dps](double t_s) { return bias_dps + 30.0 * std::sin(2.0 * t_s); };
 }
 
-// With a reference the platform may move: biases come out right although it never rested.
+// With a reference the platform may move: the biases are right although it never rested.
 TEST(PipelineReference, CalibratesOnAMovingPlatform) {
   Bench run(rig::with_reference());
   run.play(merge({stream_a(ms(0), ms(4000), rocking(kBiasA_dps)),
@@ -886,15 +885,15 @@ TEST(PipelineReference, CalibratesOnAMovingPlatform) {
   const Status& status = run.pipeline.status();
   EXPECT_EQ(status.state, State::kRunning);
   EXPECT_FALSE(status.moved_in_calibration);
-  // Chords of a sine of 30 deg/s and 2 rad/s over 10 ms miss it by 1.5e-3 deg/s at most; the line
-  // fitted to a window is carried on over the next one.
+  // Chords of a sine of 30 deg/s and 2 rad/s over 10 ms deviate from it by at most 1.5e-3 deg/s;
+  // the line fitted to a window is extended over the next one.
   EXPECT_NEAR(status.gyros[0].bias_dps, kBiasA_dps, 5e-3);
   EXPECT_NEAR(status.gyros[1].bias_dps, kBiasB_dps, 5e-3);
   EXPECT_EQ(status.reference_frames, 400U);
   EXPECT_EQ(status.reference_rejected, 0U);
 }
 
-// It had run an hour ahead, and comes back to the gyros' time: it is heard again.
+// The reference was an hour ahead and returns to the gyros' time: it is used again.
 TEST(PipelineReference, CalibratesWhenTheReferenceComesBackFromAnotherTime) {
   const auto turning = [](double t_s) { return 5.0 + t_s; };
   const auto with_bias = [&](double bias_dps) {
@@ -918,7 +917,8 @@ TEST(PipelineReference, CalibratesWhenTheReferenceComesBackFromAnotherTime) {
   EXPECT_NEAR(run.rates().back().rate_dps, turning(7.99), 0.02);
 }
 
-// No reference, no calibration: better no rate than one against an invented truth.
+// Without the reference there is no calibration: no rate is better than one against an invented
+// truth.
 TEST(PipelineReference, WithoutItNothingBecomesValid) {
   Bench run(rig::with_reference());
   run.play(both(ms(5000)));
@@ -926,7 +926,7 @@ TEST(PipelineReference, WithoutItNothingBecomesValid) {
   EXPECT_EQ(run.pipeline.status().rates_out_valid, 0U);
 }
 
-// Reference frames that cannot be used are counted and do not count as truth.
+// Unusable reference frames are counted and not used.
 TEST(PipelineReference, RefusesTruncatedAndRepeatedFrames) {
   Bench run(rig::with_reference());
   Recording reference = rig::stream(0, rig::kIdReference, ms(0), ms(4000), ms(10), rocking(0.0));
@@ -941,7 +941,7 @@ TEST(PipelineReference, RefusesTruncatedAndRepeatedFrames) {
 
 // --- deadlines -----------------------------------------------------------------------------------
 
-// Asking when nothing is due does nothing: that is what makes it cheap to ask for every frame.
+// advance() does nothing when nothing is due, so it is cheap enough to call for every frame.
 TEST(PipelineDeadline, NothingHappensBeforeIt) {
   Bench run;
   run.play(both(ms(2000)));
@@ -953,8 +953,8 @@ TEST(PipelineDeadline, NothingHappensBeforeIt) {
   EXPECT_EQ(run.pipeline.next_deadline(), deadline);
 }
 
-// A deadline that is still due after advance() would make the daemon spin. Any history, with gaps,
-// steps of the clock and garbage, has a deadline in the future after each advance.
+// A deadline that is still due after advance() would make the daemon spin. After any history, with
+// gaps, clock steps and garbage, the deadline is in the future.
 TEST(PipelineDeadline, IsNeverDueAfterAdvance) {
   for (std::uint32_t seed = 0; seed < 40; ++seed) {
     rig::Dice dice(seed);
@@ -982,7 +982,7 @@ TEST(PipelineDeadline, IsNeverDueAfterAdvance) {
   }
 }
 
-// On a silent bus the timer is needed some ten times a second, not a thousand times.
+// On a silent bus the timer wakes some ten times a second, not a thousand times.
 TEST(PipelineDeadline, WakesASilentGatewayAboutTenTimesASecond) {
   Bench run;
   run.play_live(both(ms(2000)), at_ms(2000));
@@ -992,7 +992,7 @@ TEST(PipelineDeadline, WakesASilentGatewayAboutTenTimesASecond) {
   EXPECT_LE(run.wake_ups, 220);
 }
 
-// A gyro that goes silent is noticed within its time-out although no frame says so.
+// A silent gyro is noticed within its time-out, without any frame.
 TEST(PipelineDeadline, NoticesASilentGyroInTime) {
   Bench run;
   run.play(both(ms(2000)));
@@ -1004,10 +1004,9 @@ TEST(PipelineDeadline, NoticesASilentGyroInTime) {
   EXPECT_EQ(run.pipeline.status().state, State::kLost);
 }
 
-// --- a calibration that cannot be one
-// --------------------------------------------------------------
+// --- calibrations that are refused ---------------------------------------------------------------
 
-// Switched on in a roundabout: what both read alike is no bias, however steady it is.
+// Switched on in a roundabout: a rate that both gyros read is no bias, however steady it is.
 TEST(PipelineCalibration, TakesNoSteadyTurnForRest) {
   Plan plan = rig::two_gyros();
   plan.calibration.rest_s = 4.0;
@@ -1023,7 +1022,7 @@ TEST(PipelineCalibration, TakesNoSteadyTurnForRest) {
   EXPECT_NEAR(bench.pipeline.status().gyros[1].bias_dps, kBiasB_dps, 0.01);
 }
 
-// One cheap gyro may well read 20 deg/s at rest, as long as nothing says that it cannot.
+// One cheap gyro may read 20 deg/s at rest, unless max_bias_dps excludes it.
 TEST(PipelineCalibration, BelievesALargeBiasOfOneGyroUnlessToldOtherwise) {
   Plan plan = rig::two_gyros();
   const Recording rest = merge({stream_a(ms(0), ms(4000), [](double /*t_s*/) { return 20.0; }),

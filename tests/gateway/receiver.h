@@ -1,6 +1,6 @@
 #pragma once
 
-// A receiver that has nothing but the published DBC file: output frames → signals by name.
+// A receiver that uses only the published DBC file: output frames → signals by name.
 
 #include <cstdint>
 #include <map>
@@ -17,13 +17,13 @@ namespace vgyro::gateway {
 struct Field {
   double value = 0.0;
   std::int64_t raw = 0;
-  std::string label;  ///< of the raw value; empty where it has none
+  std::string label;  ///< label of the raw value; empty if it has none
 };
 using Fields = std::map<std::string, Field>;
 
 class Receiver {
  public:
-  /// `file` in dbc/.
+  /// `file` is in dbc/.
   explicit Receiver(const std::string& file)
       : database_(dbc::load(std::string(VGYRO_DBC_DIR) + "/" + file).value()) {}
 

@@ -1,6 +1,6 @@
-// Whatever came before, good data bring back what good data bring: a hostile minute in front of a
-// good recording changes neither whether its end is valid nor, beyond noise, what it says. Each
-// case is a seed; it is printed when one fails.
+// After any history, good data give good results: a hostile minute before a good recording changes
+// neither the validity of its end nor, beyond noise, its rates. Each case is a seed, which is
+// printed on failure.
 
 #include <cmath>
 #include <string>
@@ -28,12 +28,12 @@ constexpr double kWindow_s = 2.0;
 
 struct Rates {
   std::array<double, 2> hz{100.0, 100.0};
-  /// The wait after the last of many faults, then the calibration; more where a slow gyro has to
-  /// show first that it is slow.
+  /// The recovery after the last of many faults, then the calibration; longer if the aligner must
+  /// first learn that a gyro is slow.
   double rest_s = 16.0;
 
   [[nodiscard]] double good_s() const { return rest_s + 14.0; }
-  /// At rest, and then to and fro.
+  /// At rest, then moving to and fro.
   [[nodiscard]] double truth_dps(double t_s) const {
     return t_s < rest_s ? 0.0 : 20.0 * std::sin(0.5 * (t_s - rest_s));
   }
@@ -43,7 +43,7 @@ class Gyros {
  public:
   Gyros(const Rates& rates, std::uint32_t seed) : rates_(rates), noise_(seed) {}
 
-  /// Both for this long; the platform moves from the rest on if it `moves`.
+  /// Both gyros for this long; if it `moves`, the platform moves after the rest.
   Recording speak(TimePoint from, Duration length, bool moves) {
     std::vector<Recording> parts(2);
     for (std::size_t gyro = 0; gyro < 2; ++gyro) {
@@ -92,17 +92,17 @@ Plan plan_of(Method method) {
 // --------------------------------------------------------------
 
 enum class Evil : std::uint32_t {
-  kLate,        // read half a second after it was stamped
+  kLate,        // read half a second after its stamp
   kTwice,       // with the same stamp
-  kTwiceApart,  // with a stamp and a counter of its own
-  kWildStamps,  // some frames with a stamp from anywhere
-  kFirstWild,   // only the first one
+  kTwiceApart,  // with a stamp and a counter of their own
+  kWildStamps,  // some frames have a random stamp
+  kFirstWild,   // only the first frame has one
   kHoleOfOne,
   kHoleOfBoth,
   kBurst,  // many at one instant, as from a queue
-  kSlow,   // only a few get through
+  kSlow,   // only a few frames arrive
   kSwappedBuses,
-  kGarbage,  // bits of no rate
+  kGarbage,  // bits that are no rate
   kFlagged,
   kClockForth,
   kClockBack,
@@ -176,7 +176,7 @@ class HostileMinute {
     }
   }
 
-  /// False when the frame does not arrive, or not now.
+  /// False if the frame does not arrive, or not yet.
   bool suffer(const Spell& spell, bool concerned, Event& one, std::vector<Event>& more) {
     const bool both = spell.evil == Evil::kHoleOfBoth || spell.evil == Evil::kClockForth ||
                       spell.evil == Evil::kClockBack || spell.evil == Evil::kSwappedBuses;
@@ -263,7 +263,7 @@ struct End {
   State state = State::kWaiting;
 };
 
-/// What the last two seconds of the good recording were worth.
+/// Results in the last two seconds of the good recording.
 struct EndWatcher final : RateObserver {
   EndWatcher(const Rates& rates, TimePoint good_from, TimePoint judged_from)
       : rates_(rates), good_from_(good_from), judged_from_(judged_from) {}
@@ -285,7 +285,7 @@ struct EndWatcher final : RateObserver {
   TimePoint judged_from_;
 };
 
-/// The timer as the daemon has it, but not ten times a second through years that a clock leapt
+/// Uses the timer like the daemon, but not ten times a second through years that the clock leapt
 /// over.
 void receive(Pipeline& pipeline, const Event& event, rig::Collector& out) {
   constexpr int kMost = 20;
@@ -337,7 +337,7 @@ void expect_recovery(const Rates& rates, Method method, Calibrated when, std::ui
   EXPECT_EQ(end.state, State::kRunning);
   EXPECT_GE(end.valid + 2, alone.valid);
   EXPECT_EQ(end.invalid, 0U);
-  // What was learned from garbage in the place of a rest nothing can take back but the next rest.
+  // If garbage was learned instead of a rest, only the next rest corrects it.
   if (when == Calibrated::kBefore || method == Method::kMean) {
     EXPECT_LT(end.worst_dps, alone.worst_dps + 0.02);
   }
@@ -368,7 +368,7 @@ TEST(Recovery, AnyHostileMinuteIsForgottenByOptimal) {
     expect_recoveries(rates, Method::kOptimal, 60);
 }
 
-// The guard of the stamps and the time-outs know that they are slow.
+// The stamp guard and the time-outs adapt to slow gyros.
 TEST(Recovery, AnyHostileMinuteIsForgottenWithGyrosOfOneHertz) {
   expect_recoveries(kSlowRates, Method::kMean, 100);
   expect_recoveries(kSlowRates, Method::kMutual, 100);

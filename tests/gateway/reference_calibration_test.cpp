@@ -27,7 +27,7 @@ TEST(ReferenceCalibration, InterpolatesBetweenTheNeighbours) {
   EXPECT_FALSE(reference.next());
 }
 
-// At the stamp of a reference sample its own value holds, at either end.
+// At the stamp of a reference sample the sample itself is the truth, at either end.
 TEST(ReferenceCalibration, TakesTheSampleItselfAtItsOwnStamp) {
   ReferenceCalibration reference;
   reference.add_reference(at_ms(0), 10.0);
@@ -41,7 +41,7 @@ TEST(ReferenceCalibration, TakesTheSampleItselfAtItsOwnStamp) {
   EXPECT_DOUBLE_EQ(last->true_rate_dps, 20.0);
 }
 
-// Pairs from before the reference began are passed over and do not hold up those behind them.
+// Pairs from before the reference began are skipped and do not delay later ones.
 TEST(ReferenceCalibration, PassesOverPairsBeforeTheReference) {
   ReferenceCalibration reference;
   for (std::int64_t t = 0; t < 10; ++t)
@@ -56,7 +56,7 @@ TEST(ReferenceCalibration, PassesOverPairsBeforeTheReference) {
   EXPECT_EQ(covered, (std::vector{at_ms(50), at_ms(60), at_ms(70), at_ms(80), at_ms(90)}));
 }
 
-// Nothing is interpolated across a hole of more than a second: nobody knows what happened in it.
+// Nothing is interpolated across a gap of more than a second, since the motion in it is unknown.
 TEST(ReferenceCalibration, DoesNotInterpolateAcrossAGap) {
   ReferenceCalibration reference;
   reference.add_reference(at_ms(0), 0.0);
@@ -81,7 +81,7 @@ TEST(ReferenceCalibration, IgnoresReferenceSamplesOutOfOrder) {
   EXPECT_DOUBLE_EQ(ready->true_rate_dps, 0.5);
 }
 
-// It had run an hour ahead of the gyros and has come back to their time.
+// The reference was an hour ahead of the gyros and returns to their time.
 TEST(ReferenceCalibration, GoesOnWithAReferenceThatHadRunAhead) {
   ReferenceCalibration reference;
   reference.add_reference(at_ms(3'600'000), 7.0);

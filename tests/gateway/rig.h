@@ -130,7 +130,7 @@ inline Recording stream(can::BusIndex bus, std::uint32_t id, Duration from, Dura
 inline Recording stream_a(Duration from, Duration to, const RateOf& rate_dps) {
   return stream(0, kIdA, from, to, ms(10), rate_dps);
 }
-/// 3 ms behind gyro a.
+/// 3 ms after gyro a.
 inline Recording stream_b(Duration from, Duration to, const RateOf& rate_dps) {
   return stream(1, kIdB, from + ms(3), to, ms(10), rate_dps);
 }
@@ -166,7 +166,7 @@ class Collector final : public FrameSink {
   std::vector<Output> frames;
 };
 
-/// As the daemon drives it: the timer first, whenever it is due before the next frame.
+/// Drives the pipeline like the daemon: the timer first, whenever it is due before the next frame.
 inline void receive_with_timer(Pipeline& pipeline, const Event& event, FrameSink& sink) {
   while (pipeline.next_deadline() < event.stamp && pipeline.next_deadline() > TimePoint{}) {
     pipeline.advance(pipeline.next_deadline(), sink);

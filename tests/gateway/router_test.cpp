@@ -25,7 +25,7 @@ TEST(Router, KnowsEachGyroOnItsOwnBusOnly) {
   EXPECT_EQ(router.roles(0, frame_of(rig::kIdB, {})), 0);
 }
 
-// Every identifier that nobody configured is nobody's, on every bus.
+// An identifier that is not configured has no role, on any bus.
 TEST(Router, LeavesAllOtherIdentifiersAlone) {
   const Router router(rig::two_gyros());
   for (std::uint32_t id = 0; id <= can::kStandardIdMax; ++id) {
@@ -35,7 +35,7 @@ TEST(Router, LeavesAllOtherIdentifiersAlone) {
   }
 }
 
-// A log may hold more interfaces than the plan knows; their index lies beyond the table.
+// A log may hold more interfaces than the plan; their index is beyond the table.
 TEST(Router, IgnoresBusesThatThePlanDoesNotKnow) {
   const Router router(rig::two_gyros());
   EXPECT_EQ(router.roles(2, frame_of(rig::kIdA, {})), 0);
@@ -52,7 +52,7 @@ TEST(Router, TellsStandardFromExtendedIdentifiers) {
   EXPECT_EQ(router.roles(0, frame_of(rig::kIdA, {}, can::kExtended)), kGyro2);
 }
 
-// J1939: priority and source address do not take part unless the source is configured.
+// J1939: priority is ignored, and so is the source address unless it is configured.
 TEST(Router, MatchesJ1939ByItsMask) {
   const Router router(j1939_plan());
   EXPECT_EQ(router.roles(0, frame_of(0x0CF02AE2, {}, can::kExtended)), kGyro1);
@@ -61,7 +61,7 @@ TEST(Router, MatchesJ1939ByItsMask) {
   EXPECT_EQ(router.roles(0, frame_of(0x0CF02AE3, {}, can::kExtended)), kGyro1 | kGyro2);
 }
 
-// One frame may be a gyro's and the reference's at once: two signals of one message.
+// One frame may carry a gyro and the reference: two signals of one message.
 TEST(Router, GivesOneFrameSeveralRoles) {
   Plan plan = rig::with_reference();
   plan.reference->match = plan.gyros[0].match;
@@ -76,7 +76,7 @@ TEST(Router, GivesErrorFramesNoRole) {
   EXPECT_EQ(router.roles(0, frame_of(rig::kIdA, {}, can::kError | can::kExtended)), 0);
 }
 
-// An identifier that the DBC file gives another message of the same PGN is that one's.
+// An identifier that the DBC file assigns to another message of the same PGN has no role.
 TEST(Router, LeavesTheIdentifiersOfOtherMessagesToThem) {
   Plan plan = j1939_plan();
   plan.gyros[0].match.others = {0x0CF02A07};

@@ -1,5 +1,5 @@
-// The form in which biases survive a restart: exact numbers, and nothing believed that is cut,
-// changed, or cannot be. The checksum is computed here bit by bit, apart from the product's.
+// The text form of biases across a restart: exact numbers; a text that is cut, changed or
+// impossible is refused. The checksum is computed here bit by bit, independently of the product.
 
 #include "gateway/saved_state.h"
 
@@ -109,7 +109,7 @@ TEST(SavedState, ComesBackBitForBit) {
   expect_same(plain_state(), *back);
 }
 
-// Any mantissa, from subnormal numbers to the largest that are allowed, and both zeros.
+// Any mantissa, from subnormal numbers to the largest allowed ones, and both zeros.
 TEST(SavedState, AnyNumbersComeBackBitForBit) {
   constexpr std::uint32_t kSeed = 20240607;
   SCOPED_TRACE(kSeed);
@@ -164,7 +164,7 @@ TEST(SavedState, CutAnywhereIsRefused) {
     ASSERT_FALSE(saved_state_from(text.substr(0, size), kWhere)) << size;
 }
 
-// Every byte, changed to every other value.
+// Every byte is changed to every other value.
 TEST(SavedState, OneByteChangedIsRefused) {
   std::string text = to_text(plain_state());
   for (char& byte : text) {
@@ -194,7 +194,7 @@ TEST(SavedState, BytesLostDoubledOrAddedAreRefused) {
 struct Forgery {
   const char* from;
   const char* to;
-  const char* said;  ///< in the message
+  const char* said;  ///< expected in the message
 };
 
 SavedState state_of_axes() {
@@ -209,7 +209,7 @@ SavedState state_of_axes() {
   return state;
 }
 
-// Of a platform of several axes every number comes back as it was.
+// With several axes, too, every number comes back exactly.
 TEST(SavedState, OfSeveralAxesComesBack) {
   const SavedState state = state_of_axes();
   const std::string text = to_text(state);
@@ -247,7 +247,7 @@ TEST(SavedState, OfSeveralAxesThatCannotBeIsRefused) {
   }
 }
 
-// With a right checksum, so that nothing but the check of the content stands in the way.
+// The checksum is right, so that only the check of the contents can refuse the text.
 TEST(SavedState, WhatCannotBeIsRefusedBehindARightChecksum) {
   const std::string content = content_of(to_text(plain_state()));
   ASSERT_TRUE(saved_state_from(sealed(content), kWhere));
@@ -296,7 +296,7 @@ TEST(SavedState, WhatCannotBeIsRefusedBehindARightChecksum) {
       {"slope_sigma_dps_s = [3e-07, 4e-07]\n", "", "slope_sigma_dps_s is no list of 2"},
       {"temperature_2_c = 31.5", "temperature_2_c = nan", "temperature_2_c"},
       {"temperature_2_c = 31.5", "temperature_2_c = -300.0", "temperature_2_c"},
-      {"temperature_2_c = 31.5\n", "", "coefficient_dps_k stands without a temperature"},
+      {"temperature_2_c = 31.5\n", "", "coefficient_dps_k needs a temperature"},
       {"coefficient_dps_k = [0.0", "coefficient_dps_k = [nan", "coefficient_dps_k holds nan"},
       {"coefficient_dps_k = [0.0, -0.0003]\n", "", "coefficient_dps_k is no list of 2"},
       {"coefficient_sigma_dps_k = [0.0", "coefficient_sigma_dps_k = [-0.1",
@@ -331,7 +331,7 @@ std::string file_text(const std::string& name) {
   return {std::istreambuf_iterator<char>(file), {}};
 }
 
-// Of the release before slopes, kinds of drift and temperatures were learned.
+// A file of the release before slopes, kinds of drift and temperatures were learned.
 TEST(SavedState, OfAnOlderReleaseIsReadAndWhatItDoesNotHoldIsNotKnown) {
   const std::string older = file_text("older_state.toml");
   const auto state = saved_state_from(older, kWhere);
@@ -356,7 +356,7 @@ TEST(SavedState, OfThisReleaseIsReadWithWhatItHasLearned) {
   EXPECT_EQ(to_text(*state), file_text("state.toml"));
 }
 
-// Sums of probabilities, as the estimator makes them.
+// Sums of probabilities with the rounding that the estimator causes.
 TEST(SavedState, WeightsOfARoundingMoreThanOneAreRead) {
   SavedState state = plain_state();
   const double more_than_one = std::nextafter(1.0, 2.0);
@@ -368,7 +368,7 @@ TEST(SavedState, WeightsOfARoundingMoreThanOneAreRead) {
   expect_same(state, *back);
 }
 
-// The longest numbers that there are, in every place, are far below what is looked at.
+// With the longest possible numbers in every place the text is far below its size limit.
 TEST(SavedState, WithTheLongestNumbersStaysWithinItsBound) {
   SavedState state = plain_state();
   const double longest = -1.2345678901234567e-300;

@@ -1,5 +1,5 @@
-// What leaves the gateway, without an estimation behind it: the grid of VG_Bias through gaps and
-// leaps of time, the books, and frames that say what the DBC file says they say.
+// The gateway's output without an estimation: the grid of VG_Bias through gaps and leaps of time,
+// the counts, and frames that match the DBC file.
 
 #include "gateway/sender.h"
 
@@ -51,7 +51,7 @@ class SenderTest : public ::testing::Test {
     sender.tell(told);
     return told;
   }
-  /// Samples at these instants: those of them that reached the grid.
+  /// Offers samples at these instants; returns those that reached a grid point.
   std::vector<TimePoint> reached(TimePoint from, TimePoint to, Duration every) {
     std::vector<TimePoint> found;
     for (TimePoint t = from; t < to; t += every)
@@ -66,16 +66,16 @@ class SenderTest : public ::testing::Test {
 
 // --- the grid ------------------------------------------------------------------------------------
 
-// Ten points a second at whole tenths of the axis, whatever the phase of the samples.
+// Ten points a second at whole tenths of the time axis, whatever the phase of the samples.
 TEST_F(SenderTest, GridStandsAtWholeTenthsOfASecond) {
   const std::vector<TimePoint> found = reached(at_ms(1003), at_ms(3003), ms(10));
   ASSERT_EQ(found.size(), 20U);
-  EXPECT_EQ(found[0], at_ms(1003));  // the first sample: at once
+  EXPECT_EQ(found[0], at_ms(1003));  // the first sample sends at once
   for (std::size_t i = 1; i < found.size(); ++i)
     EXPECT_EQ(found[i], at_ms(1003 + 100 * static_cast<std::int64_t>(i))) << i;
 }
 
-// A point of the grid that fell into a gap of the samples is made up for once, not once for each.
+// Grid points that fell into a gap of the samples cause one frame, not one each.
 TEST_F(SenderTest, GapInTheSamplesCostsPointsAndBringsNoBurst) {
   reached(at_ms(1000), at_ms(2000), ms(10));
   const std::vector<TimePoint> behind = reached(at_ms(5555), at_ms(5900), ms(10));
@@ -88,26 +88,26 @@ TEST_F(SenderTest, SlowSamplesAreAPointEach) {
   EXPECT_EQ(reached(at_ms(0), at_ms(3000), ms(250)).size(), 12U);
 }
 
-// A leap ahead: the grid stands before the new time at once, and goes on from there.
+// After a leap ahead the grid continues at once from the new time.
 TEST_F(SenderTest, LeapAheadGoesOnAtTheNewTime) {
   reached(at_ms(1000), at_ms(2000), ms(10));
   const TimePoint later = at_ms(2000) + std::chrono::hours(24 * 365);
   EXPECT_EQ(reached(later, later + ms(1000), ms(10)).size(), 10U);
 }
 
-// A clock that was set back by more than a second takes the grid back with it; samples that are
-// merely out of order do not.
+// A clock that was set back by more than a second moves the grid back; samples that are merely out
+// of order do not.
 TEST_F(SenderTest, ClockSetBackTakesTheGridBack) {
-  reached(at_ms(100'000), at_ms(101'000), ms(10));  // the next point: 101 s
+  reached(at_ms(100'000), at_ms(101'000), ms(10));  // the next point is at 101 s
   EXPECT_FALSE(sender.reach_grid(at_ms(100'000)));
   EXPECT_TRUE(sender.reach_grid(at_ms(99'999)));
   EXPECT_EQ(reached(at_ms(100'000), at_ms(101'000), ms(10)).size(), 10U);
 }
 
-// The timer leaves the grid to the samples, and steps in half a period after the point that none of
-// them reached; for slow samples later, after two of their intervals.
+// The timer leaves the grid to the samples, and sends half a period after a point that none of them
+// reached; with slow samples after two of their intervals.
 TEST_F(SenderTest, TimerStepsInOnlyWhereSamplesDoNotCome) {
-  ASSERT_TRUE(sender.reach_grid(at_ms(1000)));  // the next point: 1.1 s
+  ASSERT_TRUE(sender.reach_grid(at_ms(1000)));  // the next point is at 1.1 s
   EXPECT_EQ(sender.grid_missed_at(Duration::zero()), at_ms(1150));
   EXPECT_EQ(sender.grid_missed_at(ms(10)), at_ms(1150));
   EXPECT_EQ(sender.grid_missed_at(ms(400)), at_ms(1900));
@@ -119,8 +119,7 @@ TEST_F(SenderTest, TimerStepsInOnlyWhereSamplesDoNotCome) {
   EXPECT_TRUE(sender.reach_grid(at_ms(1200)));
 }
 
-// Driven by the timer alone, to the nanosecond at its deadlines, it is a heartbeat that never
-// hangs.
+// Driven by the timer alone, exactly at its deadlines, the output is a heartbeat that never stops.
 TEST_F(SenderTest, TimerAloneIsAHeartbeat) {
   TimePoint t = at_ms(777);
   ASSERT_TRUE(sender.miss_grid(t, Duration::zero())) << "at once, before the first sample";
@@ -133,7 +132,7 @@ TEST_F(SenderTest, TimerAloneIsAHeartbeat) {
   }
 }
 
-// What is sent out of turn, for a change of state, does not shift the grid.
+// A VG_Bias that is sent because of a change of state does not shift the grid.
 TEST_F(SenderTest, BiasOutOfTurnLeavesTheGrid) {
   ASSERT_TRUE(sender.reach_grid(at_ms(1000)));
   bias(at_ms(1042), {}, {});
@@ -143,7 +142,7 @@ TEST_F(SenderTest, BiasOutOfTurnLeavesTheGrid) {
 
 // --- frames --------------------------------------------------------------------------------------
 
-// Every frame says by the DBC file what the sender was told, and bears the stamp of its cause.
+// Every frame decodes by the DBC file to the given values, and has the stamp of its cause.
 TEST_F(SenderTest, FramesSayWhatTheDbcFileSays) {
   rate(at_ms(1003), rate_of(-12.34565));
   bias(at_ms(1004), {{0.12345, -1.5}, BiasMode::kStop, kGyro2Suspect}, {-2.5e-5, 0.003, 1e-5});
@@ -169,8 +168,8 @@ TEST_F(SenderTest, FramesSayWhatTheDbcFileSays) {
   EXPECT_EQ(out.frames[2].stamp, at_ms(1004));
 }
 
-// Of every rate exactly one frame, of every bias two; valid ones and those that the frame cannot
-// carry are counted apart, and an invalid one is beyond nothing.
+// Exactly one frame for every rate, two for every bias. Valid rates and those that the frame cannot
+// carry are counted separately; an invalid rate does not count as out of range.
 TEST_F(SenderTest, BooksCountWhatWentOut) {
   for (int i = 0; i < 7; ++i)
     rate(at_ms(i), rate_of(1.0));
@@ -190,7 +189,7 @@ TEST_F(SenderTest, BooksCountWhatWentOut) {
   EXPECT_EQ(out.with_id(kModelId).size(), 2U);
 }
 
-// The status tells the last rate as the bus saw it: nothing that did not go out as valid.
+// The status holds the last rate as sent: none if it was not valid.
 TEST_F(SenderTest, StatusTellsTheLastRateThatTheBusSaw) {
   EXPECT_TRUE(std::isnan(status().rate_dps));
   rate(at_ms(1), rate_of(1.5));
@@ -206,7 +205,7 @@ TEST_F(SenderTest, StatusTellsTheLastRateThatTheBusSaw) {
   EXPECT_EQ(fields["VG_Quality"].label, "unusable");
 }
 
-/// As a bus that is down: takes every `n`-th frame.
+/// Like a bus that is down: accepts every `n`-th frame.
 class Refusing final : public FrameSink {
  public:
   explicit Refusing(std::uint64_t n) : n_(n) {}
@@ -220,8 +219,8 @@ class Refusing final : public FrameSink {
   std::uint64_t offered_ = 0;
 };
 
-// A frame that its sink does not take is lost, not kept: the next one is of its own time, and its
-// counter shows the receiver how many are missing. The books count what was handed over.
+// A frame that the sink refuses is lost, not kept: the next one has its own time, and its counter
+// shows the receiver how many are missing. The counts include every frame handed over.
 TEST_F(SenderTest, FrameThatTheSinkRefusesLeavesAGapInTheCounter) {
   Refusing bus(4);
   for (std::int64_t i = 0; i < 40; ++i) {
@@ -238,13 +237,13 @@ TEST_F(SenderTest, FrameThatTheSinkRefusesLeavesAGapInTheCounter) {
   EXPECT_EQ(status().rates_out, 40U);
 }
 
-/// The program would end here.
+/// In the product, this would end the program.
 class Broken final : public FrameSink {
  public:
   void put(const can::Frame&, TimePoint) override { throw std::bad_alloc(); }
 };
 
-// A sink that throws ends its turn: the next one is another's.
+// A sink that throws ends its turn: the next turn may use another sink.
 TEST_F(SenderTest, SinkThatThrowsEndsItsTurn) {
   Broken broken;
   EXPECT_THROW(
@@ -262,7 +261,8 @@ TEST_F(SenderTest, SinkThatThrowsEndsItsTurn) {
 
 constexpr std::uint32_t kLayoutId = 0x123;
 
-/// Rate: 16 bits from bit 0, 0.01 deg/s, 0x8000 is none; counter from bit 16 to 14.
+/// Rate: 16 bits from bit 0, 0.01 deg/s, 0x8000 is "not available"; a counter from bit 16 on, up to
+/// 14.
 OutputLayout layout_on(can::BusIndex bus) {
   const dbc::SignalCodec rate = rig::codec_of(rig::signal_of(0, 16, 0.01));
   const dbc::SignalCodec counter =
@@ -281,7 +281,7 @@ OutputLayout layout_on(can::BusIndex bus) {
   return layout;
 }
 
-/// Two buses: who sends what where.
+/// Two buses: records what is sent on which.
 class TwoBuses final : public FrameSink {
  public:
   void put(const can::Frame& frame, TimePoint) override { own.push_back(frame); }
@@ -294,7 +294,7 @@ class TwoBuses final : public FrameSink {
   can::BusIndex other_bus = 0;
 };
 
-// Beside VG_Rate, in the order of the configuration, each on its bus.
+// Layouts are sent beside VG_Rate, in the order of the configuration, each on its bus.
 TEST_F(SenderTest, LayoutsGoOutWithTheRateOnTheirBus) {
   OutputPlan plan;
   plan.layouts = {layout_on(0), layout_on(2)};
@@ -315,8 +315,8 @@ TEST_F(SenderTest, LayoutsGoOutWithTheRateOnTheirBus) {
   EXPECT_EQ(buses.own[2].id, kBiasId);
 }
 
-// Alone: no VG_ frame, but a rate that only VG_Rate could not carry is valid, and whoever waits for
-// something to be said hears of it.
+// Layouts alone, without VG_ frames: a rate that only VG_Rate could not carry is valid, and
+// spoken() counts it.
 TEST_F(SenderTest, LayoutsMayGoOutAlone) {
   OutputPlan plan;
   plan.vgyro_frames = false;
@@ -338,7 +338,7 @@ TEST_F(SenderTest, LayoutsMayGoOutAlone) {
   EXPECT_EQ(told.layouts_out[0], (LayoutCounts{.frames = 1, .valid = 1}));
 }
 
-// Another configuration: the same frame goes on counting and keeps its books, a new one begins.
+// After a reload, the same frame keeps its counter and counts; a new one begins.
 TEST_F(SenderTest, LayoutsGoOnWithAnotherPlan) {
   OutputPlan plan;
   plan.layouts = {layout_on(0)};
@@ -362,7 +362,7 @@ TEST_F(SenderTest, LayoutsGoOnWithAnotherPlan) {
   EXPECT_EQ(told.layouts_total().frames, 19U);
 }
 
-// One identifier on two buses is two frames, each with a counter and books of its own.
+// One identifier on two buses means two frames, each with its own counter and counts.
 TEST_F(SenderTest, OneIdentifierOnTwoBusesIsCountedApart) {
   OutputPlan plan;
   plan.layouts = {layout_on(0), layout_on(2)};
@@ -386,7 +386,7 @@ TEST_F(SenderTest, OneIdentifierOnTwoBusesIsCountedApart) {
   EXPECT_EQ(told.layouts_out[1], (LayoutCounts{.frames = 2, .valid = 2}));
 }
 
-// What is no number is no valid rate, even where no VG_Rate is asked what it can carry.
+// NaN is no valid rate, even without VG_Rate to check what it can carry.
 TEST_F(SenderTest, NoNumberIsNoValidRateWithoutVgRate) {
   OutputPlan plan;
   plan.vgyro_frames = false;
@@ -404,7 +404,8 @@ TEST_F(SenderTest, NoNumberIsNoValidRateWithoutVgRate) {
 
 // --- another plan --------------------------------------------------------------------------------
 
-// Counters go on under the same identifier, and begin anew under another one; books and grid go on.
+// Counters continue under the same identifier, and begin anew under another; counts and grid
+// continue.
 TEST_F(SenderTest, AnotherPlanGoesOnWithWhatItShares) {
   ASSERT_TRUE(sender.reach_grid(at_ms(1000)));
   for (int i = 0; i < 5; ++i) {
@@ -424,7 +425,7 @@ TEST_F(SenderTest, AnotherPlanGoesOnWithWhatItShares) {
   EXPECT_FALSE(sender.reach_grid(at_ms(1099)));
 }
 
-// Another sender takes up the counters of the frames, and nothing else.
+// Another sender continues the counters of the frames, and nothing else.
 TEST_F(SenderTest, CountsOnFromAnotherOne) {
   for (int i = 0; i < 9; ++i)
     rate(at_ms(i), rate_of(1.0));

@@ -92,8 +92,8 @@ TEST_F(SurroundingsTest, TakeTheNewestAcceleration) {
   EXPECT_EQ(surroundings_.missing(1, model::kNeedsAcceleration), 0U);
 }
 
-// Whoever tells an input: when all have spoken none is missing, and every kind that depends on any
-// adds something. A new input is tried here without being named.
+// Once all inputs were received none is missing, and every kind that depends on one has an effect.
+// A new input is included without being named here.
 TEST_F(SurroundingsTest, LackNothingOnceAllHaveSpoken) {
   const auto all = static_cast<std::uint8_t>((1U << model::kNeedCount) - 1U);
   surroundings_.begin(at_ms(0));
@@ -123,7 +123,8 @@ TEST_F(SurroundingsTest, HoldTheSupplyVoltage) {
   EXPECT_EQ(surroundings_.missing(1, model::kNeedsSupply), model::kNeedsSupply);
 }
 
-// They are of the frame that the rate is of: an axis that tells nothing is not what it was before.
+// The rates are from the same frame as the gyro's: an axis without a value does not keep the last
+// one.
 TEST_F(SurroundingsTest, TellTheRatesAboutOtherAxesOfTheNewestFrame) {
   surroundings_.set_other_rates(1, {1.0, 2.0, std::nan("")});
   EXPECT_DOUBLE_EQ(surroundings_.at(1, at_ms(0)).other_rate_dps[1], 2.0);
@@ -133,8 +134,8 @@ TEST_F(SurroundingsTest, TellTheRatesAboutOtherAxesOfTheNewestFrame) {
   EXPECT_EQ(surroundings_.missing(0, model::kNeedsOtherAxes), model::kNeedsOtherAxes);
 }
 
-// What stays behind of a temperature that rises by 12 K and falls by 2: with a play of 5 K it is
-// 5 K below at the top, 3 K below after that.
+// The follower of a temperature that rises by 12 K and falls by 2: with a play of 5 K it is 5 K
+// below at the top, then 3 K below.
 TEST_F(SurroundingsTest, RememberWhereTheTemperatureHasBeen) {
   EXPECT_EQ(surroundings_.at(0, at_ms(0)).temperature_past, nullptr);
   const auto warm = [&](double t_s) {
@@ -148,7 +149,7 @@ TEST_F(SurroundingsTest, RememberWhereTheTemperatureHasBeen) {
   EXPECT_NEAR(s.temperature_past->followed_c(5.0, s.temperature_c), 27.0, 0.15);
 }
 
-// One frame with a hole in it must not become part of every rate from then on.
+// One frame with an impossible value must not affect every rate from then on.
 TEST_F(SurroundingsTest, RefuseAccelerationsThatCannotBe) {
   ASSERT_TRUE(accelerate(0, 0.0F, 0.0F, 1.0F));
   EXPECT_FALSE(accelerate(10, kNan, 0.0F, 1.0F));
@@ -217,7 +218,7 @@ TEST_F(SurroundingsTest, CountTimeFromTheFirstFrame) {
   EXPECT_DOUBLE_EQ(surroundings_.at(0, at_ms(1500)).t_s, 1.0);
 }
 
-// A host without a clock wakes in 1970, and is set right a minute later.
+// A host without a clock starts in 1970, and its clock is set a minute later.
 TEST_F(SurroundingsTest, DoNotCountALeapOfTheClock) {
   surroundings_.begin(at_ms(0));
   surroundings_.reach(at_ms(60'000));
@@ -228,8 +229,8 @@ TEST_F(SurroundingsTest, DoNotCountALeapOfTheClock) {
   EXPECT_DOUBLE_EQ(surroundings_.at(0, set_right + ms(1000)).t_s, 61.0);
 }
 
-// Frames of a reference are not samples: garbage among their stamps moves nothing, and where the
-// clock really was set they wait for the gyros.
+// Reference frames are not samples: a garbage stamp among them has no effect, and if the clock
+// really was set they wait for the gyros.
 TEST_F(SurroundingsTest, PassOverRatesThatLeapAheadOfTheGyros) {
   const TimePoint leap = at_ms(0) + std::chrono::hours(24 * 365 * 160);
   surroundings_.begin(at_ms(0));
@@ -265,8 +266,8 @@ Plan with_model() {
   return plan;
 }
 
-// Whatever the accelerometer and the wheels say, rates stay finite, every frame is counted, nothing
-// is allocated.
+// Whatever accelerometer and wheels send, rates stay finite, every frame is counted, and nothing is
+// allocated.
 TEST(SurroundingsInThePipeline, SurviveHostileFramesWithoutAllocating) {
   Plan plan = with_model();
   for (Quantity& axis : plan.accelerometer->axes) {
@@ -328,8 +329,8 @@ struct WorstError final : RateObserver {
   double worst_raw_dps = 0.0;
 };
 
-// A bias that follows the supply is gone from the first sample after a step on, within the wire's
-// resolution.
+// A bias that depends on the supply voltage is corrected from the first sample after a step on,
+// within the wire's resolution.
 TEST(SurroundingsInThePipeline, ASupplyThatStepsMovesNoRate) {
   constexpr double kCoefficient_dps_v = 0.4;
   const auto supply_v = [](double t_s) { return t_s < 2.0 ? 5.0 : t_s < 4.0 ? 4.7 : 5.4; };
@@ -362,7 +363,7 @@ TEST(SurroundingsInThePipeline, ASupplyThatStepsMovesNoRate) {
   }
 }
 
-// The bias that the model knows is part of what VG_Bias says, wherever it was taken off.
+// VG_Bias includes the bias that the model file states, although it was subtracted earlier.
 TEST(SurroundingsInThePipeline, BiasIsToldAsAWhole) {
   Plan plan = rig::two_gyros();
   plan.corrector.method = Method::kMutual;

@@ -59,7 +59,7 @@ std::string gyro_text(const char* name, const char* message) {
          "\"\nrate_x = \"X\"\nrate_y = \"Y\"\nrate_z = \"Z\"\ncounter = \"Counter\"\n";
 }
 
-/// A configuration of its own folder, read as users' are.
+/// A configuration in a folder of its own, read like a user's.
 Plan plan_of(const std::string& output = "",
              const std::string& calibration = "rate_dps = [0.0, 0.0, 0.0]") {
   std::string folder = std::filesystem::temp_directory_path() / "vgyro-units-XXXXXX";
@@ -77,7 +77,7 @@ Plan plan_of(const std::string& output = "",
 
 using Rates = std::array<double, 3>;
 
-/// How the platform moves; unit 2 is tilted against unit 1.
+/// Motion of the platform; unit 2 is misaligned against unit 1.
 struct World {
   Rates (*rate)(double t_s);
   Rates angle_rad{};
@@ -106,7 +106,7 @@ class Bus final : public FrameSink {
   can::Frame last_of_layout{};
 };
 
-/// Takes every rate about one axis.
+/// Checks every rate about one axis.
 class Judge final : public OutputObserver {
  public:
   Judge(const World& world, std::size_t axis) : world_(world), axis_(axis) {}
@@ -204,11 +204,11 @@ Plan own_messages(const std::string& second_mount = "") {
   return std::move(loaded->plan);
 }
 
-/// What becomes of a frame of unit 0 or 1 about a sensor's axis; false: it is lost.
+/// Changes a frame of unit 0 or 1 about a sensor axis; false: the frame is lost.
 using Spoil =
     std::function<bool(std::size_t unit, std::size_t axis, double t_s, can::Frame& frame)>;
 
-/// How often a unit speaks, and how far apart the messages of its axes are.
+/// Interval of a unit's frames, and delay between the messages of its axes.
 struct Pace {
   Duration interval = kInterval;
   std::chrono::milliseconds apart{1};
@@ -232,7 +232,7 @@ void play_apart(const World& world, const Plan& plan, double from_s, double to_s
         const Rates w = world.rate(t_s);
         double reading = noise(engine);
         reading += (unit == 0 ? world.first_bias : world.second_bias)[axis.sensor_axis];
-        // The sensor feels the vehicle's rate turned back.
+        // The sensor senses the vehicle's rate turned back into its axes.
         for (std::size_t i = 0; i < 3; ++i)
           reading += plan.gyros[unit].mount.at(i, axis.sensor_axis) * w[i];
         can::Frame frame = empty_frame(axis.match);
@@ -268,14 +268,15 @@ TEST(UnitPipeline, AllocatesNothingOnTheFramePath) {
     play(world, plan, 0.0, 1.0, pipeline, bus);
     const std::size_t before = allocations_so_far();
     play(world, plan, 1.0, 90.0, pipeline, bus);
-    // The generator's own frames and distribution take none either.
+    // The generator's frames and distribution do not allocate either.
     EXPECT_EQ(allocations_so_far() - before, 0U);
     EXPECT_GT(bus.frames, 9'000U);
     EXPECT_GT(pipeline.status().misalignment_segments, 5U);
   }
 }
 
-// Nor with what follows the heading, mixes axes in messages of their own, and meets faults.
+// The same while the heading is followed, axes in messages of their own are mixed, and faults
+// occur.
 TEST(UnitPipeline, AllocatesNothingThroughFaultsOfAMixedUnit) {
   const World world{.rate = drives};
   Plan plan = own_messages("mount = [20, 0, 0]");
@@ -296,7 +297,7 @@ TEST(UnitPipeline, AllocatesNothingThroughFaultsOfAMixedUnit) {
             400U);
 }
 
-// The tilt is known again at the start of a second drive, and its heading error gone.
+// A second drive starts with the learned misalignment, and without the heading error it caused.
 TEST(UnitPipeline, KeepsTheTiltForASecondDrive) {
   const Plan plan = plan_of();
   const World world{.rate = drives,
@@ -328,7 +329,7 @@ TEST(UnitPipeline, KeepsTheTiltForASecondDrive) {
   EXPECT_GT(judge.count, 5'000.0);
   EXPECT_GT(judge.normalised(), 0.8);
   EXPECT_LT(judge.normalised(), 1.2);
-  // By the biases' own doubt alone: 120 s times 1e-3 deg/s or so.
+  // From the σ of the biases alone: 120 s times 1e-3 deg/s or so.
   EXPECT_LT(std::abs(judge.heading_deg), 4.0 * 120.0 * status.bias_sigma_dps + 0.02);
 }
 
@@ -349,8 +350,8 @@ TEST(UnitPipeline, TakesUpNoStateOfOthers) {
   EXPECT_TRUE(second.resume(state));
 }
 
-// A ferry that turns slowly and is tilted a little: its steady turn shows about z, and what of it
-// is about x must not be learned there as drift.
+// A ferry that turns slowly and is tilted a little: its steady turn shows about z, and its
+// component about x must not be learned there as drift.
 Rates ferry(double t_s) {
   if (t_s < 60.0) return {};
   return {0.002, 0.0, 2.0};
@@ -371,7 +372,7 @@ TEST(UnitPipeline, LearnsNoDriftOfASteadyTurnThatAnotherAxisTells) {
   EXPECT_GT(probability[static_cast<std::size_t>(fusion::Hypothesis::kTurning)], 0.9);
 }
 
-// Motion about one axis is motion of the platform: no axis calibrates meanwhile.
+// Motion about one axis is motion of the platform: no axis calibrates during it.
 Rates turns_early(double t_s) {
   if (t_s < 10.0 || t_s > 30.0) return {};
   return {0.0, 0.0, 10.0 * std::sin(std::numbers::pi * (t_s - 10.0) / 20.0)};
@@ -392,14 +393,14 @@ TEST(UnitPipeline, BeginsTheCalibrationOfAllAxesAgainWhereOneMoves) {
   }
 }
 
-// Soon after eighteen of twenty seconds it turns about z, slowly and a little tilted: x sees
-// less of it than a calibration calls motion.
+// After eighteen of twenty seconds it turns about z, slowly and a little tilted: the component
+// about x is less than a calibration calls motion.
 Rates sets_off(double t_s) {
   if (t_s < 18.3) return {};
   return {0.03, -0.03, 3.0};
 }
 
-// A stop that is over is over for all axes: they are calibrated with what they rested, and none
+// Rest that ends for one axis ends for all: they are calibrated with the rest so far, and none
 // learns the rest of the turn as its drift.
 TEST(UnitPipeline, EndsTheCalibrationOfAllAxesWhereOneMovesAtTheEnd) {
   const Plan plan = plan_of();
@@ -413,13 +414,13 @@ TEST(UnitPipeline, EndsTheCalibrationOfAllAxesWhereOneMovesAtTheEnd) {
     EXPECT_EQ(status.calibration_restarts, 0U) << place;
     for (std::size_t gyro = 0; gyro < 2; ++gyro) {
       const double bias = (gyro == 0 ? world.first_bias : world.second_bias)[place];
-      // Of 900 samples; with what is left of its time it would be off by 0.0025.
+      // From 900 samples; with the remaining time included the error would be 0.0025.
       EXPECT_NEAR(status.gyros[gyro].bias_dps, bias, 6.0 * 0.002 / std::sqrt(900.0)) << place;
     }
   }
 }
 
-// An axis that has too little of the stop, because its message came later, waits for the next one.
+// An axis with too little rest, because its message began later, waits for the next rest.
 TEST(UnitPipeline, BeginsAgainWhereAnAxisHasTooLittleOfTheStop) {
   const Plan plan = own_messages();
   const World world{.rate =
@@ -441,7 +442,7 @@ TEST(UnitPipeline, BeginsAgainWhereAnAxisHasTooLittleOfTheStop) {
   EXPECT_EQ(pipeline.axis_status(0).state, State::kRunning);
 }
 
-// Where motion is accepted, an axis that does not feel it is as uncertain.
+// If motion is accepted, an axis that does not sense it is as uncertain as the others.
 TEST(UnitPipeline, AcceptedMotionIsMotionOfAllAxes) {
   const Plan plan = plan_of("", "rate_dps = [0.0, 0.0, 0.0]\nwhen_moving = \"accept\"");
   const World world{.rate = turns_early};
@@ -472,8 +473,8 @@ TEST(UnitPipeline, GoesOnUnderAnotherOutput) {
   EXPECT_EQ(second.status().state, State::kRunning);
 }
 
-// A layout that carried one axis and carries all from then on is the same stream: its counter and
-// its books go on.
+// A layout that carried one axis and then carries all is the same stream: its counter and counts
+// continue.
 TEST(UnitPipeline, GoesOnCountingWhereALayoutGetsMoreAxes) {
   const World world{.rate = drives};
   const Plan plan = plan_of(std::string(kWhole) + "rate_z = \"Z\"\n");
@@ -490,7 +491,7 @@ TEST(UnitPipeline, GoesOnCountingWhereALayoutGetsMoreAxes) {
   const LayoutCounts counts = second.status().layouts_out[0];
   EXPECT_NEAR(static_cast<double>(counts.frames - before), 500.0, 1.0);
   EXPECT_EQ(bus.last_of_layout.data[6], (counts.frames - 1) % 256);
-  // All but those of the calibration, which takes 20 s.
+  // All but those during the calibration, which takes 20 s.
   EXPECT_NEAR(static_cast<double>(counts.frames - counts.valid), 1000.0, 12.0);
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const auto raw = static_cast<std::int16_t>(bus.last_of_layout.data[2 * axis] |
@@ -499,10 +500,9 @@ TEST(UnitPipeline, GoesOnCountingWhereALayoutGetsMoreAxes) {
   }
 }
 
-// --- what is wrong with a frame, and with an axis
-// -------------------------------------------------
+// --- faults of a frame, and of an axis -----------------------------------------------------------
 
-/// The state about each axis, and whether a rate is ever further off than σ allows.
+/// The state of each axis, and whether the error of a rate ever exceeds what σ allows.
 struct Outcome {
   std::array<State, 3> during{};
   std::array<State, 3> after{};
@@ -540,8 +540,8 @@ std::uint64_t refused(Pipeline& pipeline, std::size_t axis, std::size_t gyro, Re
   return pipeline.axis_status(axis).gyros[gyro].rejected[static_cast<std::size_t>(cause)];
 }
 
-// What is wrong with a frame is wrong with all that stands in it: with three axes in one message
-// the unit is set aside, …
+// A fault of a frame affects everything in it: with three axes in one message the unit is set
+// aside, …
 TEST(UnitFaults, AFaultOfTheFrameIsOfAllAxesInIt) {
   const Plan plan = plan_of();
   const World world{.rate = drives};
@@ -565,7 +565,7 @@ TEST(UnitFaults, AFaultOfTheFrameIsOfAllAxesInIt) {
   }
 }
 
-// … and of axes in messages of their own the one whose message it is.
+// … and with axes in messages of their own, only the axis of that message.
 TEST(UnitFaults, AFaultOfAnAxisOwnFrameLeavesTheOtherAxes) {
   struct Case {
     const char* name;
@@ -607,7 +607,7 @@ TEST(UnitFaults, AFaultOfAnAxisOwnFrameLeavesTheOtherAxes) {
   }
 }
 
-// A clip is the sensor axis's own, whatever message it stands in.
+// A clip belongs to the sensor axis, whatever message carries it.
 TEST(UnitFaults, AClippedAxisIsSetAsideAlone) {
   const Plan plan = own_messages();
   Pipeline pipeline(plan);
@@ -628,8 +628,8 @@ TEST(UnitFaults, AClippedAxisIsSetAsideAlone) {
   EXPECT_LT(outcome.normalised[2], 1.3);
 }
 
-// A mount mixes y and z. A reading of z that is no longer new must not stand for one, or the rate
-// about y would be wrong by a third of what the platform turns.
+// The mount mixes y and z. An outdated reading of z must not be used, or the rate about y would be
+// wrong by a third of the platform's rate.
 TEST(UnitFaults, AMountMixesNoReadingThatIsOld) {
   const Plan plan = own_messages("mount = [20, 0, 0]");
   struct Case {
@@ -647,7 +647,7 @@ TEST(UnitFaults, AMountMixesNoReadingThatIsOld) {
     SCOPED_TRACE(one.name);
     Pipeline pipeline(plan);
     const Outcome outcome = outcome_of(plan, pipeline, one.spoil);
-    // About x the unit still tells all; about y and z it does not.
+    // About x the unit still has all readings; about y and z it has not.
     EXPECT_EQ(outcome.during, (std::array{State::kRunning, State::kDegraded, State::kDegraded}));
     EXPECT_EQ(outcome.after, kAllRunning);
     for (std::size_t axis = 0; axis < 3; ++axis)
@@ -655,7 +655,7 @@ TEST(UnitFaults, AMountMixesNoReadingThatIsOld) {
   }
 }
 
-// An axis that was sick and is well again must not find the ones that went without it sick.
+// An axis that recovers must not treat the axes that went without it as faulty.
 TEST(UnitFaults, AMixedUnitComesBackWhole) {
   const Plan plan = own_messages("mount = [20, 0, 0]");
   Pipeline pipeline(plan);
@@ -675,7 +675,7 @@ TEST(UnitFaults, AMixedUnitComesBackWhole) {
   EXPECT_GT(refused(pipeline, 2, 1, Reject::kOtherAxis), 1'000U);
 }
 
-// At ten samples a second, of which each axis's come a third of the time after another's.
+// At ten samples a second, with a third of the interval between the messages of the axes.
 TEST(UnitFaults, SlowAxesInMessagesOfTheirOwnComeIntoUse) {
   const Plan plan = own_messages("mount = [20, 0, 0]");
   const World world{.rate = [](double) { return Rates{}; }};
@@ -690,7 +690,7 @@ TEST(UnitFaults, SlowAxesInMessagesOfTheirOwnComeIntoUse) {
   }
 }
 
-// One frame that is lost is a hole, and no sickness of anybody.
+// One lost frame is a hole, and no fault.
 TEST(UnitFaults, ALostFrameOfAMixedAxisSetsNobodyAside) {
   const Plan plan = own_messages("mount = [20, 0, 0]");
   Pipeline pipeline(plan);
@@ -720,15 +720,15 @@ double north_dps() {
   return kEarth_dps * std::cos(kLatitude_deg * kRadPerDeg);
 }
 
-/// What the Earth adds where x points so, clockwise from north.
+/// The Earth's rate in the vehicle's axes for a heading clockwise from north, and a rate about z.
 Rates on_earth(double heading_deg, double about_z_dps) {
   return {north_dps() * std::cos(heading_deg * kRadPerDeg),
           north_dps() * std::sin(heading_deg * kRadPerDeg),
           kEarth_dps * std::sin(kLatitude_deg * kRadPerDeg) + about_z_dps};
 }
 
-/// Northwards at rest, then about to the south within ten seconds, and at rest again; an hour later
-/// somebody has turned the platform to the east.
+/// Northwards at rest, then round to the south within ten seconds, and at rest again; an hour later
+/// the platform has been turned to the east.
 Rates goes_south(double t_s) {
   if (t_s < 30.0) return on_earth(0.0, 0.0);
   if (t_s < 40.0) return on_earth(18.0 * (t_s - 30.0), -18.0);
@@ -737,8 +737,7 @@ Rates goes_south(double t_s) {
 
 constexpr World kOnEarth{.rate = goes_south, .noise_dps = 0.002};
 
-/// Biases of both units about x that a stop has left, less those that they have; the second unit
-/// is judged by its own.
+/// The mean error of both units' biases about x after a stop.
 double off_after(const Pipeline& pipeline) {
   const Status& x = pipeline.axis_status(0);
   EXPECT_GT(x.stops, 0U);
@@ -751,12 +750,13 @@ TEST(UnitHeading, TurnsTheEarthAtAStop) {
   Pipeline pipeline(plan);
   Bus bus;
   play(kOnEarth, plan, 0.0, 160.0, pipeline, bus);
-  // Learned with the Earth as it was to the north it would be off by twice its rate.
+  // Learned with the Earth's rate of a northward heading, the biases would be off by twice that
+  // rate.
   EXPECT_LT(std::abs(off_after(pipeline)), 0.3 * north_dps());
   EXPECT_LT(pipeline.axis_status(0).sigma_dps, 0.5 * north_dps() + kOnEarth.noise_dps);
 }
 
-// A reload, or a service that is started again at once: the heading is what it was.
+// After a reload, or an immediate restart of the service, the heading is unchanged.
 TEST(UnitHeading, IsKeptThroughAShortRestart) {
   const Plan plan = plan_of("", kNorthwards);
   Pipeline first(plan);
@@ -773,8 +773,8 @@ TEST(UnitHeading, IsKeptThroughAShortRestart) {
   EXPECT_LT(std::abs(off_after(second)), 0.3 * north_dps());
 }
 
-// After an hour nobody knows where it points: what a stop teaches then may be wrong by the Earth's
-// rate, and σ says so; before that stop it is as good as it was.
+// After an hour the heading is unknown: a bias learned at a stop may then be wrong by the Earth's
+// rate, which σ includes; before that stop σ is as it was.
 TEST(UnitHeading, IsInSigmaAfterALongRestart) {
   const Plan plan = plan_of("", kNorthwards);
   Pipeline first(plan);
@@ -804,7 +804,7 @@ TEST(UnitHeading, IsInSigmaAfterALongRestart) {
     EXPECT_GT(sigma(), 0.99 * doubt_dps);
     EXPECT_LT(sigma(), 1.2 * std::sqrt(doubt_dps * doubt_dps + white_dps));
     EXPECT_LT(std::abs(off_after(second)), 3.0 * doubt_dps);
-    // What a third run takes up is as doubtful.
+    // A third run takes up the same uncertainty.
     const auto memory = second.memory();
     ASSERT_TRUE(memory);
     EXPECT_GT(memory->axes[0].earth_doubt_dps.value_or(0.0), 0.99 * doubt_dps);
@@ -812,7 +812,8 @@ TEST(UnitHeading, IsInSigmaAfterALongRestart) {
   }
 }
 
-// The law against throws of a dice: mean and spread of the Earth's rate over headings that may be.
+// The formula against a Monte Carlo simulation: mean and spread of the Earth's rate over possible
+// headings.
 TEST(UnitHeading, HasTheMeanAndSpreadOfItsDoubt) {
   constexpr std::uint64_t kSeed = 3;
   std::mt19937_64 engine(kSeed);
@@ -859,7 +860,7 @@ TEST(UnitHeading, IsLostWhileNobodyTellsTheTurns) {
   EXPECT_EQ(heading.earth_doubt_dps(0), 0.0) << "at rest it does not turn";
   for (int i = 0; i < 500; ++i, t += kInterval)
     heading.follow(t, turn, false);
-  // To the left by 90 deg is to the west.
+  // 90 deg to the left of north is west.
   EXPECT_NEAR(heading.earth_rate_dps(1), -north_dps(), 1e-3 * north_dps());
   EXPECT_LT(heading.earth_doubt_dps(0), 0.01 * north_dps());
   heading.follow(t + std::chrono::minutes(2), turn, false);

@@ -14,7 +14,7 @@ double converted(Dimension dimension, std::string_view unit, double value) {
   return value * conversion->scale + conversion->shift;
 }
 
-// One turn per minute, said in every family of spellings, is 6 deg/s.
+// One turn per minute is 6 deg/s in every family of spellings.
 TEST(Units, TurnEveryRateIntoDegreesPerSecond) {
   constexpr double kRad = std::numbers::pi / 180.0;
   EXPECT_DOUBLE_EQ(converted(Dimension::kRate, "deg/s", 6.0), 6.0);
@@ -26,7 +26,7 @@ TEST(Units, TurnEveryRateIntoDegreesPerSecond) {
   EXPECT_DOUBLE_EQ(converted(Dimension::kRate, "rpm", 1.0), 6.0);
 }
 
-// As public DBC files write it.
+// Spellings found in public DBC files.
 TEST(Units, ReadRatesAsPeopleWriteThem) {
   constexpr double kRad = std::numbers::pi / 180.0;
   for (const std::string_view unit :
@@ -52,7 +52,7 @@ TEST(Units, ReadRatesAsPeopleWriteThem) {
   }
 }
 
-// Water freezes at 0 degC however the sensor says it.
+// 5 V in every spelling is 5 V.
 TEST(Units, TurnEveryVoltageIntoVolts) {
   EXPECT_DOUBLE_EQ(converted(Dimension::kVoltage, "V", 5.0), 5.0);
   EXPECT_DOUBLE_EQ(converted(Dimension::kVoltage, "Volt", 5.0), 5.0);
@@ -60,6 +60,7 @@ TEST(Units, TurnEveryVoltageIntoVolts) {
   EXPECT_FALSE(convert_unit(Dimension::kVoltage, "degC"));
 }
 
+// Water freezes at 0 degC in every unit.
 TEST(Units, TurnEveryTemperatureIntoCelsius) {
   EXPECT_DOUBLE_EQ(converted(Dimension::kTemperature, "degC", 20.0), 20.0);
   EXPECT_NEAR(converted(Dimension::kTemperature, "K", 273.15), 0.0, 1e-12);
@@ -67,7 +68,7 @@ TEST(Units, TurnEveryTemperatureIntoCelsius) {
   EXPECT_NEAR(converted(Dimension::kTemperature, "degF", 212.0), 100.0, 1e-12);
 }
 
-// Standard gravity and the mile are definitions; the factors must carry them exactly.
+// Standard gravity and the mile are definitions, so the factors must be exact.
 TEST(Units, TurnAccelerationIntoGAndSpeedIntoMetresPerSecond) {
   EXPECT_DOUBLE_EQ(converted(Dimension::kAcceleration, "m/s^2", 9.80665), 1.0);
   EXPECT_DOUBLE_EQ(converted(Dimension::kAcceleration, "mg", 1000.0), 1.0);
@@ -75,14 +76,14 @@ TEST(Units, TurnAccelerationIntoGAndSpeedIntoMetresPerSecond) {
   EXPECT_DOUBLE_EQ(converted(Dimension::kSpeed, "mph", 1.0), 0.44704);
 }
 
-// DBC authors do not agree on letter case and blanks.
+// DBC authors differ in letter case and blanks.
 TEST(Units, IgnoreLetterCaseAndBlanks) {
   EXPECT_DOUBLE_EQ(converted(Dimension::kRate, " Deg / S ", 1.0), 1.0);
   EXPECT_DOUBLE_EQ(converted(Dimension::kRate, "RAD/S", std::numbers::pi), 180.0);
   EXPECT_DOUBLE_EQ(converted(Dimension::kSpeed, "Km/H", 3.6), 1.0);
 }
 
-// Of temperature, acceleration and speed too; "Â°" is UTF-8 that was taken for cp1252.
+// Spellings of temperature, acceleration and speed, too; "Â°" is UTF-8 that was taken for cp1252.
 TEST(Units, AreKnownAsPublicFilesWriteThem) {
   for (const std::string_view unit : {"ºC", "˚C", "℃", "Â°C", "deg C", "degrees C",
                                       "Degree Celsius", "Grad C", "Unit_DegreCelsi"})
@@ -95,7 +96,7 @@ TEST(Units, AreKnownAsPublicFilesWriteThem) {
     EXPECT_DOUBLE_EQ(converted(Dimension::kRate, unit, 6.0), 6.0) << unit;
 }
 
-// A unit of another dimension is not a rate with a strange scale: m/s must not pass as deg/s.
+// A unit of another dimension is not a rate with an odd scale: m/s must not be accepted as deg/s.
 TEST(Units, RefuseOtherDimensions) {
   for (const std::string_view unit : {"m/s", "deg", "V", "", "g", "degC", "deg/s^2", "rad"}) {
     EXPECT_FALSE(convert_unit(Dimension::kRate, unit)) << unit;
@@ -105,7 +106,7 @@ TEST(Units, RefuseOtherDimensions) {
   EXPECT_FALSE(convert_unit(Dimension::kSpeed, "m/s^2"));
 }
 
-// What a message recommends must itself be accepted.
+// The units that an error recommends must be accepted.
 TEST(Units, RecommendOnlyWhatIsAccepted) {
   for (const Dimension dimension :
        {Dimension::kRate, Dimension::kTemperature, Dimension::kAcceleration, Dimension::kSpeed,

@@ -39,7 +39,7 @@ double added(Kind kind, Parameters parameters, double rate_dps) {
                    a_day_in_the_car());
 }
 
-// Worked out by hand from the table in docs/model-file.md.
+// Computed by hand from the table in docs/model-file.md.
 TEST(Catalogue, AddsWhatTheTableSays) {
   EXPECT_DOUBLE_EQ(added(Kind::kBias, {0.3}, -5.0), 0.3);
   EXPECT_DOUBLE_EQ(added(Kind::kBiasRamp, {1e-3}, -5.0), 0.02);
@@ -50,7 +50,8 @@ TEST(Catalogue, AddsWhatTheTableSays) {
   EXPECT_DOUBLE_EQ(added(Kind::kTemperatureBias, {1e-3, 25.0}, -5.0), 6e-3);
   EXPECT_DOUBLE_EQ(added(Kind::kTemperatureBiasQuadratic, {1e-3, 41.0}, -5.0), 0.1);
   EXPECT_DOUBLE_EQ(added(Kind::kTemperatureRateBias, {0.5}, -5.0), 0.01);
-  // With a play of 3 K it was dragged to 32 and stands there, with 1 K it was dragged back.
+  // With a play of 3 K the follower was dragged to 32 and stays there, with 1 K it was dragged
+  // back.
   EXPECT_DOUBLE_EQ(added(Kind::kTemperatureHysteresis, {1e-3, 3.0}, -5.0), 1e-3);
   EXPECT_DOUBLE_EQ(added(Kind::kTemperatureHysteresis, {1e-3, 1.0}, -5.0), 1e-3);
   EXPECT_DOUBLE_EQ(added(Kind::kTemperatureHysteresis, {1e-3, 14.0}, -5.0), -10e-3);
@@ -113,7 +114,7 @@ TEST(Catalogue, LagOfALowPassIsItsGroupDelay) {
       0.7 / (10.0 * std::numbers::pi));
 }
 
-// Every parameter at either end of what it may be, in any surroundings: nothing overflows.
+// Every parameter at either limit, in any surroundings: nothing overflows.
 TEST(Catalogue, StaysFiniteAtTheLimitsOfItsParameters) {
   for (const KindInfo& row : catalogue()) {
     for (unsigned corner = 0; corner < 1U << row.parameters.size(); ++corner) {

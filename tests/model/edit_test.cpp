@@ -170,7 +170,7 @@ TEST(ModelEdit, RefusesWhatItCannotDoRight) {
   EXPECT_NE(refusal(append_effect("", wrong, "")).find("axis"), std::string::npos);
 }
 
-// The names are the configuration's, which an edit does not know.
+// The names belong to the configuration, which an edit does not read.
 TEST(ModelEdit, KeepsTheNamesOfGyros) {
   const std::string users =
       "format = 1\n\n[[effect]]\ngyro = \"mems\"  # the cheap one\nkind = \"bias\"\nvalue_dps = "

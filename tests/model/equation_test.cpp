@@ -13,7 +13,7 @@ Effect effect(Kind kind, Parameters parameters) {
   return {.gyro = 0, .kind = kind, .parameters = parameters};
 }
 
-// In no order of theirs, of two of a kind where these add up.
+// In arbitrary order, with two of each kind whose effects add up.
 const std::vector<Effect>& mixed() {
   static const std::vector<Effect> effects{effect(Kind::kQuantization, {0.3}),
                                            effect(Kind::kScaleFactor, {0.02}),
@@ -43,7 +43,7 @@ TEST(Equation, OfNothingReadsTheRateAtItsTime) {
   EXPECT_EQ(equation.felt_at_s(3.5), 3.5);
 }
 
-// With numbers worked out by hand.
+// Against numbers computed by hand.
 TEST(Equation, EveryResponseIsToTheLateRateAndNotToTheOthers) {
   const Equation equation(mixed());
   const Surroundings s{.temperature_c = 24.0};
@@ -64,7 +64,6 @@ TEST(Equation, ClipsActInTheirOrderWhateverTheFilesOrder) {
   EXPECT_EQ(equation.clipped_dps(0.98), 0.0) << "0.9 after rounding, but 0 before it";
 }
 
-// A ramp lags a first-order low-pass by 1 / (2 pi cutoff), once it is old.
 // The two poles are those of w² / (s² + 2·damping·w·s + w²), whatever the damping.
 TEST(Equation, PolesOfASecondOrderHaveItsSumAndProduct) {
   for (const double damping : {0.02, 0.5, 0.999, 1.0, 1.4, 9.0}) {
@@ -78,6 +77,7 @@ TEST(Equation, PolesOfASecondOrderHaveItsSumAndProduct) {
   }
 }
 
+// A first-order low-pass delays a ramp by 1 / (2 pi cutoff) once it has settled.
 TEST(Equation, IsLateByDelaysThenLowPassesOfTheTrueTime) {
   const Equation equation(mixed());
   EXPECT_TRUE(equation.is_late());

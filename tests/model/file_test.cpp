@@ -21,7 +21,7 @@ std::string effect(const std::string& lines) {
   return "format = 1\n\n[[effect]]\n" + lines;
 }
 
-// The first effect stands on line 3, its keys from line 4 on.
+// The first effect is on line 3, its keys from line 4 on.
 struct Bad {
   std::string text;
   std::string begins;
@@ -63,7 +63,7 @@ coefficient_dps_k = 1
   EXPECT_DOUBLE_EQ(temperature.parameters[1], 25.0) << "reference_c is 25 unless it is given";
 }
 
-// Of whole units: `axis` is the unit's; what g_sensitivity depends on is then called `from`.
+// For whole units: `axis` is the unit's; the axis of g_sensitivity's input is then called `from`.
 TEST(ModelFile, SaysOfWhichAxisOfAUnitAnEffectIs) {
   const std::string text = R"(format = 1
 
@@ -313,7 +313,7 @@ TEST(ModelFile, ReportsAllMistakesAtOnce) {
             3U);
 }
 
-// The corrector keeps so many; one more must not be lost in silence.
+// The corrector's limit; another drift must not be dropped silently.
 TEST(ModelFile, RefusesAFourthGaussMarkovDriftOfOneGyro) {
   const std::string drift =
       "[[effect]]\ngyro = 2\nkind = \"gauss_markov\"\nsigma_dps = 1e-3\n"
@@ -340,7 +340,7 @@ TEST(ModelFile, NamesAFileThatIsNotThere) {
   EXPECT_EQ(result.error().front().where, "/nowhere/m.toml");
 }
 
-// The corrector has three correlated drifts for a gyro, of which flicker takes what is left.
+// The corrector has three correlated drifts for each gyro; flicker uses the remaining ones.
 TEST(ModelFile, KeepsRoomForFlicker) {
   const auto with_drifts = [](int drifts) {
     std::string text =

@@ -11,7 +11,7 @@ namespace {
 constexpr double kB_dps = 0.003;
 constexpr double kPi = std::numbers::pi;
 
-/// Two-sided spectrum and Allan variance of one exponentially correlated term, by the textbook.
+/// Textbook formulas: two-sided spectrum and Allan variance of one exponentially correlated term.
 double spectrum(const FlickerTerm& term, double frequency_hz) {
   const double x = 2.0 * kPi * frequency_hz * term.tau_s;
   return 2.0 * term.sigma_dps * term.sigma_dps * term.tau_s / (1.0 + x * x);
@@ -24,7 +24,7 @@ double allan_variance(const FlickerTerm& term, double tau_s) {
 }
 
 void expect_flicker(std::size_t count, double from_s, double to_s, double close) {
-  // A decade inside the ends, where no term is missing on one side.
+  // At least a decade inside the ends, so that no term is missing on one side.
   for (double tau_s = 10.0 * from_s; tau_s < 0.1 * to_s; tau_s *= 1.1) {
     const double frequency_hz = 1.0 / (2.0 * kPi * tau_s);
     double density = 0.0;
@@ -41,7 +41,7 @@ void expect_flicker(std::size_t count, double from_s, double to_s, double close)
   }
 }
 
-// An end that is a decade away still takes 6 % of the spectrum.
+// An end that is a decade away still reduces the spectrum by 6 %.
 TEST(Flicker, TermsAFactorOfFourApartAreFlickerNoise) {
   expect_flicker(15, 1e-3, 1e6, 0.08);
 }

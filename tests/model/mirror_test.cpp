@@ -12,7 +12,7 @@
 namespace vgyro::model {
 namespace {
 
-// Within the limits of every kind; an axis is 0, 1 or 2.
+// Within the limits of every kind; axes are 0, 1 or 2.
 Parameters some_parameters(const KindInfo& kind, std::mt19937& random) {
   Parameters parameters{};
   for (std::size_t i = 0; i < kind.parameters.size(); ++i) {
@@ -40,7 +40,7 @@ Surroundings some_surroundings(std::mt19937& random) {
   return around;
 }
 
-// The law: a gyro that is turned over reads the negative of the negative rate.
+// The law: a gyro that is turned over reads the negative of its reading at the negative rate.
 TEST(Mirror, IsWhatAGyroReadsThatIsTurnedOver) {
   std::mt19937 random(1);
   for (const KindInfo& kind : catalogue()) {

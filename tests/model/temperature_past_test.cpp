@@ -13,7 +13,7 @@ namespace {
 
 constexpr std::uint64_t kSeed = 12;
 
-/// The play itself, step by step, for one play.
+/// Simulates the play itself, step by step, for one play.
 class Follower {
  public:
   explicit Follower(double play_k) : play_k_(play_k) {}
@@ -35,7 +35,7 @@ void expect_follows(const std::vector<double>& temperatures_c, double close_k) {
   TemperaturePast past;
   std::vector<Follower> followers(kPlays_k.begin(), kPlays_k.end());
   for (std::size_t i = 0; i < temperatures_c.size(); ++i) {
-    // Asked before the temperature is a part of the past, and after.
+    // Compared before the temperature is added to the past, and after.
     if (i > 0) {
       for (const double play_k : kPlays_k) {
         const double ahead_c = past.followed_c(play_k, temperatures_c[i]);
@@ -62,7 +62,7 @@ TEST(TemperaturePast, BeginsAtTheFirstTemperature) {
     EXPECT_EQ(past.followed_c(play_k, 21.0), 21.0);
 }
 
-// Up by 3, back by 1, worked out by hand for a play of 1 to both sides.
+// Up by 3, back by 1, computed by hand for a play of 1 on both sides.
 TEST(TemperaturePast, StaysBehindWhereTheTemperatureTurnsRound) {
   TemperaturePast past;
   past.add(20.0);
@@ -87,18 +87,18 @@ TEST(TemperaturePast, FollowsWithEveryPlayAtOnce) {
     jumps_c.push_back(20.0 + level(random));
   }
   expect_follows(waves_c, 1e-9);
-  // Jumps at random: now and then more than are kept lie within each other.
+  // Random jumps: now and then they nest deeper than the number of bends kept.
   expect_follows(jumps_c, 0.02);
 }
 
-// Each swing smaller than the last: more than are kept. What is lost is of the size of the
-// smallest.
+// Each swing is smaller than the last, and there are more than are kept. The error has the size of
+// the smallest ones.
 TEST(TemperaturePast, LosesOnlyTheSmallestSwings) {
   std::vector<double> ringing_c;
   for (int i = 0; i < 60; ++i)
     ringing_c.push_back(25.0 + 8.0 * std::pow(0.8, i) * (i % 2 == 0 ? 1.0 : -1.0));
   expect_follows(ringing_c, 8.0 * std::pow(0.8, TemperaturePast::kBendsMax - 3));
-  // A large swing wipes them all out.
+  // A large swing erases them all.
   ringing_c.push_back(0.0);
   TemperaturePast past;
   for (const double temperature_c : ringing_c)
@@ -107,7 +107,7 @@ TEST(TemperaturePast, LosesOnlyTheSmallestSwings) {
   EXPECT_NEAR(past.followed_c(1.0, 5.0), 4.0, 1e-12);
 }
 
-// Noise that turns round at every sample for as long as it likes: the swings of its size alone.
+// Noise that reverses at every sample, for any length of time, erases only swings of its own size.
 TEST(TemperaturePast, IsNotWornOutByNoise) {
   std::mt19937_64 random(kSeed);
   std::normal_distribution<double> noise(0.0, 0.01);

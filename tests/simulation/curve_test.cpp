@@ -25,7 +25,7 @@ Points sampled(const std::function<double(double)>& f, double interval_s, std::s
   return points;
 }
 
-// Largest error between `from` and `to`, on a grid that misses the points.
+// Largest error between `from` and `to`, on a grid that avoids the points.
 double worst(const std::function<double(double)>& error, double from_s, double to_s) {
   double most = 0.0;
   for (double t_s = from_s; t_s < to_s; t_s += (to_s - from_s) / 9973.0)
@@ -43,7 +43,7 @@ SineErrors sine_errors(double samples_a_period) {
   const double w = 2.0 * kPi / (samples_a_period * 0.01);
   const Points p = sampled([&](double t) { return std::sin(w * t + 0.3); }, 0.01, 400);
   const Curve curve(p.times_s, p.values);
-  // Away from the ends, where fewer points are there.
+  // Away from the ends, where fewer points are available.
   const double from = 0.1;
   const double to = 3.9;
   const double start = curve.integral(from) + std::cos(w * from + 0.3) / w;
@@ -64,7 +64,7 @@ TEST(Curve, FollowsASineOfSixSamplesAPeriodToATenThousandth) {
   EXPECT_LT(sine_errors(6.1).value, 1e-4);
 }
 
-// On the way from one value to the next it passes none beyond them, and what stands still stays.
+// Between two values the curve never leaves their range, and constant parts stay constant.
 TEST(Curve, DoesNotRingAtStepsAndKinks) {
   const std::function<double(double)> motions[] = {
       [](double t) { return t < 1.0 ? 0.0 : 1.0; },
@@ -121,7 +121,7 @@ TEST(Curve, GoesThroughItsPointsAndStandsStillBeyondThem) {
   EXPECT_EQ(Curve().value(1.0), 0.0);
 }
 
-// Not by its own formulas: trapezes of its values.
+// Checked by trapezoids over the values, independently of the curve's formulas.
 TEST(Curve, IntegralAndSlopeBelongToTheValue) {
   const Points p =
       sampled([](double t) { return std::sin(9.0 * t) + (t > 1.3 ? 2.0 : 0.0); }, 0.05, 60);

@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 """Every kind of effect in the recordings of `vgyro simulate`, against its equation in closed form: readings
-without noise agree to the frame's last digit, noise has the variance it should, frames and stamps go wrong
-as often and as far as they should. The profile has 50 rows a second, the gyros take 100 samples between them.
+without noise agree to the frame's last digit, noise has the right variance, frames and stamps are wrong as
+often and by as much as stated. The profile has 50 rows a second, the gyros take 100 samples a second from it.
 Statistical tolerances are in standard errors; seeds are printed."""
 
 import math
@@ -20,7 +20,7 @@ from streams import Stream, Twister64  # noqa: E402
 SEED = 3
 SIGMAS = 4.0
 LENGTH_S = 20.0
-# Rounding to the step, and what the curve through the profile's points is off by.
+# Rounding to the step, and the error of the curve through the profile's points.
 CLOSE_DPS = 0.75 * rig.RATE_STEP_DPS
 RATE_HZ = 100.0
 
@@ -49,7 +49,7 @@ class Equations(unittest.TestCase):
         return rig.Frames(log, 0x101)
 
     def inside(self, t):
-        """Not so near the profile's ends that points are missing there, or that a low-pass remembers it."""
+        """Far enough from the profile's ends that no points are missing, and that low-passes have settled."""
         return (t > 0.9) & (t < LENGTH_S - 0.2)
 
     def check(self, wanted, *effects, close=CLOSE_DPS):
@@ -94,14 +94,14 @@ class Equations(unittest.TestCase):
         for axis in range(3):
             self.check(plus(lambda t: 0.04 * rig.acceleration(t)[axis]),
                        effect("g_sensitivity", axis="xyz"[axis], coefficient_dps_g=0.04))
-        # The angle keeps what the first rows' curve is off by.
+        # The angle includes the error of the curve in the first rows.
         self.check(plus(lambda t: 0.2 * np.cos(2 * rig.angle_rad(t) + 0.4)),
                    effect("angle_harmonic", harmonic=2, amplitude_dps=0.2, phase_rad=0.4), close=2e-6)
         self.check(plus(lambda t: 0.2 * np.sin(2 * np.pi * 33.3 * t + 1.0)),
                    effect("line", frequency_hz=33.3, amplitude_dps=0.2, phase_rad=1.0))
 
     def test_other_axes(self):
-        """Of the second gyro, whose frame tells them; they come as late as its own rate, in the reading and in the frame."""
+        """The second gyro's frame holds them; they have the same lag as its own rate, in the reading and in the frame."""
         for axis, coefficient, other in (("x", 0.03, rig.roll), ("y", -0.2, rig.pitch)):
             known = effect("cross_axis", 2, **{"from": axis}, coefficient=coefficient)
             self.check_second(lambda t: rig.rate(t) + coefficient * other(t), rig.roll, known)
@@ -114,7 +114,7 @@ class Equations(unittest.TestCase):
         with tempfile.TemporaryDirectory() as folder:
             frames = rig.Frames(rig.simulate(folder, effects, rig.profile(LENGTH_S)), 0x102)
         inside = self.inside(frames.t)
-        # A stamp ends at the microsecond, the reading is of the instant itself.
+        # The stamp has whole microseconds, the reading belongs to the exact instant.
         t = (np.arange(len(frames.t)) + 0.23) / RATE_HZ
         np.testing.assert_allclose(frames.t, t, atol=1e-6)
         np.testing.assert_allclose(frames.rate()[inside], wanted(t)[inside], rtol=0, atol=1.5 * CLOSE_DPS)
@@ -163,7 +163,7 @@ class Equations(unittest.TestCase):
 
 
 class Chance(unittest.TestCase):
-    """What is random, at rest unless said."""
+    """Random effects, at rest unless stated."""
 
     def frames(self, seconds, *effects, arguments=(), text=None):
         with tempfile.TemporaryDirectory() as folder:
@@ -181,7 +181,7 @@ class Chance(unittest.TestCase):
         step = rig.RATE_STEP_DPS**2 / 12
         self.expect_variance(a.rate(), 2e-4**2 * 50 + step)
         self.expect_variance(b.rate(), 3e-4**2 * 200 + step)
-        # The sum of white noise over seconds has nothing that their mean square does not say.
+        # For white noise, the sum over seconds follows from the mean square alone.
         sums = b.rate()[:80000].reshape(-1, 200).mean(axis=1)
         self.expect_variance(sums, 3e-4**2 + step / 200)
 
@@ -201,15 +201,15 @@ class Chance(unittest.TestCase):
             self.assertAlmostEqual(np.mean(y[lag:] * y[:-lag]) / 5e-3**2, wanted, delta=SIGMAS * math.sqrt(2 / independent))
 
     def test_bias_instability(self):
-        """Flicker: the Allan deviation lies at 0.664 B, whatever it is averaged over."""
+        """Flicker: the Allan deviation is 0.664 B for any averaging time."""
         a, _ = self.frames(4000, effect("bias_instability", coefficient_dps=5e-3))
         sums = np.concatenate([[0.0], np.cumsum(a.rate())])
         for samples in (20, 100, 500, 2000):
             means = np.diff(sums[::samples]) / samples
             steps = np.diff(means)
-            # Neighbouring steps of flicker hang together a little: half of them count.
+            # Neighbouring steps of flicker are slightly correlated: half of them count.
             self.expect_variance(steps / math.sqrt(2), (0.664 * 5e-3) ** 2, degrees=len(steps) / 2)
-        # Where the spectrum ends, at the sampling rate, nothing folds back and little is missing.
+        # At the end of the spectrum, the sampling rate, nothing is aliased and little is missing.
         self.assertAlmostEqual(np.mean(np.diff(a.rate()) ** 2) / 2 / (0.664 * 5e-3) ** 2, 1.0, delta=0.15)
 
     def test_rate_noise(self):
@@ -261,8 +261,8 @@ class Chance(unittest.TestCase):
 
 
 class Streams(unittest.TestCase):
-    """A seed gives the same recording in every version: each stream of random numbers is known by names, not by
-    where a kind stands in a list. The names are those of the model file."""
+    """A seed gives the same recording in every version: each stream of random numbers is identified by names, not by
+    the place of a kind in a list. The names are those of the model file."""
 
     SECONDS, JITTER_S, SEED = 8, 2e-4, 2**40 + 11
 
@@ -283,7 +283,7 @@ class Streams(unittest.TestCase):
         return np.array([stream.normal() for _ in range(count)])
 
     def test_the_generator_here_is_the_standards(self):
-        """[rand.predef] has the 10000th number of one that was begun with 5489 and no seed_seq."""
+        """[rand.predef] states the 10000th number of a generator that is seeded with 5489 and without seed_seq."""
         twister = Twister64([0])
         state = [5489]
         for i in range(1, 312):

@@ -13,7 +13,7 @@ using model::Kind;
 
 constexpr double kRate_hz = 100.0;
 constexpr std::uint64_t kSeed = 5;
-/// Standard errors that a measured figure may be off.
+/// Tolerance of a measured figure in standard errors.
 constexpr double kSigmas = 4.0;
 
 struct Instant {
@@ -84,7 +84,7 @@ TEST(GyroChain, ARandomWalkSpreadsWithTheRootOfTime) {
     expect_variance(differences(values, lag), 1e-6 * static_cast<double>(lag) / kRate_hz);
 }
 
-// The walk's law does not care how often it is looked at.
+// The law of the walk is independent of the sampling instants.
 TEST(GyroChain, ARandomWalkIsExactOverGaps) {
   std::vector<Instant> instants;
   for (int i = 0; i < 40'000; ++i)

@@ -10,7 +10,7 @@
 namespace vgyro::simulation {
 namespace {
 
-// That each is the stream that docs/simulate.md promises is tried in effects_test.py.
+// effects_test.py checks that each is the stream that docs/simulate.md specifies.
 TEST(NoiseSource, EveryNameHasAStreamOfItsOwn) {
   std::vector<std::string> purposes = model::kind_names();
   purposes.emplace_back("jitter");

@@ -1,5 +1,5 @@
 """A bench for `vgyro simulate`: a motion in closed form, its profile as CSV, a configuration whose frames
-are easily read with NumPy, and what a recording says. Shares no code with the product."""
+are easily read with NumPy, and a reader of recordings. Shares no code with the product."""
 
 import os
 import subprocess
@@ -86,7 +86,7 @@ bus = "can0"
 fd = true
 """
 
-# Amplitude in deg/s and frequency in Hz of the sines that make up the motion: all begin at their zero.
+# Amplitude in deg/s and frequency in Hz of the sines that make up the motion; all begin at zero.
 SINES = ((20.0, 0.7), (3.0, 3.1))
 ROLL_SINES = ((15.0, 0.9), (4.0, 2.3))
 
@@ -96,7 +96,7 @@ def rate(t):
 
 
 def angle_rad(t):
-    """From the beginning."""
+    """The angle turned since the beginning."""
     return np.radians(sum(a * (1 - np.cos(2 * np.pi * f * t)) / (2 * np.pi * f) for a, f in SINES))
 
 
@@ -145,7 +145,7 @@ def temperature_slope(t):
 
 
 def follow(values, play):
-    """What is dragged along by `values` once they are further from it than the play."""
+    """A follower that `values` drag along once they are further from it than the play."""
     out, at = [], None
     for value in values.tolist():
         at = value if at is None else min(max(at, value - play), value + play)

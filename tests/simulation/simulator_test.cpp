@@ -33,7 +33,7 @@ Profile sampled(const std::function<double(double)>& rate_dps, std::size_t count
   return profile;
 }
 
-// The steady answer to a sine, in complex arithmetic.
+// The steady-state response to a sine, in complex arithmetic.
 TEST(Simulator, LowPassAndDelayTurnASineAsTheyShould) {
   constexpr double kW = 2.0 * std::numbers::pi * 3.0;
   const Profile sine = sampled([](double t_s) { return std::sin(kW * t_s); }, 600);
@@ -61,7 +61,7 @@ TEST(Simulator, LowPassAndDelayTurnASineAsTheyShould) {
   }
 }
 
-// Ringing, as flat as can be, at the limit, and two real poles; alone and behind another one.
+// Ringing, maximally flat, critically damped, and two real poles; alone and after another low-pass.
 TEST(Simulator, SecondOrderTurnsASineAsItShould) {
   constexpr double kW = 2.0 * std::numbers::pi * 3.0;
   const Profile sine = sampled([](double t_s) { return std::sin(kW * t_s); }, 1200);
@@ -95,7 +95,7 @@ TEST(Simulator, RefusesMoreLowPassesThanCanBeToldApart) {
   model::Model model{.file = "m.toml",
                      .effects = std::vector<Effect>(LowPass::kStagesMax, low_pass)};
   EXPECT_TRUE(Simulator::make(model, rest, {}));
-  // One of the other gyro is none too many.
+  // One more for the other gyro is within the limit.
   model.effects.push_back(low_pass);
   model.effects.back().gyro = 1;
   EXPECT_TRUE(Simulator::make(model, rest, {}));
@@ -106,8 +106,8 @@ TEST(Simulator, RefusesMoreLowPassesThanCanBeToldApart) {
   EXPECT_NE(result.error().message().find("at most 3"), std::string::npos);
 }
 
-// A kind whose input is no column, or a column that does not reach the effects, would add nothing.
-// A new kind is tried here without being named.
+// A kind whose input has no column, or whose column does not reach the effects, would add nothing.
+// A new kind is included without being named here.
 TEST(Simulator, EveryKindThatNeedsAnInputIsMovedByIt) {
   std::string text =
       "t_s,rate_dps,temperature_c,acc_x_g,acc_y_g,acc_z_g,supply_v,rate_x_dps,"

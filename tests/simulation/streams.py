@@ -1,4 +1,4 @@
-"""The random numbers that docs/simulate.md promises, from its words alone: FNV-1a, the C++ standard's seed_seq and
+"""The random numbers that docs/simulate.md specifies, from its text alone: FNV-1a, the C++ standard's seed_seq and
 mt19937_64, and Marsaglia's polar method. Shares no code with the product."""
 
 import math
@@ -62,7 +62,7 @@ class Twister64:
 
 
 class Stream:
-    """Of the n-th (from 0) of what is called `purpose` at `sender`."""
+    """The stream of the n-th (from 0) `purpose` of `sender`."""
 
     def __init__(self, seed, sender, purpose, ordinal=0):
         self.twister = Twister64([seed & WORD, seed >> 32, fnv1a(sender), fnv1a(purpose), ordinal])
