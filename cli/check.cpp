@@ -50,7 +50,7 @@ void print_rate(const gateway::GyroPlan& gyro) {
   if (gyro.sign) detail("sign", "from a signal of its own: 1 is negative");
 }
 
-// What a gyro's message tells besides its rate.
+// The quantities in a gyro's message besides its rate.
 void print_message(const gateway::GyroPlan& gyro) {
   if (gyro.temperature) {
     detail("temperature", fmt::format("{} in {}, {}", gyro.temperature->name,
@@ -72,7 +72,7 @@ void print_message(const gateway::GyroPlan& gyro) {
   if (gyro.max_bias_dps) detail("bias", fmt::format("at most {:g} deg/s", *gyro.max_bias_dps));
 }
 
-// How a unit's axes lie in the vehicle, and how far from a rotation that was given.
+// How a unit's axes lie in the vehicle, and how far the given matrix is from a rotation.
 void print_mount(const gateway::Mount& mount) {
   if (!mount.turns() && mount.corrected == 0.0) return;
   for (std::size_t axis = 0; axis < gateway::kAxes; ++axis) {
@@ -149,7 +149,7 @@ void print_model(const gateway::Plan& plan) {
   }
 }
 
-// "0xFFFF, not available", or what it says although it has no code.
+// "0xFFFF, not available", or the raw value sent instead if the field has no such code.
 std::string said_of_none(const gateway::OutputField& field) {
   return field.has_code ? field.code : fmt::format("0x{:X}", field.none_raw);
 }

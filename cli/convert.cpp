@@ -1,4 +1,4 @@
-// `vgyro convert`: logs of any known form → one log of the form that the output's name says.
+// `vgyro convert`: logs of any known form → one log of the form that the output's name selects.
 
 #include <algorithm>
 
@@ -77,7 +77,7 @@ void tell_logs(const ConvertOptions& options, const canlog::LogReader& reader) {
     tell("{}", log_text(options.logs[i], *parts[i], true));
 }
 
-// What was read of each log, and which name has become which channel.
+// Reports what was read from each log, and the channel of each interface name.
 void tell_result(const ConvertOptions& options, const Target& target,
                  const canlog::LogReader& reader, const canlog::LogWriter& writer) {
   tell_logs(options, reader);

@@ -43,12 +43,13 @@ class Gatherer {
     analysis::PairRecording recording;
     for (std::size_t i = 0; i < 2; ++i) {
       recording.own[i] = own_[i].finish()[0];
-      // Coarser than what the DBC file allows, often; where nothing ever changed, at least that.
+      // The observed step is often coarser than that of the DBC file, which is used if the values
+      // never changed.
       const double seen_dps = steps_[i].step_dps();
       recording.step_dps[i] = seen_dps > 0.0 ? seen_dps : plan_.gyros[i].rate.step;
     }
     recording.paired = paired_.finish();
-    // Averaging a faster gyro leaves white noise white.
+    // Averaging a faster gyro keeps white noise white.
     const double ratio = to_seconds(aligner_.interval(aligner_.pacing_gyro())) /
                          to_seconds(aligner_.interval(1 - aligner_.pacing_gyro()));
     constexpr double kNextToNothing = 0.98;

@@ -1,6 +1,6 @@
 #pragma once
 
-// What a wrong command line is answered with. Known to main() alone, as CLI11 is.
+// Error messages for a wrong command line. Included by main.cpp alone, like CLI11.
 
 #include <string>
 #include <vector>
@@ -14,7 +14,7 @@
 
 namespace vgyro::cli {
 
-/// "vgyro replay": the command as far as it was understood.
+/// "vgyro replay": the command as far as it was recognized.
 inline std::string command_text(const CLI::App& app) {
   std::string text = "vgyro";
   for (const CLI::App* command = &app; !command->get_subcommands().empty();) {
@@ -24,7 +24,7 @@ inline std::string command_text(const CLI::App& app) {
   return text;
 }
 
-/// All options of the command that was understood, with their dashes.
+/// All options of the recognized command, with their dashes.
 inline std::vector<std::string> options_of(const CLI::App& app) {
   const CLI::App* command = &app;
   while (!command->get_subcommands().empty())

@@ -99,7 +99,7 @@ class Picture {
     put(to, "$model{} << EOD\n", i);
     for (int k = 0; k < kModelPoints; ++k) {
       const double share = static_cast<double>(k) / (kModelPoints - 1);
-      // Where the fit did not look it has nothing to say.
+      // The fit is not drawn beyond its own frequency range.
       const double low_s =
           std::max(tau_s_.low,
                    series_[i]->fit->limited ? 0.5 / series_[i]->fit->frequency_max_hz : tau_s_.low);

@@ -49,7 +49,7 @@ std::string estimate_text(const Estimate& estimate, double scale) {
                               : "-";
 }
 
-// Columns are padded by what is seen: fmt counts code points.
+// Columns are padded to their visible width, because fmt counts code points.
 void row(std::string& text, const std::string& name, const std::string& unit,
          const std::array<std::string, 3>& cells) {
   fmt::format_to(std::back_inserter(text), "{:<23}{:<11}", name, unit);
@@ -281,7 +281,7 @@ nlohmann::ordered_json noise_json(const SeriesNoise& noise) {
 
 struct Gyro {
   std::size_t number;
-  std::optional<std::size_t> axis;  ///< of a unit's own
+  std::optional<std::size_t> axis;  ///< a unit's own axis
 };
 
 void effect(std::string& text, const Gyro& gyro, const char* kind, const std::string& parameters) {
@@ -291,7 +291,7 @@ void effect(std::string& text, const Gyro& gyro, const char* kind, const std::st
                  gyro.number, kind, axis, parameters);
 }
 
-// Flicker noise as three Gauss-Markov processes a decade apart around the bottom of the Allan
+// Flicker noise as three Gauss–Markov processes a decade apart, around the bottom of the Allan
 // curve.
 void add_flicker(std::string& text, const Gyro& gyro, const SeriesNoise& noise) {
   const double flicker = noise.fit->flicker_dps.value;
