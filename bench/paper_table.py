@@ -1,6 +1,6 @@
 #!/usr/bin/python3
-"""Prints the paper's table as measured on the simulated twin: `vgyro replay` with `mutual` beside
-`mean`, over several seeds."""
+"""Prints the paper's table as measured on the simulated twin: `vgyro replay` with `mutual` and with `mean`, over
+several seeds."""
 
 import argparse
 import sys
