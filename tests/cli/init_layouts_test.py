@@ -15,7 +15,7 @@ import numpy as np
 import bench
 
 logging.disable(logging.CRITICAL)
-with redirect_stdout(io.StringIO()):  # canmatrix tells on stdout which other formats it lacks
+with redirect_stdout(io.StringIO()):  # canmatrix prints the formats that it lacks to stdout
     import canmatrix.formats
 
 RAD = 180 / np.pi

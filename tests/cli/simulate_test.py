@@ -20,7 +20,7 @@ import rig  # noqa: E402
 from rig import effect  # noqa: E402
 
 logging.disable(logging.CRITICAL)
-with redirect_stdout(io.StringIO()):  # canmatrix tells on stdout which other formats it lacks
+with redirect_stdout(io.StringIO()):  # canmatrix prints the formats that it lacks to stdout
     import canmatrix.formats
 
 SEED = 17

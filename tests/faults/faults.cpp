@@ -148,8 +148,7 @@ struct Dice {
   double normal() { return std::normal_distribution<double>()(engine); }
 };
 
-// ---- random faults
-// -------------------------------------------------------------------------------
+// ---- random faults ------------------------------------------------------------------------------
 
 enum class Kind : unsigned {
   kSilent,
@@ -539,8 +538,7 @@ int run_shifted(unsigned count, std::uint64_t first_seed) {
   return failed == 0 ? 0 : 1;
 }
 
-// ---- a long day
-// ----------------------------------------------------------------------------------
+// ---- a long day ---------------------------------------------------------------------------------
 
 std::uint64_t resident_kb() {
   std::ifstream file("/proc/self/statm");

@@ -560,8 +560,7 @@ TEST(Aligner, AveragesAGyroTwoThousandTimesFaster) {
   EXPECT_TRUE(result.aligner.too_far_apart());
 }
 
-// --- a choice that was made among garbage is made again
-// ------------------------------------------
+// --- a wrong first choice is corrected -----------------------------------------------------------
 
 Stream burst(int count, Duration phase) {
   Stream stream;

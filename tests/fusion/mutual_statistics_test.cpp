@@ -19,7 +19,7 @@ Calibration calibrated(int order, double rest_s, double rate_hz, Random& random)
   }
 }
 
-// A slope fitted on a short rest has an error of σ·√12/(T√n), and its heading error grows as
+// A slope fitted on a short rest has σ_slope = σ·√12/(T√n), and its heading error grows as
 // ½σ_slope·t². Holding the bias alone costs far less, unless there really is a slope.
 TEST(MutualStatistics, HeadingErrorOfAFittedSlopeGrowsWithTheSquareOfTime) {
   constexpr double kRest_s = 60.0;

@@ -318,8 +318,7 @@ TEST(MutualCorrector, PassesOverASilenceOfAnyLengthInOneStep) {
   EXPECT_NEAR(static_cast<double>(corrector->windows().skipped), 1e12, 1e12 * 1e-9);
 }
 
-// --- over a leap of time the lines are held
-// ------------------------------------------------------
+// --- lines are held across a leap of time --------------------------------------------------------
 
 Polynomial line(double at_s, double value, double slope) {
   return {.centre_s = at_s, .half_width_s = 1.0, .coefficient = {value, slope, 0.0, 0.0}};

@@ -128,7 +128,7 @@ TEST(Optimal, LosesLittleHeadingToTheBound) {
   }
 }
 
-// --- how sure ------------------------------------------------------------------------------------
+// --- the truth of σ ------------------------------------------------------------------------------
 
 struct Sureness {
   double rate = 0.0;  ///< mean of (error/σ)²
@@ -236,7 +236,7 @@ TEST(OptimalSigma, IsHonestWhereTheNoiseIsEstimated) {
   }
 }
 
-// --- the same again ------------------------------------------------------------------------------
+// --- reproducibility -----------------------------------------------------------------------------
 
 TEST(Optimal, GivesTheSameBitsForTheSameInput) {
   const Gyros gyros{world::Gyro{1e-3, 2e-5, 0.05, 0.003}, world::Gyro{2e-3, 6e-5, -0.1}};

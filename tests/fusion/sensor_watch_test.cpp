@@ -91,8 +91,7 @@ struct Two {
   std::array<double, 2> last_s{};
 };
 
-// --- healthy sensors are believed
-// ------------------------------------------------------------------
+// --- healthy sensors -----------------------------------------------------------------------------
 
 // A car's yaw rate has steps of a quarter of a degree per second and stands at 0 through every
 // halt; beside it any other gyro. Hours of town: not one finding.
@@ -171,8 +170,7 @@ TEST(SensorWatchHealthy, LateSensorIsNotStuck) {
   EXPECT_TRUE(two.all_sound(0)) << two.first_s[0].value_or(0.0);
 }
 
-// --- its step
-// --------------------------------------------------------------------------------------
+// --- its step ------------------------------------------------------------------------------------
 
 double step_after(const SensorLimits& limits, const Signal& signal, double to_s) {
   SensorWatch watch(limits);
@@ -359,8 +357,7 @@ TEST(SensorWatchStuck, CoarseSensorThatLeapsToAConstantInASteadyTurnIsFound) {
   }
 }
 
-// --- dead from the start
-// -------------------------------------------------------------------------
+// --- dead from the start -------------------------------------------------------------------------
 
 // A sensor that has sent one value since power-on may be dead. It is set aside as soon as the other
 // one plainly moves.
@@ -428,8 +425,7 @@ TEST(SensorWatchDead, CoarseSensorThatRestedFromTheStartIsNotDead) {
   }
 }
 
-// --- what time it is
-// -----------------------------------------------------------------------------
+// --- time of day ---------------------------------------------------------------------------------
 
 /// Every finding, one after the other.
 std::string findings_from(TimePoint start) {

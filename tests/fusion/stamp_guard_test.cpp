@@ -286,8 +286,7 @@ TEST(StampGuard, CarriesTheReferenceOverAStepOfTheGyrosClock) {
   EXPECT_EQ(reference.since_start, 10s + 5ms + 1us);
 }
 
-// --- streams that make it hard
-// -------------------------------------------------------------------
+// --- difficult streams ---------------------------------------------------------------------------
 
 /// How many of these stamps are accepted, with any accepting verdict.
 int accepted_of(StampGuard& guard, std::size_t stream, Duration from, Duration interval, int count,

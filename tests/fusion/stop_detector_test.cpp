@@ -183,7 +183,7 @@ TEST(StopDetector, TakesNoDoubtOfTheDriftForATurnUnderStandingWheels) {
   }
 }
 
-// --- what is said of a turn ----------------------------------------------------------------------
+// --- the odds of a turn --------------------------------------------------------------------------
 
 // Stops are commoner than steady turns; with standing wheels a turn is rare.
 TEST(StopDetector, HoldsAStopForLikelierAndMoreSoOnWheels) {
