@@ -10,10 +10,9 @@ namespace {
 
 constexpr std::size_t kValuesLeast = 8;  // a coarse car sensor on a straight road has a dozen
 constexpr double kStepMost = 0.2;        // of the range, rms; of chance 0.41
-constexpr double kLeapMost =
-    0.75;  // of the range: a knock; a value that wraps leaps across all of it
-constexpr double kOneWayMost = 0.9;  // exceeded by counters and values that only grow
-constexpr double kCertain = 5.0;     // standard deviations of chance
+constexpr double kLeapMost = 0.75;       // of the range: a knock; a wrap leaps across all of it
+constexpr double kOneWayMost = 0.9;      // exceeded by counters and values that only grow
+constexpr double kCertain = 5.0;         // standard deviations of chance
 
 }  // namespace
 

@@ -155,8 +155,7 @@ Likeness at_scale(const Sums& first, const Sums& second, const Grid& grid, doubl
 constexpr std::size_t kTaps = 32;
 constexpr std::size_t kTapsAhead = 6;
 constexpr std::size_t kRowsMost = 6000;
-constexpr double kUnexplainedMost =
-    0.03;  // share of the variance that the source may leave unexplained
+constexpr double kUnexplainedMost = 0.03;  // of the variance
 
 struct Rows {
   Eigen::MatrixXd taps;

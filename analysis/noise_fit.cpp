@@ -102,9 +102,8 @@ class Likelihood {
     double cost = 0.0;
     double ramp = 0.0;
     double ramp_information = 0.0;
-    Eigen::Vector4d gradient = Eigen::Vector4d::Zero();  ///< with respect to the logarithms
-    Eigen::Matrix4d information =
-        Eigen::Matrix4d::Zero();  ///< Fisher information, also with respect to the logarithms
+    Eigen::Vector4d gradient = Eigen::Vector4d::Zero();     ///< with respect to the logarithms
+    Eigen::Matrix4d information = Eigen::Matrix4d::Zero();  ///< Fisher, by the logarithms
   };
   [[nodiscard]] Value at(const Powers& strength) const {
     Value value;

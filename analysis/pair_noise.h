@@ -41,13 +41,11 @@ struct Correlation {
 
 struct PairNoise {
   MotionSummary motion;
-  std::array<SeriesNoise, 2>
-      gyros;  ///< over motion.rest; without a rest over everything, and no fit
+  std::array<SeriesNoise, 2> gyros;  ///< over motion.rest; without one over all, no fit
   SeriesNoise difference;
-  std::optional<Mismatch> removed;  ///< from the difference
-  std::optional<Correlation>
-      correlation;  ///< ρ of the white noise; needs rest, and no noise hidden by a step
-  std::array<double, 2> step_dps{};  ///< step between each gyro's values: its resolution
+  std::optional<Mismatch> removed;         ///< from the difference
+  std::optional<Correlation> correlation;  ///< ρ of the white noise; needs rest, none hidden
+  std::array<double, 2> step_dps{};        ///< step between each gyro's values: its resolution
 };
 
 PairNoise judge_pair(const PairRecording& recording);

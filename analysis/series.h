@@ -62,8 +62,8 @@ class SeriesBuilder {
   std::size_t holes_ = 0;  ///< places before the newest one that no sample took
   std::size_t hole_at_ = 0;
   std::uint64_t filled_ = 0;
-  double grid_s_ =
-      0.0;  ///< for the mean interval: total time of the parts, and their number of places
+  /// For the mean interval: total time of the parts, and their number of places.
+  double grid_s_ = 0.0;
   double grid_places_ = 0.0;
   double part_begin_s_ = 0.0;
   std::array<Series, 2> series_;

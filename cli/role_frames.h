@@ -48,8 +48,7 @@ class RoleFrames {
                                      const canlog::InterfaceTable& interfaces);
 
   std::vector<Pair> pairs_;
-  std::vector<can::BusIndex>
-      buses_;  ///< by the log's own index; indices beyond the plan's are foreign
+  std::vector<can::BusIndex> buses_;  ///< by the log's own index; beyond the plan's: foreign
   std::vector<std::string> interfaces_;
 };
 

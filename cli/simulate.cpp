@@ -80,9 +80,8 @@ static_assert(all_besides_are_played());
 struct SimulatedMessage {
   const FrameMatch* match = nullptr;
   std::vector<Part> parts{};
-  const gateway::Quantity* page =
-      nullptr;           ///< if set: only this quantity, and the others on its page
-  double after_s = 0.0;  ///< delay after the first message of its unit
+  const gateway::Quantity* page = nullptr;  ///< if set: only this, and the others on its page
+  double after_s = 0.0;                     ///< delay after the first message of its unit
   std::size_t next = 0;
   double stamp_s = 0.0;
 };

@@ -23,8 +23,8 @@ struct DriftMemory {
   std::array<double, 3> bias_covariance{};  ///< of gyro 1, of both, of gyro 2; (deg/s)²
   std::array<double, 3> white_density{};    ///< N₁², N₁N₂ρ, N₂²; (deg/s)²/Hz
   std::array<double, 2> sample_variance{};  ///< of one raw sample about the rate; (deg/s)²
-  std::array<double, kWalkPairs>
-      walk_weight{};  ///< probability of each pair of ratios, gyro 2's varying faster; sums to 1
+  /// Probability of each pair of ratios, gyro 2's ratio varying faster; sums to 1.
+  std::array<double, kWalkPairs> walk_weight{};
   double scale_difference = 0.0;  ///< gyro 1 less gyro 2, relative
   double scale_difference_sigma = 0.0;
   double skew_s = 0.0;  ///< gyro 2 is later than gyro 1

@@ -30,8 +30,7 @@ struct GyroParameters {
   double lag_sigma_s = 0.0;
   double lag_common_sigma_s = 0.0;
   std::optional<double> max_bias_dps = {};  ///< largest bias that this gyro can have
-  bool learns_temperature =
-      false;  ///< its temperature is measured, but its coefficient is not given
+  bool learns_temperature = false;  ///< its temperature is measured, its coefficient not given
 
   friend bool operator==(const GyroParameters&, const GyroParameters&) = default;
 };

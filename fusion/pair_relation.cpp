@@ -21,7 +21,7 @@ constexpr double kMovedMin_dps = 0.2;
 constexpr double kMovedMuch_dps = 1.0;
 // A gyro must have turned over this range, deg, within the memory: vibration beyond half the
 // sampling rate looks like slow motion, which the two gyros may even see with opposite signs, but
-// it turns nothing.
+// it does not turn the platform.
 constexpr double kSwung_deg = 3.0;
 // Motion smaller than a drift of this slope, deg/s within a second, is judged without its trend.
 constexpr double kDrift_dps_s = 0.1;

@@ -36,8 +36,8 @@ struct PairVerdict {
   Contradiction contradiction = Contradiction::kNone;
   double probability = 0.0;  ///< that they contradict each other
   double slope = 0.0;        ///< gyro 2's motion over gyro 1's; NaN if they have nothing in common
-  double slope_sigma =
-      0.0;  ///< 1σ from its scatter between blocks; NaN if the slope is NaN or the finding is kLag
+  /// 1σ of the slope from its scatter between blocks; NaN for kLag, or if the slope is NaN.
+  double slope_sigma = 0.0;
   double lag_s = 0.0;    ///< delay of gyro 2 against gyro 1 for kLag, else 0
   std::size_t gyro = 2;  ///< gyro with erratic values for kErratic, else 2
 };
@@ -93,8 +93,8 @@ class PairRelation {
   /// After a gap longer than this, and than four cells, everything but the evidence restarts.
   static constexpr double kGap_s = 0.5;
   static constexpr std::size_t kBlock = 10;  ///< cells of a block
-  static constexpr std::size_t kLongBlock =
-      20;                                     ///< cells of a block that is compared over all lags
+  /// Cells of a long block, which is compared over all lags.
+  static constexpr std::size_t kLongBlock = 20;
   static constexpr std::size_t kLags = 30;    ///< most lag to either side, in cells
   static constexpr std::size_t kCells = 128;  ///< cells in memory
 

@@ -144,8 +144,8 @@ class Habit {
   double bend_before_ = 0.0;
   int turns_ = 0;       ///< second differences with the opposite sign of the one before
   double bends_ = 0.0;  ///< Σ of squared second differences
-  double smallest_ =
-      std::numeric_limits<double>::infinity();  ///< smallest second difference that is not 0
+  /// Smallest second difference that is not 0.
+  double smallest_ = std::numeric_limits<double>::infinity();
   bool step_known_ = false;
   std::uint64_t blocks_ = 0;
   std::uint64_t coarse_blocks_ = 0;
@@ -216,8 +216,8 @@ class SensorWatch {
   bool unproven_ = false;          ///< dead from the start, until it moves with the other gyro
   TimePoint alive_since_;          ///< time of its first change
   double peak_dps_ = 0.0;          ///< largest magnitude before this run
-  double clip_dps_ =
-      std::numeric_limits<double>::infinity();  ///< magnitude at which it was found to clip
+  /// Magnitude at which it was found to clip.
+  double clip_dps_ = std::numeric_limits<double>::infinity();
 };
 
 }  // namespace vgyro::fusion

@@ -64,8 +64,8 @@ bool StampGuard::confirm(Stream& stream, TimePoint time) {
     stream.close_by = true;
   }
   stream.candidate = time;
-  stream.spacing =
-      std::clamp<Duration>(since, -kSlowest, 2 * kSlowest);  // out of range: matches no spacing
+  // A spacing at these limits is even with no other one.
+  stream.spacing = std::clamp<Duration>(since, -kSlowest, 2 * kSlowest);
   return stream.confirmations >= (stream.close_by ? kConfirmations : kSlowConfirmations);
 }
 
