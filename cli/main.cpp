@@ -313,26 +313,26 @@ CLI::App* add_gap(CLI::App& app, GapOptions& options) {
       ->required();
   command
       ->add_option("--accept", options.accept,
-                   "which reading of an ambiguous effect to apply: gyro=N or gyro=NAME,\n"
+                   "which explanation of an ambiguous effect to apply: gyro=N or gyro=NAME,\n"
                    "kind=KIND, both with a comma between, or likeliest; may be repeated")
       ->allow_extra_args(false)
       ->check(wrong_acceptance);
   command->add_option("--evidence", options.evidence,
-                      "what this recording says, for vgyro fleet: one JSON line");
+                      "evidence of this recording, for vgyro fleet: one JSON line");
   add_number(*command, "--time-limit", options.time_limit_s, {0.0, kTimeLimitMax_s},
              "stop after this many seconds and write what is certain; 0: no limit");
   add_number(*command, "--seed", options.seed, {}, "seed of the simulations");
   command->add_flag("-q,--quiet", options.quiet, "no summary");
   command->footer(
       "The folder is written whole or not at all; an earlier result in it is replaced.\n"
-      "vgyro(1) says how to read the result.\n"
+      "vgyro(1) explains the result.\n"
       "Example: vgyro gap --config vgyro.toml --measured drive.log.xz --out found");
   return command;
 }
 
 CLI::App* add_fleet(CLI::App& app, FleetOptions& options) {
   CLI::App* command = app.add_subcommand(
-      "fleet", "Pool the evidence of many drives: what types have, which units go bad");
+      "fleet", "Pool the evidence of many drives: properties of types, units that degrade");
   command
       ->add_option("EVIDENCE", options.evidence,
                    "files that vgyro gap, vgyro allan or vgyro fleet left;\nof a folder all *.json")

@@ -34,9 +34,9 @@ class Gatherer {
   [[nodiscard]] std::optional<Error> no_pair(const std::string& log) const {
     if (pairs_ > 0) return std::nullopt;
     return Error{log,
-                 fmt::format("the gyros {} and {} never spoke at the same time{}, or too shortly",
+                 fmt::format("the gyros {} and {} never sent at the same time{}, or too briefly",
                              plan_.gyros[0].name, plan_.gyros[1].name, about_axis(plan_)),
-                 "a recording in which both are there is needed"};
+                 "use a recording that contains both gyros"};
   }
 
   analysis::PairRecording finish() {

@@ -480,7 +480,8 @@ Expected<void> check_motion(const Plan& plan, const simulation::Profile& profile
 
 Expected<void> check_output(const SimulateOptions& options, std::vector<std::string> inputs) {
   if (options.output.ends_with(".xz")) {
-    return fail(options.output, "is not compressed here", "write a .log, then `xz` compresses it");
+    return fail(options.output, "cannot be written compressed",
+                "write a .log, then `xz` compresses it");
   }
   inputs.insert(inputs.end(), {options.model, options.profile});
   return check_outputs(inputs, {options.output});

@@ -40,7 +40,7 @@ inline std::vector<std::string> options_of(const CLI::App& app) {
 /// An unknown option comes first, because it is often the reason why another one is missing.
 inline Error usage_error(const CLI::App& app, const CLI::ParseError& error) {
   const std::string command = command_text(app);
-  const std::string help = fmt::format("`{} --help` lists what it takes", command);
+  const std::string help = fmt::format("`{} --help` lists its arguments", command);
   if (const auto unknown = unknown_option(app.remaining(true), options_of(app))) {
     return {command, fmt::format("there is no option {}", printable(unknown->name)),
             unknown->near ? fmt::format("did you mean {}?", *unknown->near) : help};

@@ -38,7 +38,7 @@ Expected<AllanReport> judge(const AllanOptions& options, const gateway::Plan& pl
         name_of(options.logs),
         fmt::format("holds {:.1f} s of both gyros{}, too short to separate noise from drift",
                     seconds, about_axis(plan)),
-        fmt::format("{:g} s at the least; an hour at rest shows drift", kSecondsMin));
+        fmt::format("use at least {:g} s; an hour at rest shows drift", kSecondsMin));
   }
   AllanReport report{name_of(options.logs), {plan.gyros[0].name, plan.gyros[1].name}, {}, {}};
   report.axis = axis_name(plan);

@@ -151,7 +151,7 @@ class Picture {
     }
     put(to, "$curve{} u 1:2:3:4 w yerrorbars pt 7 ps 0.55 lw 1.2 lc rgb '{}' t {}\n", i,
         noise.fit ? "#222222" : kColours[i],
-        noise.fit ? "'measured, 95 % bounds'" : "'measured; it holds motion'");
+        noise.fit ? "'measured, 95 % bounds'" : "'measured; contains motion'");
   }
 
   static std::string part_title(const NoiseFit& fit, const PartOfModel& part) {

@@ -102,7 +102,7 @@ std::string table(const AllanReport& report) {
                            : std::string("-");
         }));
   }
-  row(text, "drift that forgets", "deg/s, s", cells(report, [](const SeriesNoise& noise) {
+  row(text, "correlated drift", "deg/s, s", cells(report, [](const SeriesNoise& noise) {
         return noise.fit ? markov_text(*noise.fit) : std::string("-");
       }));
   row(text, "ramp", "deg/s²", cells(report, [](const SeriesNoise& noise) {
@@ -129,7 +129,8 @@ std::string motion_text(const AllanReport& report) {
   }
   if (const auto& removed = report.noise.removed) {
     text += fmt::format(
-        "Taken off the difference by least squares: {:+.3g} of the rate (scale factor), {:+.2g} ms "
+        "Removed from the difference by least squares: {:+.3g} of the rate (scale factor), {:+.2g} "
+        "ms "
         "of\nlag. What vibration and motion leave beyond that is in the difference's figures.\n",
         removed->scale, 1e3 * removed->lag_s);
   }
@@ -142,22 +143,24 @@ std::string caution(const std::string& name, const SeriesNoise& noise) {
   if (noise.filled_share > kFewFilled) {
     fmt::format_to(to,
                    "{}: {:.1f} % of the places on an even grid had no sample (lost, or very uneven "
-                   "stamps) and were bridged.\n",
+                   "stamps) and were filled in.\n",
                    name, 100.0 * noise.filled_share);
   }
   if (!noise.fit) return text;
   const NoiseFit& fit = *noise.fit;
   if (fit.limited) {
-    fmt::format_to(to,
-                   "{}: fitted below {:.3g} Hz; above, the spectrum is not that of these noises "
-                   "(a filter in the gyro, or vibration).\n",
-                   name, fit.frequency_max_hz);
+    fmt::format_to(
+        to,
+        "{}: fitted below {:.3g} Hz; above, the spectrum is not that of these noise terms "
+        "(a filter in the gyro, or vibration).\n",
+        name, fit.frequency_max_hz);
   }
   if (!fit.describes) {
-    fmt::format_to(to,
-                   "{}: these noises do not describe the record: around {:.2g} Hz it holds {:.2g} "
-                   "times the power of the fit, and the figures are a rough guide only.\n",
-                   name, fit.worst_hz, fit.worst_ratio);
+    fmt::format_to(
+        to,
+        "{}: these noise terms do not describe the record: around {:.2g} Hz it holds {:.2g} "
+        "times the power of the fit, and the figures are a rough guide only.\n",
+        name, fit.worst_hz, fit.worst_ratio);
   }
   return text;
 }
@@ -193,7 +196,7 @@ std::string correlation_text(const AllanReport& report) {
     return fmt::format("ρ, correlation of the white noises: {:+.3f} ± {:.3f}\n", rho->value,
                        rho->sigma);
   }
-  return "ρ, correlation of the white noises: not resolved; it takes a rest in which white noise "
+  return "ρ, correlation of the white noises: not resolved; this needs a rest in which white noise "
          "is "
          "seen.\n";
 }

@@ -37,7 +37,7 @@ class Check(bench.Bench):
         self.assertNotIn("shadow", self.good("check", "vgyro.toml").stdout.decode())
         self.write("vgyro.toml", bench.CONFIG.replace("[output]", "[output]\ntransmit = false", 1))
         text = self.good("check", "vgyro.toml").stdout.decode()
-        self.assertRegex(text, r"(?m)^  shadow mode +the gateway sends none of what follows: transmit = false$")
+        self.assertRegex(text, r"(?m)^  shadow mode +the gateway sends none of these frames: transmit = false$")
         self.assertIn("[output] transmit must be true or false",
                       self.check_replaced("transmit = false", 'transmit = "no"'))
 

@@ -25,8 +25,8 @@ class ModelList(bench.Bench):
         kind = ""
         for line in lines:
             kind = line.split()[0] if re.match(r"  \S", line) else kind
-            if line.startswith("    may be taken for "):
-                others = set(line.removeprefix("    may be taken for ").strip().split(", "))
+            if line.startswith("    may be confused with "):
+                others = set(line.removeprefix("    may be confused with ").strip().split(", "))
                 self.assertLessEqual(others, kinds - {kind})
 
     def test_every_kind_is_told_and_has_equations_of_its_own(self):
