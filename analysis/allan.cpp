@@ -9,8 +9,8 @@ namespace vgyro::analysis {
 
 namespace {
 
-// Angle at the ends of every sample, less that of the mean rate: Allan's differences do not see the
-// mean, and their digits are not spent on it.
+// Angle at the ends of every sample, less that of the mean rate: Allan's differences cancel the
+// mean, which would only cost digits.
 std::vector<double> angles(const std::vector<double>& rate_dps, double interval_s) {
   double mean = 0.0;
   for (const double rate : rate_dps)

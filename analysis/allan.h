@@ -26,11 +26,12 @@ struct AllanPoint {
 
 inline constexpr double kConfidence = 0.95;
 
-/// `kind_at(tau_s)`: what dominates there. Averaging times go to a third of the longest part.
+/// `kind_at(tau_s)`: the kind of noise that dominates there. Averaging times reach a third of the
+/// longest part.
 std::vector<AllanPoint> allan_deviation(const Series& series,
                                         const std::function<NoiseKind(double)>& kind_at);
 
-/// Of n samples averaged m at a time.
+/// Equivalent degrees of freedom of n samples averaged m at a time.
 double degrees_of_freedom(NoiseKind kind, std::size_t n, std::size_t m);
 
 /// x with P(χ² ≤ x) = probability.

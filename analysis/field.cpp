@@ -10,9 +10,9 @@ namespace {
 
 constexpr std::size_t kValuesLeast = 8;  // a coarse car sensor on a straight road has a dozen
 constexpr double kStepMost = 0.2;        // of the range, rms; of chance 0.41
-constexpr double kLeapMost = 0.75;   // of the range: a knock; what wraps, leaps across all of it
-constexpr double kOneWayMost = 0.9;  // what counts or only grows
-constexpr double kCertain = 5.0;     // standard deviations of chance
+constexpr double kLeapMost = 0.75;       // of the range: a knock; a wrap leaps across all of it
+constexpr double kOneWayMost = 0.9;      // exceeded by counters and values that only grow
+constexpr double kCertain = 5.0;         // standard deviations of chance
 
 }  // namespace
 
@@ -45,8 +45,8 @@ bool moves_as_a_rate(const FieldFigures& figures) {
          figures.step <= kStepMost * figures.range && figures.leap <= kLeapMost * figures.range;
 }
 
-// Of a quantity cut in two at any bit, the steps of both parts are correlated by −1/6 of a squared
-// unit of the upper part; of two quantities by nothing.
+// If a quantity is cut in two at any bit, the steps of both parts are correlated by −1/6 of a
+// squared unit of the upper part; the steps of two independent quantities are not.
 bool carries_into(const std::vector<std::int64_t>& raw, unsigned bits) {
   const double unit = std::ldexp(1.0, static_cast<int>(bits));
   double upper_power = 0.0;

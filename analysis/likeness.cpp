@@ -13,14 +13,14 @@ namespace vgyro::analysis {
 namespace {
 
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
-constexpr double kLagMost_s = 0.6;              // gateways and filters; slower ones serve no gyro
-constexpr std::array kScales_s{0.1, 0.4, 1.6};  // a hand's or a rotor's motion to a car's bend
+constexpr double kLagMost_s = 0.6;  // of gateways and filters; slower ones are no use for a gyro
+constexpr std::array kScales_s{0.1, 0.4, 1.6};  // from a hand's or a rotor's motion to a car's bend
 constexpr std::size_t kGridMost = 150'000;
 constexpr double kGapMost_s = 0.5;  // nothing is interpolated across more
 constexpr double kSharedLeast_s = 4.0;
 constexpr double kQuickStep_s = 0.05;
 constexpr double kQuickStepMost_s = 0.5;
-constexpr double kQuickPoints = 6000;  // as many as a grid has, before its step grows
+constexpr double kQuickPoints = 6000;  // points of a grid, before its step grows
 constexpr std::size_t kQuickPointsMost = 30'000;
 constexpr std::array<std::size_t, 2> kQuickSpans{8, 32};  // steps
 
@@ -45,7 +45,7 @@ struct Grid {
   std::size_t size = 0;
 };
 
-/// Sums up to each place, of the values and of how many there are.
+/// Cumulative sums of the values and of their number, up to each place.
 struct Sums {
   std::vector<double> value;
   std::vector<double> count;
@@ -73,7 +73,7 @@ Sums resample(const StampedSignal& signal, const Grid& grid) {
 }
 
 /// Mean of the next `span` places less the mean of the `span` before; NaN where some are missing.
-/// Rare spikes are cut to what else there is.
+/// Rare spikes are clipped to the range of the other changes.
 std::vector<double> changes(const Sums& sums, std::size_t span) {
   const std::size_t size = sums.value.size() - 1;
   std::vector<double> result(size, kNone);
@@ -155,7 +155,7 @@ Likeness at_scale(const Sums& first, const Sums& second, const Grid& grid, doubl
 constexpr std::size_t kTaps = 32;
 constexpr std::size_t kTapsAhead = 6;
 constexpr std::size_t kRowsMost = 6000;
-constexpr double kUnexplainedMost = 0.03;  // of what the source explains
+constexpr double kUnexplainedMost = 0.03;  // of the variance
 
 struct Rows {
   Eigen::MatrixXd taps;
@@ -164,7 +164,7 @@ struct Rows {
 
 Rows make_rows(const StampedSignal& copy, const StampedSignal& source, double shift_s) {
   const std::size_t count = std::min(copy.t_s.size(), kRowsMost);
-  std::vector<std::pair<std::size_t, std::size_t>> found;  // of copy and of source
+  std::vector<std::pair<std::size_t, std::size_t>> found;  // indices in copy and source
   for (std::size_t k = 0; k < count; ++k) {
     const auto at = std::upper_bound(source.t_s.begin(), source.t_s.end(), copy.t_s[k] + shift_s);
     const std::size_t newest = static_cast<std::size_t>(at - source.t_s.begin());
@@ -232,8 +232,8 @@ bool all_explained(const StampedSignal& copy, const StampedSignal& source, doubl
     noise_seen = order == 2 && now.explained > 2.0 * rounded;
   }
   if (noise_seen) return true;
-  // Rounding hides the noise of both: only a copy has the same zero (or, cut off, half a step less)
-  // and the same scale.
+  // Rounding hides the noise of both signals: only a copy has the same zero (or, truncated, half a
+  // step less) and the same scale.
   const double zero = std::abs(level.bias) / std::max(copy.step, 1e-300);
   const bool same_zero = zero < 0.05 || std::abs(zero - 0.5) < 0.05;
   return same_zero && std::abs(std::abs(level.gain) - 1.0) < 0.005;
@@ -303,7 +303,7 @@ ChangeShape change_shape(const StampedSignal& signal, double begin_s, double sec
 
 double quick_correlation(const ChangeShape& first, const ChangeShape& second) {
   const long most = std::max(1L, std::lround(kLagMost_s / first.step_s));
-  constexpr double kShared = 80;  // spans' quarters: some twenty independent ones
+  constexpr double kShared = 80;  // quarters of a span: some twenty independent changes
   double best = 0.0;
   for (std::size_t i = 0; i < kQuickSpans.size(); ++i) {
     const std::size_t stride = kQuickSpans[i] / 4;

@@ -17,23 +17,24 @@ constexpr Mask bit(std::size_t term) {
   return 1U << term;
 }
 
-// Half the χ² that a value 95 % sure to be too high costs, one-sided.
+// Increase of the cost at a one-sided 95 % upper bound: half the χ².
 constexpr double kBoundCost = 1.353;
-// An octave is misfitted when its power is off by so much, and by so many standard errors.
+// An octave is misfitted when its power is off by this share and by this many standard errors.
 constexpr double kMisfit = 0.15;
 constexpr double kMisfitSigmas = 5.0;
 constexpr double kOctaveCountMin = 30.0;
-// The first coefficients' sines are wider than flicker noise is even: share of its power that the
-// j-th one misses, times j. Measured by numerical integration.
+// Flicker noise is not even over the width of the first coefficients' sines: share of its power
+// that the j-th one misses, times j. Measured by numerical integration.
 constexpr double kFlickerLoss = 0.21;
-constexpr double kLogPowerMin = -30.0;  ///< below the largest that the data allow
+constexpr double kLogPowerMin = -30.0;  ///< relative to the largest power that the data allow
 constexpr double kStepMax = 2.0;
 constexpr int kIterationsMax = 200;
 constexpr double kTolerance = 1e-9;
 
-// Drift that forgets itself instead of a walk: what each parameter more must gain in twice the
-// logarithm of the likelihood (by chance once in 140 walks); memories that are tried, from so many
-// intervals on; the record must hold so many of the longest, or nobody can say that it forgets.
+// Exponentially correlated drift instead of a walk: gain that each additional parameter needs in
+// twice the log likelihood (chance reaches it in one of 140 walks); factor between the correlation
+// times that are tried, and the first one in intervals; number of the longest correlation times
+// that a record must hold to show that the correlation ends.
 constexpr double kMarkovGain = 6.0;
 constexpr double kMemoryStep = 1.3;
 constexpr double kMemoryIntervals = 20.0;
@@ -45,7 +46,7 @@ double flicker_variance_gain() {
   return 2.0 * std::numbers::ln2 / std::numbers::pi;
 }
 
-// What is left of a walk's power when it forgets itself with this memory; 0: it does not.
+// Share of a walk's power that exponential correlation with this memory leaves; memory 0: all.
 double remembered(const PowerBin& bin, double memory_s) {
   if (memory_s <= 0.0) return 1.0;
   const double keeps = std::exp(-bin.interval_s / memory_s);
@@ -81,7 +82,7 @@ class Likelihood {
       count_ += bin.count;
     }
     largest_.setConstant(std::numeric_limits<double>::infinity());
-    // More of a term than a run of bins holds altogether cannot be.
+    // A term cannot have more power than a run of bins has altogether.
     constexpr std::size_t kRun = 8;
     for (std::size_t first = 0; first + kRun <= bins_.size(); first += kRun) {
       Powers expected = Powers::Zero();
@@ -101,8 +102,8 @@ class Likelihood {
     double cost = 0.0;
     double ramp = 0.0;
     double ramp_information = 0.0;
-    Eigen::Vector4d gradient = Eigen::Vector4d::Zero();     ///< by the logarithms
-    Eigen::Matrix4d information = Eigen::Matrix4d::Zero();  ///< Fisher's, likewise
+    Eigen::Vector4d gradient = Eigen::Vector4d::Zero();     ///< with respect to the logarithms
+    Eigen::Matrix4d information = Eigen::Matrix4d::Zero();  ///< Fisher, by the logarithms
   };
   [[nodiscard]] Value at(const Powers& strength) const {
     Value value;
@@ -175,8 +176,8 @@ struct Solution {
   Likelihood::Value value;
 };
 
-// Fisher's scoring with Marquardt's damping, in logarithms of the strengths: the curvature that σ
-// needs anyhow is the natural step.
+// Fisher scoring with Marquardt's damping, in logarithms of the strengths. The Fisher information
+// is needed for σ anyway.
 Solution solve(const Likelihood& likelihood, Mask mask, Powers strength, Mask fixed = 0) {
   for (std::size_t term = 0; term < kTermCount; ++term)
     if ((mask & bit(term)) == 0) strength[static_cast<Eigen::Index>(term)] = 0.0;
@@ -237,7 +238,7 @@ double upper_bound(const Likelihood& likelihood, const Solution& chosen, std::si
   const Mask mask = chosen.mask | bit(term);
   const Solution best = solve(likelihood, mask, start);
   const double least = std::min(chosen.value.cost, best.value.cost);
-  // The likelihood may fall to both sides of the best value: the bound is above it.
+  // If the likelihood has a maximum here, it falls on both sides: the bound is above the maximum.
   double low = kLogPowerMin;
   if (best.value.cost < chosen.value.cost)
     low = std::max(low, std::log(best.strength[index] / likelihood.largest()[index]));
@@ -277,7 +278,7 @@ Estimate estimate(const Likelihood& likelihood, const Solution& chosen, std::siz
   return result;
 }
 
-// Both gyros' white noise, the one that was interpolated and the one that was not.
+// White noise of both gyros together: the one that was interpolated and the one that was not.
 Estimate whole_white(const Likelihood& likelihood, const Solution& chosen) {
   if ((chosen.mask & (bit(kWhite) | bit(kOther))) == 0) return estimate(likelihood, chosen, kWhite);
   Eigen::Vector4d by_logarithm = Eigen::Vector4d::Zero();
@@ -313,7 +314,7 @@ NoiseFit result_of(const Likelihood& likelihood, const Solution& chosen, bool in
 
 namespace {
 
-// A drift that forgets itself, where that makes the record much likelier than what was chosen.
+// An exponentially correlated drift, if it makes the record much likelier than the chosen terms.
 struct Forgetting {
   double memory_s = 0.0;
   Solution solution;
@@ -324,7 +325,7 @@ std::optional<Forgetting> forgetting(const std::vector<PowerBin>& bins, double t
   double lowest_hz = top_hz;
   for (const PowerBin& bin : bins)
     lowest_hz = std::min(lowest_hz, bin.frequency_hz / bin.half_periods);
-  // A coefficient's half periods fill the record.
+  // The first coefficient has one half period, which fills the record.
   const double longest_s = 0.5 / lowest_hz / kMemories;
   const auto score = [](const Solution& solution, int more) {
     return 2.0 * solution.value.cost + kMarkovGain * (std::popcount(solution.mask) + more);
@@ -345,7 +346,7 @@ std::optional<Forgetting> forgetting(const std::vector<PowerBin>& bins, double t
   return best;
 }
 
-// K is then what the drift is over short times, and no walk of the record is more.
+// K is then only a bound: a walk of the record is no more than the drift over short times.
 void set_markov(const Forgetting& forgetting, NoiseFit& fit) {
   const Estimate walk = fit.walk_dps_rts;
   fit.markov = Markov{walk.value * std::sqrt(0.5 * forgetting.memory_s), forgetting.memory_s};
@@ -362,7 +363,7 @@ std::optional<NoiseFit> fit_noise(const std::vector<PowerBin>& bins, const FitSe
     const Likelihood likelihood(bins, top_hz, settings);
     if (likelihood.count() < kCoefficientsMin) return fit;
     const bool limited = top_hz < whole_hz;
-    // What grows with the frequency inside a limited band is no quantisation.
+    // Power that grows with the frequency inside a limited band is not quantisation.
     const bool asks_other = interpolated || !limited;
     const Mask all = bit(kTermCount) - 1;
     const Solution walking = select(likelihood, asks_other ? all : all & ~bit(kOther));

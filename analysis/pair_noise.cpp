@@ -12,9 +12,11 @@ namespace vgyro::analysis {
 
 namespace {
 
-// Interpolation leaves the two noises' common part alone up to this share of the pairs' rate.
+// Interpolation does not change the common part of the two noises up to this share of the pairs'
+// rate.
 constexpr double kShareOfRate = 0.1;
-// Where white noise is this much stronger than all else, the correlation is that of white noise.
+// If white noise is this much stronger than all other noise, the correlation is that of white
+// noise.
 constexpr double kWhiteOverOther = 10.0;
 constexpr double kCoefficientsForCorrelation = 50.0;
 constexpr std::size_t kPiece = std::size_t{1} << 17U;
@@ -54,7 +56,7 @@ SeriesNoise judge_gyro(const Series& series, double step_dps, bool rests) {
   return noise;
 }
 
-// Above this frequency nothing but white noise matters; white noise is there.
+// Frequency above which only white noise matters. Precondition: white noise is resolved.
 double white_from_hz(const NoiseFit& fit) {
   const double white = fit.white_dps_rthz.value * fit.white_dps_rthz.value / kWhiteOverOther;
   const double walk = fit.markov ? fit.markov->walk_dps_rts() : fit.walk_dps_rts.value;
@@ -71,7 +73,7 @@ struct Products {
   double count = 0.0;
 };
 
-// Steps of white noise grow with the frequency: every coefficient counts by its share of that.
+// Steps of white noise grow with the frequency, so every coefficient is divided by that gain.
 void add_products(std::span<const double> y1, std::span<const double> y2, double interval_s,
                   double from_hz, double to_hz, Products& sum) {
   const std::vector<double> z1 = step_sine_transform(y1);

@@ -1,7 +1,7 @@
 #pragma once
 
-// A recording of two gyros → the noise of each, of their difference, and how far their white noises
-// agree. Each gyro is judged where the platform rested; the difference wherever there are pairs.
+// The noise of each gyro in a recording, of their difference, and the correlation of their white
+// noise. Each gyro is judged while the platform rested; the difference wherever there are pairs.
 
 #include <array>
 #include <optional>
@@ -15,10 +15,11 @@
 namespace vgyro::analysis {
 
 struct PairRecording {
-  std::array<Series, 2> own;         ///< each gyro's samples as they came
+  std::array<Series, 2> own;         ///< each gyro's samples as received
   std::array<Series, 2> paired;      ///< both at common instants
   std::array<double, 2> step_dps{};  ///< between the values that a gyro can send; 0: unknown
-  /// White-noise variance of the interpolated rates over that of raw samples, 1 without.
+  /// White-noise variance of the interpolated rates over that of raw samples; 1 without
+  /// interpolation.
   double interpolation_gain = 1.0;
 };
 
@@ -30,7 +31,7 @@ struct SeriesNoise {
   double mean_dps = 0.0;
   std::vector<AllanPoint> allan;
   bool hidden_by_step = false;  ///< the step between its values hides this gyro's own noise
-  std::optional<NoiseFit> fit;  ///< nothing where motion is in it, or the record is too short
+  std::optional<NoiseFit> fit;  ///< nothing if it contains motion, or the record is too short
 };
 
 struct Correlation {
@@ -40,11 +41,11 @@ struct Correlation {
 
 struct PairNoise {
   MotionSummary motion;
-  std::array<SeriesNoise, 2> gyros;  ///< over motion.rest; without one over everything, no fit
+  std::array<SeriesNoise, 2> gyros;  ///< over motion.rest; without one over all, no fit
   SeriesNoise difference;
   std::optional<Mismatch> removed;         ///< from the difference
-  std::optional<Correlation> correlation;  ///< ρ of the white noises; needs rest, none hidden
-  std::array<double, 2> step_dps{};        ///< between its values: the resolution of each gyro
+  std::optional<Correlation> correlation;  ///< ρ of the white noise; needs rest, none hidden
+  std::array<double, 2> step_dps{};        ///< step between each gyro's values: its resolution
 };
 
 PairNoise judge_pair(const PairRecording& recording);

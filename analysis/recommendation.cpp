@@ -10,14 +10,15 @@ namespace {
 constexpr std::array<double, 11> kWindows_s{1.0,  2.0,  5.0,   10.0,  15.0, 20.0,
                                             30.0, 60.0, 120.0, 300.0, 600.0};
 constexpr double kShareOfRecord = 0.25;
-// The shortest window whose error is within this of the least: short is good against what no noise
-// figure knows, such as a temperature that changes.
+// The shortest window is chosen whose error is within this factor of the least: a short window also
+// follows changes that no noise figure covers, such as a temperature that changes.
 constexpr double kGoodEnough = 1.1;
 
-// Error of the mean over the next window, in units of K²·T: held at this window's mean, and
-// continued along this window's straight line.
+// Error of the mean over the next window from a walk, in units of K²·T: this window's mean is held
+// (order 0), or its line is continued (order 1).
 constexpr std::array<double, 2> kWalkGain{2.0 / 3.0, 13.0 / 15.0};
-// Of the noise of a window's mean: the line is worth √13 times less one window further on.
+// Error from white noise, in units of the variance of a window's mean: √13 times the σ for the
+// line, one window later.
 constexpr std::array<double, 2> kWhiteGain{1.0, 13.0};
 
 }  // namespace
@@ -38,7 +39,7 @@ Recommendation recommend(const NoiseFit& difference, double seconds) {
   best.ramp_significant = difference.ramp_significance() > kRampSigmas;
   const double ramp_dps_s = best.ramp_significant ? difference.ramp_dps_s : 0.0;
   best.drift_known = difference.walk_dps_rts.resolved || difference.markov || best.ramp_significant;
-  // What forgets itself later than a window is a walk to it.
+  // Drift whose correlation time is longer than a window is a walk within it.
   const double bound =
       difference.markov ? difference.markov->walk_dps_rts() : difference.walk_dps_rts.below;
   const double walk = difference.walk_dps_rts.resolved ? difference.walk_dps_rts.value : bound;
@@ -60,7 +61,7 @@ Recommendation recommend(const NoiseFit& difference, double seconds) {
       if (error(of_s, order) <= kGoodEnough * least[order]) break;
     }
   }
-  // A slope needs evidence, and must pay.
+  // Order 1 only if the ramp is significant and the error smaller.
   const std::size_t order = best.ramp_significant && least[1] < least[0] ? 1 : 0;
   best.order = static_cast<int>(order);
   best.window_s = window_s[order];

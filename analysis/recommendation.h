@@ -1,8 +1,8 @@
 #pragma once
 
-// Window and order for the corrector, from the noise of the pair's difference. What a window learns
-// is used over the next one, one window later: its error is white noise, which a longer window
-// averages, and drift on the way, which a longer window has more of.
+// Window and order for the corrector, from the noise of the pair's difference. The result of a
+// window is used over the next one, one window later. Its error is white noise, which a longer
+// window averages, and the drift in between, which grows with the window.
 
 #include "analysis/noise_fit.h"
 
@@ -11,7 +11,7 @@ namespace vgyro::analysis {
 struct Recommendation {
   double window_s = 10.0;
   int order = 0;
-  double error_dps = 0.0;    ///< expected of the difference of the drifts, 1 σ
+  double error_dps = 0.0;    ///< expected error of the difference of the drifts, 1 σ
   bool drift_known = false;  ///< a walk or a ramp was resolved; else the bound on the walk decides
   bool ramp_significant = false;
   bool record_limits = false;  ///< a longer record might allow a longer window

@@ -8,16 +8,16 @@ namespace vgyro::analysis {
 
 namespace {
 
-// Rounding of the decoded values is not a step.
+// A difference from rounding in the decoder is not a step.
 constexpr double kDecodedRounding = 1e-9;
 constexpr double kRoundingShare = 1.0 / 12.0;
 constexpr double kBlock_s = 1.0;
 constexpr std::size_t kBlockSamplesMin = 16;
-// Noise of half a step is off by a hundredth at most, wherever the rate lies between thresholds;
-// and chance adds a little.
+// Scatter of half a step is wrong by a hundredth at most, wherever the rate lies between
+// thresholds; the rest allows for chance.
 constexpr double kBoundShare = 0.55;
 
-// A drift that would have crossed a step in the record, and did not, is below this.
+// A term is below `least`, at which a drift would have crossed a step in the record.
 Estimate bounded(const Estimate& found, double least) {
   if (found.resolved && found.value >= least) return found;
   return {.below = std::max({least, found.below, found.value + 2.0 * found.sigma})};

@@ -11,63 +11,67 @@ namespace vgyro::analysis {
 
 namespace {
 
-// Motion is slower than this, or is seen by the scatter; slow gyros need longer for so many pairs.
+// Motion is slower than this, or shows in the scatter; slow gyros need longer blocks for so many
+// pairs.
 constexpr double kBlock_s = 1.0;
 constexpr double kPairsMin = 5.0;
-// The mean of a block that holds less of the usual count is too unsure to be held against others.
+// The mean of a block with a smaller share of the usual count is too uncertain to be compared.
 constexpr double kFullShare = 0.5;
-// The part of the blocks whose noise is surely the gyros' own: motion leaves some of itself in the
-// difference, by other scales and delays.
+// One in so many blocks certainly has only the gyros' own noise: motion leaves a part in the
+// difference, because scales and delays differ.
 constexpr std::size_t kQuietOneIn = 10;
-// The mean may scatter so many times as the difference: noise that both have in common raises it,
-// by three up to a correlation of 0.8.
+// The mean may scatter so many times as much as the difference: common noise raises the ratio, up
+// to three times for a correlation of 0.8.
 constexpr double kScatterMost = 4.0;
 constexpr double kCommonMost = 3.0;
-// And beyond what is usual at rest by this, and by so many standard errors of a scatter.
+// It may exceed the usual ratio at rest by this factor, and by so many standard errors of a
+// scatter.
 constexpr double kSteady = 1.5;
 constexpr double kScatterSigmas = 4.0;
-// Of one gyro alone, whose noise changes less than the two's ratio; and of how many blocks its
-// quiet is told.
+// The same factor for one gyro alone, whose noise changes less than the ratio of two; and the least
+// number of blocks from which its noise at rest is taken.
 constexpr double kSteadyAlone = 1.15;
 constexpr std::size_t kAloneBlocksMin = 10;
-// A block whose difference is livelier than the quiet ones by more than this is no measure.
+// A block whose difference scatters more than this factor above the quiet ones is no measure of
+// noise.
 constexpr double kLively = 3.0;
-// The lower decile of a scatter of five values, in its standard deviation.
+// The lower decile of a scatter of five values, in units of the true standard deviation.
 constexpr double kFifthsDecile = 0.516;
 constexpr double kFifthsCount = 5.0;
-// Of a normal value, from its mean down.
+// Lower decile of a normal distribution, in σ below its mean.
 constexpr double kDecileSigmas = 1.2816;
-// A value that stands between two steps of a coarse sensor scatters by half a step; this is a
-// quarter of both.
+// A coarse sensor's value that lies between two steps scatters by half a step; this is a quarter of
+// both sensors' step.
 constexpr double kStepShare = 0.25;
-// From block to block, and over two and four of them, the mean may move by so many times what the
-// difference does, and by what a building sways.
+// Over one, two and four blocks, the mean may move so many times as far as the difference does, and
+// by the sway of a building.
 constexpr std::array<std::size_t, 3> kLags{1, 2, 4};
 constexpr double kLagSigmas = 5.0;
 constexpr double kSway_dps = 0.005;
-// Of normal values: standard deviation over the median of the magnitudes.
+// Standard deviation of normal values over the median of their magnitudes.
 constexpr double kSigmaPerMedian = 1.4826;
-// Against the last rest the mean may have moved by this, as in the gateway's calibration, and by
-// what two gyros drift alike when they warm up. What one alone has drifted the difference tells.
+// Since the last rest the mean may have moved by this, as in the gateway's calibration, and by the
+// drift that two warming gyros share. The drift of one gyro alone shows in the difference.
 constexpr double kStill_dps = 0.05;
 constexpr double kAlike_dps_s = 1e-3;
 constexpr double kAlone = 1.2;
-// One gyro alone by no more: else it is blind, and the other one turns.
+// Largest drift of one gyro alone: beyond it, one gyro is blind and the other one turns.
 constexpr double kAloneMost_dps = 2.0;
 // Shorter rests are turning points of a motion.
 constexpr std::size_t kBlocksMin = 4;
-// Beside a motion this much of a rest may hold the end of it.
+// Next to a motion, this much of a rest may hold its end.
 constexpr std::size_t kMarginBlocks = 1;
-// And as much more, up to this, as the last few seconds' mean is off those before, beyond chance.
+// Further blocks of an edge, up to this many, are cut while their mean deviates from the next ones
+// beyond chance.
 constexpr std::array<std::size_t, 4> kEdges{1, 2, 4, 8};
 constexpr std::size_t kEdgeMost = 12;
 constexpr double kEdgeSigmas = 4.0;
-// The recording begins at rest, the configuration says: a rest that begins so soon is the first.
+// The configuration says that the recording begins at rest: a rest that begins this early is it.
 constexpr double kStart_s = 5.0;
 
 using Blocks = std::vector<RestBlock>;
 
-// Precondition: there are some.
+// Precondition: `values` is not empty.
 double quantile(std::vector<double> values, std::size_t one_in) {
   const auto place = values.begin() + static_cast<std::ptrdiff_t>(values.size() / one_in);
   std::nth_element(values.begin(), place, values.end());
@@ -78,7 +82,7 @@ double median(std::vector<double> values) {
   return values.empty() ? 0.0 : quantile(std::move(values), 2);
 }
 
-// From block `first` to before `end`.
+// Blocks [first, end).
 struct Run {
   std::size_t first = 0;
   std::size_t end = 0;
@@ -100,7 +104,7 @@ Level level_of(const Blocks& blocks, std::size_t first, std::size_t end) {
   return {level.common_dps / count, level.apart_dps / count};
 }
 
-// All that is asked of the blocks of one recording.
+// Finds the rests among the blocks of one recording.
 class RestSearch {
  public:
   RestSearch(const Blocks& blocks, double block_s, const RestFinder::Settings& settings)
@@ -128,8 +132,8 @@ class RestSearch {
  private:
   [[nodiscard]] std::size_t size() const { return blocks_.size(); }
 
-  // What the difference scatters by where nothing moves. Two gyros at their limits would scatter by
-  // nothing at all: what turns has no say, if there is anything else.
+  // Scatter of the difference where nothing moves. Two gyros at their limits do not scatter at all,
+  // so turning blocks are left out if there are any others.
   void set_quiet() {
     std::vector<double> scatters;
     std::vector<double> slow;
@@ -154,7 +158,8 @@ class RestSearch {
     common_ = std::clamp(median(std::move(ratios)), 1.0, kCommonMost);
   }
 
-  // The lower decile of a scatter of as many values as a block has, in its standard deviation.
+  // The lower decile of a scatter of as many values as a block has, in units of the true standard
+  // deviation.
   [[nodiscard]] double decile_of_scatter() const {
     std::vector<double> counts;
     for (const RestBlock& block : blocks_)
@@ -167,7 +172,7 @@ class RestSearch {
     steady_.assign(size(), 0);
     for (std::size_t i = 0; i < size(); ++i) {
       const RestBlock& block = blocks_[i];
-      // Motion is slow: in the means of fifths it stands out of more noise than in the samples.
+      // Motion is slow, so it stands out more in the means of fifths than in the samples.
       const bool steady =
           block.common_scatter_dps <= kScatterMost * quiet_dps_ &&
           is_steady(block.common_scatter_dps, block.apart_scatter_dps, quiet_dps_, block.count) &&
@@ -176,13 +181,14 @@ class RestSearch {
     }
   }
 
-  // What one gyro scatters by at rest is its own noise: more is motion that the other one's hides.
+  // At rest a gyro scatters by its own noise: a larger scatter is motion that the other gyro's
+  // noise hides.
   void unmark_unsteady_alone() {
     for (std::size_t gyro = 0; gyro < 2; ++gyro) {
       std::vector<double> scatters;
       std::vector<double> slow;
       for (std::size_t i = 0; i < size(); ++i) {
-        // At its limit a gyro scatters by nothing.
+        // A gyro at its limit does not scatter.
         if (steady_[i] == 0 || turns({blocks_[i].common_dps, blocks_[i].apart_dps})) continue;
         scatters.push_back(blocks_[i].own_scatter_dps[gyro]);
         slow.push_back(blocks_[i].own_slow_dps[gyro]);
@@ -205,7 +211,7 @@ class RestSearch {
     return quiet_dps * (kSteadyAlone + kScatterSigmas / std::sqrt(2.0 * (count - 1.0)));
   }
 
-  // Of so many values, where the difference scatters by `quiet_dps` when nothing moves.
+  // Is the scatter of `count` values that of rest, where the difference scatters by `quiet_dps`?
   [[nodiscard]] bool is_steady(double common_dps, double apart_dps, double quiet_dps,
                                double count) const {
     const double own_dps = std::clamp(apart_dps, quiet_dps, kLively * quiet_dps);
@@ -213,7 +219,7 @@ class RestSearch {
     return common_dps <= factor * common_ * own_dps;
   }
 
-  // By how much the difference moves over so many blocks.
+  // Usual change of the difference over each lag.
   void set_lags() {
     for (std::size_t k = 0; k < kLags.size(); ++k) {
       std::vector<double> moves;
@@ -230,7 +236,7 @@ class RestSearch {
       if (i < run.first + kLags[k]) break;
       const RestBlock& before = blocks_[i - kLags[k]];
       const double most_dps = kLagSigmas * common_ * lag_dps_[k] + kSway_dps + 0.5 * step_dps_;
-      // Across a hole no lag is known.
+      // Nothing is known across a hole.
       if (blocks_[i].from_s - before.from_s > (static_cast<double>(kLags[k]) + 0.5) * block_s_)
         continue;
       if (std::abs(blocks_[i].common_dps - before.common_dps) > most_dps) return false;
@@ -240,7 +246,7 @@ class RestSearch {
                    {blocks_[i].common_dps, blocks_[i].apart_dps}, blocks_[i].from_s - first.from_s);
   }
 
-  // What two gyros at rest may have drifted from one level to the other.
+  // May two gyros at rest have drifted from one level to the other?
   [[nodiscard]] bool is_near(const Level& one, const Level& other, double apart_s) const {
     const double common_dps = std::abs(one.common_dps - other.common_dps);
     const double alone_dps = std::abs(one.apart_dps - other.apart_dps);
@@ -274,7 +280,7 @@ class RestSearch {
     return sum_dps / static_cast<double>(width);
   }
 
-  // What is usual of it in the difference, and in each gyro.
+  // Usual bend of the difference, and of each gyro.
   void set_bends() {
     for (std::size_t e = 0; e < kEdges.size(); ++e) {
       bend_dps_[e] = usual_bend([](const RestBlock& block) { return block.apart_dps; }, kEdges[e]);
@@ -299,7 +305,7 @@ class RestSearch {
     return kSigmaPerMedian * median(std::move(bends));
   }
 
-  // How many blocks of an edge are off what lies inside of them: `at(k)` is the k-th from the edge.
+  // How many blocks of an edge deviate from those inside: `at(k)` is the k-th from the edge.
   template <class At>
   [[nodiscard]] std::size_t off_edge(std::size_t length, const At& at) const {
     std::size_t off = 0;
@@ -327,7 +333,7 @@ class RestSearch {
     return false;
   }
 
-  // Without what may hold a motion's end; before the recording begins and after it ends there is
+  // The run without blocks that may hold the end of a motion; at the recording's own ends there is
   // none.
   [[nodiscard]] Run trimmed(const Run& run) const {
     const auto from_front = [&](std::size_t k) -> const RestBlock& {
@@ -352,7 +358,7 @@ class RestSearch {
     return smaller_dps > MotionSummary::kTurning_dps;
   }
 
-  // The rest that is surely one: the first, where the recording begins with it, else the longest.
+  // The most certain rest: the first, if the recording begins with it, else the longest.
   [[nodiscard]] std::size_t surest(const std::vector<Run>& runs,
                                    const std::vector<Level>& levels) const {
     std::size_t best = runs.size();
@@ -364,7 +370,8 @@ class RestSearch {
     return best;
   }
 
-  // From the surest on to both sides: each that reads what the last rest did, as far as drift lets.
+  // From the most certain rest to both sides: each rest whose level agrees with the last one within
+  // drift.
   [[nodiscard]] std::vector<Run> of_one_level(const std::vector<Run>& runs) const {
     std::vector<Level> levels;
     for (const Run& run : runs)
@@ -398,9 +405,9 @@ class RestSearch {
   double rate_dps_;
   bool by_each_alone_;
   std::array<double, 2> own_step_dps_;
-  double step_dps_;  ///< of both
+  double step_dps_;  ///< of both gyros together
   double quiet_dps_ = 0.0;
-  double slow_dps_ = 0.0;  ///< likewise of the means of fifths
+  double slow_dps_ = 0.0;  ///< usual scatter of the means of fifths
   double common_ = 1.0;    ///< scatter of the mean over that of the difference, at rest
   std::array<double, kLags.size()> lag_dps_{};
   std::array<double, kEdges.size()> bend_dps_{};
@@ -423,7 +430,7 @@ void RestFinder::add(double t_s, const std::array<double, 2>& rate_dps) {
     open_.from_s = from_s;
     fifths_ = {};
   }
-  // About the first, so that squares keep their digits.
+  // Sums about the first value keep the digits of the squares.
   const double common_dps = 0.5 * (rate_dps[0] + rate_dps[1]);
   const double apart_dps = 0.5 * (rate_dps[0] - rate_dps[1]);
   if (open_.count == 0.0) pivot_ = {common_dps, apart_dps};
@@ -545,10 +552,10 @@ MotionSummary find_motion(const std::array<Series, 2>& paired,
 
 namespace {
 
-// Means over so long are regressed: noise in the common rate would pass for mismatch, and motion is
-// slower than most of it.
+// Means over this time are regressed: in shorter ones, noise in the common rate would look like a
+// mismatch, and motion is mostly slower.
 constexpr double kMean_s = 1.0;
-// Beyond this it is no mismatch of two gyros, and nothing is taken off.
+// A larger scale is not a mismatch of two gyros, and nothing is removed.
 constexpr double kScaleMax = 0.2;
 
 std::vector<std::array<double, 2>> means_of(const std::vector<double>& y1,
@@ -561,8 +568,8 @@ std::vector<std::array<double, 2>> means_of(const std::vector<double>& y1,
   return means;
 }
 
-// Steps of the difference against steps of the common rate and of its derivative: biases and slow
-// drifts have no say in them.
+// Regresses steps of the difference on steps of the common rate and of its derivative, so that
+// biases and slow drifts cancel.
 std::optional<Mismatch> fit_mismatch(const std::array<Series, 2>& paired) {
   Eigen::Matrix2d normal = Eigen::Matrix2d::Zero();
   Eigen::Vector2d right = Eigen::Vector2d::Zero();

@@ -1,12 +1,12 @@
 #pragma once
 
-// Was the platform still, and when? The one notion of rest that `vgyro allan`, `vgyro gap` and
-// `vgyro init` share. Noise and drift belong to each gyro alone, motion to both: at rest the mean
-// of the two rates varies like half their difference, in motion far more. So rest is judged by both
-// gyros, by steadiness alone, and against what the gyros' own noise is: no quiet second of a hover
-// passes. A rest is known again by what the gyros read in the last one, not in the first, because
-// drift moves on. A steady turn cannot be distinguished from two equal biases, so a common rate
-// beyond kTurning_dps counts as turning.
+// Was the platform still, and when? `vgyro allan`, `vgyro gap` and `vgyro init` share this
+// definition of rest. Noise and drift belong to each gyro alone, motion to both: at rest the mean
+// of the two rates varies like half their difference, in motion far more. Rest is judged by both
+// gyros, by steadiness alone, and against the gyros' own noise: no quiet second of a hover passes.
+// A later rest is recognized by the readings of the last rest, not of the first, because drift
+// continues. A steady turn cannot be distinguished from two equal biases, so a common rate beyond
+// kTurning_dps counts as turning.
 
 #include <array>
 #include <cstddef>
@@ -23,10 +23,10 @@ struct Stretch {
   [[nodiscard]] double seconds() const { return to_s - from_s; }
 };
 
-/// What is without a hole of a rest.
+/// A part of a rest without a hole.
 struct RestPart {
   Stretch stretch;
-  std::size_t rest = 0;  ///< parts of one rest have its number
+  std::size_t rest = 0;  ///< number of the rest, the same for all of its parts
 };
 
 /// The mean of both gyros, and half their difference, in a block of time.
@@ -54,17 +54,17 @@ class RestFinder {
     double interval_s = 0.01;          ///< of the pairs
     std::array<double, 2> step_dps{};  ///< between a gyro's values; 0: unknown, or none
     double rate_dps = 0.0;             ///< true rate at rest
-    /// What only the finer gyro feels is motion too: for who takes each gyro's reading at rest for
-    /// its error.
+    /// Motion that only the finer gyro feels counts too: for callers that take each gyro's reading
+    /// at rest as its error.
     bool by_each_alone = false;
   };
   explicit RestFinder(const Settings& settings);
 
   void add(double t_s, const std::array<double, 2>& rate_dps);
 
-  /// Whole blocks, without what is at the edge of a motion. To be called once.
+  /// The rests in whole blocks, without the edges of motions. To be called once.
   std::vector<RestPart> find();
-  /// Those with enough pairs for a result; of find().
+  /// Blocks with enough pairs; valid after find().
   [[nodiscard]] const std::vector<RestBlock>& blocks() const { return blocks_; }
   [[nodiscard]] double block_s() const { return block_s_; }
 
@@ -92,23 +92,23 @@ struct MotionSummary {
   static constexpr double kRestMin_s = 30.0;
 
   bool at_rest = false;           ///< throughout
-  double turned_up_to_dps = 0.0;  ///< fastest second, off the median
-  std::optional<Stretch> rest;    ///< the longest, where it is at least kRestMin_s
+  double turned_up_to_dps = 0.0;  ///< fastest second, relative to the median
+  std::optional<Stretch> rest;    ///< the longest, if it has at least kRestMin_s
 };
 
 /// `paired`: both gyros' rates at common instants.
 MotionSummary find_motion(const std::array<Series, 2>& paired,
                           const std::array<double, 2>& step_dps = {});
 
-/// How much of the difference y₁ − y₂ follows the rotation.
+/// The part of the difference y₁ − y₂ that follows the rotation.
 struct Mismatch {
-  double scale = 0.0;  ///< per unit of rate: gyro 1 reads more, where positive
-  double lag_s = 0.0;  ///< gyro 1 is ahead of gyro 2, where positive
+  double scale = 0.0;  ///< per unit of rate; positive: gyro 1 reads more
+  double lag_s = 0.0;  ///< positive: gyro 1 is ahead of gyro 2
 };
 
 struct Difference {
   Series series;
-  std::optional<Mismatch> removed;  ///< by least squares, where the platform moved
+  std::optional<Mismatch> removed;  ///< by least squares, if the platform moved
 };
 
 Difference difference(const std::array<Series, 2>& paired, const MotionSummary& motion);

@@ -7,10 +7,10 @@ namespace vgyro::analysis {
 
 namespace {
 
-// Share of a sample's lateness by which the grid follows it: jitter averages out over some fifty
-// samples, a clock that runs wrong by 1e-3 is still followed within a twentieth of an interval.
+// Share of a sample's deviation by which the grid follows it: jitter averages out over some fifty
+// samples, and a clock error of 1e-3 is followed within a twentieth of an interval.
 constexpr double kFollow = 0.02;
-// Measured neighbours on each side of a hole that stand in for it.
+// Measured neighbours on each side of a hole whose mean fills it.
 constexpr std::size_t kNeighbours = 4;
 constexpr std::size_t kSamplesMin = 3;
 
@@ -51,7 +51,7 @@ void SeriesBuilder::add(double t_s, const std::array<double, 2>& values) {
   if (first_.size() == kSamplesToJudge) find_interval();
 }
 
-// The mean of what is near the median: lost samples and pauses have no say.
+// The mean of the intervals near the median, without lost samples and pauses.
 void SeriesBuilder::find_interval() {
   std::vector<double> intervals;
   for (std::size_t i = 1; i < first_.size(); ++i)
@@ -128,7 +128,7 @@ void SeriesBuilder::close_part() {
   grid_places_ += static_cast<double>(series_[0].parts.back().rate_dps.size() - 1);
 }
 
-// The mean of the neighbours keeps slow drift and adds next to no noise of its own.
+// The mean of the neighbours keeps slow drift and adds hardly any noise.
 void SeriesBuilder::bridge() {
   if (holes_ == 0) return;
   for (Series& series : series_) {

@@ -15,12 +15,12 @@ namespace {
 constexpr std::size_t kValuesMin = 16;
 constexpr std::size_t kWholeMax = std::size_t{1} << 18U;
 constexpr std::size_t kPieceMin = std::size_t{1} << 17U;
-// Of a long record, the means serve up to this share of their own highest frequency, and the
-// pieces begin where a piece holds this many half periods.
+// In a long record, the means are used up to this share of their own highest frequency; the pieces
+// are used from this many half periods in a piece.
 constexpr double kShareOfMeans = 0.1;
 constexpr std::size_t kHalfPeriodsMin = 128;
-// The first coefficients stand alone; later bins are so narrow that the power changes by 3 %
-// inside.
+// The first coefficients have a bin each; later bins are so narrow that the power changes by 3 %
+// within one.
 constexpr std::size_t kAlone = 128;
 constexpr std::size_t kBinsPerRatio = 64;
 
@@ -44,7 +44,7 @@ void add_bins(std::span<const double> values, double interval_s, Band band,
     bin.step_gain = 4.0 * std::sin(half_angle) * std::sin(half_angle);
     bin.half_periods = middle;
     for (; j < end; ++j) {
-      // Σ sin(πjk/n) over k is cot(πj/2n) for odd j and nothing for even j.
+      // Σ sin(πjk/n) over k is cot(πj/2n) for odd j and 0 for even j.
       const double angle = 0.5 * std::numbers::pi * static_cast<double>(j) / size;
       const double h = j % 2 == 0 ? 0.0 : interval_s * std::sqrt(2.0 / size) / std::tan(angle);
       bin.count += 1.0;

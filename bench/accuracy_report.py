@@ -1,4 +1,4 @@
-"""What bench/accuracy makes of its measurements: figures, verdicts, tables and a picture."""
+"""Figures, verdicts, tables and a picture from the measurements of bench/accuracy."""
 
 import math
 
@@ -9,7 +9,7 @@ from judge import motion, score
 from judge.pair import PAIRS
 
 DPH = 3600.0  # deg/h in 1 deg/s
-# How much of the bound's heading error each mode may have.
+# Largest heading error of each mode, relative to the bound's.
 LIMITS = {"given": 1.05, "estimated": 1.25}
 ERROR2_LIMITS = (0.8, 1.2)
 RIVALS = {
@@ -43,14 +43,14 @@ def ratio(of, to):
 
 
 def below(measured, limit):
-    """yes, no, or open where the seeds do not decide."""
+    """Returns "yes", "no", or "open" if the seeds do not decide."""
     if measured["high"] <= limit:
         return "yes"
     return "no" if measured["low"] > limit else "open"
 
 
 def mean_of(figures, name):
-    """Over the seeds that have it."""
+    """Mean over the seeds that have the figure."""
     values = np.array([np.atleast_1d(f[name]) for f in figures], dtype=float)
     counts = np.isfinite(values).sum(axis=0)
     return np.where(counts > 0, np.nansum(values, axis=0) / np.maximum(counts, 1), np.nan)

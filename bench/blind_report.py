@@ -83,7 +83,7 @@ NOISE = {"white_noise", "rate_random_walk", "gauss_markov", "rate_noise", "bias_
 
 
 def outcome(line):
-    """One word for what became of a recording."""
+    """The outcome of a recording in a word."""
     j, group = line["judged"], line["answer"]["group"]
     if j["confident"]:
         return "CONFIDENTLY WRONG" if any(k not in NOISE for k, _ in j["confident"]) else "surplus noise"
@@ -99,12 +99,12 @@ def outcome(line):
 
 
 def inside(line):
-    """Whether the gap on the samples that took no part is inside its band."""
+    """Is the gap of the held-out samples inside its band?"""
     return line["gap"]["after"] <= line["gap"]["band95"][1]
 
 
 def one_line(line):
-    """A recording in a line: seed, world, hidden, verdict, names, outcome, gap and band, cost."""
+    """One line for a recording: seed, world, hidden, verdict, names, outcome, gap and band, cost."""
     answer = line["answer"]
     hidden = " + ".join(f"{e['kind']} {e['gyro']}" for e in answer["effects"]) or "–"
     if answer["outside"]:
@@ -130,7 +130,7 @@ def one_line(line):
 
 
 def changes(lines, before):
-    """What became of the same recordings under another build: outcome, gap inside its band, seconds."""
+    """Differences from another build's run of the same recordings: outcome, gap inside its band, seconds."""
     def told(line):
         if "failed" in line:
             return "FAILED", False, math.inf
@@ -150,8 +150,8 @@ def changes(lines, before):
 
 
 def must_reach(lines):
-    """The rows that decide, of drives or of all worlds. A run that failed or was ended has done nothing right; of what
-    it would have named nobody knows, so that rows of wrong names count the others."""
+    """The rows with limits, for drives or for all worlds. A run that failed or was ended counts as not right; its
+    names are not known, so the rows of wrong names count only the other runs."""
     judged = [line for line in lines if "judged" in line]
 
     def of(*groups, among=lines):
@@ -201,8 +201,8 @@ def must_reach(lines):
 
 
 def uniformity(judged):
-    """Of clean recordings: is the p of the best of all candidates (`null.p_value` of gap.json, where it is written) as
-    often below any bound as the bound says? Kolmogorov and Smirnov's distance, with its 5 % bound."""
+    """For clean recordings: is the p of the best candidate (`null.p_value` of gap.json, if present) below any bound
+    as often as the bound says? Kolmogorov and Smirnov's distance, with its 5 % bound."""
     p = sorted(
         line["null_p"] for line in judged if line["answer"]["group"] == "clean" and line.get("null_p") is not None
     )
@@ -228,7 +228,7 @@ FAMILIES = {
 
 
 def coverage(judged):
-    """Parameters inside their 95 % interval, by family: median of |error|/σ is 0.67 where σ is right."""
+    """Share of parameters inside their 95 % interval, by family; the median of |error|/σ is 0.67 if σ is right."""
     lines = ["| family | inside 95 % | median of \\|error\\|/σ |", "|---|---|---|"]
     for family, names in FAMILIES.items():
         own = [e for line in judged for e in line["judged"]["errors"] if e[0] in names]

@@ -1,8 +1,8 @@
 /* Two gyros at any rate, for bench/faults: bus_load BUS_A BUS_B PAIRS_PER_S SECONDS [OTHERS]
-   Frames as examples/twin.dbc describes them. Intervals are random about their mean, so that nothing falls into step with
-   a kernel's clock ticks; with OTHERS pairs come evenly, and so many frames of other identifiers stand back to back with
-   each gyro's: one system call for a bus, or under User Mode Linux sending would be what fills the machine. Prints the
-   gyros' frames, all frames, and by how many seconds the last was late. */
+   Frames as in examples/twin.dbc. Intervals are random about their mean, so that nothing falls into step with a kernel's
+   clock ticks. With OTHERS, pairs come evenly, and OTHERS frames of other identifiers follow each gyro's back to back, in
+   one system call for each bus: under User Mode Linux, sending would otherwise take most of the machine. Prints the number
+   of the gyros' frames, of all frames, and the lateness of the last one in seconds. */
 
 #define _GNU_SOURCE
 #include <errno.h>

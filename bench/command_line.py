@@ -1,5 +1,5 @@
-"""What the benchmarks' command lines share: numbers that are finite and in their range, names that can be
-nothing but names, and pictures by gnuplot."""
+"""Shared parts of the benchmarks' command lines: numbers that are finite and in their range, names that cannot be
+taken for options, and pictures by gnuplot."""
 
 import argparse
 import math
@@ -22,7 +22,7 @@ def number(low, high):
 
 
 def whole(low, high):
-    """For argparse: a whole number in the range, decimal whatever it begins with."""
+    """For argparse: a whole number in the range, always decimal, even with a leading zero."""
 
     def parse(text):
         value = int(text, 10)
@@ -35,12 +35,12 @@ def whole(low, high):
 
 
 def file_name(text):
-    """For argparse: a path that no program takes for an option or a command, since it begins with a slash."""
+    """For argparse: an absolute path, which no program takes for an option or a command."""
     return Path(os.path.abspath(text))
 
 
 def refuse_overwriting(parser, inputs, outputs):
-    """Wrong usage when an output is an input or another output, under whatever name."""
+    """Wrong usage if an output is an input or another output, also under another name."""
     outputs = [path for path in outputs if path is not None]
     for i, output in enumerate(outputs):
         for other in [*inputs, *outputs[:i]]:
@@ -49,6 +49,6 @@ def refuse_overwriting(parser, inputs, outputs):
 
 
 def draw(script, path):
-    """The script sets a terminal and no output: gnuplot takes a name that begins with a bar for a command."""
+    """The script must set a terminal and no output: gnuplot would run a name that begins with a bar as a command."""
     picture = subprocess.run(["gnuplot", "--default-settings", "-"], input=script.encode(), stdout=subprocess.PIPE, check=True).stdout
     Path(path).write_bytes(picture)

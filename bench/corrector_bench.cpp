@@ -1,5 +1,6 @@
-// What a pair of samples costs in the optimal corrector: turning or at a stop, at 100 and 500 Hz,
-// with N and K given (one filter) or estimated (one for each pair of supposed K).
+// Cost of a pair of samples in the optimal corrector: turning or at a stop, at 100 and 500 Hz, with
+// N and K given (one filter for each kind of drift) or estimated (one for each pair of supposed K
+// as well).
 
 #include <cmath>
 #include <cstdint>

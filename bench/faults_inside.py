@@ -1,6 +1,6 @@
 #!/usr/bin/python3
-"""The part of bench/faults that runs where the vcan interfaces are; see tests/vcan/ground.py. Orders come in
-plan.json in the folder named first, results go beside it; captures are kept in the folder named second meanwhile."""
+"""The part of bench/faults that runs where the vcan interfaces are; see tests/vcan/ground.py. Its orders are in
+plan.json in the first folder, and its results go there too; captures are kept in the second folder meanwhile."""
 
 import json
 import os
@@ -24,7 +24,7 @@ def resident_kb(pid):
 
 
 def latencies_us(path):
-    """From the stamp of the gyro frame that came last to the rate's, by the kernel's stamps."""
+    """Latencies from the last gyro frame to the rate's frame, by the kernel's stamps."""
     found, last = [], None
     with open(path, encoding="ascii") as file:
         for line in file:
@@ -37,7 +37,7 @@ def latencies_us(path):
 
 
 def mark(folder, name):
-    """The host looks at its own clock of processor time when this appears."""
+    """Creates a file; when it appears, the host reads its own clock of processor time."""
     time.sleep(0.3)
     with open(os.path.join(folder, name), "wb"):
         pass

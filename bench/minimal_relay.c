@@ -1,7 +1,7 @@
 /* The least that receives and sends, for bench/faults: minimal_relay OUT BUS [BUS [clocks]]
-   Reads the frames of two gyros and answers every second gyro's with one frame. One bus: read and write, nothing
-   else; two: poll in front. `clocks`: it also asks for the time, of both clocks, as often as it is woken; under User
-   Mode Linux that is a system call each, elsewhere it is none. */
+   Reads the frames of two gyros and answers each frame of gyro 2 with one frame. One bus: read and write alone;
+   two: a poll before them. `clocks`: it also reads both clocks whenever it wakes up; under User Mode Linux that is a
+   system call each, elsewhere none. */
 
 #include <linux/can.h>
 #include <linux/can/raw.h>

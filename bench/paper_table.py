@@ -1,6 +1,6 @@
 #!/usr/bin/python3
-"""Prints the paper's table as measured on the simulated twin: `vgyro replay` with `mutual` beside
-`mean`, over several seeds."""
+"""Prints the paper's table as measured on the simulated twin: `vgyro replay` with `mutual` and with `mean`, over
+several seeds."""
 
 import argparse
 import sys
@@ -29,7 +29,7 @@ def main():
     parser.add_argument("--seeds", type=command_line.whole(1, 10_000), default=10, help="seeds 1 … this (default %(default)s)")
     count = parser.parse_args().seeds
 
-    print(f"Medians over seeds 1 … {count} (in brackets: the worst seed). 1 σ: what the twin's noise lets one expect of `mutual`.\n")
+    print(f"Medians over seeds 1 … {count} (in brackets: the worst seed). 1 σ: expected error of `mutual` from the twin's noise.\n")
     print("| run | magnitude of | plain mean | virtual gyro, `mutual` | 1 σ | paper: mean | paper: virtual |")
     print("|---|---|---|---|---|---|---|")
     for run in paper.RUNS:

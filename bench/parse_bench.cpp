@@ -1,5 +1,5 @@
-// What each stage costs per frame: the log's text, a signal's bits, the whole pipeline, the
-// output's text. Works on examples/twin.log.xz, unpacked into memory beforehand.
+// Cost of each stage per frame: the log's text, a signal's bits, the whole pipeline, the output's
+// text. Uses examples/twin.log.xz, unpacked into memory beforehand.
 
 #include <algorithm>
 #include <cstdint>
@@ -111,7 +111,7 @@ class CountingSink final : public gateway::FrameSink {
   std::uint64_t sum = 0;
 };
 
-/// One pass is the recording from waiting to the end of the run; the pipeline is made anew outside
+/// One pass is the recording from waiting to the end of the run; the pipeline is rebuilt outside
 /// the measured time. Argument: the method.
 void pipeline_frame(benchmark::State& state) {
   gateway::Plan plan = load_plan();

@@ -1,4 +1,4 @@
-// Parses every line of a candump log and prints how many frames it held.
+// Parses every line of a candump log and prints the number of its frames.
 
 #include <cstdio>
 #include <utility>
@@ -18,7 +18,7 @@ int main(int argc, char** argv) {
   }
   vgyro::canlog::CandumpReader reader(std::move(*source));
   vgyro::canlog::LogRecord record;
-  unsigned long long id_sum = 0;  // printed, so that nothing of the parsing can be left out
+  unsigned long long id_sum = 0;  // printed, so that the compiler can leave out no parsing
   while (reader.next(record))
     id_sum += record.frame.id + record.frame.data[0];
   std::printf("%llu frames (sum %llu)\n", static_cast<unsigned long long>(reader.counts().frames),

@@ -1,6 +1,7 @@
 #!/usr/bin/python3
-"""What a script of a dozen lines does: python-can reads the log, struct takes the rates out of the
-frames, their mean is formed. Prints frames and seconds of the loop, without Python's own start."""
+"""A script of a dozen lines for comparison: python-can reads the log, struct decodes the rates, and
+their mean is computed. Prints the number of frames and the seconds of the loop, without Python's own
+start."""
 
 import struct
 import sys

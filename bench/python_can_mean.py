@@ -1,6 +1,6 @@
 #!/usr/bin/python3
-"""What a script of a dozen lines does live: python-can receives both gyros on one bus, struct takes the rates out,
-their mean goes back. For bench/faults."""
+"""A script of a dozen lines for comparison, live: python-can receives both gyros on one bus, struct decodes the
+rates, and their mean is sent back. For bench/faults."""
 
 import struct
 import sys

@@ -1,4 +1,4 @@
-// Reads a log of any form and prints how many frames it held and how long that took.
+// Reads a log of any form and prints the number of its frames and the time taken.
 
 #include <chrono>
 #include <cstdio>
@@ -18,7 +18,7 @@ int main(int argc, char** argv) {
   }
   vgyro::canlog::LogReader& reader = **opened;
   vgyro::canlog::LogRecord record;
-  unsigned long long id_sum = 0;  // printed, so that nothing of the reading can be left out
+  unsigned long long id_sum = 0;  // printed, so that the compiler can leave out no reading
   while (reader.next(record))
     id_sum += record.frame.id + record.frame.data[0];
   const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - begin;

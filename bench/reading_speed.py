@@ -1,6 +1,7 @@
 #!/usr/bin/python3
-"""How fast logs of several forms are read, nothing being done with their frames, beside python-can's readers of the same
-files, all in one run, pinned to one core. The log is throughput.py's. Prints Markdown. Needs Debian's package python3-can."""
+"""Speed of reading logs of several forms, without use of their frames, compared with python-can's readers of the
+same files; all in one run, pinned to one core. The log is throughput.py's. Prints Markdown. Needs Debian's package
+python3-can."""
 
 import argparse
 import os

@@ -1,12 +1,12 @@
 #!/usr/bin/python3
-"""Real recordings of two whole units: makes a log of their three axes from the publishers' own files, and says how much of the
+"""Real recordings of two whole units: makes a log of their three axes from the publishers' own files, and prints how much of the
 difference's power below 2 Hz a small rotation between the units explains, and how much is left after `vgyro replay` has learned one.
 
     bench/real_axes.py dots Horizontal/            # path_N/IMU_1.csv and IMU_2.csv, segments joined by pauses of 2 s
     bench/real_axes.py dataflash log171.bin        # IMU and IMU2 of an ArduPilot log
 
-The shares by least squares are of stretches that the fit has not seen: each half of the recording is judged with what the other
-half says. docs/real-data.md says where the files come from; none is part of this repository."""
+The shares by least squares are of stretches that the fit has not seen: each half of the recording is judged with the fit of the
+other half. docs/real-data.md lists the sources of the files; none is part of this repository."""
 
 import argparse
 import csv
@@ -30,7 +30,7 @@ START_US = 1_690_000_000_000_000
 PAUSE_S = 2.0  # between two segments
 GAP_S = 0.5  # longer silences cut a recording
 SLOW_HZ = 2.0
-STRETCH_S = 10.0  # is Fourier's; a shorter rest is left out
+STRETCH_S = 10.0  # length of a Fourier transform; a shorter remainder is left out
 FASTEST_DPS = 400.0  # beyond it a craft tumbles
 LAG_MAX_S, LAG_STEP_S = 0.06, 0.001
 
@@ -44,7 +44,7 @@ DBC = 'VERSION ""\n\nBU_: CRAFT\n' + "".join(
 
 # ---------------------------------------------------------------- the publishers' files
 def dots(folder):
-    """Time and rates of two modules, segment behind segment."""
+    """Time and rates of two modules, segment after segment."""
     paths = sorted(Path(folder).glob("path_*"), key=lambda path: int(path.name.split("_")[1]))
     if not paths:
         sys.exit(f"{folder}: holds no path_1, path_2, …; the folder Horizontal of the repository does")
@@ -68,7 +68,7 @@ FLOATS = {"f": "f", "d": "d", "b": "b", "B": "B", "h": "h", "H": "H", "i": "i", 
 
 
 def dataflash(path):
-    """Time and rates of IMU and IMU2: records are A3 95 TYPE and the fields that a record of type 128 has announced."""
+    """Time and rates of IMU and IMU2: a record is A3 95 TYPE and the fields that a record of type 128 has defined."""
     data, kinds, found, at = Path(path).read_bytes(), {}, {"IMU": [], "IMU2": []}, 0
     while (at := data.find(b"\xa3\x95", at)) >= 0 and at + 3 <= len(data):
         kind = data[at + 2]
@@ -116,7 +116,7 @@ def config_text(rest_s):
 
 
 def replay(units, rest_s, keep):
-    """What the product says of the rotation."""
+    """The rotation by the product's summary."""
     with tempfile.TemporaryDirectory(prefix="vgyro-real-") as scratch:
         folder = Path(keep or scratch)
         folder.mkdir(parents=True, exist_ok=True)
@@ -125,7 +125,7 @@ def replay(units, rest_s, keep):
         (folder / "measured.log").write_text(log_of(units))
         done = subprocess.run([VGYRO, "replay", "--quiet", "--config", folder / "vgyro.toml", "-o", "/dev/null", "--json", "-", folder / "measured.log"],
                               capture_output=True, check=False)
-    # A pair that cannot be one is told by exit code 1, behind the summary.
+    # For a contradicted pair the exit code is 1, after a complete summary.
     if not done.stdout:
         sys.exit(done.stderr.decode(errors="replace"))
     return json.load(io.BytesIO(done.stdout)), done.stderr.decode(errors="replace").strip()
@@ -133,7 +133,7 @@ def replay(units, rest_s, keep):
 
 # ---------------------------------------------------------------- the difference
 def stretches(units):
-    """Parts of STRETCH_S in which both speak and nothing tumbles: both units on one even grid."""
+    """Parts of STRETCH_S in which both units send and nothing tumbles, on one even grid."""
     one, two = units
     step_s = float(np.median(np.diff(one[:, 0])))
     count = int(STRETCH_S / step_s)
@@ -150,7 +150,7 @@ def stretches(units):
 
 
 def late_by(grid, a, near):
-    """By how much unit 2 comes later, over all axes: what leaves the least of the difference."""
+    """Delay of unit 2 over all axes: the one that leaves the least difference."""
     lags = np.arange(-LAG_MAX_S, LAG_MAX_S + LAG_STEP_S, LAG_STEP_S)
     left = []
     for lag_s in lags:
@@ -160,7 +160,7 @@ def late_by(grid, a, near):
 
 
 def slow(values, step_s):
-    """What lies below 2 Hz, without mean and trend: a level and a drift are the corrector's business."""
+    """The part below 2 Hz, without mean and trend, which are left to the corrector."""
     n = values.shape[1]
     line = np.linspace(-1.0, 1.0, n)
     level = values - values.mean(axis=1)[:, None]
@@ -171,7 +171,7 @@ def slow(values, step_s):
 
 
 def rows_of(a):
-    """What θ about x, y and z adds to the difference of each axis: b − a = a × θ, θ in rad. (3 axes, 3 angles, n)"""
+    """Effect of θ about x, y and z on the difference of each axis: b − a = a × θ, θ in rad. (3 axes, 3 angles, n)"""
     x, y, z = a
     none = np.zeros_like(x)
     return np.array([[none, -z, y], [z, none, -x], [-y, x, none]])
@@ -190,7 +190,7 @@ def fit(parts, with_scale):
 
 
 def power(parts, theta, scale=np.zeros(3)):
-    """Mean square of the slow difference of each axis, less what this rotation and these scale factors foretell."""
+    """Mean square of the slow difference of each axis, less the prediction by this rotation and these scale factors."""
     squares, count = np.zeros(3), 0
     for a, d in parts:
         left = d - np.einsum("ijk,j->ik", rows_of(a), theta) - scale[:, None] * a
@@ -199,7 +199,7 @@ def power(parts, theta, scale=np.zeros(3)):
 
 
 def held_out(parts, with_scale):
-    """As power(), each half with what the other says."""
+    """Like power(), each half with the fit of the other half."""
     halves = [parts[: len(parts) // 2], parts[len(parts) // 2 :]]
     found = [fit(half, with_scale) for half in halves]
     total = sum(len(half) * power(half, other[:3], other[3:] if with_scale else np.zeros(3)) for half, other in zip(halves, reversed(found)))

@@ -1,8 +1,8 @@
 #!/usr/bin/python3
-"""Do the names that `vgyro gap` gives a real recording stand up? A plain regression, written apart from the product and
-with none of its ideas: means over cells of 0.2 s, one gyro less the reference (or less the other gyro), least squares on
+"""Are the names that `vgyro gap` gives a real recording correct? A plain regression, independent of the product's code
+and methods: means over cells of 0.2 s, one gyro less the reference (or less the other gyro), least squares on
 rate, |rate|, rate², temperature, time and the change of rate, and the recording cut into stretches whose sizes must
-agree. Its errors are the scatter between stretches, and a shape has to foretell stretches that it was not fitted to.
+agree. Its errors are the scatter between stretches, and a shape has to predict stretches that it was not fitted to.
 
 FOLDER holds one recording a subfolder: vgyro.toml, signals.dbc, measured.log.xz. By default $VGYRO_RECORDINGS."""
 
@@ -25,16 +25,16 @@ import command_line
 
 CELL_S = 0.2  # vibration averages out in it, a turn does not
 PAUSE_S = 0.5  # longer silences cut the recording
-STRETCH_S = 20.0  # whose sizes are compared
+STRETCH_S = 20.0  # length of the stretches whose sizes are compared
 STRETCHES_MIN = 4  # fewer show no scatter
-FASTEST_DPS = 400.0  # beyond it a craft tumbles, and no gyro of these is within its range
-OUTLIER_TIMES, OUTLIER_SHARE = 8.0, 0.9  # beyond so many times what this share of cells stays below: a crash
+FASTEST_DPS = 400.0  # beyond it a craft tumbles, and these gyros are out of range
+OUTLIER_TIMES, OUTLIER_SHARE = 8.0, 0.9  # beyond this many times the quantile of this share of cells: a crash
 LAG_MAX_S, LAG_STEP_S = 0.15, 0.001
-PARTS = 5  # of a recording, for lags and levels
-ALIKE_MIN = 0.7  # correlation below which a lag is nobody's
-SIGMAS = 3.0  # what a size must be of its scatter to be there, and may be off
-UNSEEN_TIMES = 20.0  # a share that is claimed is not there when less than a twentieth of it shows
-FORETELLS = 0.002  # of the variance of stretches left out: less is nothing
+PARTS = 5  # number of parts of a recording, for lags and levels
+ALIKE_MIN = 0.7  # correlation below which a lag is not used
+SIGMAS = 3.0  # least size in units of its scatter to be present, and largest deviation
+UNSEEN_TIMES = 20.0  # an effect is contradicted if less than a twentieth of its claimed share shows
+FORETELLS = 0.002  # least predicted share of the variance of stretches that were left out
 BEGIN, END = "<!-- real_regression: begin -->", "<!-- real_regression: end -->"
 
 
@@ -54,7 +54,7 @@ def signals_of(dbc):
 
 
 def frames_of(log, wanted):
-    """(bus, id) → stamps, eight bytes each, of the wanted ones in a candump log."""
+    """(bus, id) → stamps and eight bytes each, for the wanted frames in a candump log."""
     stamps, data = {key: [] for key in wanted}, {key: [] for key in wanted}
     opened = lzma.open if log.suffix == ".xz" else open
     with opened(log, "rt") as lines:
@@ -74,7 +74,7 @@ def frames_of(log, wanted):
 def values_of(raw, layout):
     _, start, bits, little, signed, factor, offset = layout
     words = np.ascontiguousarray(raw).view("<u8" if little else ">u8")[:, 0].astype(np.uint64)
-    # Motorola: the start names the highest bit, counted from the left as the row of bytes lies.
+    # Motorola: the start is the highest bit, counted from the left in the row of bytes.
     shift = start if little else 64 - (start // 8 * 8 + 7 - start % 8) - bits
     value = ((words >> np.uint64(shift)) & np.uint64((1 << bits) - 1)).astype(np.int64)
     if signed:
@@ -83,7 +83,7 @@ def values_of(raw, layout):
 
 
 class Recording:
-    """Two gyros and what else is there, as (t, value) in seconds since the first frame."""
+    """Two gyros and the other signals, as (t, value) in seconds since the first frame."""
 
     def __init__(self, folder):
         config = tomllib.loads((folder / "vgyro.toml").read_text())
@@ -106,7 +106,7 @@ class Recording:
 
 # ---------------------------------------------------------------- cells
 def lag_of(late, early):
-    """Seconds by which the first stream comes behind the second: where they correlate best, to a parabola's top."""
+    """Delay of the first stream behind the second, s: the best correlation, refined by a parabola."""
     t = np.arange(max(late[0][0], early[0][0]) + 1.0, min(late[0][-1], early[0][-1]) - 1.0, 0.02)
     calm = lambda x: np.convolve(x, np.hanning(17) / np.hanning(17).sum(), "same")
     fixed = calm(np.interp(t, *early))
@@ -120,15 +120,15 @@ def lag_of(late, early):
 
 
 def cell_means(t, y, edges):
-    """Means of each cell by the trapezoids' area, and how many samples it holds: a plain mean of samples belongs to
-    the middle of the samples, not of the cell, and half a sample is a delay of milliseconds."""
+    """Mean of each cell from the trapezoids' area, and its number of samples. A plain mean of samples belongs to the
+    middle of the samples, not of the cell, and half a sample is a delay of milliseconds."""
     area = np.concatenate([[0.0], np.cumsum(0.5 * (y[1:] + y[:-1]) * np.diff(t))])
     count = np.diff(np.searchsorted(t, edges))
     return np.diff(np.interp(edges, t, area)) / np.diff(edges), count
 
 
 class Cells:
-    """What is regressed: `y` of one gyro less `truth` (the reference, or the other gyro), and the shapes."""
+    """Input of the regression: `y` of one gyro less `truth` (the reference, or the other gyro), and the shapes."""
 
     def __init__(self, recording, gyro):
         own, other = recording.gyros[gyro - 1], recording.gyros[2 - gyro]
@@ -155,7 +155,7 @@ class Cells:
 
 
 def _usual(d, columns, good):
-    """Where the difference, less what level, rate and change explain, is not beyond all measure."""
+    """The cells in which the difference, less its fit by level, rate and change, is no outlier."""
     a = np.column_stack(columns)
     for _ in range(3):
         off = np.abs(d - a @ np.linalg.lstsq(a[good], d[good], rcond=None)[0])
@@ -164,7 +164,8 @@ def _usual(d, columns, good):
 
 
 def _stretches(t, pauses):
-    """Number of the stretch of each cell: as near to STRETCH_S as pauses allow, at least STRETCHES_MIN in all."""
+    """Index of each cell's stretch: stretches are as near to STRETCH_S as pauses allow, at least STRETCHES_MIN in
+    all."""
     length = min(STRETCH_S, (t[-1] - t[0]) / (STRETCHES_MIN + 1))
     label = np.floor((t - t[0]) / length).astype(int)
     if pauses[-1] >= STRETCHES_MIN:
@@ -174,8 +175,8 @@ def _stretches(t, pauses):
 
 # ---------------------------------------------------------------- regression
 class Fit:
-    """Least squares; errors from the scatter of stretches (a jackknife over them); what the last column foretells of
-    stretches that were left out."""
+    """Least squares. The errors come from the scatter of stretches (a jackknife over them), and `foretells` is the
+    share that the last column predicts of stretches that were left out."""
 
     def __init__(self, y, columns, stretch):
         scale = np.array([max(np.abs(c).max(), 1e-300) for c in columns])
@@ -196,11 +197,11 @@ class Fit:
         bare = sum(np.sum((q - p[:, :-1] @ b) ** 2) for (p, q), b in zip(parts, less))
         self.foretells = 1.0 - full / bare
         beside = a[:, -1] - a[:, :-1] @ solve(whole[:-1, :-1], whole[:-1, -1])
-        self.of_one_unit = float(beside @ beside) * scale[-1] ** 2 / bare  # share that one unit would make of the rest
+        self.of_one_unit = float(beside @ beside) * scale[-1] ** 2 / bare  # share of the remainder that one unit would be
 
 
 def shape_of(kind, p, cells):
-    """What one unit of the effect adds to `d`; None where a plain regression has no such column."""
+    """Effect of one unit on `d`; None if a plain regression has no such column."""
     c = cells
     heat = None if c.heat is None else c.heat - p.get("reference_c", 25.0)
     table = {
@@ -224,7 +225,7 @@ def shape_of(kind, p, cells):
 
 
 def base_columns(cells, without):
-    """What stands beside a shape: level, rate, change of rate; not what the shape itself is."""
+    """The other columns of a regression: level, rate, change of rate, except the shape itself."""
     columns = {"level": np.ones(len(cells.t)), "rate": cells.x, "change": cells.slope}
     if without in ("scale_factor",):
         del columns["rate"]
@@ -234,7 +235,7 @@ def base_columns(cells, without):
 
 
 def looked_at(kind, p, cells):
-    """(size, error, share foretold, share that one unit would make) of one shape beside the base."""
+    """(size, error, predicted share, share that one unit would be) of one shape together with the base columns."""
     shape = shape_of(kind, p, cells)
     if shape is None or np.ptp(shape) < 1e-12:
         return None
@@ -246,7 +247,8 @@ def looked_at(kind, p, cells):
 
 
 def both_ways(cells):
-    """Scale factor from y on x and from x on y: noise in the one shrinks, in the other swells it; the truth is between."""
+    """Scale factor from y on x and from x on y: noise makes one too small and the other too large; the truth is
+    between."""
     centred = lambda v: v - v.mean()
     x, y = centred(cells.x), centred(cells.y)
     xy = float(x @ y)
@@ -275,7 +277,7 @@ def allan(cells_d, t, tau_cells):
 
 
 def steps_between(values):
-    """(step, how well values keep to it: 1 on a lattice, 0 anywhere)."""
+    """(step, how well values agree with it: 1 on a lattice, 0 for arbitrary values)."""
     levels = np.unique(np.round(values, 9))
     gaps = np.diff(levels)
     gaps = gaps[gaps > 1e-9]
@@ -289,7 +291,7 @@ def steps_between(values):
 
 # ---------------------------------------------------------------- judgement
 def judge_size(effect, told):
-    """(word, reason) for an effect with a size that a column has."""
+    """(word, reason) for an effect whose size is that of a column."""
     kind, name = effect["kind"], SIZES[effect["kind"]]
     claimed = effect["parameters"][name]
     doubt = effect.get("sigma", {}).get(name, 0.0) or 0.0
@@ -385,7 +387,7 @@ def levels_by_part(cells):
 
 
 def findings(recording, cells):
-    """What the regression sees by itself, whatever anybody named."""
+    """The findings of the regression itself, independent of the names."""
     lines = []
     for gyro, c in cells.items():
         if c.against == "other gyro" and gyro == 1:

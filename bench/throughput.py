@@ -1,8 +1,8 @@
 #!/usr/bin/python3
-"""How fast `vgyro replay` goes through a log of 2.4 million frames, beside programs that do less with
-it, all in one run, each pinned to one core; and how much memory each takes. And through a car's log, in
-which one frame in twenty is a gyro's. With --former, beside another build in the same run. Prints Markdown.
-Needs Debian's packages time, can-utils, python3-can and python3-numpy."""
+"""Speed and memory of `vgyro replay` on a log of 2.4 million frames, compared with programs that do less with it,
+all in one run, each pinned to one core; and on a car's log, in which one frame in twenty is a gyro's. With --former,
+compared with another build in the same run. Prints Markdown. Needs Debian's packages time, can-utils, python3-can
+and python3-numpy."""
 
 import argparse
 import dataclasses
@@ -35,8 +35,8 @@ class Row:
     log: Path
     frames: int
     from_pipe: bool = False
-    prints_seconds: bool = False  # of its loop, which then count instead of the process's
-    former: "Row | None" = None  # the same with the former build
+    prints_seconds: bool = False  # prints its loop's seconds, which count instead of the process's
+    former: "Row | None" = None  # the same row with the former build
     times_s: list = dataclasses.field(default_factory=list)
     cpu_s: float = math.inf
     rss_max_kb: int = 0
@@ -64,8 +64,8 @@ def make_log(path, frames):
 
 
 def make_car_log(path, gyro_log):
-    """The gyros' frames of the long log's beginning, with 19 other ones behind each: 60 identifiers on both
-    buses, most with 8 bytes. FRAMES_LONG in all. Cached likewise."""
+    """The gyros' frames of the long log's beginning, each followed by 19 other frames: 60 identifiers on both buses,
+    most with 8 bytes. FRAMES_LONG in all. Cached: the same name always holds the same frames."""
     if path.exists():
         return path
     print(f"making {path.name} …", file=sys.stderr)
@@ -80,7 +80,7 @@ def make_car_log(path, gyro_log):
             seconds, fraction = line[1 : line.index(")")].split(".")
             stamp_us = int(seconds) * 1_000_000 + int(fraction)
             for place, (bus, identifier, length) in enumerate(draw.choices(foreign, k=FOREIGN_PER_GYRO_FRAME)):
-                # All of them before gyro 2's frame, 300 us behind gyro 1's.
+                # All of them come before gyro 2's frame, which is 300 us after gyro 1's.
                 at_us = stamp_us + (place + 1) * step_us // 4
                 to.write(f"({at_us // 1_000_000}.{at_us % 1_000_000:06}) {bus} {identifier:03X}#"
                          f"{draw.randbytes(length).hex().upper()}\n")
@@ -89,8 +89,8 @@ def make_car_log(path, gyro_log):
 
 
 def measure(row, core, other_core, usage_file):
-    """One run, wall time from start to exit; the feeding `cat` of a pipe runs on the other core. The
-    kernel counts a process's memory from before its exec: /usr/bin/time is small, Python is not."""
+    """One run; wall time is from start to exit, and the `cat` that feeds a pipe runs on the other core. The kernel
+    counts a process's memory from before its exec: /usr/bin/time is small, Python is not."""
     feeder = None
     stdin = subprocess.DEVNULL
     begin = time.perf_counter()
@@ -159,7 +159,7 @@ def print_table(measured, rounds, core):
 
 
 def gain(row):
-    """Of the best times, wall and CPU."""
+    """Gain by the best times, wall and CPU."""
     if row.former is None:
         return ""
     return f"{min(row.former.times_s) / min(row.times_s):.2f} (CPU {row.former.cpu_s / max(row.cpu_s, 0.01):.2f})"
@@ -192,7 +192,7 @@ def main():
         measured = rows(a.bin, a.former, long_log, short_log, car_log, Path(folder) / "out.log")
         for log in (long_log, short_log, car_log):
             subprocess.run(["wc", "-l", log], check=True, stdout=subprocess.DEVNULL)  # into the page cache
-        # Rounds over all rows, not rows one by one: a disturbance then spares somebody's best time.
+        # Rounds over all rows, not row by row: a disturbance then leaves each row some undisturbed times.
         for number in range(a.rounds):
             for row in measured:
                 print(f"round {number + 1} of {a.rounds}: {row.name}", file=sys.stderr)

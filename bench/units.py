@@ -1,6 +1,6 @@
 #!/usr/bin/python3
-"""What three axes cost beside one: `vgyro replay` of one log of two whole units, once with all their axes and once
-with one of them as a pair of single gyros, in turns in the same run, each pinned to one core. Prints Markdown."""
+"""Cost of three axes relative to one: `vgyro replay` on one log of two whole units, with all their axes and with one
+of them as a pair of single gyros, alternating in the same run, each pinned to one core. Prints Markdown."""
 
 import argparse
 import os
@@ -21,7 +21,7 @@ SEED = 5
 START_US = 1_700_000_000_000_000
 NOISE_DPS = 0.02
 BIAS_DPS = ((0.1, -0.2, 0.3), (-0.07, 0.15, -0.25))
-AXES_MOST = 3.2  # times the CPU of one
+AXES_MOST = 3.2  # largest ratio to the CPU time of one axis
 
 MESSAGE = """\
 BO_ {id} {name}: 16 RIG
@@ -61,7 +61,7 @@ def make_log(path):
         rates = [0.0, 0.0, 0.0]
         for n in range(SAMPLES):
             if n > (REST_S + 5) * RATE_HZ:
-                # Turns that come and go within seconds.
+                # Turns that begin and end within seconds.
                 rates = [0.999 * rate + draw.gauss(0.0, size) for rate, size in zip(rates, (0.02, 0.02, 0.2))]
             for unit, (bias, late_us) in enumerate(zip(BIAS_DPS, (0, 700))):
                 raw = [round((rate + b + draw.gauss(0.0, NOISE_DPS)) * 1e6) for rate, b in zip(rates, bias)]

@@ -2,12 +2,12 @@
 """Is the difference of the two corrected gyros white? Runs `vgyro replay` over a recording, takes both corrected
 rates from its CAN FD frames (dbc/vgyro_fd.dbc), and judges the record stretch by stretch.
 
-The statistic is Ljung and Box's in the form that bears noise whose strength changes (vibration comes and goes):
+The statistic is Ljung and Box's in the form that tolerates noise of changing strength (vibration comes and goes):
 Q = Σ_k (Σ_t d_t·d_{t+k})² / Σ_t d_t²·d_{t+k}², which for white d of any such strength is χ² with as many degrees of
-freedom as lags, so Q/lags is about 1. The mean is *not* taken off first: a bias that is left is no white noise.
+freedom as lags, so Q/lags is about 1. The mean is *not* subtracted first: a remaining bias is not white noise.
 It is computed for single samples and for means over 0.1 s, the corrector's cells; and for these once more less the
-stretch's own line, which tells what no correction of biases could have made white. r1 is the correlation of
-neighbouring samples."""
+stretch's own line, which shows the part that no correction of biases could have made white. r1 is the correlation
+of neighbouring samples."""
 
 import argparse
 import math
@@ -39,7 +39,7 @@ def frame_type():
 
 
 def configured(config, folder, accept_motion):
-    """A copy of the configuration that sends VG_Rate as CAN FD; relative paths become absolute."""
+    """A copy of the configuration that sends VG_Rate as CAN FD; its relative paths become absolute."""
     lines, section = [], ""
     for line in config.read_text(encoding="utf-8").splitlines():
         header = re.match(r"\s*\[+\s*([\w.]+)", line)
@@ -129,7 +129,7 @@ def judge(t, rate, difference, lags, cell_s):
 
 
 def thinned(t, values, points):
-    """Means over equal times, at most so many; a break where nothing was measured."""
+    """Means over equal times, at most `points`; a break where nothing was measured."""
     place = np.minimum(((t - t[0]) / (t[-1] - t[0] + 1e-9) * points).astype(int), points - 1)
     count = np.bincount(place, minlength=points)
     with np.errstate(invalid="ignore"):
@@ -170,7 +170,7 @@ plot $samples with points pt 6 lc rgb '#999999' title 'samples', $cells with poi
 
 
 def self_check(lags):
-    """White noise whose strength changes must come out white, and a left bias must not."""
+    """White noise of changing strength must be found white, and a remaining bias must not."""
     rng = np.random.default_rng(7)
     strength = np.exp(np.sin(np.arange(1000) / 50.0))
     tails = [chi_square_tail(box_statistic(strength * rng.standard_normal(1000), lags), lags) for _ in range(400)]

@@ -13,8 +13,8 @@ namespace vgyro::cli {
 
 namespace {
 
-// Farther from a quarter turn the sensor feels a hundredth of a percent of another axis's rate more
-// than a pair about its own would: that is as much as cross_axis tells of good sensors.
+// Largest deviation of a mount from quarter turns: beyond it a sensor feels more than a hundredth
+// of a percent of another axis's rate, which is the cross_axis of good sensors.
 constexpr double kTiltMost = 1e-4;
 
 std::optional<Error> tilted_unit(const std::string& config, const gateway::Plan& plan) {

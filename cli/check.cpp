@@ -50,7 +50,7 @@ void print_rate(const gateway::GyroPlan& gyro) {
   if (gyro.sign) detail("sign", "from a signal of its own: 1 is negative");
 }
 
-// What a gyro's message tells besides its rate.
+// The quantities in a gyro's message besides its rate.
 void print_message(const gateway::GyroPlan& gyro) {
   if (gyro.temperature) {
     detail("temperature", fmt::format("{} in {}, {}", gyro.temperature->name,
@@ -72,7 +72,7 @@ void print_message(const gateway::GyroPlan& gyro) {
   if (gyro.max_bias_dps) detail("bias", fmt::format("at most {:g} deg/s", *gyro.max_bias_dps));
 }
 
-// How a unit's axes lie in the vehicle, and how far from a rotation that was given.
+// How a unit's axes lie in the vehicle, and how far the given matrix is from a rotation.
 void print_mount(const gateway::Mount& mount) {
   if (!mount.turns() && mount.corrected == 0.0) return;
   for (std::size_t axis = 0; axis < gateway::kAxes; ++axis) {
@@ -80,10 +80,10 @@ void print_mount(const gateway::Mount& mount) {
            fmt::format("vehicle's {} = {:+.6f} x {:+.6f} y {:+.6f} z", gateway::kAxisNames[axis],
                        mount.at(axis, 0), mount.at(axis, 1), mount.at(axis, 2)));
   }
-  detail("",
-         mount.corrected == 0.0
-             ? std::string("a rotation, exactly")
-             : fmt::format("as given up to {:.2g} from a rotation in an element", mount.corrected));
+  detail("", mount.corrected == 0.0
+                 ? std::string("a rotation, exactly")
+                 : fmt::format("as given; its elements differ from a rotation by up to {:.2g}",
+                               mount.corrected));
 }
 
 void print_gyro(const gateway::GyroPlan& gyro) {
@@ -111,7 +111,7 @@ void print_calibration(const gateway::CalibrationPlan& plan, std::string_view ab
   }
   const bool waits = plan.when_moving == fusion::WhenMoving::kWait;
   say("the first {:g} s{}, true rate {}{:g} deg/s", plan.rest_s,
-      waits ? " of rest" : ", taken for rest whatever moves", about, plan.rate_dps);
+      waits ? " of rest" : ", used as rest even if the platform moves", about, plan.rate_dps);
   if (plan.doubt_dps > 0.0)
     say(", the Earth's share unknown: {:.2g} deg/s more in sigma", plan.doubt_dps);
   say("\n");
@@ -149,7 +149,7 @@ void print_model(const gateway::Plan& plan) {
   }
 }
 
-// "0xFFFF, not available", or what it says although it has no code.
+// "0xFFFF, not available", or the raw value sent instead if the field has no such code.
 std::string said_of_none(const gateway::OutputField& field) {
   return field.has_code ? field.code : fmt::format("0x{:X}", field.none_raw);
 }
@@ -255,14 +255,14 @@ void print_plan(const gateway::Plan& plan) {
   say("\n");
   print_model(plan);
   if (!plan.output.transmit)
-    say("  {:<14}the gateway sends none of what follows: transmit = false\n", "shadow mode");
+    say("  {:<14}the gateway sends none of these frames: transmit = false\n", "shadow mode");
   print_output(plan);
   for (const gateway::OutputLayout& layout : plan.output.layouts)
     print_layout(plan, layout);
 }
 
 void print_origins(const toml::table& table) {
-  say("  {:<14}as several files say them together\n", "values");
+  say("  {:<14}merged from several files\n", "values");
   for (const TomlOrigin& origin : toml_origins(table))
     say("    {:<32}{:<24} {}\n", origin.key, origin.value, origin.where);
 }

@@ -1,7 +1,7 @@
 #pragma once
 
 // The subcommands of `vgyro`, each in a file of its own. They return the exit code (exit_code.h);
-// wrong usage is main()'s business.
+// main() handles wrong usage.
 
 #include <cstdint>
 #include <optional>
@@ -23,7 +23,7 @@ struct InitOptions {
   std::vector<std::string> logs;
   std::vector<std::string> dbc_files;
   std::string output = "vgyro.toml";  ///< "-": standard output
-  bool force = false;                 ///< replaces a file that is there
+  bool force = false;                 ///< replaces an existing file
   std::vector<std::uint32_t> ids{};   ///< identifiers to look at; empty: all
   double turned_deg = 0.0;            ///< in the whole log, positive to the left; 0: not given
 };
@@ -39,7 +39,7 @@ int run_decode(const DecodeOptions& options);
 struct ConvertOptions {
   std::vector<std::string> logs;
   std::string output;   ///< "-": a candump log on standard output
-  unsigned digits = 0;  ///< of a stamp's fraction, 6 or 9; 0: as the logs have them
+  unsigned digits = 0;  ///< digits of a stamp's fraction, 6 or 9; 0: as in the logs
   bool quiet = false;
 };
 int run_convert(const ConvertOptions& options);
@@ -55,12 +55,12 @@ struct ReplayOptions {
   std::string plot;                  ///< empty: none
   std::vector<std::string> bus_map;  ///< "LOGNAME=CONFIGNAME"
   std::vector<std::string> logs;
-  unsigned digits = 0;  ///< of the output's stamps, 6 or 9; 0: as the log has them
+  unsigned digits = 0;  ///< digits of the output's stamps, 6 or 9; 0: as in the log
   bool quiet = false;
 };
 int run_replay(const ReplayOptions& options);
 
-/// The kinds of effects that a model file may hold.
+/// Lists the kinds of effects that a model file may hold.
 int run_model_list();
 
 struct AllanOptions {
@@ -122,9 +122,9 @@ struct SimulateOptions {
 };
 int run_simulate(const SimulateOptions& options);
 
-/// Of several gateways on a host.
+/// Selects among several gateways on a host.
 struct WhichGateway {
-  std::string instance;  ///< empty: the one without a name
+  std::string instance;  ///< empty: the gateway without a name
   bool all = false;
 };
 

@@ -1,4 +1,4 @@
-// `vgyro convert`: logs of any known form → one log of the form that the output's name says.
+// `vgyro convert`: logs of any known form → one log of the form that the output's name selects.
 
 #include <algorithm>
 
@@ -51,11 +51,11 @@ Expected<Target> target_of(const std::string& path) {
     for (const canlog::WrittenForm& form : canlog::written_forms())
       endings += fmt::format("{}{} ({})", endings.empty() ? "" : ", ", form.ending, form.name);
     return fail(
-        path, "its name does not say which form it is to have",
+        path, "its name does not select a log form",
         "the name ends in " + endings + "; text also in .log.gz, .log.xz, .log.zst and so on");
   }
   if (!target.packing.empty() && !target.form->is_text) {
-    return fail(path, fmt::format("{} is packed in itself", target.form->name),
+    return fail(path, fmt::format("{} is already compressed", target.form->name),
                 fmt::format("leave {} away", target.packing));
   }
   return target;
@@ -77,7 +77,7 @@ void tell_logs(const ConvertOptions& options, const canlog::LogReader& reader) {
     tell("{}", log_text(options.logs[i], *parts[i], true));
 }
 
-// What was read of each log, and which name has become which channel.
+// Reports what was read from each log, and the channel of each interface name.
 void tell_result(const ConvertOptions& options, const Target& target,
                  const canlog::LogReader& reader, const canlog::LogWriter& writer) {
   tell_logs(options, reader);
@@ -109,7 +109,7 @@ int run_convert(const ConvertOptions& options) {
   if (target->form->rewrites && !file.can_rewrite()) {
     return report(Error{
         options.output,
-        fmt::format("{} is completed at its end, which only a file allows", target->form->name),
+        fmt::format("{} is completed at the end, so the output must be a file", target->form->name),
         "name a file"});
   }
   std::unique_ptr<canlog::PackingSink> packed;

@@ -25,12 +25,12 @@ namespace vgyro::cli {
 namespace {
 
 std::string json_text(std::string_view text) {
-  // JSON lets controls of eight bits through; as \u009b they are text to a terminal too.
+  // JSON passes 8-bit control characters through; as \u009b they are text for a terminal too.
   const bool ascii_only = printable(text) != text;
   return nlohmann::json(text).dump(-1, ' ', ascii_only, nlohmann::json::error_handler_t::replace);
 }
 
-// What is the same in every line.
+// The parts of a signal's output that are the same in every line.
 struct KnownSignal {
   std::string name;
   std::string unit;
@@ -47,7 +47,7 @@ struct KnownMessage {
   }
   dbc::MessageCodec codec;
   std::string name;
-  std::size_t file;  ///< among those given
+  std::size_t file;  ///< index among the given files
   std::unordered_map<const dbc::Signal*, KnownSignal> signals;
   std::uint64_t frames = 0;
 };
@@ -62,8 +62,9 @@ class Decoder {
     }
   }
 
-  /// The message of a frame's identifier, from the first file that knows it; null when none does.
-  /// The very identifier goes before J1939's PGN from the same sender, that before any sender.
+  /// The message of a frame's identifier, from the first file that has it, or null. An exact
+  /// identifier takes precedence over a J1939 PGN from the same sender, and that over a PGN from
+  /// any sender.
   KnownMessage* find(std::uint32_t id, bool extended) {
     const std::uint64_t key = static_cast<std::uint64_t>(extended) << 32U | id;
     const auto known = by_id_.find(key);
@@ -74,7 +75,8 @@ class Decoder {
     return message;
   }
 
-  /// After the log: files of which no message came, and messages that came from other senders.
+  /// After the log: warns of files without a frame in it, and of messages that came from other
+  /// senders.
   void warn_of_silence() const {
     std::vector<std::uint64_t> frames(databases_.size());
     for (const auto& message : messages_)
@@ -121,7 +123,7 @@ class Decoder {
           others.remedy(message.id_mask())});
   }
 
-  /// As candump writes them.
+  /// In candump's notation.
   [[nodiscard]] std::string ids_that_came() const {
     std::set<std::uint64_t> ids;
     for (const auto& [key, message] : by_id_)
@@ -145,7 +147,8 @@ class Decoder {
 
 using Text = fmt::memory_buffer;
 
-// Fifteen digits show what the file's decimal scale meant; a float shows its own shortest form.
+// Fifteen digits show the value that the file's decimal scale meant; a float is shown in its
+// shortest form.
 void put_number(Text& out, const dbc::Signal& signal, double value, std::string_view not_finite) {
   auto to = std::back_inserter(out);
   if (!std::isfinite(value)) {
@@ -226,7 +229,7 @@ void put_text(Text& out, const canlog::LogRecord& record, std::string_view bus,
   fmt::format_to(to, "\n");
 }
 
-// ASCII without control characters, but for the end of the line: most lines are.
+// Is the line ASCII without control characters, except its end? Most lines are.
 bool is_plain(std::string_view line) {
   return std::all_of(line.begin(), line.end() - 1, [](char c) { return c >= ' ' && c <= '~'; });
 }
@@ -244,7 +247,7 @@ Expected<Decoder> load_decoder(const std::vector<std::string>& files) {
   return Decoder(std::move(databases));
 }
 
-// What was no frame, of each log, and the sum.
+// Reports the lines of each log that were no frame, and the sum.
 void tell_counts(const std::vector<std::string>& logs, const canlog::LogReader& reader,
                  std::uint64_t decoded) {
   std::uint64_t not_understood = 0;

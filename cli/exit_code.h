@@ -1,6 +1,6 @@
 #pragma once
 
-// What `vgyro` says to the shell when it ends.
+// Exit codes of `vgyro`.
 
 namespace vgyro::cli {
 

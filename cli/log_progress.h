@@ -1,6 +1,6 @@
 #pragma once
 
-// How far the reading of logs is, on a terminal. Costs a record a subtraction.
+// Progress of reading logs, on a terminal. Costs one subtraction a record.
 
 #include <cstddef>
 #include <cstdint>
@@ -13,11 +13,11 @@ namespace vgyro::cli {
 
 class LogProgress {
  public:
-  /// The reader must live as long.
+  /// `reader` must outlive this.
   LogProgress(const std::string& what, const canlog::LogReader& reader)
       : progress_(what), reader_(reader) {}
 
-  /// So many records more were taken.
+  /// `records` more records were taken.
   void add(std::size_t records = 1) {
     if (until_drawn_ > records) {
       until_drawn_ -= records;

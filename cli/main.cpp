@@ -114,7 +114,7 @@ CLI::App* add_init(CLI::App& app, InitOptions& options) {
   return command;
 }
 
-// What ends in .dbc among the logs is a DBC file.
+// A name that ends in .dbc among the logs is a DBC file.
 void sort_init_files(InitOptions& options) {
   const auto is_dbc = [](const std::string& name) { return name.ends_with(".dbc"); };
   std::copy_if(options.logs.begin(), options.logs.end(), std::back_inserter(options.dbc_files),
@@ -270,10 +270,10 @@ CLI::App* add_compare(CLI::App& app, CompareOptions& options) {
   return command;
 }
 
-// Longer nobody waits.
+// Longest time limit.
 constexpr double kTimeLimitMax_s = 1e6;
 
-// Empty for a good one, as CLI11 wants it.
+// Empty for a valid word, as CLI11 requires.
 std::string wrong_acceptance(const std::string& word) {
   const auto numbered = with_gyro_numbers(word, {.names = {}, .any = true});
   const auto acceptance = acceptance_from(numbered ? *numbered : word);
@@ -281,7 +281,7 @@ std::string wrong_acceptance(const std::string& word) {
   return acceptance.error().what + "; " + acceptance.error().remedy;
 }
 
-// A configuration that cannot be read is the command's own complaint.
+// A configuration that cannot be read is left to the command, which reports it.
 vgyro::Expected<void> number_gyros(GapOptions& options) {
   if (options.accept.empty()) return {};
   const auto loaded = vgyro::gateway::load_config(options.config);
@@ -313,26 +313,26 @@ CLI::App* add_gap(CLI::App& app, GapOptions& options) {
       ->required();
   command
       ->add_option("--accept", options.accept,
-                   "which reading of an ambiguous effect to apply: gyro=N or gyro=NAME,\n"
+                   "which explanation of an ambiguous effect to apply: gyro=N or gyro=NAME,\n"
                    "kind=KIND, both with a comma between, or likeliest; may be repeated")
       ->allow_extra_args(false)
       ->check(wrong_acceptance);
   command->add_option("--evidence", options.evidence,
-                      "what this recording says, for vgyro fleet: one JSON line");
+                      "evidence of this recording, for vgyro fleet: one JSON line");
   add_number(*command, "--time-limit", options.time_limit_s, {0.0, kTimeLimitMax_s},
              "stop after this many seconds and write what is certain; 0: no limit");
   add_number(*command, "--seed", options.seed, {}, "seed of the simulations");
   command->add_flag("-q,--quiet", options.quiet, "no summary");
   command->footer(
       "The folder is written whole or not at all; an earlier result in it is replaced.\n"
-      "vgyro(1) says how to read the result.\n"
+      "vgyro(1) explains the result.\n"
       "Example: vgyro gap --config vgyro.toml --measured drive.log.xz --out found");
   return command;
 }
 
 CLI::App* add_fleet(CLI::App& app, FleetOptions& options) {
   CLI::App* command = app.add_subcommand(
-      "fleet", "Pool the evidence of many drives: what types have, which units go bad");
+      "fleet", "Pool the evidence of many drives: properties of types, units that degrade");
   command
       ->add_option("EVIDENCE", options.evidence,
                    "files that vgyro gap, vgyro allan or vgyro fleet left;\nof a folder all *.json")
@@ -384,7 +384,7 @@ CLI::App* add_recalibrate(CLI::App& app, WhichGateway& which) {
   return command;
 }
 
-// CLI11 would only say that a subcommand is missing.
+// CLI11 would only report that a subcommand is missing.
 std::optional<vgyro::Error> unknown_command(const CLI::App& app,
                                             const std::vector<std::string>& words) {
   if (words.empty() || words[0].starts_with('-')) return std::nullopt;
@@ -406,7 +406,8 @@ std::vector<std::string> words_of(int argc, char** argv) {
   return words;
 }
 
-// Takes the command line. The exit code where that is all: help is given, or the usage is wrong.
+// Parses the command line. Returns an exit code if nothing is left to do: help was printed, or the
+// usage is wrong.
 std::optional<int> parse_words(CLI::App& app, std::vector<std::string> words) {
   try {
     std::reverse(words.begin(), words.end());  // CLI11 takes them from the back
@@ -424,7 +425,7 @@ std::optional<int> parse_words(CLI::App& app, std::vector<std::string> words) {
   return std::nullopt;
 }
 
-// The exit code of the command, or of what the command line is instead of one.
+// Returns the exit code of the command, or of help or wrong usage.
 int run(int argc, char** argv) {
   CLI::App app{"vgyro: two gyros on CAN in, one better gyro out", "vgyro"};
   app.set_version_flag("--version", "vgyro " VGYRO_VERSION);
@@ -471,8 +472,7 @@ int run(int argc, char** argv) {
   if (simulate->parsed()) return run_simulate(options.simulate);
   if (status->parsed()) return run_status(options.status);
   if (recalibrate->parsed()) return run_recalibrate(options.recalibrate);
-  // Frames are the main result; they give way only to a summary or a table that wants the same
-  // place.
+  // Frames are the main result: they go to standard output unless a summary or a table does.
   const bool output_given = replay->count("--output") > 0;
   const bool stdout_taken = options.replay.json == "-" || options.replay.csv == "-";
   if (!output_given && !stdout_taken) options.replay.output = "-";

@@ -36,7 +36,8 @@ void print_kind(const model::KindInfo& kind) {
   }
   const model::Evidence& evidence = model::evidence(kind.kind);
   say("    {:<26}{}\n", "shown by", evidence.shown_by);
-  if (!evidence.taken_for.empty()) say("    {:<26}{}\n", "may be taken for", evidence.taken_for);
+  if (!evidence.taken_for.empty())
+    say("    {:<26}{}\n", "may be confused with", evidence.taken_for);
 }
 
 }  // namespace

@@ -1,8 +1,8 @@
 #pragma once
 
-// Options that are numbers: one way to read them for all commands. A number is finite, in its range
-// and the whole of its word, whole numbers are decimal; everything else is wrong usage, reported
-// with the option, the word and the range. Known to main() alone, as CLI11 is.
+// Options that are numbers, read in the same way by all commands. A number is finite, in its range
+// and the whole of its word; whole numbers are decimal. Everything else is wrong usage, reported
+// with the option, the word and the range. Included by main.cpp alone, like CLI11.
 
 #include <charconv>
 #include <cmath>
@@ -25,7 +25,7 @@ struct NumberRange {
   T maximum = std::numeric_limits<T>::max();
 };
 
-/// As short as it is exact.
+/// The shortest exact text.
 template <class T>
 std::string number_text(T value) {
   if constexpr (std::is_integral_v<T>) {
@@ -35,21 +35,21 @@ std::string number_text(T value) {
   }
 }
 
-/// "FLOAT in [0.1 - 10000]"; any number of its type goes without saying.
+/// "FLOAT in [0.1 - 10000]"; no range for a whole number.
 template <class T>
 std::string type_text(const NumberRange<T>& range) {
   if (std::is_integral_v<T>) return "UINT";
   return fmt::format("FLOAT in [{} - {}]", number_text(range.minimum), number_text(range.maximum));
 }
 
-/// Throws CLI::ValidationError, as CLI11 wants it.
+/// Throws CLI::ValidationError, as CLI11 requires.
 template <class T>
 T number_from(const std::string& option, const std::string& word, const NumberRange<T>& range) {
   T value{};
   const char* end = word.data() + word.size();
   const auto [at, code] = std::from_chars(word.data(), end, value);
   bool good = code == std::errc() && at == end;
-  good = good && value >= range.minimum && value <= range.maximum;  // NaN is not
+  good = good && value >= range.minimum && value <= range.maximum;  // false for NaN
   if (good) return value;
   throw CLI::ValidationError(option,
                              fmt::format("\"{}\" is not a {} from {} to {}", printable(word),
@@ -57,7 +57,7 @@ T number_from(const std::string& option, const std::string& word, const NumberRa
                                          number_text(range.minimum), number_text(range.maximum)));
 }
 
-/// One number; its present value is the default that help shows.
+/// Adds an option of one number; its present value is the default that help shows.
 template <class T>
 CLI::Option* add_number(CLI::App& command, const std::string& name, T& value,
                         const NumberRange<T>& range, const std::string& help) {
@@ -72,7 +72,7 @@ CLI::Option* add_number(CLI::App& command, const std::string& name, T& value,
       ->default_str(number_text(value));
 }
 
-/// One to `most` numbers with commas between them.
+/// Adds an option of one to `most` numbers with commas between them.
 template <class T>
 CLI::Option* add_numbers(CLI::App& command, const std::string& name, std::vector<T>& values,
                          int most, const NumberRange<T>& range, const std::string& help) {

@@ -33,7 +33,7 @@ std::string OtherSenders::text(const std::string& message, std::uint32_t message
 
 std::string OtherSenders::remedy(std::uint32_t mask) const {
   const bool exact = (mask & kPriorityMask) != 0;
-  return exact ? "where it is a J1939 message its DBC file should say so: VFrameFormat = J1939PG"
+  return exact ? "if it is a J1939 message, mark it so in the DBC file: VFrameFormat = J1939PG"
                : "another source_address";
 }
 

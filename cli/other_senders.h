@@ -1,7 +1,7 @@
 #pragma once
 
-// The senders that a J1939 parameter group came from, for a message of one identifier that never
-// came: most likely its DBC file forgets to say that it is J1939, or another unit was built in.
+// The senders of a J1939 parameter group, for a message whose own identifier never came: most
+// likely its DBC file does not mark it as J1939, or another unit was built in.
 
 #include <cstdint>
 #include <set>
@@ -11,13 +11,13 @@ namespace vgyro::cli {
 
 class OtherSenders {
  public:
-  /// A frame's identifier; kept when it has the message's group and another sender. Both of 29
-  /// bits.
+  /// Keeps the frame's sender if it has the message's group and a different sender. Both
+  /// identifiers have 29 bits.
   void add(std::uint32_t message_id, std::uint32_t frame_id);
   [[nodiscard]] bool empty() const { return addresses_.empty(); }
   /// "no frame 18F02A01 came (TURN_LEFT), but the same PGN came from 0x13"
   [[nodiscard]] std::string text(const std::string& message, std::uint32_t message_id) const;
-  /// `mask` as the message is compared with: by PGN with a source address, or by all bits.
+  /// `mask`: the bits by which the message is compared: PGN and source address, or all.
   [[nodiscard]] std::string remedy(std::uint32_t mask) const;
 
  private:

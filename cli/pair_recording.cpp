@@ -34,21 +34,22 @@ class Gatherer {
   [[nodiscard]] std::optional<Error> no_pair(const std::string& log) const {
     if (pairs_ > 0) return std::nullopt;
     return Error{log,
-                 fmt::format("the gyros {} and {} never spoke at the same time{}, or too shortly",
+                 fmt::format("the gyros {} and {} never sent at the same time{}, or too briefly",
                              plan_.gyros[0].name, plan_.gyros[1].name, about_axis(plan_)),
-                 "a recording in which both are there is needed"};
+                 "use a recording that contains both gyros"};
   }
 
   analysis::PairRecording finish() {
     analysis::PairRecording recording;
     for (std::size_t i = 0; i < 2; ++i) {
       recording.own[i] = own_[i].finish()[0];
-      // Coarser than what the DBC file allows, often; where nothing ever changed, at least that.
+      // The observed step is often coarser than that of the DBC file, which is used if the values
+      // never changed.
       const double seen_dps = steps_[i].step_dps();
       recording.step_dps[i] = seen_dps > 0.0 ? seen_dps : plan_.gyros[i].rate.step;
     }
     recording.paired = paired_.finish();
-    // Averaging a faster gyro leaves white noise white.
+    // Averaging a faster gyro keeps white noise white.
     const double ratio = to_seconds(aligner_.interval(aligner_.pacing_gyro())) /
                          to_seconds(aligner_.interval(1 - aligner_.pacing_gyro()));
     constexpr double kNextToNothing = 0.98;

@@ -1,7 +1,7 @@
 #pragma once
 
-// Logs → both gyros' rates on even grids, each alone and in pairs, through the gateway's own
-// decoding, stamp guard and alignment. Memory: 32 bytes a pair of samples.
+// Reads logs into both gyros' rates on even grids, each alone and in pairs, through the gateway's
+// own decoding, stamp guard and alignment. Memory: 32 bytes a pair of samples.
 
 #include <span>
 #include <string>
@@ -13,8 +13,8 @@
 
 namespace vgyro::cli {
 
-/// Of each of these pairs, in one reading of the logs. Error when a log cannot be read, or a gyro
-/// is not in them.
+/// One recording for each of these pairs, from one pass over the logs. Error if a log cannot be
+/// read, or a gyro is not in them.
 Expected<std::vector<analysis::PairRecording>> read_pair_recordings(
     const std::vector<std::string>& logs, std::span<const gateway::Plan> plans);
 

@@ -14,8 +14,8 @@ namespace vgyro::cli {
 
 namespace {
 
-// A limit beyond this is none of a gyro: a floating-point number has no other than what is
-// plausible.
+// A larger limit is not that of a gyro: the range of a floating-point number ends only where values
+// are no longer plausible.
 constexpr double kLimitMost_dps = 5e4;
 
 double limit_of(const gateway::Quantity& rate) {
@@ -26,7 +26,7 @@ double limit_of(const gateway::Quantity& rate) {
   return limit_dps < kLimitMost_dps ? limit_dps : 0.0;
 }
 
-// A counter of all pages does not tell which frames of the gyro's own page are missing.
+// A counter over all pages does not show which frames of the gyro's own page are missing.
 bool counts_samples(const gateway::GyroPlan& gyro) {
   const auto& counter = gyro.e2e.counter;
   return counter && (gyro.rate.presence.always() || !counter->presence.always());
@@ -89,7 +89,7 @@ class Recorder {
   double reach(TimePoint t) {
     if (!begun_) zero_ = newest_ = t;
     begun_ = true;
-    // A clock that was set by more than a day: the recording goes on where it was.
+    // The clock was set ahead by more than a day: the recording continues from where it was.
     if (t - newest_ > gateway::Surroundings::kLeap) zero_ += t - newest_;
     newest_ = std::max(newest_, t);
     const double t_s = to_seconds(t - zero_);
@@ -100,7 +100,7 @@ class Recorder {
 
   void take_gyro(std::size_t i, const canlog::LogRecord& record) {
     const gateway::GyroIntake::Result taken = inputs_[i].take(record.frame, record.stamp, guard_);
-    // A frame whose counter moved is a new one, whatever its stamp.
+    // A frame with a counter is a sample of its own even if its stamp repeats.
     const bool counted = counts_samples(plan_.gyros[i]);
     const bool new_at_old_stamp = counted && taken.reject == gateway::Reject::kStampRepeated;
     if (taken.reject && !new_at_old_stamp) return;
@@ -138,14 +138,15 @@ class Recorder {
       recording_.acceleration.g[axis].push_back(taken.value[axis]);
   }
 
-  // Nothing asks for the speed; its frames lengthen the recording.
+  // The speed is not used; its frames only extend the recording.
   void take_speed(const canlog::LogRecord& record) {
     gateway::StampResult stamp;
     gateway::judge_stamp(gateway::kSpeedStream, record.stamp, guard_, stamp);
     if (stamp.believed()) reach(stamp.t);
   }
 
-  // Zero is the earliest frame: on the slower of two buses it may come second.
+  // Time 0 is that of the earliest frame, which need not be the first: on the slower of two buses
+  // it may come second.
   void shift(std::vector<double>& t_s) const {
     double last_s = 0.0;
     for (double& t : t_s) {
@@ -154,8 +155,8 @@ class Recorder {
     }
   }
 
-  // What a unit's other axis says while the platform rests is its bias, which no other axis feels.
-  // Beside a single gyro nobody knows whether the bias is the frame's own.
+  // The reading of a unit's other axis at rest is its bias, which no other axis feels. Beside a
+  // single gyro it is not known whether the bias belongs to that frame.
   void take_off_level(const std::vector<double>& t_s, std::vector<double>& rate_dps) const {
     const auto resting = std::lower_bound(t_s.begin(), t_s.end(), recording_.rest_s) - t_s.begin();
     if (resting == 0 || rate_dps.empty()) return;
@@ -167,7 +168,7 @@ class Recorder {
       rate -= level_dps;
   }
 
-  // It may stand on a page that comes later; what never came is not known.
+  // The first value may be on a later page; a quantity that never came is removed.
   static void fill_beginning(std::vector<double>& beside) {
     const auto known = std::find_if_not(beside.begin(), beside.end(),
                                         [](double value) { return std::isnan(value); });

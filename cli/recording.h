@@ -1,9 +1,9 @@
 #pragma once
 
-// A log → the gap workflow's input: every usable frame of the gyros, raw rates with their
-// own stamps, and what else the configuration names. Through the gateway's decoding; the model file
-// is not applied. Stamps that are garbage are refused as the live path refuses them. Memory: 28
-// bytes a gyro frame.
+// Reads a log into the gap workflow's input: every usable frame of the gyros, raw rates with their
+// own stamps, and the other quantities of the configuration. Uses the gateway's decoding; the model
+// file is not applied. Garbage stamps are refused as in the live path. Memory: 28 bytes a gyro
+// frame.
 
 #include <span>
 #include <string>
@@ -15,8 +15,8 @@
 
 namespace vgyro::cli {
 
-/// Of each of these pairs, in one reading of the log. Error when the log cannot be read, or a gyro
-/// is not in it. `doing` is for the line of progress.
+/// One recording for each of these pairs, from one pass over the log. Error if the log cannot be
+/// read, or a gyro is not in it. `doing` is the text of the progress line.
 Expected<std::vector<gap::Recording>> read_recordings(const std::string& log,
                                                       std::span<const gateway::Plan> plans,
                                                       const std::string& doing);

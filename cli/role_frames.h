@@ -1,8 +1,8 @@
 #pragma once
 
-// A log's frames that play a role in the plan of a pair of gyros, one after the other, in the log's
-// order. Several pairs, the axes of whole units, see the log in one reading. Judges no bits and no
-// stamps.
+// The frames of a log that have a role in the plan of a pair of gyros, one after the other, in the
+// log's order. Several pairs, the axes of whole units, share one pass over the log. Checks no bits
+// and no stamps.
 
 #include <array>
 #include <cstdint>
@@ -25,16 +25,15 @@ class RoleFrames {
   using Take =
       std::function<void(std::size_t pair, std::uint8_t roles, const canlog::LogRecord& record)>;
 
-  /// Of one configuration; they outlive this.
+  /// `plans` are of one configuration, and must outlive this.
   explicit RoleFrames(std::span<const gateway::Plan> plans);
 
-  /// Several logs are merged by stamp. `doing` stands on the terminal's line of progress, before
-  /// the logs' name.
+  /// Several logs are merged by stamp. `doing` is the text of the progress line, before the logs'
+  /// name.
   Expected<void> read(const std::vector<std::string>& logs, const std::string& doing,
                       const Take& take);
 
-  /// After read(): what is wrong with logs of which so many samples of each gyro of the pair could
-  /// be used.
+  /// After read(): the error if a gyro of the pair has no usable samples; `used` is their number.
   [[nodiscard]] std::optional<Error> missing_gyro(const std::string& name, std::size_t pair,
                                                   const std::array<std::uint64_t, 2>& used) const;
 
@@ -44,7 +43,7 @@ class RoleFrames {
     gateway::Router router;
     std::array<std::uint64_t, 2> frames{};
   };
-  /// In the plan: the configuration's buses are those of all its pairs.
+  /// Index in the plan; all pairs of a configuration have the same buses.
   [[nodiscard]] can::BusIndex bus_of(const canlog::LogRecord& record,
                                      const canlog::InterfaceTable& interfaces);
 

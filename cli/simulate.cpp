@@ -29,11 +29,12 @@ namespace {
 using gateway::FrameMatch;
 using gateway::Plan;
 
-// Of the first samples, in intervals of their own stream: nothing on a bus comes at once.
+// Offsets of the first samples, in intervals of their own stream: frames on a bus do not come at
+// the same time.
 constexpr std::array<double, 2> kGyroOffsets{0.0, 0.23};
 constexpr double kReferenceOffset = 0.22;
 constexpr double kAccelerometerOffset = 0.06;
-// What stands on a page of its own goes out with every tenth sample, a little later.
+// A quantity on a page of its own is sent with every tenth sample, a little later.
 constexpr std::size_t kPageEvery = 10;
 constexpr double kPageAfter_s = 1e-4;
 // A unit that has several messages sends one after the other.
@@ -44,7 +45,7 @@ constexpr double kMicro = 1e6;
 
 enum Part : std::uint8_t { kGyroA = 0, kGyroB = 1, kReference = 2, kAccelerometer = 3 };
 
-/// What a gyro's message tells besides its rate, and where the simulator has it from.
+/// A quantity in a gyro's message besides its rate, and its value in the simulator.
 struct Beside {
   std::optional<gateway::Quantity> gateway::GyroPlan::*quantity;
   double (*value)(const simulation::Simulator& simulator, const simulation::GyroSample& sample);
@@ -79,13 +80,13 @@ static_assert(all_besides_are_played());
 struct SimulatedMessage {
   const FrameMatch* match = nullptr;
   std::vector<Part> parts{};
-  const gateway::Quantity* page = nullptr;  ///< set: only this, and what else stands on its page
-  double after_s = 0.0;                     ///< behind the first message of its unit
+  const gateway::Quantity* page = nullptr;  ///< if set: only this, and the others on its page
+  double after_s = 0.0;                     ///< delay after the first message of its unit
   std::size_t next = 0;
   double stamp_s = 0.0;
 };
 
-/// A gyro, or one axis of a unit: where its rate stands, and what it reads.
+/// A gyro, or one axis of a unit: its signal and its readings.
 struct Sensor {
   const gateway::GyroPlan* plan = nullptr;
   std::vector<simulation::GyroSample> samples{};
@@ -150,11 +151,11 @@ simulation::Settings settings_of(const SimulateOptions& options,
 
 class Recording {
  public:
-  /// `simulator` plays what is not of a gyro.
+  /// `simulator` supplies everything except the gyros.
   Recording(const Plan& plan, const simulation::Simulator& simulator, Sensors sensors,
             std::vector<SimulatedMessage> messages);
 
-  /// All frames in the order of their stamps.
+  /// Writes all frames in the order of their stamps.
   void write(OutputFile& output, double start_s);
   void summarize(const SimulateOptions& options) const;
   void warn_of_limits() const;
@@ -168,7 +169,7 @@ class Recording {
   void put_reference(std::size_t n, can::Frame& frame);
   void put_sensors(Part part, const FrameMatch& match, std::size_t n, can::Frame& frame);
   [[nodiscard]] const gateway::E2ePlan& e2e_of(Part part, const FrameMatch& match) const;
-  /// The first that stands in this message: it tells what the message tells besides rates.
+  /// The first sensor in this message; its plan has the message's other quantities.
   [[nodiscard]] const Sensor& sensor_in(Part part, const FrameMatch& match) const;
   void put_besides(const Sensor& sensor, std::size_t n, can::Frame& frame) const;
   void put_page(Part part, std::size_t n, const gateway::Quantity& page, can::Frame& frame) const;
@@ -181,7 +182,7 @@ class Recording {
   std::vector<SimulatedMessage> messages_;
   Sensors sensors_;
   std::vector<simulation::RateSample> reference_;
-  /// Of a platform of several axes: about each of the vehicle's, at the same instants.
+  /// With several axes: the reference about each axis of the vehicle, at the same instants.
   std::array<std::vector<simulation::RateSample>, gateway::kAxes> reference_axes_;
   std::vector<simulation::AccelerationSample> acceleration_;
   std::uint64_t frames_ = 0;
@@ -206,7 +207,7 @@ Recording::Recording(const Plan& plan, const simulation::Simulator& simulator, S
   add_pages(kGyroB);
 }
 
-// One for all that stands on it.
+// Adds one message for each page, with all quantities on it.
 void Recording::add_pages(Part part) {
   const gateway::GyroPlan& gyro = plan_.gyros[part];
   can::Frame with_rate = gateway::empty_frame(gyro.match);
@@ -244,7 +245,7 @@ bool Recording::lost(const SimulatedMessage& message) const {
   });
 }
 
-// From message.next on; false where there is none.
+// Finds the next sample to send from message.next on; false if there is none.
 bool Recording::find_next(SimulatedMessage& message) const {
   const Part leader = message.parts.front();
   const std::size_t step = message.page != nullptr ? kPageEvery : 1;
@@ -300,7 +301,7 @@ const Sensor& Recording::sensor_in(Part part, const FrameMatch& match) const {
   });
 }
 
-// Beside a rate that stands on every page those on pages of their own take turns.
+// If the rate is on every page, the quantities on different pages take turns.
 void Recording::put_besides(const Sensor& sensor, std::size_t n, can::Frame& frame) const {
   const gateway::GyroPlan& gyro = *sensor.plan;
   bool page_is_chosen = false;
@@ -359,7 +360,7 @@ void Recording::write(OutputFile& output, double start_s) {
         std::min_element(alive.begin(), alive.end(),
                          [](const auto* a, const auto* b) { return a->stamp_s < b->stamp_s; });
     SimulatedMessage& message = **first;
-    // A log's last digit is the microsecond.
+    // A log's stamps have microseconds.
     const auto since_ns = static_cast<std::int64_t>(std::llround(message.stamp_s * kMicro)) * 1000;
     output.commit(formatters[message.match->bus].format(
         output.room(canlog::kLineBytesMax), time_from_ns(start_ns + since_ns), frame(message), 6));
@@ -421,7 +422,7 @@ void Recording::warn_of_limits() const {
   }
 }
 
-// The motion and the effects of one axis of a unit.
+// A simulator with the motion and the effects of one axis of a unit.
 Expected<simulation::Simulator> axis_simulator(const gateway::GyroPlan& unit, std::size_t gyro,
                                                std::size_t axis, const model::Model& model,
                                                const simulation::Profile& profile,
@@ -455,7 +456,7 @@ Expected<Sensors> simulate_units(const Plan& plan, const model::Model& model,
   return sensors;
 }
 
-// Of the motion of single gyros, or of units about all axes that they tell.
+// Checks that the profile has the motion of single gyros, or of units about all of their axes.
 Expected<void> check_motion(const Plan& plan, const simulation::Profile& profile,
                             const model::Model& model) {
   if (plan.axes.empty()) {
@@ -479,7 +480,8 @@ Expected<void> check_motion(const Plan& plan, const simulation::Profile& profile
 
 Expected<void> check_output(const SimulateOptions& options, std::vector<std::string> inputs) {
   if (options.output.ends_with(".xz")) {
-    return fail(options.output, "is not compressed here", "write a .log, then `xz` compresses it");
+    return fail(options.output, "cannot be written compressed",
+                "write a .log, then `xz` compresses it");
   }
   inputs.insert(inputs.end(), {options.model, options.profile});
   return check_outputs(inputs, {options.output});

@@ -1,6 +1,6 @@
 #pragma once
 
-// What a wrong command line is answered with. Known to main() alone, as CLI11 is.
+// Error messages for a wrong command line. Included by main.cpp alone, like CLI11.
 
 #include <string>
 #include <vector>
@@ -14,7 +14,7 @@
 
 namespace vgyro::cli {
 
-/// "vgyro replay": the command as far as it was understood.
+/// "vgyro replay": the command as far as it was recognized.
 inline std::string command_text(const CLI::App& app) {
   std::string text = "vgyro";
   for (const CLI::App* command = &app; !command->get_subcommands().empty();) {
@@ -24,7 +24,7 @@ inline std::string command_text(const CLI::App& app) {
   return text;
 }
 
-/// All options of the command that was understood, with their dashes.
+/// All options of the recognized command, with their dashes.
 inline std::vector<std::string> options_of(const CLI::App& app) {
   const CLI::App* command = &app;
   while (!command->get_subcommands().empty())
@@ -40,7 +40,7 @@ inline std::vector<std::string> options_of(const CLI::App& app) {
 /// An unknown option comes first, because it is often the reason why another one is missing.
 inline Error usage_error(const CLI::App& app, const CLI::ParseError& error) {
   const std::string command = command_text(app);
-  const std::string help = fmt::format("`{} --help` lists what it takes", command);
+  const std::string help = fmt::format("`{} --help` lists its arguments", command);
   if (const auto unknown = unknown_option(app.remaining(true), options_of(app))) {
     return {command, fmt::format("there is no option {}", printable(unknown->name)),
             unknown->near ? fmt::format("did you mean {}?", *unknown->near) : help};

@@ -7,7 +7,8 @@ namespace vgyro::fusion {
 
 namespace {
 
-// Rates that differ by less than this are the same nominal rate; phase then decides who paces.
+// Rates that differ by less than this factor are the same nominal rate; then the phase decides
+// which gyro paces.
 constexpr double kSameRate = 1.1;
 
 double line_at(TimePoint t, TimePoint t0, double y0, TimePoint t1, double y1) {
@@ -72,7 +73,7 @@ bool Aligner::push(std::size_t gyro, TimePoint t, double rate_dps) {
   const bool in_order = ring.is_behind_all(t);
   if (!in_order && ring.contains(t)) return false;
   if (ring.size() == kCapacity) {
-    // Of the gyro that does not pace, old samples are only kept in case the other one is late.
+    // Old samples of the gyro that does not pace are only kept in case the other one is late.
     if (!chosen_ || gyro == pace_) ++counts_.unpaired[gyro];
     used_until_[gyro] = ring[0].t;
     any_used_[gyro] = true;
@@ -92,10 +93,10 @@ bool Aligner::push(std::size_t gyro, TimePoint t, double rate_dps) {
   return true;
 }
 
-// Reviews are of one stream alone, so that it makes no difference how the two of them interleave.
+// A review uses one stream alone, so that it does not depend on how the two interleave.
 void Aligner::close_review(std::size_t gyro, TimePoint t) {
   Review& review = reviews_[gyro];
-  // One hole is no pace.
+  // The longest interval may be a hole, and is left out.
   const Duration pace = (review.sum - review.longest) / (review.intervals - 1);
   const bool other_pace = !alike(pace, interval_[gyro]);
   const bool again =
@@ -104,7 +105,7 @@ void Aligner::close_review(std::size_t gyro, TimePoint t) {
   if (again) choose_again(gyro, pace, t);
 }
 
-// What is buffered was received at the old pace, or before anybody knew; it is let go.
+// The buffered samples came at the old pace, or before the new one was found; they are dropped.
 void Aligner::choose_again(std::size_t gyro, Duration interval, TimePoint behind) {
   reviewed_[gyro] = interval;
   reviews_ = {};
@@ -138,8 +139,8 @@ Duration Aligner::mean_wait(std::size_t pace, TimePoint until) const {
   return waited == 0 ? Duration::max() : sum / waited;
 }
 
-// Judged on the samples up to one instant that both gyros have reached: which of two buses the
-// kernel served first makes no difference.
+// Uses the samples up to one instant that both gyros have reached: the choice does not depend on
+// which of two buses the kernel served first.
 void Aligner::choose_pace() {
   if (std::min(rings_[0].size(), rings_[1].size()) < kSamplesToChoose) return;
   const TimePoint until =
@@ -165,8 +166,8 @@ void Aligner::choose_pace() {
   }
   const bool averages = std::max(ratio, 1.0 / ratio) >= kAverageRatio;
   half_window_ = averages ? interval_[pace_] / 2 : Duration::zero();
-  // From behind the pair before to half a window behind this one, and what comes earlier by its
-  // lag.
+  // The buffer holds samples from the previous pair to half a window after this one, and those that
+  // come earlier by their lag.
   const double kept_s =
       2.0 * to_seconds(interval_[pace_]) + std::max(to_seconds(lag_[pace_] - lag_[1 - pace_]), 0.0);
   too_far_apart_ = kept_s > static_cast<double>(kCapacity) * to_seconds(interval_[1 - pace_]);
@@ -174,7 +175,8 @@ void Aligner::choose_pace() {
   ever_chosen_ = true;
 }
 
-// Samples that no pair at or behind `needed` can use; the last one before it is still a neighbour.
+// Drops samples that no pair at or after `needed` can use; the last one before it is still a
+// neighbour.
 void Aligner::drop_before(TimePoint needed, std::size_t gyro) {
   Ring& ring = rings_[gyro];
   std::size_t stale = 0;
@@ -191,7 +193,7 @@ bool Aligner::pop_next(AlignedPair& pair) {
   const Ring& other = rings_[1 - pace_];
   while (!own.empty()) {
     pair.t = own[0].t;
-    // While a pair waits nothing is dropped: an earlier sample may still come in late.
+    // While a pair waits, nothing is dropped: an earlier sample may still arrive late.
     if (other.empty() || other.back().t < pair.t + half_window_) return false;
     drop_before(pair.t - half_window_, 1 - pace_);
     const bool paired = half_window_ == Duration::zero() ? interpolate(other, pair, 1 - pace_)
@@ -213,7 +215,7 @@ bool Aligner::pop_next(AlignedPair& pair) {
 
 bool Aligner::interpolate(const Ring& other, AlignedPair& pair, std::size_t other_index) {
   if (other[0].t > pair.t) return false;
-  // pop() has left the last sample at or before the pair in front.
+  // pop_next() has left the last sample at or before the pair at index 0.
   const RateSample& before = other[0];
   if (before.t == pair.t) {
     pair.rate_dps[other_index] = before.rate_dps;

@@ -1,13 +1,13 @@
 #pragma once
 
 // Two gyros' samples, each at its own rate and phase, become pairs at common instants. One gyro
-// paces: pairs stand at its stamps, and the other is brought there: by linear interpolation between
-// its two neighbours, or, where it is at least kAverageRatio times faster, by the mean of its
-// interpolant over one pace interval, so that none of its information is lost and nothing aliases.
-// A pair is complete with the first sample of the other gyro at or behind it; that is the latency.
-// Readings that are known to come late are dated back first. The choice is made from the first
-// samples, and made again when a gyro keeps another pace than was found then.
-// Buffers are bounded; a sample that can no longer be paired is counted, never used.
+// paces: pairs have its stamps. The other one is converted to these instants: by linear
+// interpolation between its two neighbours, or, if it is at least kAverageRatio times faster, by
+// the mean of its interpolant over one pace interval, so that no information is lost and nothing
+// aliases. A pair is complete with the first sample of the other gyro at or after it; this wait is
+// the latency. Readings that are known to come late are dated back first. The pacing gyro is chosen
+// from the first samples, and again when a gyro keeps a different pace. Buffers are bounded; a
+// sample that can no longer be paired is counted, never used.
 
 #include <algorithm>
 #include <array>
@@ -32,22 +32,21 @@ class Aligner {
   static constexpr std::size_t kCapacity = 4096;
   /// Samples of each gyro before the pacing gyro is chosen.
   static constexpr std::size_t kSamplesToChoose = 8;
-  /// The choice looks back over no more of them than this.
+  /// The choice uses no more than the newest so many.
   static constexpr std::size_t kSamplesJudged = 64;
-  /// An interval longer than this many of its own usual ones is a gap: nothing is interpolated in
-  /// it.
+  /// An interval longer than this many usual ones of the gyro is a gap, in which nothing is
+  /// interpolated.
   static constexpr double kGapIntervals = 4.0;
   static constexpr double kAverageRatio = 1.5;
-  /// A pace this much off the one found is another one, when two reviews in a row say so.
+  /// A pace that differs by this factor in two reviews in a row is a new one.
   static constexpr double kOtherPace = 1.5;
-  /// A review takes so long and so many samples: more than a queue that was held up delivers at
-  /// once.
+  /// Least duration and number of samples of a review: more than a delayed queue delivers at once.
   static constexpr Duration kReview = std::chrono::seconds(1);
   static constexpr int kReviewSamples = 8;
-  /// Longer, it is no interval: the clock was set among the samples judged.
+  /// A longer interval is not one: the clock was set between the two samples.
   static constexpr Duration kIntervalMax = std::chrono::hours(1);
 
-  /// `lag`: a sample stamped t is of the rate at t − lag.
+  /// `lag`: a sample stamped t holds the rate at t − lag.
   explicit Aligner(std::array<Duration, 2> lag = {}) : lag_(lag) {}
 
   /// False when the sample is older than what has already been used.
@@ -56,8 +55,8 @@ class Aligner {
   /// The next complete pair; t grows from pair to pair.
   bool pop(AlignedPair& pair) { return can_pair() && pop_next(pair); }
 
-  /// The oldest buffered sample of this gyro behind `t`: for when it will find no partner. False
-  /// when there is none.
+  /// The oldest buffered sample of this gyro after `t`, for the time when it finds no partner.
+  /// False when there is none.
   [[nodiscard]] bool next_behind(std::size_t gyro, TimePoint t, TimePoint& sample_t,
                                  double& rate_dps) const;
 
@@ -65,19 +64,19 @@ class Aligner {
   void clear();
 
   struct Counts {
-    /// Of the gyro that sets the instants: inside a gap of the other one, or pushed out of the
-    /// buffer by waiting for it.
+    /// Samples of the pacing gyro inside a gap of the other one, or pushed out of the buffer while
+    /// waiting for it.
     std::array<std::uint64_t, 2> unpaired{};
   };
   [[nodiscard]] const Counts& counts() const { return counts_; }
 
-  /// Has the choice ever been made? While it is made again the old intervals stand.
+  /// Has a pacing gyro ever been chosen? During a new choice the old intervals stay valid.
   [[nodiscard]] bool chosen() const { return ever_chosen_; }
-  /// Gyro at whose stamps the pairs stand. Precondition of both: chosen().
+  /// Gyro whose stamps the pairs have. Precondition of this and of interval(): chosen().
   [[nodiscard]] std::size_t pacing_gyro() const { return pace_; }
   [[nodiscard]] Duration interval(std::size_t gyro) const { return interval_[gyro]; }
-  /// The faster gyro's samples of an averaging and of the wait for it do not fit the buffer: there
-  /// will be no pairs.
+  /// The faster gyro's samples for one average, and for the wait for it, do not fit the buffer:
+  /// there will be no pairs.
   [[nodiscard]] bool too_far_apart() const { return too_far_apart_; }
 
  private:
@@ -108,7 +107,7 @@ class Aligner {
     /// Keeps the stamps ascending. Precondition: size() < kCapacity, no equal stamp inside.
     [[gnu::cold, gnu::noinline]] void insert(const RateSample& sample);
     [[nodiscard]] bool contains(TimePoint t) const;
-    /// Of the samples at or before `until`: their usual interval, and one more than the last index.
+    /// Usual interval, and number, of the samples at or before `until`.
     [[nodiscard]] Duration usual_interval(TimePoint until) const;
     [[nodiscard]] std::size_t count_until(TimePoint until) const;
 
@@ -119,17 +118,17 @@ class Aligner {
     std::size_t size_ = 0;
   };
 
-  /// How a gyro's stamps have followed each other since the last review.
+  /// Intervals between a gyro's stamps since the last review.
   struct Review {
     bool begun = false;
     TimePoint newest;
     Duration sum{0};
     Duration longest{0};
     int intervals = 0;
-    Duration odd_pace{0};  ///< of the review before, if it was another one than was found; else 0
+    Duration odd_pace{0};  ///< pace of the review before if it differed from interval_; else 0
   };
 
-  /// Is there a sample to pair, and one of the other gyro at or behind it?
+  /// Is there a sample to pair, and one of the other gyro at or after it?
   [[nodiscard]] bool can_pair() const {
     const Ring& own = rings_[pace_];
     const Ring& other = rings_[1 - pace_];
@@ -161,13 +160,13 @@ class Aligner {
   std::array<Duration, 2> lag_;
   std::array<Ring, 2> rings_;  ///< at the instants of the rates
   std::array<Review, 2> reviews_{};
-  std::array<Duration, 2> reviewed_{};  ///< intervals that a review has found; 0: none has yet
+  std::array<Duration, 2> reviewed_{};  ///< intervals found by a review; 0: none yet
   std::array<Duration, 2> interval_{};
   std::array<Duration, 2> gap_{};
   std::array<TimePoint, 2> used_until_{};  ///< samples at or before this come too late
   std::array<bool, 2> any_used_{};
-  TimePoint burst_until_{};  ///< stamp: earlier pairs waited for the choice until then
-  Duration half_window_{0};  ///< of the averaging; 0 where interpolation does
+  TimePoint burst_until_{};  ///< stamp until which earlier pairs waited for the choice
+  Duration half_window_{0};  ///< of the averaging; 0 with interpolation
   std::size_t pace_ = 0;
   bool chosen_ = false;
   bool ever_chosen_ = false;

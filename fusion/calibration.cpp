@@ -78,7 +78,7 @@ void Calibrator::reject() {
 
 bool Calibrator::cut_short(double t_s, double still_until_s) {
   if (when_moving_ != WhenMoving::kWait || !started_) return false;
-  // Stamps of one instant come by way of different sums.
+  // Times of one instant were computed in different ways.
   constexpr double kRounding_s = 1e-6;
   const bool last_too = calm_until_s_ <= still_until_s + kRounding_s;
   const double until_s = last_too ? calm_until_s_ : calmer_until_s_;

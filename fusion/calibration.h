@@ -1,9 +1,9 @@
 #pragma once
 
 // Initial calibration: with the true rate Ω known, y_k − Ω over rest_s seconds gives each gyro's
-// drift polynomial P_k⁰ by least squares. Fitted as sum and difference of the two gyros, because
-// the sum shows whether the platform really stands still: second by second, a step of the common
-// rate that noise cannot explain is motion, and what was gathered so far is thrown away.
+// drift polynomial P_k⁰ by least squares. Sum and difference of the two gyros are fitted, because
+// the sum shows whether the platform really stands still: a step of the common rate from second to
+// second that noise cannot explain is motion, and the pairs gathered so far are discarded.
 
 #include <array>
 #include <cstdint>
@@ -15,12 +15,12 @@ namespace vgyro::fusion {
 
 struct Calibration {
   double end_s = 0.0;         ///< the first window starts here
-  double used_until_s = 0.0;  ///< what came later was not used: motion
+  double used_until_s = 0.0;  ///< pairs after this were not used: motion
   Polynomial sum;             ///< P₁⁰ + P₂⁰, deg/s
   Polynomial difference;      ///< P₁⁰ − P₂⁰, deg/s
-  bool in_motion = false;     ///< the platform moved, and that was accepted
+  bool in_motion = false;     ///< the platform moved, and the motion was accepted
 
-  /// Motion has ended it before its time.
+  /// Motion ended the calibration early.
   [[nodiscard]] bool cut_short() const { return used_until_s < end_s; }
 
   [[nodiscard]] double bias_dps(std::size_t gyro, double t_s) const {
@@ -31,7 +31,7 @@ struct Calibration {
 /// What to do when the platform moves while it should rest.
 enum class WhenMoving : std::uint8_t {
   kWait,    ///< begin again: the calibration is the first rest_s seconds of rest
-  kAccept,  ///< go on, say so in Calibration::in_motion, and learn no slope from the motion
+  kAccept,  ///< continue, set Calibration::in_motion, and learn no slope from the motion
   kKnown    ///< the true rate comes from a reference: motion does not matter
 };
 
@@ -40,15 +40,15 @@ class Calibrator {
   /// A common rate that moves less than this from second to second never counts as motion: no
   /// vehicle turns so slowly for long, and a platform that only sways must be able to calibrate.
   static constexpr double kStill_dps = 0.05;
-  /// On top, this many standard errors of a block's mean, from the noise of the difference.
+  /// In addition, this many standard errors of a block's mean, from the noise of the difference.
   static constexpr double kNoiseFactor = 10.0;
   static constexpr double kBlock_s = 1.0;
-  /// Fewer pairs are not judged; slow gyros get longer blocks.
+  /// Blocks of fewer pairs are not judged; slow gyros get longer blocks.
   static constexpr std::uint64_t kBlockPairsMin = 8;
   /// Motion that begins after this share of rest_s ends the calibration instead of spoiling it.
   static constexpr double kEnoughShare = 0.9;
-  /// Two sensors of one type may both be biased, but not both by so much and by the same within
-  /// this share of it.
+  /// Two sensors of one type may both have a bias, but not both of this size and equal within this
+  /// share.
   static constexpr double kLargeBias_dps = 5.0;
   static constexpr double kSameBias = 0.1;
 
@@ -56,27 +56,28 @@ class Calibrator {
   Calibrator(int order, double rest_s, WhenMoving when_moving = WhenMoving::kWait);
 
   /// The next pair and the true rate at its time; t_s grows. Returns false when the calibration is
-  /// complete and this pair was not used for it: then result() is there.
+  /// complete, without this pair: then result() is valid.
   bool add(double t_s, const std::array<double, 2>& rate_dps, double true_rate_dps);
 
   /// Seconds gathered so far.
   [[nodiscard]] double covered_s() const { return covered_s_; }
-  /// Times that motion, or holes in the stream, made it begin again.
+  /// Number of restarts because of motion or holes in the stream.
   [[nodiscard]] std::uint64_t restarts() const { return restarts_; }
   /// Precondition: add() has returned false.
   [[nodiscard]] const Calibration& result() const { return result_; }
-  /// Precondition: add() has returned false. Can what both gyros read at rest be their biases? Not
-  /// where one is larger than `max_bias_dps` says (infinite: nothing is said), nor where both are
-  /// large and the same: that is a platform that turns steadily.
+  /// Precondition: add() has returned false. Can the readings at rest be the gyros' biases? Not if
+  /// one is larger than `max_bias_dps` (infinite: not given), nor if both are large and equal: then
+  /// the platform turns steadily.
   [[nodiscard]] bool plausible(const std::array<double, 2>& max_bias_dps) const;
   /// The result is rejected: begin again with the next pair.
   void reject();
 
-  /// Somebody else saw that the platform moves, and stood still until `still_until_s`, a block ago
-  /// at most; asked before add() has returned false. As if these pairs had shown it: true when the
-  /// calibration is complete, else it begins again, or goes on where motion is accepted or known.
+  /// Motion was detected elsewhere, after standstill until `still_until_s`, at most a block ago.
+  /// Acts as if these pairs had shown it: true when the calibration is complete; otherwise it
+  /// begins again, or continues where motion is accepted or known. Precondition: add() has not
+  /// returned false.
   bool cut_short(double t_s, double still_until_s);
-  /// Motion was accepted, here or, by note_motion(), elsewhere.
+  /// Motion was accepted: detected here, or reported by note_motion().
   [[nodiscard]] bool moved() const { return moved_; }
   void note_motion();
 
@@ -112,7 +113,7 @@ class Calibrator {
   Sums sums_;
   Sums calm_;  ///< up to the last block that was judged still
   double calm_until_s_ = 0.0;
-  Sums calmer_;  ///< up to the one before
+  Sums calmer_;  ///< up to the still block before that
   double calmer_until_s_ = 0.0;
   StillnessBlock block_;
   double level_dps_ = 0.0;  ///< common rate of the last blocks, smoothed

@@ -1,7 +1,7 @@
 #pragma once
 
-// Means of the initial calibration, each over some seconds: what drift, slope and noise of a rest
-// show, in fixed memory however long it is.
+// Means of the initial calibration, each over some seconds: they show drift, slope and noise of a
+// rest of any length, in fixed memory.
 
 #include <array>
 #include <cmath>
@@ -15,7 +15,7 @@ namespace vgyro::fusion {
 /// Means of the calibration, each over some seconds.
 class CalibrationBlocks {
  public:
-  /// When they are full, neighbours are merged.
+  /// Capacity; when it is reached, neighbours are merged.
   static constexpr std::size_t kBlocks = 64;
 
   struct Mean {
@@ -44,9 +44,9 @@ class CalibrationBlocks {
   [[nodiscard]] std::size_t count() const { return count_; }
   [[nodiscard]] const Mean& operator[](std::size_t i) const { return means_[i]; }
 
-  /// What the platform's own motion adds to the variance of both gyros' means in a block, (deg/s)²:
-  /// from how the common rate scatters from block to block, beyond the sensors' noise; enlarged,
-  /// since neighbours sway alike. 0 where noise explains it.
+  /// Variance that the platform's own motion adds to both gyros' means in a block, (deg/s)²: the
+  /// scatter of the common rate from block to block beyond the sensors' noise, enlarged because
+  /// neighbours sway alike. 0 where noise explains the scatter.
   [[nodiscard]] double sway_variance(const Symmetric& density) const;
 
  private:
@@ -68,19 +68,19 @@ class CalibrationBlocks {
   std::array<Mean, kBlocks> means_;
   std::size_t count_ = 0;
   std::size_t merge_ = 1;     ///< blocks in each mean
-  std::size_t gathered_ = 0;  ///< in the last one
+  std::size_t gathered_ = 0;  ///< blocks in the last mean
 };
 
 inline double CalibrationBlocks::sway_variance(const Symmetric& density) const {
-  // The level of the quieter gyro counts most; noise alone scatters it by N_v²/length.
+  // The quieter gyro counts most in the level, whose noise has a variance of N_v²/length.
   const double sum = density[0] + density[2] - 2.0 * density[1];
   const double first = sum > 0.0 ? (density[2] - density[1]) / sum : 0.5;
   const std::array<double, 2> weight{first, 1.0 - first};
   const auto level = [&](std::size_t i) {
     return weight[0] * means_[i].excess_dps[0] + weight[1] * means_[i].excess_dps[1];
   };
-  // Second differences: a level and a slope fall out. Of blocks at several distances, for sway of
-  // one period does not show at each.
+  // Second differences cancel a level and a slope. Several distances are used, because sway of one
+  // period does not show at every distance.
   constexpr std::array<std::size_t, 6> kApart{1, 2, 3, 5, 8, 13};
   // A scatter that chance gives in one calibration of a thousand is still noise.
   constexpr double kChance = 4.0;

@@ -1,8 +1,8 @@
 #pragma once
 
-// Samples of both gyros → means over about a tenth of a second (cells), about half a second of
-// which make a block. White noise survives averaging, so blocks hold all that drift, stops and
-// scale factors are learned from, while the samples themselves are forgotten. O(1) a sample.
+// Samples of both gyros → means over about a tenth of a second (cells) → about half a second of
+// cells (block). Averaging white noise loses no information about drift, stops and scale factors,
+// so the samples are not stored. O(1) a sample.
 
 #include <algorithm>
 #include <array>
@@ -13,7 +13,7 @@
 
 namespace vgyro::fusion {
 
-/// Whose samples a block holds.
+/// The gyros whose samples a block holds.
 enum class Present : std::uint8_t { kGyro1 = 0, kGyro2 = 1, kBoth = 2 };
 
 struct Cell {
@@ -62,7 +62,7 @@ class CellBuilder {
     if (count_ > 0.0) {
       const double step = t_s - newest_s_;
       const bool gap = intervals_ > 0.0 && step > kGap_s && step > kGapIntervals * interval_s_;
-      // What passed for the first intervals was a gap.
+      // The first intervals contained a gap.
       if (intervals_ < kGapIntervals && kGapIntervals * step < interval_s_) intervals_ = 0.0;
       if (gap || present != block_.present) {
         close_cell(newest_s_ + interval_s_);

@@ -7,8 +7,9 @@ namespace vgyro::fusion {
 
 namespace {
 
-// A gyro goes blind once in many thousand hours, here per block; what one block can tell is
-// bounded, so that a step of the other gyro, which shows in three blocks, is not enough.
+// Prior log odds: a gyro goes blind once in many thousand hours, here per block. The evidence of
+// one block is bounded, so that a step of the other gyro, which shows in three blocks, is not
+// enough.
 constexpr double kBlindPrior = -20.0;
 constexpr double kBlockTells = 6.0;
 constexpr double kBlindMost = 12.0;
@@ -19,18 +20,18 @@ constexpr double kMoved = 5.0;
 constexpr double kMovedMin_dps = 0.05;
 // Healthy gyros may differ by this share of a change: scale factors, and instants of blocks.
 constexpr double kChangeTolerance = 0.05;
-// Somebody else's frames may look like a gyro that moves for some seconds; until then a gyro that
-// does not is not surely the wrong one.
+// For some seconds foreign frames may look like a gyro that moves. Until then the gyro that does
+// not move may be the right one, and the probability is limited.
 constexpr double kSure_s = 10.0;
 constexpr double kShown_s = 2.5;  ///< of these, seconds in which only one of the two moved
 constexpr double kUnsureMost = 0.95;
 constexpr double kSureMost = 0.9995;
-// Changes that differ by so many standard deviations are no chance.
+// Changes that differ by so many standard deviations are not chance.
 constexpr double kUnlike = 6.0;
 constexpr double kContradictionPrior = -8.0;
 constexpr double kContradictionMost = 12.0;
 constexpr double kAlikeTells = 2.0;
-// A hole between two blocks beyond which they are not compared.
+// Blocks with a longer hole between them are not compared.
 constexpr double kGap_s = 1.0;
 
 }  // namespace
@@ -71,7 +72,7 @@ void Coherence::judge(const std::array<double, 2>& mean_dps, double from_s, doub
     } else if (moved[gyro]) {
       tells = -kBlockTells;
     } else if (blind_[gyro] < -kBlindPrior) {
-      // What a step of the other gyro has left fades.
+      // Evidence left by a step of the other gyro fades.
       tells = -kFades;
     }
     blind_[gyro] = std::clamp(blind_[gyro] + tells, 0.0, kBlindMost - kBlindPrior);

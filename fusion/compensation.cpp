@@ -6,10 +6,10 @@ namespace vgyro::fusion {
 
 namespace {
 
-// Rounding of the response itself: the iteration cannot settle closer than this.
+// Rounding of the response: the iteration cannot converge closer than this.
 constexpr double kSettled = 1e-13;
-// A gyro answers at least this strongly. Where its model says less, the step would overshoot into
-// rates that the model was never made for.
+// Least slope of a gyro's response. Where its model has less, the step would overshoot into rates
+// that the model was never made for.
 constexpr double kSlopeMin = 0.05;
 
 }  // namespace

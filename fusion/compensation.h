@@ -14,34 +14,34 @@
 
 namespace vgyro::fusion {
 
-/// Newton's steps at most; a response that is nearly straight needs two or three.
+/// Limit of Newton steps; a nearly linear response needs two or three.
 inline constexpr int kInversionStepsMax = 12;
 
 class Compensation {
  public:
-  /// Takes readings as they are.
+  /// No effects: correct() returns the reading.
   Compensation() = default;
   /// `effects` of one gyro, of any kind.
   explicit Compensation(std::span<const model::Effect> effects);
 
   [[nodiscard]] bool takes_any() const { return equation_.adds(); }
 
-  /// Where the response has no inverse (a model far outside the rates it was made for), the reading
+  /// If the response has no inverse (a rate far outside the model's range), returns the reading
   /// less its offsets.
   [[nodiscard]] double correct(double reading_dps, const model::Surroundings& surroundings) const;
 
-  /// The part that is the gyro's zero offset, for people and for VG_Bias: all offsets but lines,
-  /// which are over before anybody has read them, and what comes of other rotations.
+  /// The gyro's zero offset, for reports and for VG_Bias: all offsets except lines, which are too
+  /// fast to be read, and the effect of other rotations.
   [[nodiscard]] double zero_offset_dps(const model::Surroundings& surroundings) const;
 
-  /// A sample stamped t is of the rate at t − lag.
+  /// A sample stamped t holds the rate at t − lag.
   [[nodiscard]] Duration lag() const { return lag_; }
 
  private:
   [[nodiscard]] double invert(double reading_dps, const model::Surroundings& surroundings) const;
 
   model::Equation equation_;
-  model::Equation lasting_;  ///< the zero offset's
+  model::Equation lasting_;  ///< the effects of the zero offset
   Duration lag_{0};
 };
 

@@ -9,7 +9,7 @@ namespace vgyro::fusion {
 
 namespace {
 
-// A response that is flatter than this has no inverse, and compensation leaves it alone.
+// A response that is flatter than this has no inverse, and Compensation does not correct it.
 constexpr double kSlopeMin = 0.05;
 
 bool is_taken_back(model::Kind kind) {
@@ -17,7 +17,7 @@ bool is_taken_back(model::Kind kind) {
   return nature == model::Nature::kOffset || nature == model::Nature::kResponse;
 }
 
-// The effect with this parameter moved by so much, within its limits.
+// The effect with this parameter changed by `by`, within its limits.
 model::Effect moved(model::Effect effect, std::size_t parameter, double by) {
   effect.parameters[parameter] = model::within_limits(
       model::info(effect.kind).parameters[parameter], effect.parameters[parameter] + by);

@@ -1,8 +1,8 @@
 #pragma once
 
-// The seam between the pipeline and a correction method: aligned pairs in, virtual rate out.
-// Times are seconds on one monotone axis, rates deg/s. After construction nothing is allocated.
-// A method has no frames, stamps or states; the pipeline decides when it is called.
+// The interface between the pipeline and a correction method: aligned pairs in, virtual rate out.
+// Times are seconds on one monotone axis, rates deg/s. After construction nothing is allocated. A
+// method knows no frames, stamps or states; the pipeline decides when it is called.
 
 #include <array>
 #include <cstdint>
@@ -25,17 +25,16 @@ struct RatePair {
 
 struct VirtualRate {
   double rate_dps = 0.0;
-  double sigma_dps = 0.0;                 ///< NaN where the method makes no statement
+  double sigma_dps = 0.0;                 ///< NaN where the method gives none
   std::array<double, 2> corrected_dps{};  ///< each gyro less its own drift
   bool usable = true;                     ///< false: its only source is contradicted
 };
 
 struct Drift {
   std::array<double, 2> bias_dps{};  ///< NaN where the method has none
-  double slope_dps_s = 0.0;          ///< of the drift that is taken off the virtual rate; NaN
-  double bias_sigma_dps =
-      0.0;  ///< of the drift that is subtracted from the virtual rate; NaN where unknown
-  double slope_sigma_dps_s = 0.0;  ///< of the slope; NaN where unknown
+  double slope_dps_s = 0.0;  ///< of the drift subtracted from the virtual rate; NaN where unknown
+  double bias_sigma_dps = 0.0;     ///< 1σ of that drift; NaN where unknown
+  double slope_sigma_dps_s = 0.0;  ///< 1σ of the slope; NaN where unknown
 };
 
 struct WindowCounts {
@@ -43,45 +42,45 @@ struct WindowCounts {
   std::uint64_t skipped = 0;  ///< too few pairs: the drift was held
 };
 
-/// What a wheel-speed signal says of the vehicle.
+/// State of the vehicle according to its wheel-speed signal.
 enum class Wheels : std::uint8_t { kUnknown, kStanding, kRolling };
 
 /// The hypotheses, each with its probability.
 enum class Hypothesis : std::uint8_t {
   kStanding,      ///< in a steady stretch: the platform stands
   kTurning,       ///< in a steady stretch: it turns at a constant rate
-  kGyro1Stepped,  ///< its bias has jumped, and this is not settled yet
+  kGyro1Stepped,  ///< its bias may have jumped; not settled yet
   kGyro2Stepped,
   kGyro1Blind,  ///< it feels no rotation
   kGyro2Blind,
-  kWarmingUp,   ///< the biases have slopes that die away
-  kOwnSlopes,   ///< the biases have slopes that come and go, each its own
-  kAlikeSlopes  ///< the same, both alike
+  kWarmingUp,   ///< the biases have slopes that fade
+  kOwnSlopes,   ///< the biases have slopes that come and go, independent of each other
+  kAlikeSlopes  ///< the biases have slopes that come and go, alike in both gyros
 };
 inline constexpr std::size_t kHypotheses = 9;
 
 /// What the platform's other axes show.
 struct Elsewhere {
-  bool moves = false;        ///< about one of them it moves, so it does not stand
-  double log_turning = 0.0;  ///< log of how much likelier they make a steady turn than a stop
+  bool moves = false;        ///< the platform moves about one of them, so it does not stand
+  double log_turning = 0.0;  ///< log odds of a steady turn against a stop, from these axes
 
   friend bool operator==(const Elsewhere&, const Elsewhere&) = default;
 };
 
-/// What the method does at present, for people and for VG_Bias.
+/// Present state of the method, for reports and for VG_Bias.
 struct Condition {
   bool stopped = false;         ///< standing still: the common drift is being learned
-  bool moves = false;           ///< about this axis, as far as it sees itself
-  bool steady = false;          ///< in a steady stretch: probability says what it is
+  bool moves = false;           ///< the platform moves about this axis, by this axis's own gyros
+  bool steady = false;          ///< in a steady stretch: stop or turn by `probability`
   bool ambiguous = false;       ///< two hypotheses are likely, and far apart
-  std::array<bool, 2> blind{};  ///< this gyro feels no rotation, as it seems
+  std::array<bool, 2> blind{};  ///< this gyro probably feels no rotation
   std::array<double, kHypotheses> probability{};
-  bool disagree = false;            ///< the gyros contradict each other; which is wrong is open
-  std::array<bool, 2> noisy{};      ///< the noise of this gyro is far above what it was
+  bool disagree = false;            ///< the gyros contradict each other; which one is wrong is open
+  std::array<bool, 2> noisy{};      ///< the noise of this gyro is far above its usual one
   std::uint64_t stops = 0;          ///< stops learned from
   std::uint64_t stops_refused = 0;  ///< steady, but a turn was likelier
   std::uint64_t stops_open = 0;     ///< steady stretches that ended with both hypotheses likely
-  std::uint64_t restarts = 0;       ///< times that the estimate was not finite and was restarted
+  std::uint64_t restarts = 0;       ///< restarts of an estimate that was not finite
   std::uint64_t disagreements = 0;  ///< times that `disagree` began
 };
 
@@ -94,17 +93,17 @@ class Corrector {
   virtual void calibrate(const RatePair& /*pair*/, double /*true_rate_dps*/) {}
   /// The platform moved: discards the pairs given to calibrate() so far.
   virtual void restart_calibration() {}
-  /// Must be called once before update() where needs_calibration().
+  /// Must be called once before update() if needs_calibration().
   virtual void start(const Calibration& calibration) = 0;
-  /// Instead of a calibration: the memory of `age_s` seconds before `t_s`. False when this method
-  /// keeps no memory, or the memory cannot be right; then nothing has changed.
+  /// Instead of a calibration: continues from a memory that is `age_s` seconds old at `t_s`. False
+  /// when this method keeps no memory, or the memory is not plausible; then nothing has changed.
   virtual bool resume(const DriftMemory& /*memory*/, double /*age_s*/, double /*t_s*/) {
     return false;
   }
 
   /// The next pair; t_s grows from call to call, also across update_alone().
   virtual VirtualRate update(const RatePair& pair) = 0;
-  /// One gyro alone: the rate of the other one is not used.
+  /// One gyro alone: the other gyro's rate is not used.
   virtual VirtualRate update_alone(std::size_t gyro, const RatePair& pair) = 0;
   /// The state of the wheels from now on.
   virtual void set_wheels(Wheels /*wheels*/) {}
@@ -117,18 +116,18 @@ class Corrector {
 
   /// What the platform's other axes show from now on.
   virtual void set_elsewhere(const Elsewhere& /*elsewhere*/) {}
-  /// The variance that the gyros' difference has because they are not quite parallel and the
-  /// platform turns about other axes, from now on, (deg/s)².
+  /// Variance of the gyros' difference that comes from rotation about other axes, because the gyros
+  /// are not quite parallel; from now on, (deg/s)².
   virtual void set_cross_variance(double /*variance_dps2*/) {}
-  /// The true rate at a stop from now on, where there is one at all.
+  /// The true rate at a stop from now on. No effect if OptimalSettings::stop_rate_dps was absent.
   virtual void set_stop_rate(double /*rate_dps*/) {}
 
-  /// The weight of each gyro in the rate: they add up to 1.
+  /// Weight of each gyro in the rate; the sum is 1.
   [[nodiscard]] virtual std::array<double, 2> shares() const { return {0.5, 0.5}; }
   [[nodiscard]] virtual Drift drift(double t_s) const = 0;
   [[nodiscard]] virtual WindowCounts windows() const = 0;
   [[nodiscard]] virtual Condition condition() const { return {}; }
-  /// Another number means that condition() may have changed; it does so some times a second.
+  /// Changes whenever condition() may have changed, some times a second.
   [[nodiscard]] virtual std::uint64_t condition_edition() const { return 0; }
   /// To be kept across a restart; empty before anything is learned.
   [[nodiscard]] virtual std::optional<DriftMemory> memory(double /*t_s*/) const {
@@ -144,13 +143,13 @@ std::unique_ptr<Corrector> make_mutual_corrector(int order, double window_s);
 
 struct OptimalSettings {
   double window_s = 10.0;
-  /// The true rate at a stop; without it stops teach nothing.
+  /// The true rate at a stop; if absent, stops are not used.
   std::optional<double> stop_rate_dps = 0.0;
   std::array<GyroParameters, 2> gyros;
 };
 
-/// Weights from the gyros' noise, drift divided by a Kalman filter over windows, stops:
-/// docs/optimal.md.
+/// Weights from the gyros' noise, drift divided between the gyros by a Kalman filter over windows,
+/// biases from stops: docs/optimal.md.
 std::unique_ptr<Corrector> make_optimal_corrector(const OptimalSettings& settings);
 
 }  // namespace vgyro::fusion

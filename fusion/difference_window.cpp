@@ -9,14 +9,15 @@ namespace vgyro::fusion {
 
 namespace {
 
-// A cell's rate or its derivative counts as a regressor when it is this far above its own noise:
-// the noise of a regressor would be taken for knowledge.
+// A cell's rate or its derivative counts as a regressor when it is this far above its own noise,
+// which would otherwise bias the fit.
 constexpr double kExcited = 5.0;
 
-// Within a cell the two gyros need not have met an acceleration at quite the same time.
+// Within a cell the two gyros may see an acceleration at slightly different times.
 constexpr double kTimingDoubt_s = 0.0005;
 
-// Scale factors bend, and a skew is not quite the derivative's multiple: so much is left of either.
+// Remainder of a turn: scale factors are not linear, and the effect of a skew is not quite a
+// multiple of the derivative.
 constexpr double kScaleLeft = 1e-4;
 constexpr double kTimingLeft_s = 3e-4;
 
@@ -44,8 +45,9 @@ void DifferenceWindow::add(const RateCell& cell, const RateNoise& noise) {
   if (count_ == recent_.size()) regress(noise);
 }
 
-// The middle one of the recent cells; its neighbours give the mean of dΩ/dt over it, to fourth
-// order: a skew of milliseconds shows in the smallest accelerations, and so would their error.
+// Adds the middle one of the recent cells. Its neighbours give the mean of dΩ/dt over it, to fourth
+// order: a skew of milliseconds shows in the smallest accelerations, and so would an error of the
+// mean.
 void DifferenceWindow::regress(const RateNoise& noise) {
   const auto& [first, before, cell, after, last] = recent_;
   const double span_s = 12.0 * cell.length_s;
@@ -66,7 +68,7 @@ void DifferenceWindow::regress(const RateNoise& noise) {
   right_ += regressor * (cell.difference_dps / variance);
 }
 
-// Normal equations → rows of unit noise, by Cholesky; what was not excited has no row.
+// Normal equations → rows of unit noise, by Cholesky. A regressor that was not excited has no row.
 DriftMeasurement DifferenceWindow::measure() const {
   constexpr double kNothing = 1e-9;
   Eigen::Matrix3d lower = Eigen::Matrix3d::Zero();

@@ -1,8 +1,8 @@
 #pragma once
 
-// What one window of the two gyros' difference measures: its regression on (1, Ω, dΩ/dt), cell by
+// Measurement of one window of the two gyros' difference: its regression on (1, Ω, dΩ/dt), cell by
 // cell, kept as normal equations. Ω is the gyros' own virtual rate, so a cell's rate or its
-// derivative counts only where it is far above its noise. Knows no drift and no time.
+// derivative counts only where it is far above its noise. Holds no drift and no time.
 
 #include <array>
 #include <cstddef>
@@ -13,33 +13,34 @@
 
 namespace vgyro::fusion {
 
-/// A cell as the regression needs it.
+/// A cell, as input of the regression.
 struct RateCell {
   double rate_dps = 0.0;        ///< virtual rate
   double difference_dps = 0.0;  ///< y₁ − y₂
   double length_s = 0.0;
 };
 
-/// What noise a cell of one second would have.
+/// Variances of a cell of one second.
 struct RateNoise {
   double rate_density = 0.0;        ///< of the virtual rate
   double difference_density = 0.0;  ///< of y₁ − y₂
-  double per_rate_square = 0.0;     ///< of y₁ − y₂, more of it, per (deg/s)² of rate
+  double per_rate_square = 0.0;     ///< of y₁ − y₂, in addition, per (deg/s)² of rate
 };
 
 class DifferenceWindow {
  public:
   /// The next cell, without a gap to the one before. The middle one of the last five is regressed.
   void add(const RateCell& cell, const RateNoise& noise);
-  /// There is a gap, or the gyros are not both there.
+  /// A gap, or one gyro is missing: the next cell does not continue the last one.
   void break_off() { count_ = 0; }
   /// A new window; the last cells are kept.
   void clear();
-  /// Rows of unit noise; none for what was not excited.
+  /// Rows of unit noise; no row for a regressor that was not excited.
   [[nodiscard]] DriftMeasurement measure() const;
-  /// What turning alone may leave of the difference beyond scale factor and skew, (deg/s)².
+  /// Variance that turning alone may leave in the difference beyond scale factor and skew,
+  /// (deg/s)².
   [[nodiscard]] double motion_variance() const;
-  /// How much is known of scale factor and skew: 1/variance.
+  /// Information about scale factor and skew: 1/variance.
   [[nodiscard]] double scale_information() const { return normal_(1, 1); }
   [[nodiscard]] double skew_information() const { return normal_(2, 2); }
 

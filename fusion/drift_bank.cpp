@@ -8,28 +8,28 @@ namespace vgyro::fusion {
 
 namespace {
 
-// Where nothing says otherwise K is N times 2e-2 per second, give or take a factor of five: the
-// span from good fibre-optic gyros to cheap MEMS.
+// Prior of K/N: 2e-2 per second, within a factor of five, which spans good fibre-optic gyros and
+// cheap MEMS.
 constexpr double kUsualRatioLog10 = -1.7;
 constexpr double kRatioSpreadLog10 = 0.7;
 
-// Drift that a sensor takes on between two runs, in units of N over √(1 s), and how long it must
-// have been off for that.
+// σ of a sensor's drift between two runs, in units of N over √(1 s), and the time off after which
+// it counts in full.
 constexpr double kRunToRunWhite = 3.0;
 constexpr double kRunToRunAge_s = 60.0;
-// Slopes of before go on for so long.
+// Slopes continue for at most this long across a restart.
 constexpr double kSlopesGoOn_s = 600.0;
 
-/// Slopes go with a sensor's class, as N does: σ in units of N.
+/// Slopes depend on a sensor's class, as N does: their σ are in units of N.
 struct DriftKind {
   double prior;
   double begin_per_s;   ///< σ of the slope at the start over N
   double steady_per_s;  ///< in the long run
   double tau_s;
   double correlation;
-  double relative;  ///< how far a slope's own course may be another one, as a share of it
+  double relative;  ///< change of a slope in the long run, as a share of it
   bool alike;       ///< both gyros' slopes are of the quieter one's size
-  /// Every how many of kWalkRatios_per_s it is tried with, and how many are left out at each end.
+  /// Which of kWalkRatios_per_s are tried: every stride-th, without `margin` values at each end.
   std::size_t stride;
   std::size_t margin;
 };
@@ -41,28 +41,28 @@ constexpr std::array<DriftKind, kDriftKinds> kKinds{{
     {0.01, 0.0, 0.1, 300.0, 0.98, 0.0, true, 2, 2},
 }};
 
-// So much less likely are all but the first where the model gives K.
+// Factor on the priors of all kinds but the first where the model file gives K.
 constexpr double kMeasured = 0.2;
 
-// A coefficient before anything is known of it, in units of N per kelvin.
+// Prior σ of a temperature coefficient, in units of N per kelvin.
 constexpr double kCoefficientWhite_per_k = 1.5;
-// It grows with this power of K over its usual value, within limits.
+// This σ grows with this power of K over its usual value, within limits.
 constexpr double kUsualRatio_per_s = 0.02;
 constexpr double kCoefficientPower = 0.7;
 constexpr double kCoefficientLeast = 0.2;
 constexpr double kCoefficientMost = 5.0;
-// What a bias does with temperature besides: bends and hysteresis, a walk over kelvins.
+// Bends and hysteresis of a bias over temperature: a random walk over kelvins.
 constexpr double kBendWhite_per_rtk = 0.05;
 
-// Scale errors go with a sensor's class, from 0.05 % of a fibre-optic gyro to 0.5 % of a cheap
-// MEMS; that two differ is plain from so many standard deviations on.
+// Scale errors depend on a sensor's class, from 0.05 % of a fibre-optic gyro to 0.5 % of a cheap
+// MEMS. Two scale factors plainly differ from this many standard deviations on.
 constexpr double kUsualScale = 5e-4;
 constexpr double kUsualScaleWhite = 1e-4;
 constexpr double kUsualScaleMin = 3e-4;
 constexpr double kUsualScaleMax = 5e-3;
 constexpr double kPlainSigmas = 4.0;
 
-// Parts that weigh less are left out of the sums.
+// Parts with less weight are left out of the sums.
 constexpr double kWeightMin = 1e-9;
 constexpr double kHalfLogTwoPi = 0.918938533204672741780;
 
@@ -87,7 +87,7 @@ struct WalkChoice {
   std::size_t place = 0;
 };
 
-/// The values of K that a kind of drift is tried with.
+/// The values of K that are tried with a kind of drift.
 struct WalkChoices {
   std::array<WalkChoice, kWalkRatios_per_s.size()> choice{};
   std::size_t count = 0;
@@ -121,8 +121,8 @@ SlopeModel slopes_of(const DriftKind& kind, const std::array<double, 2>& white_d
   return slopes;
 }
 
-/// The share that a weight of DriftMemory::walk_weight at place `from` gives to a kind's place
-/// `to`: places in between are shared out, those beyond the ends go to the ends.
+/// The share of a weight at place `from` of DriftMemory::walk_weight that goes to a kind's place
+/// `to`: weights between two places are divided, those beyond the ends go to the ends.
 double share_of_place(const DriftKind& kind, std::size_t from, std::size_t to) {
   const auto last = static_cast<double>(kWalkRatios_per_s.size() - 1 - kind.margin);
   const double at = std::clamp(static_cast<double>(from), static_cast<double>(kind.margin), last);
@@ -130,7 +130,7 @@ double share_of_place(const DriftKind& kind, std::size_t from, std::size_t to) {
   return std::max(1.0 - away, 0.0);
 }
 
-// What drifts more feels heat more.
+// A gyro that drifts more reacts more to heat.
 double usual_coefficient(double white_dps_rthz, double walk_dps_rts) {
   const double ratio = walk_dps_rts / (white_dps_rthz * kUsualRatio_per_s);
   return kCoefficientWhite_per_k * white_dps_rthz *
@@ -196,7 +196,7 @@ DriftBank::DriftBank(const std::array<GyroParameters, 2>& gyros) : gyros_(gyros)
   filters_.reserve(kFiltersMax);
 }
 
-// Who gives K has measured the drift, and would have seen more of it.
+// A user who gives K has measured the drift, and would have seen other kinds.
 double DriftBank::prior_of(std::size_t kind) const {
   const bool measured = gyros_[0].walk_dps_rts && gyros_[1].walk_dps_rts;
   if (!measured) return kKinds[kind].prior;
@@ -268,7 +268,7 @@ void DriftBank::resume(const DriftMemory& memory, double age_s) {
   take_slopes(memory);
   take_coefficients(memory);
   normalize();
-  // Heat that comes and goes does not add up for days.
+  // Slopes come from heat that comes and goes, and do not add up for days.
   const double sloping_s = std::min(age_s, kSlopesGoOn_s);
   for (WeighedFilter& one : filters_) {
     one.filter.predict(one.filter.has_slopes() ? sloping_s : age_s);
@@ -321,7 +321,7 @@ void DriftBank::take_slopes(const DriftMemory& memory) {
   }
 }
 
-// The biases were known where the temperature was; from there on the coefficient counts.
+// The saved biases hold at the saved temperature, where the coefficient therefore counts from.
 void DriftBank::take_coefficients(const DriftMemory& memory) {
   for (std::size_t gyro = 0; gyro < 2; ++gyro) {
     if (!gyros_[gyro].learns_temperature || !memory.has_temperature[gyro]) continue;
@@ -334,8 +334,9 @@ void DriftBank::take_coefficients(const DriftMemory& memory) {
   }
 }
 
-// As long as nothing is known of their difference, and where they plainly differ, gyros have the
-// scale errors of their class, and what both have in common does not show.
+// Variance of a common scale error, which the difference does not show. As long as the difference
+// is unknown, and where it is plainly not 0, gyros are assumed to have the scale errors of their
+// class.
 double DriftBank::usual_scale_doubt(double difference, double variance) const {
   std::array<double, 2> usual{};
   for (std::size_t gyro = 0; gyro < 2; ++gyro) {
@@ -437,8 +438,8 @@ DriftEstimate DriftBank::estimate() const {
     const double drift = part.growth[0] + part.growth[1];
     part.drift_share[0] = drift > 0.0 ? part.growth[0] / drift : 0.5;
     part.drift_share[1] = 1.0 - part.drift_share[0];
-    // s₁ = share·s, s₂ = −(1 − share)·s. What both have in common stays open: had one gyro been off
-    // by all of s, the other's share of it would be wrong.
+    // s₁ = share·s, s₂ = −(1 − share)·s. The common part stays open: if one gyro had all of s, the
+    // other one's share would be wrong.
     const double share = one.scale_share;
     const double rest = 1.0 - share;
     const double s = part.mean(kScale);
@@ -469,7 +470,7 @@ void DriftBank::save(DriftMemory& memory) const {
     const double weight = std::exp(one.log_weight);
     memory.kind_weight[one.kind] += weight;
     if (!walks_are_known) memory.walk_weight[one.place] += weight;
-    // Slopes as they are if there are any; how likely that is, kind_weight says.
+    // Mean of the slopes given that there are any; kind_weight holds the probability of that.
     if (one.filter.has_slopes()) {
       const DriftFilter::Slopes slopes = one.filter.slopes();
       sloping += weight;

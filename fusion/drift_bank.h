@@ -25,7 +25,7 @@ struct DriftEstimate {
   DriftFilter::Covariance covariance = DriftFilter::Covariance::Zero();
   std::array<double, 2> growth{};  ///< of the biases' variances, (deg/s)²/s
   std::array<double, 2> scale{};   ///< share of each gyro in the scale-factor difference
-  /// Of both gyros' scale factors, as far as their difference shows: variances and covariance.
+  /// Variances and covariance of both gyros' scale factors, as known from their difference.
   Symmetric scale_covariance{};
   /// Which gyro is likely the cause where the two differ about a turn: (N·K)² over the sum.
   std::array<double, 2> blame{};
@@ -37,10 +37,10 @@ struct DriftEstimate {
   std::array<double, kDriftKinds> kind_weight{};  ///< probability of each kind of drift
 };
 
-/// Moments of a mixture: adds up what each part says, in proportion to its weight.
+/// Moments of a mixture: adds its parts in proportion to their weights.
 class EstimateMixer {
  public:
-  /// Σ of weights must come to 1.
+  /// The weights must add up to 1.
   void add(double weight, const DriftEstimate& part);
   [[nodiscard]] DriftEstimate result() const;
 
@@ -67,7 +67,7 @@ class DriftBank {
   /// tried.
   void begin(const std::array<double, 2>& white_dps_rthz, const std::array<double, 2>& bias_dps,
              const Symmetric& covariance);
-  /// From a memory, aged.
+  /// Continues from a memory that is `age_s` seconds old.
   void resume(const DriftMemory& memory, double age_s);
 
   void predict(double length_s);
@@ -76,14 +76,13 @@ class DriftBank {
   void widen(double variance_1, double covariance_12, double variance_2);
   /// One gyro's drift has jumped.
   void shift(std::size_t gyro, double by_dps, double variance);
-  /// The gyros' temperatures: the coefficients are learned from the first one on. A NaN is passed
-  /// over.
+  /// The gyros' temperatures: coefficients count from the first one. A NaN is ignored.
   void set_temperature(const std::array<double, 2>& temperature_c);
-  /// The temperatures of the next measurement, where they are not quite the present ones.
+  /// The temperatures of the next measurement, if they differ from the present ones.
   void observe_at(const std::array<double, 2>& temperature_c);
 
   [[nodiscard]] DriftEstimate estimate() const;
-  /// N² of a gyro, as the bank was begun with.
+  /// N² of a gyro, as given to begin() or resume().
   [[nodiscard]] double white_density(std::size_t gyro) const {
     return squared(white_dps_rthz_[gyro]);
   }

@@ -76,7 +76,7 @@ DriftFilter::DriftFilter(const DriftModel& model, const Observables& mean,
     }
     for (std::size_t i = 0; i < model.gauss_markov_count[k]; ++i, ++place) {
       observe_(gyro, place) = 1.0;
-      // The bias was seen as a whole: what the term holds the walk does not.
+      // Only the sum of walk and term was measured: their errors are opposite.
       const double variance = squared(model.gauss_markov[k][i].sigma_dps);
       covariance_(place, place) += variance;
       covariance_(gyro, place) -= variance;
@@ -118,7 +118,7 @@ DriftFilter::Transition DriftFilter::transition(double length_s) const {
   return all;
 }
 
-// A slope that wanders by itself: what it gains in a window, and what that has added to the drift.
+// Noise of the slopes: what a slope gains by itself in a window, and what that adds to the drift.
 void DriftFilter::add_slope_noise(double length_s, Square& walked) const {
   const SlopeModel& slopes = model_.slopes;
   const double tau_s = slopes.tau_s;
@@ -126,7 +126,7 @@ void DriftFilter::add_slope_noise(double length_s, Square& walked) const {
   const double gone = -std::expm1(-a);
   const double slope_gain = -std::expm1(-2.0 * a);
   const double cross_s = tau_s * gone * gone;
-  // ½·variance of the integral, as a series where rounding would leave nothing of it.
+  // ½·variance of the integral, as a series where rounding would cancel all of it.
   const double integral_s2 =
       tau_s * tau_s *
       (a < kShort ? 2.0 / 3.0 * a * a * a : std::max(2.0 * (a - gone) - gone * gone, 0.0));
@@ -161,7 +161,7 @@ void DriftFilter::predict(double length_s) {
   covariance_ = (flow * covariance_ * flow.transpose() + walked).eval();
 }
 
-// One window with its measurement, in sizes that the compiler knows: states and rows.
+// One window with its measurement, with States and Rows known at compile time.
 template <int States, int Rows>
 class DriftFilter::SizedUpdate {
  public:
@@ -180,9 +180,9 @@ class DriftFilter::SizedUpdate {
     walk_covariance_ = walked;
   }
 
-  /// The states behind the window go to `state`; returns the log likelihood of `values`.
+  /// Puts the states at the window's end into `state`; returns the log likelihood of `values`.
   double correct(const DriftMeasurement::Values& values, State& state);
-  /// After correct(): their covariance goes to `covariance`.
+  /// After correct(): puts the covariance of these states into `covariance`.
   void spread(Square& covariance) const;
 
  private:
@@ -201,14 +201,14 @@ class DriftFilter::SizedUpdate {
   Transition window_;
   StateVector carry_;
   StateVector end_variance_;
-  StateSquare walk_covariance_;  ///< where there are slopes: only theirs is no diagonal
+  StateSquare walk_covariance_;  ///< only with slopes, whose part is not diagonal
   StateSquare before_;
   StateVector state_;
-  StateVector end_;  ///< the states behind the window, unmeasured
-  Map h_;            ///< what the measurement sees of r, of the start, and of w
+  StateVector end_;  ///< predicted states at the window's end
+  Map h_;            ///< maps r to the measurement; h_mean_: the start; h_lead_: w
   Map h_mean_;
   Map h_lead_;
-  RowSquare noise_;  ///< of the measurement, with r
+  RowSquare noise_;  ///< of the measurement, including r
   Gain gain_;
 };
 
@@ -250,7 +250,7 @@ double DriftFilter::SizedUpdate<States, Rows>::correct(const DriftMeasurement::V
   innovation_covariance.noalias() += h_lead_ * led;
 
   const Eigen::LLT<RowSquare> factor(innovation_covariance);
-  // gain · L · Lᵀ = cross, column by column: what the general solver does, without its blocks.
+  // gain · L · Lᵀ = cross, column by column: as the general solver does, without its blocks.
   const RowSquare& lower = factor.matrixLLT();
   gain_ = cross;
   for (int row = 0; row < Rows; ++row) {
@@ -280,8 +280,8 @@ void DriftFilter::SizedUpdate<States, Rows>::spread(Square& covariance) const {
   }
   StateSquare walked = -gain_ * h_lead_;
   walked.diagonal().array() += 1.0;
-  // Of sizes that are known, term by term: the general product, which packs its operands first,
-  // takes several times as long.
+  // Fixed sizes, term by term: Eigen's general product packs its operands first and takes several
+  // times as long.
   const StateSquare started = start.lazyProduct(before_);
   StateSquare next = started.lazyProduct(start.transpose());
   next += wandered_covariance(walked);
@@ -290,9 +290,9 @@ void DriftFilter::SizedUpdate<States, Rows>::spread(Square& covariance) const {
   covariance = 0.5 * (next + next.transpose());
 }
 
-// walked · (covariance of w) · walkedᵀ, less the products that are exact zeros: of the states
-// behind the observables only slopes wander, Gauss–Markov terms apart, and no measurement sees
-// their w.
+// walked · (covariance of w) · walkedᵀ, without the products that are exactly zero: among the
+// states after the observables only slopes wander (Gauss–Markov terms apart), and no measurement
+// depends on their w.
 template <int States, int Rows>
 auto DriftFilter::SizedUpdate<States, Rows>::wandered_covariance(const StateSquare& walked) const
     -> StateSquare {
@@ -317,8 +317,8 @@ auto DriftFilter::SizedUpdate<States, Rows>::wandered_covariance(const StateSqua
   return wandered;
 }
 
-// Without Gauss–Markov terms, as always where the parameters are estimated, all sizes are known to
-// the compiler: several times faster.
+// Without Gauss–Markov terms, which only the model file adds, all sizes are known at compile time:
+// several times faster.
 double DriftFilter::update(double length_s, const DriftMeasurement& measurement) {
   const bool terms = model_.gauss_markov_count[0] + model_.gauss_markov_count[1] > 0;
   if (terms) return update_of<Eigen::Dynamic>(length_s, measurement);
@@ -379,7 +379,7 @@ void DriftFilter::set_coefficient(std::size_t gyro, double mean_dps_k, double va
   covariance_(at, at) = variance;
 }
 
-// In sizes that the compiler knows, where update() has them.
+// With fixed sizes for the same cases as update().
 template <int States>
 DriftFilter::Covariance DriftFilter::covariance_of() const {
   using Sees = Eigen::Matrix<double, kObservables, States>;

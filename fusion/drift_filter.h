@@ -1,7 +1,7 @@
 #pragma once
 
 // Kalman filter over the drifts of two gyros, fed one window at a time. The states are the random
-// walks b₁, b₂, the scale-factor difference s and the time skew τ of the two gyros, and, where the
+// walks b₁, b₂, the scale-factor difference s and the time skew τ of the two gyros, and, if the
 // model has them, the slopes of the drifts, their temperature coefficients, and Gauss–Markov terms.
 // A window measures the *mean* of a drift over its length; the filter treats the mean exactly, so
 // that long windows lose nothing but time. The covariance is a sum of squares at every step (Joseph
@@ -84,10 +84,10 @@ class DriftFilter {
   void widen(double variance_1, double covariance_12, double variance_2);
   /// One gyro's drift has jumped.
   void shift(std::size_t gyro, double by_dps, double variance);
-  /// Gyro k is away_k[k] kelvin from where its coefficient was begun.
+  /// Gyro k is away_k[k] kelvin from the reference of its coefficient.
   void set_temperature(const std::array<double, 2>& away_k);
-  /// What is known of slopes, or of temperature coefficients, from before: mean and covariance of
-  /// both gyros'. Precondition: the model has these states.
+  /// Slopes, or temperature coefficients, from an earlier run: mean and covariance. Precondition:
+  /// the model has these states.
   void set_slopes(const Eigen::Vector2d& mean_dps_s, const Eigen::Matrix2d& covariance);
   void set_coefficient(std::size_t gyro, double mean_dps_k, double variance);
 
@@ -105,7 +105,7 @@ class DriftFilter {
   [[nodiscard]] Slopes slopes() const;
   /// Mean and variance of a temperature coefficient. Precondition: has_temperature().
   [[nodiscard]] std::array<double, 2> coefficient(std::size_t gyro) const;
-  /// How the variance of each bias grows, (deg/s)² per s, slopes apart.
+  /// Growth of each bias's variance, (deg/s)² per s, without the part of the slopes.
   [[nodiscard]] std::array<double, 2> growth_per_s() const;
 
  private:
@@ -114,15 +114,15 @@ class DriftFilter {
   using Observe = Eigen::Matrix<double, kObservables, Eigen::Dynamic, 0, kObservables, kStatesMax>;
 
   /// The states over a window: end = F·start + w, mean = M·start + lead·w + r. F and M are diagonal
-  /// (carry, carry_mean) but for what a slope adds to its drift.
+  /// (carry, carry_mean) except for the effect of a slope on its drift.
   struct Transition {
     State carry;
     State carry_mean;
-    State end_variance;  ///< of w, but for the slopes' part
+    State end_variance;  ///< of w, without the slopes' part
     State lead;
     State mean_variance;        ///< of r
-    double slope_end_s = 0.0;   ///< a slope's share in its drift's end
-    double slope_mean_s = 0.0;  ///< in its drift's mean
+    double slope_end_s = 0.0;   ///< effect of a slope on its drift's end
+    double slope_mean_s = 0.0;  ///< effect of a slope on its drift's mean
   };
   [[nodiscard]] Transition transition(double length_s) const;
   void add_slope_noise(double length_s, Square& walked) const;

@@ -25,12 +25,12 @@ struct GyroParameters {
   std::size_t gauss_markov_count = 0;
   double rate_noise_rthz = 0.0;  ///< white noise of density rate_noise_rthz · |Ω|, on top of N
   double resolution_dps = 0.0;   ///< step of the values, 0 when unknown
-  /// Doubt of how late its readings are known to come; and, where that is another gyro's as likely,
-  /// the part that neither would contradict.
+  /// 1σ of the known delay of its readings; and, where the delay may as well be another gyro's, the
+  /// part that both would have in common, so that neither contradicts the other.
   double lag_sigma_s = 0.0;
   double lag_common_sigma_s = 0.0;
   std::optional<double> max_bias_dps = {};  ///< largest bias that this gyro can have
-  bool learns_temperature = false;  ///< its temperature is known, what it does to the bias is not
+  bool learns_temperature = false;  ///< its temperature is measured, its coefficient not given
 
   friend bool operator==(const GyroParameters&, const GyroParameters&) = default;
 };

@@ -14,10 +14,10 @@ namespace vgyro::fusion {
 namespace {
 
 constexpr double kPrior_rad = Misalignment::kPrior_deg * kRadPerDeg;
-// Data sheets of cheap gyros; a bus that delivers one unit later than the other.
+// From data sheets of cheap gyros, and buses that deliver one unit later than the other.
 constexpr double kScalePrior = 0.02;
 constexpr double kSkewPrior_s = 0.01;
-// In an hour a housing warps by so much, scale factors drift by so much, clocks by so much.
+// Changes in an hour: of the housing, of scale factors, of clocks.
 constexpr double kWarp_rad = 0.005 * kRadPerDeg;
 constexpr double kScaleDrift = 1e-4;
 constexpr double kSkewDrift_s = 1e-4;
@@ -25,23 +25,24 @@ constexpr double kHour_s = 3600.0;
 
 // A longer hole than this many cells ends a segment.
 constexpr double kHole_s = 3.0 * Misalignment::kCell_s;
-// Derivatives take a neighbour on each side.
+// Derivatives need a neighbour on each side.
 constexpr std::size_t kEdge = 1;
 constexpr std::size_t kCellsMin = 20;
-// A regressor counts where it is this far above its own noise, or that would be taken for
-// knowledge, and where anything turns at all.
+// A segment counts if its rates are this far above their own noise, which would otherwise bias the
+// fit, and above this rate.
 constexpr double kExcited = 5.0;
 constexpr double kTurning_dps = 0.05;
-// Readings in steps repeat themselves, and seem to have no noise.
+// Least noise: coarse readings repeat, and seem to have none.
 constexpr double kNoiseLeast_dps = 1e-4;
-// What a segment shows of its own noise is fitted with: a level, three rates, a derivative.
+// Parameters of the fit whose remainder is a segment's noise: a level, three rates, a derivative.
 constexpr int kFitted = 5;
-// A segment that contradicts what is known by this much, per state, is believed less.
+// χ² per state from which a segment counts less.
 constexpr double kContradiction = 4.0;
-// By this much it is of a fault, unless so many in a row say so.
+// χ² per state from which a segment is taken for a fault and left out, unless more than so many
+// follow each other.
 constexpr double kUnlikely = 50.0;
 constexpr int kUnlikelyMost = 3;
-// Neighbours that are alike by more than this are one value.
+// Limit of the correlation of neighbours.
 constexpr double kAlikeMost = 0.9;
 
 std::size_t next(std::size_t axis) {
@@ -66,7 +67,7 @@ Misalignment::Misalignment() {
 void Misalignment::add(double t_s, const AxisRates& first_dps, const AxisRates& second_dps,
                        const Both& both) {
   if (both != both_) {
-    // What came just before an axis was set aside may be of its fault.
+    // The samples just before an axis was set aside may be faulty.
     cells_count_ = 0;
     break_off();
   }
@@ -123,8 +124,8 @@ Misalignment::State Misalignment::regressor(std::size_t axis, std::size_t cell) 
   return row;
 }
 
-// Of what no rate and no derivative explains, whatever the units are; neighbours that are alike
-// count as fewer.
+// Variance of the remainder that no rate and no derivative explains; it is larger where neighbours
+// are correlated.
 double Misalignment::noise_variance(std::size_t axis) const {
   using Fit = Eigen::Matrix<double, kFitted, 1>;
   Eigen::Matrix<double, kFitted, kFitted> normal = Eigen::Matrix<double, kFitted, kFitted>::Zero();
@@ -141,7 +142,7 @@ double Misalignment::noise_variance(std::size_t axis) const {
     normal += row * row.transpose();
     right += row * cells_[i].difference_dps[axis];
   }
-  // An axis that does not turn has no column.
+  // The column of an axis that does not turn is zero.
   constexpr double kRidge = 1e-9;
   normal.diagonal().array() += kRidge * (1.0 + normal.trace());
   const Fit fit = normal.ldlt().solve(right);
@@ -210,12 +211,12 @@ void Misalignment::grow(double length_s) {
   covariance_(6, 6) += share * squared(kSkewDrift_s);
 }
 
-// Kalman's update in the form of information; what contradicts all that is known weighs less.
+// Kalman update in information form; a segment that contradicts the present state weighs less.
 void Misalignment::learn(Square information, State right) {
   const Square before = covariance_;
   const State away = right - information * mean_;
   Square expected = information * before * information + information;
-  // States that the segment does not move have no row in it.
+  // States that the segment does not excite have a zero row.
   expected.diagonal().array() += 1e-12 * (1.0 + expected.trace());
   const double excess = away.dot(expected.ldlt().solve(away)) / kStates;
   unlikely_ = excess > kUnlikely ? unlikely_ + 1 : 0;
@@ -231,7 +232,7 @@ void Misalignment::learn(Square information, State right) {
   ++segments_used_;
 }
 
-// --- what comes of it ----------------------------------------------------------------------------
+// --- the excess of unit 2 ------------------------------------------------------------------------
 
 double Misalignment::cross_dps(std::size_t axis, const AxisRates& rate_dps) const {
   return rate_dps[next(axis)] * mean_(static_cast<int>(after_next(axis))) -

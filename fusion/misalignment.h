@@ -1,11 +1,11 @@
 #pragma once
 
-// The small rotation θ between two units of gyros: unit 2 reads Ω + Ω × θ. Learned from the
-// difference of the units while they turn, together with the other effects of turning: a scale
-// factor difference of each axis and a time skew. Cells of a tenth of a second make segments of
-// some seconds; within a segment biases are constants and drop out. Each segment estimates its
-// noise. docs/optimal.md derives it. Rates in deg/s, θ in rad; nothing is allocated, and a platform
-// of two axes has a third that does not turn.
+// The small rotation θ between two whole units: unit 2 reads Ω + Ω × θ. Learned from the difference
+// of the units while they turn, together with the other effects of turning: a scale factor
+// difference of each axis and a time skew. Cells of a tenth of a second make segments of some
+// seconds; within a segment biases are constant and cancel. Each segment estimates its own noise.
+// docs/optimal.md derives it. Rates in deg/s, θ in rad. Nothing is allocated; a platform of two
+// axes has a third one that does not turn.
 
 #include <array>
 #include <cstddef>
@@ -26,7 +26,7 @@ struct MisalignmentMemory {
 
 class Misalignment {
  public:
-  /// What is not known of two units whose mounts are given.
+  /// Prior σ of θ between two units whose mounts are given.
   static constexpr double kPrior_deg = 1.0;
   static constexpr double kCell_s = 0.1;
   static constexpr std::size_t kSegmentCells = 50;
@@ -36,25 +36,25 @@ class Misalignment {
   /// The axes about which both units measure the rate.
   using Both = std::array<bool, kPlatformAxes>;
 
-  /// One instant, as the units read it, biases included; t_s grows. About an axis that only one of
-  /// them measures, both rates are the best known one, or 0.
+  /// The readings of both units at one instant, biases included; t_s grows. About an axis that only
+  /// one unit measures, both rates are the best known one, or 0.
   void add(double t_s, const AxisRates& first_dps, const AxisRates& second_dps,
            const Both& both = {true, true, true});
   /// The next sample does not continue the present segment.
   void break_off();
 
-  /// What unit 2 reads too much about `axis` while the platform turns at `rate_dps` …
+  /// Excess of unit 2 about `axis` while the platform turns at `rate_dps`.
   [[nodiscard]] double cross_dps(std::size_t axis, const AxisRates& rate_dps) const;
-  /// … and the variance that is left of it, (deg/s)².
+  /// Variance of cross_dps(), (deg/s)².
   [[nodiscard]] double cross_variance(std::size_t axis, const AxisRates& rate_dps) const;
 
   [[nodiscard]] std::array<double, 3> angle_rad() const;
   [[nodiscard]] std::array<double, 3> sigma_rad() const;
-  /// Segments that were used.
+  /// Number of segments that were used.
   [[nodiscard]] std::size_t segments() const { return segments_used_; }
 
   [[nodiscard]] MisalignmentMemory memory() const;
-  /// False where it cannot be right; then nothing has changed.
+  /// False if the memory cannot be right; then nothing has changed.
   bool resume(const MisalignmentMemory& memory, double age_s);
 
  private:
@@ -73,7 +73,7 @@ class Misalignment {
   void grow(double length_s);
   /// Row of `axis` in a cell.
   [[nodiscard]] State regressor(std::size_t axis, std::size_t cell) const;
-  /// False where it has no information.
+  /// False if the axis has no information.
   bool add_axis(std::size_t axis, Square& information, State& right) const;
   [[nodiscard]] double noise_variance(std::size_t axis) const;
   void learn(Square information, State right);

@@ -12,8 +12,8 @@ void MovingVariance::drop_oldest() {
   --size_;
 }
 
-// Sums that are only added to and taken from gather rounding; now and then they begin again, about
-// a pivot near the values.
+// Running sums accumulate rounding errors, so they are recomputed now and then, about a pivot near
+// the values.
 void MovingVariance::sum_anew() {
   const double shift = size_ == 0 ? 0.0 : sum_ / static_cast<double>(size_);
   pivot_ += shift;
@@ -31,7 +31,7 @@ void MovingVariance::sum_anew() {
 void MovingVariance::add(TimePoint t, double value) {
   if (size_ > 0) {
     const TimePoint newest = values_[(head_ + size_ - 1) % kCapacity].t;
-    // Its clock was set back: what it said is of another time.
+    // The clock was set back: the stored values belong to another time.
     if (newest - t > kWindow) {
       size_ = 0;
     } else if (t <= newest) {

@@ -1,6 +1,6 @@
 #pragma once
 
-// Variance of a quantity over the last second: how strongly something shakes. Bounded: at more than
+// Variance of a quantity over the last second, which measures vibration. Bounded: with more than
 // kCapacity values a second the window is shorter. Nothing is allocated.
 
 #include <array>
@@ -15,8 +15,8 @@ class MovingVariance {
   static constexpr Duration kWindow = std::chrono::seconds(1);
   static constexpr std::size_t kCapacity = 2048;
 
-  /// A value at or before the last one's time is passed over; one that is far before it begins
-  /// anew. Precondition: finite.
+  /// A value at or before the last one's time is ignored; one more than kWindow before it restarts
+  /// the window. Precondition: finite.
   void add(TimePoint t, double value);
 
   /// 0 with fewer than two values in the window.

@@ -7,19 +7,19 @@
 
 // The paper's steps, per window i, with P_k the fitted and p_k the predicted (extrapolated) drifts:
 //   cross drifts   d₁ = y₁ − (y₂ − p₂) = δ + p₂,   d₂ = −δ + p₁,   δ = y₁ − y₂
-//   fit            P₁ⁱ = D + p₂, P₂ⁱ = −D + p₁      with D the fit of δ: a fit of a polynomial is
-//   itself average        c₁ = ½(p₁ + P₁ⁱ) = ½(S + D),     c₂ = ½(S − D),  S = p₁ + p₂ virtual gyro
-//   Ω = ½(y₁ + y₂) − ½(c₁ + c₂) = ½(y₁ + y₂) − ½S
+//   fit            P₁ⁱ = D + p₂,   P₂ⁱ = −D + p₁;   D: fit of δ; a polynomial's fit is itself
+//   average        c₁ = ½(p₁ + P₁ⁱ) = ½(S + D),   c₂ = ½(S − D),   S = p₁ + p₂
+//   virtual gyro   Ω = ½(y₁ + y₂) − ½(c₁ + c₂) = ½(y₁ + y₂) − ½S
 // and P₁ⁱ + P₂ⁱ = p₁ + p₂ = S is the calibration's sum, extrapolated for ever. So S from the
-// calibration and one fit D per window are the whole method; docs/mutual.md has the derivation, and
-// the tests hold it against the literal steps.
+// calibration and one fit D per window are the whole method. docs/mutual.md has the derivation; the
+// tests compare it with the literal steps.
 
 namespace vgyro::fusion {
 
 namespace {
 
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
-// A count beyond this tells no more, and a double beyond 64 bits none at all.
+// Limit of a count of skipped windows: a double beyond 64 bits cannot be converted.
 constexpr double kSkippedMost = 1e15;
 
 class MutualCorrector final : public Corrector {
@@ -77,7 +77,7 @@ class MutualCorrector final : public Corrector {
   void close_window(double t_s) {
     if (const auto fit = window_.fit()) {
       difference_ = fit->polynomial;
-      // The line of a window is for the next one; where that brings none it is held.
+      // The fit of a window is extrapolated through the next one; if that gives none, it is held.
       difference_until_s_ = window_end_s_ + window_s_;
       ++counts_.completed;
     } else {
@@ -89,11 +89,11 @@ class MutualCorrector final : public Corrector {
     open_window(window_end_s_ + behind * window_s_);
   }
 
-  // The method extends its lines by a window, so a silence that is longer is none that they can
-  // bridge: the clock was set, or nobody knows what the drifts did.
+  // The method extrapolates by one window. A longer silence cannot be bridged: the clock was set,
+  // or the drifts changed in an unknown way.
   [[nodiscard]] bool leap_to(double t_s) const { return t_s - newest_s_ > window_s_; }
 
-  // Behind a leap the lines go on where they were.
+  // After a leap the polynomials continue from where they were.
   void reach(double t_s) {
     if (leap_to(t_s)) {
       const double leap_s = t_s - newest_s_;
@@ -113,8 +113,8 @@ class MutualCorrector final : public Corrector {
   LeastSquares window_;
   double window_end_s_ = 0.0;
   double newest_s_ = 0.0;
-  Polynomial sum_;         ///< S
-  Polynomial difference_;  ///< D of the last completed window; of the calibration before the first
+  Polynomial sum_;                   ///< S
+  Polynomial difference_;            ///< D of the last completed window, or of the calibration
   double difference_until_s_ = 0.0;  ///< held from here on
   WindowCounts counts_;
 };

@@ -7,38 +7,39 @@ namespace vgyro::fusion {
 
 namespace {
 
-// Older measurements count half when so many cells are there: noise changes with age and heat.
+// When so many cells are summed, all sums are halved: noise changes with age and heat.
 constexpr double kCellsMax = 12000.0;
 
-// A correlation below this many of its own standard deviations is none.
+// A correlation below this many of its own standard deviations counts as 0.
 constexpr double kRealCorrelation = 4.0;
 
 // A greater correlation than this is motion.
 constexpr double kSwayCorrelation = 0.8;
 
-// How fast a rise is followed, per block, and how sure it must be.
+// Gain per block with which a rise is followed; significance that it needs; share of
+// NoiseTracker::kNoisyFactor below which it is over; bound of a single block.
 constexpr double kRiseGain = 0.3;
 constexpr double kSureSigma = 3.0;
 constexpr double kNoLongerNoisy = 0.5;
 constexpr double kOneBlockMax = 22.0;
 
-// A sensor that says nothing of its resolution still has some noise, (deg/s)²/Hz.
+// A sensor of unknown resolution still has some noise, (deg/s)²/Hz.
 constexpr double kDensityMin = 1e-14;
 
 // A block is usual within so many standard deviations of its sum of squares.
 constexpr double kUsualSigmas = 4.0;
 constexpr double kGainMin = 1e-3;
 
-// A cell's difference scatters by so many standard deviations of noise: no Gaussian's does, and a
-// value that is off by less than a dozen or two of them does little harm.
+// Scatter of a cell's difference, in standard deviations of its noise, that no Gaussian noise
+// reaches. A value that is off by less than one or two dozen of them does little harm.
 constexpr double kSpikeSigma = 4.0;
-// … of so many values at least: one of a few is not told from motion.
+// Least number of values in such a cell: among fewer, an outlier looks like motion.
 constexpr double kSpikeSamples = 4.0;
-// … and beyond this share of what the gyros have in common, which skews and scales do not leave.
+// Share of the common motion that skew and scale factors may leave in the difference.
 constexpr double kMotionShare = 0.01;
 
-// What motion shares between the gyros never explains all of one's noise: scale factors differ, and
-// the difference of the two is noise that neither can be without.
+// Least share of the difference's noise that each gyro has: common motion never explains all of one
+// gyro's noise, because scale factors differ.
 constexpr double kOwnShareMin = 0.05;
 
 }  // namespace
@@ -53,8 +54,8 @@ double NoiseTracker::step_dps(std::size_t gyro) const {
   return std::max(gyros_[gyro].resolution_dps, step_dps_[gyro]);
 }
 
-// The mean of a rounded value is off by (step/π)·sin(…)·exp(−2π²σ²/step²) to first order: its
-// square over all places between two steps, which noise of half a step makes vanish.
+// The mean of a rounded value is off by (step/π)·sin(…)·exp(−2π²σ²/step²) to first order. This is
+// its mean square over all places between two steps; noise of half a step makes it vanish.
 double NoiseTracker::rounding_variance(std::size_t gyro) const {
   const double step = step_dps(gyro);
   if (!(step > 0.0)) return 0.0;
@@ -122,7 +123,7 @@ bool NoiseTracker::spiked(const CellBlock& block, double more) const {
     const double motion = std::max(cell.scatter[1], 0.0);
     const double scatter = of_difference(cell.scatter) - kMotionShare * motion;
     if (scatter <= squared(kSpikeSigma) * cell.count * noise) continue;
-    // What one gyro feels and the other one does not goes on from cell to cell.
+    // Rotation that only one gyro feels continues from cell to cell.
     double moved = 0.0;
     for (std::size_t other = 0; other < block.count; ++other)
       moved = std::max(moved, std::abs(difference(other) - difference(i)));
@@ -144,7 +145,7 @@ void NoiseTracker::settle(double interval_s) {
   };
   const double cell_shared = shared(cell_squares_, cells_);
   const double sample_shared = shared(sample_squares_, samples_);
-  // Sensors' noises are never that alike: the platform sways.
+  // The noise of two sensors is never that alike: the platform sways.
   const bool sways =
       shared_is_motion_ ||
       squared(cell_shared) > squared(kSwayCorrelation) * cell_squares_[0] * cell_squares_[2];
@@ -197,10 +198,10 @@ void NoiseTracker::watch(const CellBlock& block) {
   const std::array<double, 2> expected{(sample_[0] - sample_[1]) * gain[0],
                                        (sample_[2] - sample_[1]) * gain[1]};
   if (expected[0] <= 0.0 || expected[1] <= 0.0) return;
-  // What the gyros share is motion. It does not fall out of one gyro's sum of squares exactly: the
-  // doubt grows with the motion, and with the other gyro's noise.
-  // What is late shows with opposite signs, and is no more noise than both have together.
-  // Rounding leaves a difference of squares below zero where both step alike.
+  // The common part is motion. It does not cancel exactly in one gyro's sum of squares: its
+  // uncertainty grows with the motion, and with the other gyro's noise. A delay shows with opposite
+  // signs in the two gyros, and is at most what both have together. Rounding leaves a difference of
+  // squares below zero where both step alike.
   const double both = std::max(of_difference(squares), 0.0);
   const std::array<double, 2> own{std::clamp(squares[0] - squares[1], 0.0, both),
                                   std::clamp(squares[2] - squares[1], 0.0, both)};
@@ -214,10 +215,11 @@ void NoiseTracker::watch(const CellBlock& block) {
   const double sure = both - kSureSigma * both_expected * std::sqrt(2.0 / freedom);
   const double missing = std::max(sure / explained, 1.0);
   for (std::size_t gyro = 0; gyro < 2; ++gyro) {
-    // One wild block is not noise; several are, however wild.
+    // One outlying block is not noise; several are, however large.
     const double followed = std::min(rise[gyro] * missing, 3.0 * rise_[gyro] + kOneBlockMax);
     rise_[gyro] += kRiseGain * (followed - rise_[gyro]);
-    // Whose noise it is must be plain: nothing is missing, or what is sure is enough by itself.
+    // Report a gyro only if the noise is plainly its own: the rises of both explain the difference,
+    // or its own significant rise is enough.
     const bool plain = missing < 2.0 || rise[gyro] > kNoisyFactor;
     if (rise_[gyro] > kNoisyFactor && plain) noisy_[gyro] = true;
     if (rise_[gyro] < kNoLongerNoisy * kNoisyFactor) noisy_[gyro] = false;

@@ -1,9 +1,9 @@
 #pragma once
 
-// The white noise of two gyros: N at the time scale of cells (what drift and heading feel), and the
-// variance of single samples (what σ of a published rate is made of). Known from the model file,
-// or measured where the true rate is known; otherwise only a rise is followed, from the noise that
-// the two gyros do not share.
+// The white noise of two gyros: N at the time scale of cells, which drift and heading feel, and the
+// variance of single samples, which σ of a published rate contains. Known from the model file, or
+// measured where the true rate is known. Elsewhere only a rise is followed, from the noise that the
+// two gyros do not share.
 
 #include <array>
 
@@ -28,8 +28,8 @@ class NoiseTracker {
   /// Does the block scatter as its gyros usually do? Boarding passengers and running engines are
   /// not noise, even at a true stop.
   [[nodiscard]] bool usual(const CellBlock& block) const;
-  /// Has one of the gyros sent a value or two that are no measurement? In some cell of the block
-  /// the difference scatters more than noise and motion allow. `more` is additional variance of a
+  /// Has a gyro sent a value or two that are no measurement? True if in some cell of the block the
+  /// difference scatters more than noise and motion allow. `more` is additional variance of a
   /// sample's difference, (deg/s)².
   [[nodiscard]] bool spiked(const CellBlock& block, double more) const;
   /// A block whose true rate is unknown.
@@ -38,10 +38,10 @@ class NoiseTracker {
   void forget_rise();
   /// The smallest step that a gyro's values have shown.
   void set_resolution(std::size_t gyro, double step_dps) { step_dps_[gyro] = step_dps; }
-  /// The rounding variance of a gyro's mean, (deg/s)²: noise
-  /// that is small against the step does not average it out.
+  /// The rounding variance of a gyro's mean, (deg/s)²: noise that is small against the step does
+  /// not average it out.
   [[nodiscard]] double rounding_variance(std::size_t gyro) const;
-  /// Make density() and sample_variance() of what was measured.
+  /// Computes density() and sample_variance() from the measured blocks.
   void settle(double interval_s);
   void resume(const Symmetric& density, const std::array<double, 2>& sample_variance);
 

@@ -15,11 +15,10 @@
 #include "fusion/readings.h"
 #include "fusion/stop_detector.h"
 
-// Samples → cells (0.1 s) → blocks (0.5 s) → windows → the readings of what they mean, each a bank
-// of drift filters. A window holds either the difference of the gyros, regressed on rate and its
-// derivative, or, while both are steady, both gyros against the known rate. Between windows a
-// sample costs two subtractions, two weights and its share in a cell. docs/optimal.md derives
-// weights and σ.
+// Samples → cells (0.1 s) → blocks (0.5 s) → windows → hypotheses (Readings), each a bank of drift
+// filters. A window holds either the difference of the gyros, regressed on rate and its derivative,
+// or, while both are steady, both gyros against the known rate. Between windows a sample costs two
+// subtractions, two weights and its share in a cell. docs/optimal.md derives weights and σ.
 
 namespace vgyro::fusion {
 
@@ -29,72 +28,73 @@ constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
 constexpr double kSmooth_s = 0.05;
 
-// Instants closer together than this are the same.
+// Instants closer together than this are equal.
 constexpr double kRounding_s = 1e-6;
 
-// Windows of a steady run: white noise read there is heading until it is learned. The first one
-// decides between stop and turn, so it is not too short; later ones grow to this, and further where
-// every window costs many filters.
+// Length of windows in a steady run. White noise accumulates in the heading until the window is
+// learned, so windows are short; the first one decides between stop and turn and is not too short.
+// Later ones grow to kStopWindow_s, or to kStopWindowOfMany_s where a window updates many filters.
 constexpr double kFirstStopWindow_s = 1.0;
 constexpr double kStopWindow_s = 2.0;
 constexpr double kStopWindowOfMany_s = 4.0;
 
-// Blocks of a steady run until it is sure, and one more.
+// Blocks of a steady run until it is long enough, and one more.
 constexpr std::size_t kHeldMax = 8;
 
 // Windows are short against every Gauss–Markov term.
 constexpr double kShareOfTau = 0.1;
 
-// An interval that is not known yet, or is none, is no divisor.
+// Least divisor for an interval that is unknown or 0.
 constexpr double kIntervalMin_s = 1e-6;
 
-// Blocks in a row that may be left out for values that are no measurements.
+// Blocks in a row that may be left out because of values that are no measurements.
 constexpr int kSpikedBlocks = 2;
 
-// The difference of the gyros, averaged over some samples, is watched on every sample …
+// Limits of the gyros' difference: smoothed over some samples, at every sample;
 constexpr double kFastGain = 0.125;
 constexpr double kFastNoise = kFastGain / (2.0 - kFastGain);
 constexpr double kFastSigma = 5.0;
-// … and unaveraged, against all noise of the sample …
+// unsmoothed, at every sample, against all of its noise;
 constexpr double kSuddenSigma = 6.0;
-// … and block by block: beyond this it has jumped.
+// of a block's mean: beyond this the difference has jumped.
 constexpr double kJumpSigma = 6.0;
-// … it is a step where it stays within this share of itself, or a drift after so many blocks.
+// A jump that stays constant within this share is a step; one that changes for so many blocks is a
+// drift.
 constexpr double kStepTolerance = 0.05;
 constexpr int kDriftBlocks = 6;
-// After so long without a contradiction the last one is over.
+// A contradiction is over after this time without another one.
 constexpr double kCalm_s = 120.0;
-// While turning, this much of the rate may be the gyros' own disagreement about it.
+// In a turn the gyros may differ by this share of the rate.
 constexpr double kTurnTolerance = 0.02;
-constexpr double kTurnTolerance_s = 0.02;  ///< the same of its derivative, at most
-// … and at least this beyond what is known of the skew.
+constexpr double kTurnTolerance_s = 0.02;  ///< in a turn, times the rate's derivative, at most
+// Allowance for the skew beyond its estimate and σ.
 constexpr double kSkewTolerance_s = 0.001;
 constexpr double kTurning_dps = 1.0;
-// Who jumped cannot be seen; neither gyro is above suspicion.
+// The difference does not show which gyro jumped: least share of either.
 constexpr double kShareMin = 1.0 / 3.0;
 
-// A window that contradicts the filter by this much, per row, is believed less.
+// χ² per row from which a window's noise is enlarged.
 constexpr double kContradiction = 9.0;
-// … and by this many standard deviations of the bias difference one gyro may have stepped.
+// Deviation of the bias difference, in standard deviations, from which a gyro may have stepped.
 constexpr double kStepSigma = 5.0;
 
-// What other axes leave in a rate that is less than so many of its standard deviations may be all
-// there is of it.
+// A rate below this many standard deviations of the remainder from other axes may consist of that
+// remainder alone.
 constexpr double kTilted = 5.0;
 
-// From here on a gyro counts as blind; below the other probability nothing is said of it.
+// A gyro counts as blind from probability kBlind on; below kBlindMin it does not affect the rate.
 constexpr double kBlind = 0.5;
 constexpr double kBlindMin = 1e-3;
 
-// A steady stretch was a stop, or was not, from this probability on.
+// A steady stretch counts as a stop from this probability on, and below it as a turn.
 constexpr double kDecided = 0.5;
 
 // The temperature moves the biases at once when it has changed by this much.
 constexpr double kTemperatureStep_k = 0.05;
 
-// The specific force's variance at a stop against that at other stops: a spread of ± 0.7 in its
-// logarithm; on the road it is twelve times more, give or take a factor of five. What it may tell
-// is bounded: a ferry and a smooth road are as still as a stop.
+// Logarithm of the specific force's variance, relative to that at other stops: 0 ± 0.7 at a stop,
+// 2.5 ± 1.6 on the road (twelve times more, within a factor of five). The log odds from it are
+// bounded: a ferry and a smooth road are as still as a stop.
 constexpr double kStillSpread = 0.7;
 constexpr double kMovingLog = 2.5;
 constexpr double kMovingSpread = 1.6;
@@ -103,14 +103,16 @@ constexpr double kVibrationLeast = -1.0;
 constexpr double kVibrationGain = 0.05;
 constexpr double kVibrationFloor_g2 = 1e-8;
 
-// An estimate that is not finite begins anew at the last good one, this much less sure.
+// An estimate that is not finite is restarted from the last good biases, with this many times their
+// variance.
 constexpr double kRestartDoubt = 100.0;
 
 Symmetric biases_of(const DriftFilter::Covariance& covariance) {
   return {covariance(kBias1, kBias1), covariance(kBias1, kBias2), covariance(kBias2, kBias2)};
 }
 
-/// Both gyros against the known rate, over `length_s` seconds; `shared` is what both are off by.
+/// Both gyros against the known rate, over `length_s` seconds; `shared` is the variance of an error
+/// that both have in common.
 DriftMeasurement excess_of_both(const std::array<double, 2>& excess_dps, const Symmetric& density,
                                 double length_s, double shared) {
   DriftMeasurement measurement(2);
@@ -147,7 +149,7 @@ bool are_finite(const Values& values) {
   return std::all_of(values.begin(), values.end(), is_finite);
 }
 
-/// Whatever kept it may have spoilt it.
+/// Checks a memory before use: its storage may have corrupted it.
 bool is_sound(const DriftMemory& memory) {
   return is_covariance(memory.bias_covariance) && is_covariance(memory.white_density) &&
          is_variance(memory.sample_variance[0]) && is_variance(memory.sample_variance[1]) &&
@@ -197,7 +199,7 @@ class OptimalCorrector final : public Corrector {
 
   void start(const Calibration& calibration) override;
   bool resume(const DriftMemory& memory, double age_s, double t_s) override;
-  /// In one piece, as Pipeline::Impl::receive_gyro().
+  /// Inlined as a whole, like AxisPipeline::receive_gyro().
   [[gnu::flatten]] VirtualRate update(const RatePair& pair) override;
   VirtualRate update_alone(std::size_t gyro, const RatePair& pair) override;
   void set_wheels(Wheels wheels) override { wheels_ = wheels; }
@@ -235,15 +237,15 @@ class OptimalCorrector final : public Corrector {
   enum class Kind : std::uint8_t { kNothing, kDifference, kSteady };
   enum class Run : std::uint8_t { kMoving, kStop, kTurn };
 
-  /// What has been gathered since the filters were last updated.
+  /// Sums since the filters were last updated.
   struct Window {
     Kind kind = Kind::kNothing;
     Present present = Present::kBoth;
     double from_s = 0.0;
     double to_s = 0.0;
-    double covered_s = 0.0;  ///< of a steady one
-    double sway_s = 0.0;     ///< Σ of its variance · seconds
-    double cross_s = 0.0;    ///< Σ of what other axes may leave in the difference · seconds
+    double covered_s = 0.0;  ///< by the blocks of a steady window
+    double sway_s = 0.0;     ///< Σ variance of the sway · seconds
+    double cross_s = 0.0;    ///< Σ variance of the remainder from other axes · seconds
     double cross_covered_s = 0.0;
     std::array<double, 2> excess_s{};
     std::array<double, 2> temperature_c_s{};
@@ -280,16 +282,16 @@ class OptimalCorrector final : public Corrector {
   [[nodiscard]] DriftMeasurement standing_measurement() const;
   [[nodiscard]] DriftMeasurement turning_measurement() const;
   [[nodiscard]] SteadyWindow steady_window();
-  /// By how much a window contradicts what is foretold.
+  /// Deviation of a window from its prediction.
   struct Contradiction {
-    double per_row = 0.0;   ///< χ² a row
-    double bias_dps = 0.0;  ///< of the bias difference, in its first row
+    double per_row = 0.0;   ///< χ² per row
+    double bias_dps = 0.0;  ///< deviation of the bias difference, from the first row
     double bias_variance = 0.0;
   };
   [[nodiscard]] Contradiction contradiction(const DriftMeasurement& measurement,
                                             double length_s) const;
 
-  // What samples need.
+  // For each sample.
   void refresh();
   void begin_anew();
   [[gnu::noinline]] void set_weights(Present present);
@@ -301,7 +303,7 @@ class OptimalCorrector final : public Corrector {
   [[nodiscard]] double rate_density(std::size_t gyro, double rate_dps) const {
     return squared(settings_.gyros[gyro].rate_noise_rthz * rate_dps);
   }
-  /// Of the gyros' difference.
+  /// For the gyros' difference.
   [[nodiscard]] double rate_density(double rate_dps) const {
     return rate_density(0, rate_dps) + rate_density(1, rate_dps);
   }
@@ -310,7 +312,8 @@ class OptimalCorrector final : public Corrector {
     const double late_s = std::max(t_s - learned_until_s_, 0.0);
     return doubt_ + (doubt_growth_ + 2.0 * doubt_with_slope_ + slope_variance_ * late_s) * late_s;
   }
-  /// How likely it is gyro 1 where the two contradict each other and nothing tells which is wrong.
+  /// Probability that gyro 1 is the wrong one when the gyros contradict each other, by the drifts
+  /// alone.
   [[nodiscard]] double suspicion_of_first() const {
     return std::clamp(estimate_.drift_share[0], kShareMin, 1.0 - kShareMin);
   }
@@ -335,34 +338,34 @@ class OptimalCorrector final : public Corrector {
   std::array<double, 2> applied_temperature_c_{kNone, kNone};
   double vibration_g2_ = kNone;
   Elsewhere elsewhere_;
-  double log_turning_elsewhere_ = 0.0;  ///< as far as this steady run has been told
+  double log_turning_elsewhere_ = 0.0;  ///< the part already counted in this steady run
   double cross_variance_ = 0.0;         ///< at present
   double cross_sum_ = 0.0;              ///< since the last block
   std::uint64_t cross_count_ = 0;
   double still_vibration_g2_ = kNone;  ///< at stops
 
   Window window_;
-  double learned_until_s_ = 0.0;               ///< the filters stand here
-  double stop_length_s_ = kFirstStopWindow_s;  ///< of the next window of this steady run
-  /// Blocks that wait for a verdict on the platform: the last one, and while a run is not sure all
-  /// of its blocks so far.
+  double learned_until_s_ = 0.0;               ///< time of the filters' state
+  double stop_length_s_ = kFirstStopWindow_s;  ///< of the next window in this steady run
+  /// Blocks that are not learned yet: the last one, and, while a steady run is not long enough, all
+  /// of its blocks.
   std::array<CellBlock, kHeldMax> held_;
   std::size_t held_count_ = 0;
   double recent_until_s_ = 0.0;
   bool held_steady_ = false;
-  bool held_begins_ = false;  ///< the first of them begins a run of steady ones
-  /// What was known before the gyros began to contradict each other.
+  bool held_begins_ = false;  ///< the first held block begins a run of steady blocks
+  /// The likeliest bank from before the gyros began to contradict each other.
   DriftBank before_;
   bool has_before_ = false;
   double before_s_ = 0.0;
-  double contradicted_s_ = 0.0;  ///< they did so last
-  int spiked_blocks_ = 0;        ///< in a row
-  int jump_blocks_ = 0;          ///< in a row that contradict what is foretold
+  double contradicted_s_ = 0.0;  ///< time of the last contradiction
+  int spiked_blocks_ = 0;        ///< spiked blocks in a row
+  int jump_blocks_ = 0;          ///< blocks in a row that deviate from the prediction
   double suspected_jump_dps_ = 0.0;
   Run run_ = Run::kMoving;
-  bool run_open_ = false;  ///< both readings of the run are likely
+  bool run_open_ = false;  ///< stop and turn are both likely
 
-  // What a sample needs, made by refresh().
+  // Values for each sample, computed by refresh().
   DriftEstimate estimate_;
   std::array<double, 2> bias_{};
   std::array<double, 2> slope_{};
@@ -375,23 +378,23 @@ class OptimalCorrector final : public Corrector {
   double slope_variance_ = 0.0;
   double scale_doubt_ = 0.0;    ///< variance per (deg/s)² of rate
   double timing_doubt_ = 0.0;   ///< variance per (deg/s²)² of acceleration
-  double smooth_rate_ = 0.0;    ///< of the virtual rate, over kSmooth_s
-  double smoother_rate_ = 0.0;  ///< the same once more
+  double smooth_rate_ = 0.0;    ///< virtual rate, smoothed over kSmooth_s
+  double smoother_rate_ = 0.0;  ///< smooth_rate_, smoothed once more
   double smooth_until_s_ = 0.0;
-  double fast_noise_ = 0.0;  ///< of the smoothed difference
+  double fast_noise_ = 0.0;  ///< variance of the smoothed difference
   double fast_difference_ = 0.0;
   double blame_ = 0.0;  ///< variance of the virtual rate per squared excess difference
   std::array<double, 2> blind_{};
-  bool blind_before_ = false;  ///< at the last block one gyro counted as blind
+  bool blind_before_ = false;  ///< one gyro counted as blind at the last block
 
   WindowCounts windows_;
   Condition condition_;
-  std::uint64_t edition_ = 1;  ///< of condition(): moved on by whatever does more than weigh a pair
+  std::uint64_t edition_ = 1;  ///< of condition()
 };
 
 // --- calibration ---------------------------------------------------------------------------------
 
-// The last second is kept back: the calibration may end early because motion has begun in it.
+// Holds back the last second: motion that ends the calibration early has begun in it.
 void OptimalCorrector::take_calibration() {
   constexpr double kKept_s = 1.0;
   const auto use_first = [this] {
@@ -414,7 +417,7 @@ void OptimalCorrector::start(const Calibration& calibration) {
   }
   held_count_ = 0;
   if (calibration_.count() == 0) {
-    // Too short for a single block: the calibration's own means are all there is.
+    // The rest was shorter than one block: only the calibration's own means are known.
     readings_.begin(
         {1.0, 1.0},
         {calibration.bias_dps(0, calibration.end_s), calibration.bias_dps(1, calibration.end_s)},
@@ -446,8 +449,8 @@ void OptimalCorrector::start(const Calibration& calibration) {
   run(learned_until_s_);
 }
 
-// The motion was accepted as rest: its mean is all there is, and how far that is from rest is
-// anyone's guess: as far as it swung.
+// The motion was accepted as rest: only its mean is known. How far the mean is from rest is not
+// known, so the swing of the motion is its uncertainty.
 void OptimalCorrector::begin_in_motion(const std::array<double, 2>& white,
                                        const Symmetric& density) {
   std::array<double, 2> mean{};
@@ -538,13 +541,13 @@ VirtualRate OptimalCorrector::update(const RatePair& pair) {
                     scale_doubt_ * rate * rate;
   if (timing_doubt_ > 0.0) variance += timing_doubt_ * acceleration_square(rate, pair.t_s);
 
-  // The gyros contradict each other: until it is known who is wrong, each may be.
+  // While the gyros contradict each other, either may be wrong: σ covers both.
   fast_difference_ += kFastGain * (first - second - fast_difference_);
   const double contradiction = fast_difference_ * fast_difference_;
   const double allowed =
       squared(kFastSigma) *
       (fast_noise_ + kFastNoise * rate_density(rate) / interval + cross_variance_);
-  // A single value may be no measurement at all.
+  // A single value that is no measurement.
   const double sudden =
       squared(first - second) -
       squared(kSuddenSigma) * (noise_1 - 2.0 * noise_12 + noise_2 + fast_noise_ + cross_variance_);
@@ -575,13 +578,13 @@ VirtualRate OptimalCorrector::with_blindness(const VirtualRate& rate,
   return mixed;
 }
 
-// Squared dΩ/dt as far as it rises above the noise of the smoothed rate.
+// Squared dΩ/dt, less the noise that the smoothed rate has.
 double OptimalCorrector::acceleration_square(double rate_dps, double t_s) {
   const double tau_s = std::max(kSmooth_s, 2.0 * cells_.interval_s());
   const double share = std::clamp((t_s - smooth_until_s_) / tau_s, 0.0, 1.0);
   smooth_until_s_ = t_s;
   smooth_rate_ += share * (rate_dps - smooth_rate_);
-  // Smoothed once more it lags by tau_s · dΩ/dt.
+  // smoother_rate_ lags behind smooth_rate_ by tau_s · dΩ/dt.
   const double slope = (smooth_rate_ - smoother_rate_) / tau_s;
   smoother_rate_ += share * (smooth_rate_ - smoother_rate_);
   const double noise = weighted(weight_, noise_.density()) / (4.0 * tau_s) / squared(tau_s);
@@ -590,14 +593,15 @@ double OptimalCorrector::acceleration_square(double rate_dps, double t_s) {
 
 VirtualRate OptimalCorrector::update_alone(std::size_t gyro, const RatePair& pair) {
   const Present present = gyro == 0 ? Present::kGyro1 : Present::kGyro2;
-  // The missing gyro's place is filled so that its sums stay finite; nothing reads them.
+  // The missing gyro gets a value so that its sums stay finite; nothing reads them.
   RatePair alone = pair;
   alone.rate_dps[1 - gyro] = 0.0;
   if (cells_.add(alone.t_s, alone.rate_dps, alone.noise_gain, present)) close_block(cells_.last());
   if (weights_for_ != present) {
     ++edition_;
     readings_.suspect(1 - gyro);
-    // A rise was told by comparison: a gyro that falls out may have made the other one look noisy.
+    // A rise of noise is found by comparison: the gyro that fell out may have made the other one
+    // look noisy.
     noise_.forget_rise();
     set_weights(present);
   }
@@ -653,7 +657,7 @@ BlockLevel OptimalCorrector::level_of(const CellBlock& block) const {
   return level;
 }
 
-/// A gyro that is blind has no say.
+/// The gyros that may be used: a blind gyro is ignored.
 Present OptimalCorrector::trusted(Present present) const {
   if (present != Present::kBoth) return present;
   if (blind_[0] >= kBlind) return Present::kGyro2;
@@ -665,15 +669,15 @@ void OptimalCorrector::judge_coherence(const CellBlock& block) {
     coherence_.break_off();
     return;
   }
-  // Raw means: what is learned meanwhile must not look like motion.
+  // Raw means: an update of the biases must not look like motion.
   const std::array<double, 2> mean{block.mean_dps(0) * gain_[0], block.mean_dps(1) * gain_[1]};
-  // Gyros that are not parallel need not feel alike what is about other axes.
+  // Gyros that are not parallel may feel a rotation about other axes differently.
   const double fastest = std::max(std::abs(mean[0]), std::abs(mean[1]));
   if (squared(kTilted) * block.cross_variance > squared(fastest)) {
     coherence_.break_off();
     return;
   }
-  // A time skew shows where the rate's own slope changes within the block.
+  // A time skew sets the gyros apart by at most the skew times the steepest slope in the block.
   double bend = 0.0;
   for (std::size_t i = 1; i < block.count; ++i) {
     for (std::size_t gyro = 0; gyro < 2; ++gyro) {
@@ -686,8 +690,8 @@ void OptimalCorrector::judge_coherence(const CellBlock& block) {
   blind_ = {coherence_.blind(0), coherence_.blind(1)};
 }
 
-// Values that are no measurements teach nothing, and neither end a stop nor begin one. A gyro that
-// goes on like that has grown noisy, which is to be learned.
+// A block with values that are no measurements is left out: it teaches nothing, and neither begins
+// nor ends a stop. After kSpikedBlocks in a row the gyro has become noisy, which is learned.
 bool OptimalCorrector::is_spiked(const CellBlock& block) {
   const double rate = cell_rate(block.cells[0], block.to_s, weights_for_);
   if (!noise_.spiked(block, rate_density(rate) / interval_s())) {
@@ -705,7 +709,7 @@ double OptimalCorrector::take_cross_variance() {
   return mean;
 }
 
-// A block is used when the next one has been judged: motion begins before it is seen.
+// A block is used after the next one has been judged: motion begins before it is detected.
 void OptimalCorrector::close_block(const CellBlock& complete) {
   ++edition_;
   const double cross_variance = take_cross_variance();
@@ -728,7 +732,7 @@ void OptimalCorrector::close_block(const CellBlock& complete) {
   if (settings_.stop_rate_dps)
     steadiness = detector_.judge(level_of(block), wheels_, elsewhere_.moves);
   const bool steady = steadiness == StopDetector::Steadiness::kSteady;
-  // All held blocks but the last belong to a run that has just become sure, or to none.
+  // All held blocks but the last belong to a run that has just become long enough, or to none.
   const bool waits = steadiness == StopDetector::Steadiness::kUnsure && held_count_ < kHeldMax;
   if (!waits || detector_.run_begins()) {
     for (std::size_t i = 0; i < held_count_; ++i) {
@@ -759,7 +763,7 @@ void OptimalCorrector::learn_from(const CellBlock& block, bool steady) {
   add_difference(block, present);
 }
 
-// Stop or turn, as it seems now; a stretch is counted once, as what it was held for last.
+// Counts the present stretch as a stop or a turn: once, by the latest verdict.
 void OptimalCorrector::note_run(Run run) {
   if (run_ == run) return;
   if (run_ == Run::kStop) --condition_.stops;
@@ -823,8 +827,9 @@ bool OptimalCorrector::has_jumped(const CellBlock& block) {
   return !is_step(away, variance);
 }
 
-// One block may hold anything. A step stays what it is: two blocks that agree are one. What goes on
-// changing is a turn that one gyro does not feel, as long as that is likely, and else a drift.
+// One block alone proves nothing. Two blocks in a row that agree are a step. A deviation that keeps
+// changing is a turn that one gyro does not feel, while coherence suspects that, and otherwise a
+// drift.
 bool OptimalCorrector::is_step(double away_dps, double variance) {
   const double changed = std::abs(away_dps - suspected_jump_dps_);
   const bool constant = jump_blocks_ > 0 && changed <= kJumpSigma * std::sqrt(2.0 * variance) +
@@ -843,8 +848,8 @@ bool OptimalCorrector::is_step(double away_dps, double variance) {
   return true;
 }
 
-// A gyro that is blind contradicts the other one before it is known for what it is: what was
-// learned in that time may be wrong for both.
+// A blind gyro contradicts the other one before it is recognized, and what is learned meanwhile may
+// be wrong for both. This keeps the bank from before.
 void OptimalCorrector::keep_before() {
   if (!has_before_ || learned_until_s_ - contradicted_s_ > kCalm_s) {
     readings_.copy_likeliest(before_);
@@ -871,7 +876,7 @@ void OptimalCorrector::open_window(const CellBlock& block, Kind kind, Present pr
                        block.from_s <= window_.to_s + kRounding_s;
   if (!goes_on) {
     close_window();
-    // What a run of one gyro has shown says nothing of a level of both.
+    // A steady run of other gyros is over: its level cannot be compared with this one's.
     if (run_ != Run::kMoving && window_.present != present) end_steady();
     if (block.from_s > learned_until_s_) {
       readings_.predict(block.from_s - learned_until_s_);
@@ -909,7 +914,7 @@ void OptimalCorrector::add_difference(const CellBlock& block, Present present) {
     }
   }
   recent_until_s_ = block.to_s;
-  // A turn that tells much about scale factor or skew is used at once.
+  // A turn that determines scale factor or skew better than they are known is used at once.
   const bool tells = difference_.scale_information() * estimate_.covariance(kScale, kScale) > 1.0 ||
                      difference_.skew_information() * estimate_.covariance(kSkew, kSkew) > 1.0;
   if (tells || window_.to_s - window_.from_s >= window_s_) close_window();
@@ -923,7 +928,7 @@ void OptimalCorrector::add_steady(const CellBlock& block, Present present) {
   }
   window_.covered_s += length;
   window_.sway_s += detector_.sway_variance() * length;
-  // At the beginning of a stop every second counts; later the windows grow.
+  // Windows are short at the beginning of a stop, and grow later.
   const double longest_s = readings_.few() ? kStopWindow_s : kStopWindowOfMany_s;
   if (window_.to_s - window_.from_s < std::min({stop_length_s_, window_s_, longest_s})) return;
   stop_length_s_ = 2.0 * stop_length_s_;
@@ -957,8 +962,8 @@ void OptimalCorrector::learn_difference(double length_s) {
     ++windows_.skipped;
     return;
   }
-  // The rows are of unit noise; what comes of another axis is the same in all of the window, and
-  // may go with this axis's own rate.
+  // The rows have unit noise. The remainder from other axes is the same in the whole window, and
+  // may be proportional to this axis's own rate, so it is added to every row.
   const double information = squared(measurement.rows(0, kBias1));
   measurement.noise.diagonal().array() += information * window_cross_variance();
   const Contradiction found = contradiction(measurement, length_s);
@@ -1035,7 +1040,7 @@ SteadyWindow OptimalCorrector::steady_window() {
   steady.log_turning = run_ == Run::kMoving
                            ? detector_.log_turning(wheels_) + log_turning_by_vibration()
                            : detector_.log_turning_gain(wheels_, steady.length_s);
-  // Of what the other axes show this run hears each part once.
+  // Each part of the other axes' log odds counts once in this run.
   if (run_ == Run::kMoving) log_turning_elsewhere_ = 0.0;
   steady.log_turning += elsewhere_.log_turning - log_turning_elsewhere_;
   log_turning_elsewhere_ = elsewhere_.log_turning;
@@ -1058,7 +1063,7 @@ void OptimalCorrector::learn_steady() {
   }
 }
 
-// Turns that neither scale factor nor skew explains, and drift that is faster than its model.
+// Large for turns that neither scale factor nor skew explains, and for drift faster than its model.
 OptimalCorrector::Contradiction OptimalCorrector::contradiction(const DriftMeasurement& measurement,
                                                                 double length_s) const {
   DriftFilter::Covariance doubt = estimate_.covariance;
@@ -1135,7 +1140,7 @@ void OptimalCorrector::refresh() {
   condition_.ambiguous = readings_.ambiguous();
 }
 
-// Nothing that is not finite stays: the last good biases go on, less sure.
+// Restarts from the last good biases with a larger variance, so that no value stays non-finite.
 void OptimalCorrector::begin_anew() {
   ++condition_.restarts;
   const Symmetric& density = noise_.usual_density();
@@ -1152,8 +1157,8 @@ void OptimalCorrector::begin_anew() {
   set_weights(weights_for_);
 }
 
-// The weights that make the heading's error over one window least: doubt of the drift stays for
-// the window's length, white noise averages out over it.
+// Weights that minimize the heading's error over one window: the uncertainty of the drift is
+// constant over the window, white noise averages out.
 void OptimalCorrector::set_weights(Present present) {
   weights_for_ = present;
   Symmetric doubt = biases_of(estimate_.covariance);
@@ -1165,8 +1170,8 @@ void OptimalCorrector::set_weights(Present present) {
     const double both = doubt[1] + density[1] / window_s_;
     const double second = doubt[2] + density[2] / window_s_;
     const double sum = first + second - 2.0 * both;
-    // Where both biases may be off together the difference seems to tell how far; to use that the
-    // rate would have to leave the two gyros, and their noise would be many times what it is.
+    // Where both biases may be wrong together, the optimum is a negative weight: a rate beyond both
+    // gyros, with their noise amplified many times. So the weights are limited to 0…1.
     weight_[0] = sum > 0.0 ? std::clamp((second - both) / sum, 0.0, 1.0) : 0.5;
     weight_[1] = 1.0 - weight_[0];
   } else {
@@ -1184,7 +1189,7 @@ void OptimalCorrector::set_weights(Present present) {
   fast_noise_ = kFastNoise * of_difference(noise_.sample_variance()) + of_difference(doubt);
   const double first_share = suspicion_of_first();
   blame_ = first_share * squared(weight_[0]) + (1.0 - first_share) * squared(weight_[1]);
-  // Which gyro is late, or early, the skew does not tell; the worse one is likelier.
+  // The skew does not show which gyro is late; the worse one is likelier.
   const double skew_square = squared(estimate_.mean(kSkew)) - estimate_.covariance(kSkew, kSkew);
   timing_doubt_ = present != Present::kBoth || skew_square <= 0.0
                       ? 0.0

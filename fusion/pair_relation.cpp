@@ -12,95 +12,99 @@ namespace {
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 constexpr double kAny = std::numeric_limits<double>::infinity();
 
-// A gyro has moved in a block when its cells differ by so many standard deviations of what is not
-// smooth from cell to cell: noise, steps of its values, vibration.
+// A gyro has moved in a block when its cells scatter by this many standard deviations of the part
+// that is not smooth from cell to cell: noise, steps of its values, vibration.
 constexpr double kMoved = 4.0;
-// … one of them by so much at least, deg/s rms: no bias wanders so far within a second.
+// At least one gyro must have moved this much, deg/s rms: no bias wanders so far within a second.
 constexpr double kMovedMin_dps = 0.2;
-// … and by so much where the other one has to follow.
+// Motion that the other gyro has to follow, deg/s rms.
 constexpr double kMovedMuch_dps = 1.0;
-// … and to and fro by so much, deg, within the memory: vibration beyond half the sampling rate
-// looks like slow motion, which the two gyros may even see with opposite signs, but turns nothing
-// about.
+// A gyro must have turned over this range, deg, within the memory: vibration beyond half the
+// sampling rate looks like slow motion, which the two gyros may even see with opposite signs, but
+// it does not turn the platform.
 constexpr double kSwung_deg = 3.0;
-// What moves less than a bias may drift, deg/s within a second, is judged less its trend.
+// Motion smaller than a drift of this slope, deg/s within a second, is judged without its trend.
 constexpr double kDrift_dps_s = 0.1;
 
-// Slopes beyond which a pair is none. What lies between them and PairRelation::kSlopeMost speaks
-// for nothing: no unit is mistaken for another one so near to it (rpm for deg/s is 6).
+// Slopes beyond this contradict a pair. Slopes between this and PairRelation::kSlopeMost are no
+// evidence for anything: no wrong unit is so near to the right one (rpm for deg/s is 6).
 constexpr double kContrarySlope = 5.0;
 
-// What neither slope nor lag explains of a healthy pair's motion: bandwidths, and motion between
-// two cells.
+// Share of a healthy pair's motion that neither slope nor lag explains: bandwidths, and motion
+// between two cells.
 constexpr double kTolerance = 0.03;
-// A contradiction is heard only where its own slope leaves no more than this …
+// A contradiction counts only if its own slope leaves no more than this share …
 constexpr double kExplained = 0.2;
-// … or than this and noise, for a unit: what is clipped at a small part of the motion leaves 0.19.
+// … or, for a unit, this share plus noise: a signal that is clipped at a small part of the motion
+// leaves 0.19.
 constexpr double kScaleExplained = 0.1;
-// … and as the same one only where the slope is the same within this much of its logarithm.
+// Blocks support the same contradiction only if their slopes agree within this, in the logarithm.
 constexpr double kSameSlope = 0.4;
-// A block of smooth motion is worth so many independent values; what it tells is bounded, or one
-// odd second would be enough.
+// Half the number of independent values in a block of smooth motion; and the bound of a block's
+// evidence, so that one odd second is not enough.
 constexpr double kHalfValues = 2.0;
 constexpr double kBlockTells = 6.0;
-// A configuration is wrong once in some thousand; three blocks are needed, four to take it back.
+// A configuration is wrong once in some thousand: prior log odds. Three blocks are needed for a
+// finding, four to take it back.
 constexpr double kPrior = -8.0;
 constexpr double kFound = 6.0;
 constexpr double kEvidenceMost = 24.0;
 constexpr double kEvidenceLeast = -12.0;
 
-// So far a lag is looked for.
+// Largest lag that is searched.
 constexpr double kLagSought_s = 3.0;
-// Long blocks are remembered over so many.
+// Number of long blocks over which their evidence fades.
 constexpr double kRemembered = 32.0;
-// A lag needs so many of them, must leave no more than this, and this many times less than any
-// healthy lag does.
+// A lag needs this many long blocks, must leave no more than this share, and this many times less
+// than any healthy lag.
 constexpr double kLagBlocks = 6.0;
 constexpr double kLagLeaves = 0.2;
 constexpr double kLagBetter = 5.0;
-// … in so large a share of the blocks this many times: in periodic motion one odd block would do.
+// It must also be better by this factor in this share of the blocks: in periodic motion one odd
+// block could decide otherwise.
 constexpr double kLagShare = 0.6;
 constexpr double kLagBlockBetter = 3.0;
-// … and is believed until it does no more than this.
+// A lag that was found stands while it is better by this factor.
 constexpr double kLagStillBetter = 2.0;
 constexpr double kNamingBlocks = 3.0;
-// And sign or unit are named only where one slope leaves less than this on average.
+// Sign or unit are named only if one slope leaves less than this share on average.
 constexpr double kOneSlopeLeaves = 0.3;
-// What a healthy slope leaves of a pair at its lag on average, at most; how far blocks of streams
-// that have nothing in common scatter in it, and how sure it must be. So many blocks at least, in
-// which both moved, one of them much.
+// For streams with nothing in common: the most that a healthy slope leaves of a pair at its lag on
+// average; the scatter of that share between blocks; the significance needed; and the least number
+// of blocks in which both moved, one of them much.
 constexpr double kPairLeaves = 0.4;
 constexpr double kLeftSpread = 0.3;
 constexpr double kUnrelatedSigmas = 2.5;
 constexpr double kStrongBlocks = 8.0;
 constexpr double kBothMoved_dps = 0.3;
-// A gyro follows the other one where they are alike to this, and does not where they are less so,
-// or where it moves less than this share.
+// Correlation from which a gyro follows the other one, and below which it does not; it does not
+// follow either if it moves less than this share of the other one's motion.
 constexpr double kFollows = 0.8;
 constexpr double kFollowsNot = 0.3;
 constexpr double kSmallShare = 0.2;
-// What a long block tells of it: four of either gyro are needed.
+// Log odds from a long block that a gyro moves by itself: five blocks for each gyro are needed.
 constexpr double kAloneTells = 3.5;
 
-// No gyro's samples scatter so much from one to the next, deg/s rms, while the other one's do not;
-// nor has one such a bias against the other, from the start on.
+// Limits that no gyro reaches: scatter from sample to sample, deg/s rms, also as a multiple of the
+// other gyro's, …
 constexpr double kErratic_dps = 30.0;
 constexpr double kErraticRatio = 10.0;
-// … in all cells of a block but one.
+// … least scatter in all cells of a block but one, bias against the other gyro from the start on,
+// and the number of such blocks for a finding.
 constexpr double kErraticCell_dps = 10.0;
 constexpr double kBiasMost_dps = 100.0;
 constexpr double kErraticBlocks = 8.0;
-// After so many blocks with less than this it was a gyro.
+// After this many blocks with less scatter than this, the values were a gyro's.
 constexpr std::size_t kCalmBlocks = 5;
 constexpr double kCalm_dps = 3.0;
-// No gyro leaps so far from one sample to the next, and stays there, while the other one moves, so
-// many times as far as that one does within a sample, or about that time. Leaps both ways are
-// needed; they are remembered over a hundred blocks of motion.
+// No gyro leaps so far from one sample to the next and stays there, while the other one moves:
+// least leap, as a multiple of the other's largest leap, and of the range of the other around that
+// time. Leaps both ways are needed; they are remembered over a hundred blocks of motion.
 constexpr double kLeap_dps = 30.0;
 constexpr double kLeapRatio = 5.0;
 constexpr double kLeapRange = 2.0;
 constexpr double kLeapStays = 0.6;
-constexpr std::size_t kLeapCells = 3;  // before it and after it
+constexpr std::size_t kLeapCells = 3;  // cells compared before the leap and after it
 constexpr double kLeaps = 1.5;
 constexpr double kLeapsStill = 0.5;
 constexpr double kLeapKept = 0.99;
@@ -119,7 +123,7 @@ void PairRelation::Slopes::add(const Fit& fit) {
   product += fit.own * fit.both;
 }
 
-// Blocks differ by more than noise, so it is their scatter that counts.
+// From the scatter of the blocks, which differ by more than noise.
 double PairRelation::Slopes::sigma() const {
   const double s = slope();
   const double square = both_square - 2.0 * s * product + s * s * own_square;
@@ -179,7 +183,7 @@ PairRelation::Stretch PairRelation::stretch(std::size_t gyro, std::size_t from,
   const auto n = static_cast<double>(length);
   out.mean_dps /= n;
   out.rough /= n;
-  // White noise makes second differences of six times its variance; smooth motion makes none.
+  // Second differences of white noise have six times its variance; smooth motion has none.
   double bends = 0.0;
   for (std::size_t i = 0; i < length; ++i) {
     const double value = cell(from + i).mean_dps[gyro];
@@ -252,7 +256,7 @@ PairRelation::Fit PairRelation::fit(const Products& sums, double slope_least, do
   return out;
 }
 
-// A lag of half a cell must not be what a healthy pair lacks where the motion is fast.
+// In fast motion a lag of half a cell would make a healthy pair look unlike.
 PairRelation::Fit PairRelation::halfway_fit(std::size_t from, std::size_t lagged_from,
                                             std::size_t length, bool trends_off) const {
   return fit(products(from, lagged_from, length, trends_off, true), 1.0 / kSlopeMost, kSlopeMost);
@@ -283,7 +287,7 @@ void PairRelation::judge_block() {
   decide();
 }
 
-// Is what the trends have left motion still?
+// Is there still motion above the noise after the trends are removed?
 bool PairRelation::clear_of_noise(const Products& sums, const std::array<Stretch, 2>& both) {
   const double most = squared(kMoved) * static_cast<double>(kBlock);
   return sums.first > most * both[0].noise && sums.second > most * both[1].noise;
@@ -326,7 +330,7 @@ double PairRelation::block_tells(std::size_t from, std::size_t lags,
 
 void PairRelation::hear(double tells, const Fit& contrary) {
   if (tells > 0.0) {
-    // Another slope is another contradiction: what spoke for the one does not speak for it.
+    // Another slope is another contradiction: evidence for the old one does not count for it.
     const double ratio = slopes_.own > 0.0 ? contrary.slope / slopes_.slope() : 1.0;
     if (!(ratio > 0.0) || std::abs(std::log(ratio)) > kSameSlope) {
       slopes_ = {};
@@ -338,7 +342,7 @@ void PairRelation::hear(double tells, const Fit& contrary) {
   if (evidence_ <= 0.0) slopes_ = {};
 }
 
-// Nearly every value of the block does, and not a few that are far off.
+// True if nearly every value of the block jumps, not just a few outliers.
 bool PairRelation::jumps(std::size_t gyro, std::size_t from, const std::array<Stretch, 2>& both,
                          bool moving) const {
   const Stretch& own = both[gyro];
@@ -360,9 +364,9 @@ bool PairRelation::jumps(std::size_t gyro, std::size_t from, const std::array<St
   return cells + 1 >= kBlock - 2;
 }
 
-// From one sample to the next, for good, many times as far as the other one has come: where a sign
-// bit is taken for a value, or a value wraps. A gyro that the other one does not follow because
-// that is blind makes none, nor does an outlier.
+// A leap from one sample to the next that stays, many times as far as the other gyro has moved: a
+// sign bit is read as part of a value, or a value wraps. A healthy gyro beside a blind one makes no
+// leap, nor does an outlier.
 void PairRelation::look_for_leaps(std::size_t gyro, std::size_t from, bool moving) {
   if (!moving) return;
   const std::size_t lags = near_lags(kLags);
@@ -381,8 +385,8 @@ void PairRelation::look_for_leaps(std::size_t gyro, std::size_t from, bool movin
        ++i) {
     const double leap = cell(i).leap[gyro];
     if (std::abs(leap) < enough) continue;
-    double before = -kAny;  // the farthest in its direction
-    double after = kAny;    // the nearest
+    double before = -kAny;  // farthest in the leap's direction
+    double after = kAny;    // nearest
     for (std::size_t away = 1; away <= kLeapCells; ++away) {
       before = std::max(before, cell(i - away).mean_dps[gyro] / leap);
       after = std::min(after, cell(i + away).mean_dps[gyro] / leap);
@@ -393,8 +397,8 @@ void PairRelation::look_for_leaps(std::size_t gyro, std::size_t from, bool movin
     leaps[way] = kLeapKept * leaps[way] + (any[way] ? 1.0 : 0.0);
 }
 
-// Values that are no gyro's, however the platform moves, from the start on: a gyro that was one,
-// at rest or in motion, and no longer is, is sick, and not mistaken for another.
+// Finds values that are no gyro's, however the platform moves, from the start on. A gyro whose
+// values were normal, at rest or in motion, and no longer are is faulty, not configured wrongly.
 void PairRelation::judge_values(std::size_t from, const std::array<Stretch, 2>& both) {
   const auto n = static_cast<double>(kBlock);
   const double apart_dps = std::abs(both[0].mean_dps - both[1].mean_dps);
@@ -428,7 +432,7 @@ void PairRelation::judge_values(std::size_t from, const std::array<Stretch, 2>& 
   }
 }
 
-// As long as it was found, and stands, less is enough.
+// A finding needs less evidence to stand than to begin.
 bool PairRelation::erratic(std::size_t gyro) const {
   const Values& values = values_[gyro];
   const bool stands = verdict_.contradiction == Contradiction::kErratic && verdict_.gyro == gyro;
@@ -512,13 +516,13 @@ void PairRelation::judge_following(const std::array<Stretch, 2>& both, double mo
     alone_[gyro] = std::clamp(alone_[gyro] + tells, kEvidenceLeast, kEvidenceMost);
     follows = follows || (tells < 0.0 && left < 0.5 * kExplained);
   }
-  // Much motion says more of sign and unit than little does.
+  // Following in large motion outweighs earlier evidence for a wrong sign or unit.
   if (follows) hear(-kBlockTells, {});
   const double least = std::min(alone_[0], alone_[1]);
   unrelated_ = kPrior + least > kFound || (unrelated_ && least > 0.0);
 }
 
-// How far is what the gyros have in common from what a pair has?
+// Have the gyros significantly less in common than a pair?
 void PairRelation::judge_common(double left) {
   if (strong_blocks_ < kStrongBlocks) return;
   const double mean = left / strong_blocks_;
@@ -565,7 +569,7 @@ void PairRelation::weigh_lags() {
 void PairRelation::decide() {
   const bool before = contradicts();
   const double log_odds = kPrior + evidence_;
-  // What was found stands until as much speaks against it as spoke for it.
+  // A finding stands until the evidence against it equals the evidence for it.
   by_blocks_ = slopes_.own > 0.0 && (log_odds > kFound || (by_blocks_ && evidence_ > 0.0));
   const bool one_slope = long_blocks_ < kNamingBlocks || best_any_left_ < kOneSlopeLeaves;
   PairVerdict now;

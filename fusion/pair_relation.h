@@ -1,14 +1,14 @@
 #pragma once
 
-// Can these two streams be of gyros that turn together? Gyro 2 against gyro 1, from how their means
-// over tenths of a second change: a healthy pair moves alike, whatever their noise, biases, scale
-// factors, bandwidths and delays of some tenths of a second. Where one moves against the other,
-// many times as far, late by much more than that, or on its own, the two contradict each other: a
-// sign, a unit, an axis or the bits of a signal are not what they are taken for. Found on evidence
-// that is bounded block by block, so that neither a step, a drift nor an odd second is enough, and
-// taken back the same way.
-// It does not say which of the two is wrong: nothing in two streams does. A gyro that does not move
-// at all while the other one does is no business of it either (fusion/coherence).
+// Can these two streams be of gyros that turn together? Compares the changes of the gyros' means
+// over tenths of a second. A healthy pair moves alike, whatever its noise, biases, scale factors,
+// bandwidths, and delays of some tenths of a second. If one gyro moves against the other, many
+// times as far, much later than that, or on its own, the two contradict each other: a sign, a unit,
+// an axis or the bits of a signal are wrong in the configuration. The evidence of one block is
+// bounded, so that a step, a drift or an odd second is not enough; a contradiction is taken back in
+// the same way.
+// It does not find which of the two is wrong: two streams cannot show that. A gyro that does not
+// move at all while the other one does is left to fusion/coherence.
 // Bounded memory, nothing is allocated; times are seconds on one monotone axis, rates deg/s.
 
 #include <algorithm>
@@ -24,26 +24,27 @@ namespace vgyro::fusion {
 enum class Contradiction : std::uint8_t {
   kNone,
   kSign,       ///< gyro 2 moves against gyro 1
-  kScale,      ///< it moves with gyro 1, many times as far, or a small part of it
-  kLag,        ///< it moves as gyro 1 does, but at another time
+  kScale,      ///< gyro 2 moves with gyro 1, but many times as far, or a small part of it
+  kLag,        ///< gyro 2 moves as gyro 1 does, but at another time
   kUnrelated,  ///< both move, and have too little in common
-  kErratic     ///< the values of one jump, or stand, where no gyro's do
+  kErratic     ///< one gyro's values jump, or are far off, as no gyro's do
 };
 inline constexpr std::size_t kContradictions = 6;
 
-/// How gyro 2 follows gyro 1. Without a contradiction the figures say nothing.
+/// How gyro 2 follows gyro 1. The figures are valid only with a contradiction.
 struct PairVerdict {
   Contradiction contradiction = Contradiction::kNone;
   double probability = 0.0;  ///< that they contradict each other
-  double slope = 0.0;        ///< gyro 2's motion over gyro 1's; NaN where nothing is in common
-  double slope_sigma = 0.0;  ///< by its scatter between the blocks; NaN where the slope is
-  double lag_s = 0.0;        ///< gyro 2 is so much later; of kLag, else 0
-  std::size_t gyro = 2;      ///< whose values are erratic; of kErratic, else 2
+  double slope = 0.0;        ///< gyro 2's motion over gyro 1's; NaN if they have nothing in common
+  /// 1σ of the slope from its scatter between blocks; NaN for kLag, or if the slope is NaN.
+  double slope_sigma = 0.0;
+  double lag_s = 0.0;    ///< delay of gyro 2 against gyro 1 for kLag, else 0
+  std::size_t gyro = 2;  ///< gyro with erratic values for kErratic, else 2
 };
 
 class PairRelation {
  public:
-  /// What healthy gyros may differ by: the slope and its reciprocal, and the time.
+  /// Most by which healthy gyros differ: slope or its reciprocal, and delay.
   static constexpr double kSlopeMost = 2.5;
   static constexpr double kLagMost_s = 0.6;
 
@@ -70,7 +71,7 @@ class PairRelation {
     newest_s_ = t_s;
   }
 
-  /// One of them is found faulty: its last samples are no evidence about the pair.
+  /// A gyro was found faulty: its last samples are no evidence about the pair.
   void break_off() {
     samples_ = 0;
     sum_ = square_ = step_square_ = step_most_ = {};
@@ -78,29 +79,30 @@ class PairRelation {
     since_block_ = since_long_block_ = 0;
   }
 
-  /// Before the first pair: what was found in an earlier run. It stands until some blocks show a
-  /// pair, or something else is found.
+  /// Before the first pair: the verdict of an earlier run. It stands until some blocks show a
+  /// healthy pair, or something else is found.
   void resume(const PairVerdict& verdict) { verdict_ = earlier_ = verdict; }
 
   [[nodiscard]] const PairVerdict& verdict() const { return verdict_; }
   [[nodiscard]] bool contradicts() const { return verdict_.contradiction != Contradiction::kNone; }
-  /// Times that a contradiction began.
+  /// Number of times that a contradiction began.
   [[nodiscard]] std::uint64_t times() const { return times_; }
 
  private:
   static constexpr double kCell_s = 0.1;
   /// After a gap longer than this, and than four cells, everything but the evidence restarts.
   static constexpr double kGap_s = 0.5;
-  static constexpr std::size_t kBlock = 10;      ///< cells of a block
-  static constexpr std::size_t kLongBlock = 20;  ///< … of one that is compared over all lags
-  static constexpr std::size_t kLags = 30;       ///< cells to either side
-  static constexpr std::size_t kCells = 128;     ///< of the memory
+  static constexpr std::size_t kBlock = 10;  ///< cells of a block
+  /// Cells of a long block, which is compared over all lags.
+  static constexpr std::size_t kLongBlock = 20;
+  static constexpr std::size_t kLags = 30;    ///< most lag to either side, in cells
+  static constexpr std::size_t kCells = 128;  ///< cells in memory
 
   struct RelationCell {
     std::array<double, 2> mean_dps{};
-    std::array<double, 2> scatter{};  ///< variance of the samples about it; 0 of one sample
-    std::array<double, 2> leap{};     ///< its largest step from one sample to the next
-    std::array<double, 2> rough{};    ///< … as it were if they were white: from their steps
+    std::array<double, 2> scatter{};  ///< variance of the samples about the mean; 0 for one sample
+    std::array<double, 2> leap{};     ///< largest step from one sample to the next, signed
+    std::array<double, 2> rough{};    ///< variance of the samples from their steps, as if white
     double samples = 0.0;
     double length_s = 0.0;
   };
@@ -108,33 +110,33 @@ class PairRelation {
   struct Stretch {
     double mean_dps = 0.0;
     double squares = 0.0;  ///< about the mean
-    double bends = 0.0;    ///< variance of a cell's mean, from its bends
+    double bends = 0.0;    ///< variance of a cell's mean, from second differences
     double noise = 0.0;    ///< variance of a cell's mean that is not smooth motion
     double rough = 0.0;    ///< variance of a sample within its cell, from steps between samples
   };
-  /// Sums of a stretch of gyro 1 and one of gyro 2, about their means.
+  /// Sums of squares and products of a stretch of gyro 1 and one of gyro 2, about their means.
   struct Products {
     double first = 0.0;
     double second = 0.0;
     double both = 0.0;
   };
-  /// How one stretch follows another.
+  /// How a stretch of gyro 2 follows one of gyro 1.
   struct Fit {
     double slope = 0.0;
-    double left = 1.0;  ///< share of the second's squares that it leaves
-    double own = 0.0;   ///< Σ of the first one's squares
+    double left = 1.0;  ///< share of gyro 2's squares that the slope leaves
+    double own = 0.0;   ///< Σ of gyro 1's squares
     double both = 0.0;  ///< Σ of the products
   };
-  /// What the long blocks have shown at one lag, older ones fading.
+  /// Sums over the long blocks at one lag, older ones fading.
   struct AtLag {
-    double now = 0.0;          ///< share that a healthy slope leaves of the newest
-    double left = 0.0;         ///< Σ of that share
-    double blocks = 0.0;       ///< those that support this lag, against all healthy ones
-    double any_left = 0.0;     ///< Σ of the share that the slope leaves which fits best
-    double strong_left = 0.0;  ///< as `left`, of blocks in which both have moved far
+    double now = 0.0;          ///< share that a healthy slope leaves in the newest block
+    double left = 0.0;         ///< Σ of `now`
+    double blocks = 0.0;       ///< number of blocks that support this lag against all healthy ones
+    double any_left = 0.0;     ///< Σ of the share that the best slope of any size leaves
+    double strong_left = 0.0;  ///< as `left`, for blocks in which both moved far
     double both = 0.0;         ///< Σ of the products
   };
-  /// Slopes of blocks that support one contradiction.
+  /// Sums over the blocks that support one contradiction, for their common slope.
   struct Slopes {
     double own = 0.0;
     double both = 0.0;
@@ -151,16 +153,17 @@ class PairRelation {
     return cells_[(head_ + i) % kCells];
   }
   [[nodiscard]] Stretch stretch(std::size_t gyro, std::size_t from, std::size_t length) const;
-  /// Less their trends too, where these may be drift; of gyro 2 half a cell later, if halfway.
+  /// `trends_off` removes trends too, which may be drift; `halfway` shifts gyro 2 by half a cell
+  /// more.
   [[nodiscard]] Products products(std::size_t from, std::size_t lagged_from, std::size_t length,
                                   bool trends_off, bool halfway = false) const;
-  /// With a slope between these limits.
+  /// Best fit with a slope between these limits.
   [[nodiscard]] static Fit fit(const Products& sums, double slope_least, double slope_most);
-  /// … with a healthy one, half a cell later.
+  /// Best fit with a healthy slope, half a cell later.
   [[nodiscard]] Fit halfway_fit(std::size_t from, std::size_t lagged_from, std::size_t length,
                                 bool trends_off) const;
   [[nodiscard]] static bool moves(const Stretch& stretch, std::size_t length);
-  /// How far it has turned to and fro within the memory, deg.
+  /// Range of the angle that this gyro has turned within the memory, its mean rate removed, deg.
   [[nodiscard]] double swing_deg(std::size_t gyro) const;
 
   void judge_block();
@@ -195,34 +198,34 @@ class PairRelation {
   std::array<RelationCell, kCells> cells_;
   std::size_t head_ = 0;
   std::size_t count_ = 0;
-  double length_s_ = 0.0;             ///< of a cell, as a rule
-  std::size_t since_block_ = 0;       ///< cells since the last one was judged
+  double length_s_ = 0.0;             ///< usual length of a cell
+  std::size_t since_block_ = 0;       ///< cells since the last block was judged
   std::size_t since_long_block_ = 0;  ///< cells since the last long block was judged
 
-  double evidence_ = 0.0;  ///< of blocks: log odds above the prior
+  double evidence_ = 0.0;  ///< log odds of the blocks, above the prior
   Slopes slopes_;
-  bool by_blocks_ = false;  ///< they have found a contradiction, and it stands
+  bool by_blocks_ = false;  ///< a contradiction found by the blocks stands
   std::array<AtLag, 2 * kLags + 1> lags_{};
-  std::size_t lag_cells_ = 0;  ///< of these to either side, as long as the cells are what they were
+  std::size_t lag_cells_ = 0;  ///< number of lags to either side, for the present cell length
   double long_blocks_ = 0.0;
   double strong_blocks_ = 0.0;
-  bool pooled_ = false;  ///< over these, they have too little in common
+  bool pooled_ = false;  ///< the gyros have too little in common over the strong blocks
   double pooled_probability_ = 0.0;
   double own_ = 0.0;
-  PairVerdict late_;               ///< what the lags say
-  double best_any_left_ = 0.0;     ///< of any slope, at a healthy lag
-  std::array<double, 2> alone_{};  ///< log odds above the prior: this gyro moves by itself
-  bool unrelated_ = false;         ///< both do, as it was found
-  /// What the values of a gyro are like.
+  PairVerdict late_;               ///< verdict from the lags
+  double best_any_left_ = 0.0;     ///< mean `any_left` at the best healthy lag
+  std::array<double, 2> alone_{};  ///< log odds, above the prior, that this gyro moves by itself
+  bool unrelated_ = false;         ///< both gyros were found to move by themselves
+  /// Evidence about the values of one gyro.
   struct Values {
-    // While the other one stood still, and while it moved:
-    std::array<double, 2> erratic{};    ///< blocks in which they were no gyro's, less calm ones
-    std::array<std::size_t, 2> calm{};  ///< blocks in which they were
-    std::array<double, 2> leaps{};      ///< down, up; those of long ago fade
+    // Index: 0 while the other gyro stood still, 1 while it moved.
+    std::array<double, 2> erratic{};    ///< erratic blocks, less calm ones
+    std::array<std::size_t, 2> calm{};  ///< calm blocks
+    std::array<double, 2> leaps{};      ///< index: 0 down, 1 up; older ones fade
   };
   std::array<Values, 2> values_;
-  bool were_near_ = false;  ///< the two have been nearer to each other than any bias is large
-  PairVerdict earlier_;     ///< of an earlier run, while it stands
+  bool were_near_ = false;  ///< the gyros have been closer than the largest bias
+  PairVerdict earlier_;     ///< verdict of an earlier run, while it stands
   PairVerdict verdict_;
   std::uint64_t times_ = 0;
 };

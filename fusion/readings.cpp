@@ -8,49 +8,51 @@ namespace vgyro::fusion {
 
 namespace {
 
-// How fast platforms turn when they turn steadily: as likely between 0.02 and 0.2 deg/s as between
-// 2 and 20; below 0.02 about even.
+// Prior of the rate of steady turns: 0.02 to 0.2 deg/s is as likely as 2 to 20; below 0.02 deg/s
+// the density is about constant.
 constexpr double kSlowTurn_dps = 0.02;
 constexpr double kFastTurn_dps = 60.0;
 
-// A steady turn that was interrupted goes on as it was: a circle with a wobble, a ferry in a swell,
-// a turntable; and so does a stop in which somebody gets in. How likely, and how nearly. When the
-// platform has moved on in between, the next turn may be like the last one all the same.
+// Probability that an interrupted turn (a circle with a wobble, a ferry in a swell) continues at
+// its rate, or an interrupted stop (a passenger gets in) continues; how closely; and the
+// probability that the next turn resembles the last one even after the platform has moved on.
 constexpr double kGoesOn = 0.95;
 constexpr double kGoesOnElsewhere = 0.05;
 constexpr double kGoesOnWithin = 0.05;
-// How fast the level's scatter from run to run is followed.
+// Gain that follows the level's scatter from run to run.
 constexpr double kSwellGain = 0.3;
 
-// How a steady turn wanders, per √s: not at all on a turntable, little on a ship's slow circle,
-// more in a helmsman's and a driver's hands. How common each is.
+// Random walk of a turn's rate, per √s: none on a turntable, little in a ship's slow circle, more
+// in a helmsman's or driver's hands; and the prior of each.
 constexpr std::array<double, Readings::kTurnKinds> kTurnWalk_dps_rts{0.0, 2e-4, 0.002};
 constexpr std::array<double, Readings::kTurnKinds> kTurnWalkShare_rts{0.0, 0.0, 0.02};
 constexpr std::array<double, Readings::kTurnKinds> kTurnPrior{0.15, 0.25, 0.6};
 
-// A step is of one gyro; one that has stepped is the one to step again, or back.
+// Probability that the next step is of the gyro that stepped last, forward or back.
 constexpr double kSameGyroAgain = 0.97;
-// How likely a step is in a window that contradicts what is foretold.
+// Prior of a step in a window that deviates from its prediction.
 constexpr double kStepInWindow = 1e-2;
-// At a stop the drifts are not where they can be: how likely, and how far they are off at least,
-// over N per √1 s, and at most.
+// Hypothesis that the platform stands although the filters exclude its drifts: prior, least
+// deviation in units of N per √1 s, greatest deviation.
 constexpr double kSurprise = 1e-4;
 constexpr double kSurpriseWhite = 30.0;
 constexpr double kSurpriseMost_dps = 1.0;
-// What contradicted was no drift of either: frames of somebody else, bits that fell over.
+// Prior that a contradiction was no drift of either gyro, but foreign frames or flipped bits.
 constexpr double kNobodysDrift = 1e-3;
-// A gyro that contradicts the other one and then falls out was the wrong one, but for this share.
+// A gyro that contradicts the other one and then falls out was the wrong one, except with this
+// probability.
 constexpr double kStepOfTheOther = 0.02;
-// How far a step is known when it is seen: by the blocks that show it, and this share of it.
+// σ of a step when it is detected, as a share of it, in addition to the noise of its blocks.
 constexpr double kStepDoubt = 0.05;
 
-// A run of steady windows is another one when its level has changed by so many standard deviations.
+// A run of steady windows ends when its level has changed by this many standard deviations.
 constexpr double kOtherRun = 3.5;
 
-// A bias beyond what its gyro can have: σ of that limit, as a share of it.
+// σ of the limit max_bias_dps, as a share of it.
 constexpr double kLimitSoftness = 0.1;
 
-// Readings so much alike are one.
+// Hypotheses are merged when their biases differ by less than this many σ, and their variances by
+// less than this factor.
 constexpr double kAlikeSigmas = 0.1;
 constexpr double kAlikeVariance = 1.2;
 
@@ -137,7 +139,7 @@ void Readings::learn_steady(const SteadyWindow& window) {
   settle();
 }
 
-// A run ends where its likeliest reading no longer fits: a ferry that casts off, a circle that
+// A run ends where its likeliest hypothesis no longer fits: a ferry that casts off, a circle that
 // ends.
 bool Readings::goes_on(const SteadyWindow& window) {
   const Reading& best = slots_[likeliest()];
@@ -160,7 +162,7 @@ double Readings::turn_density(const Reading& reading, const SteadyWindow& window
   const double anew = 1.0 / (kSpan * (kSlowTurn_dps + std::sqrt(turn * turn + variance)));
   if (reading.last != Steady::kTurns) return anew;
   const double share = window.elsewhere ? kGoesOnElsewhere : kGoesOn;
-  // Where it has not moved on, how nearly it goes on has been seen.
+  // While the platform has not moved on, swell_variance_ holds the observed scatter instead.
   const double within = window.elsewhere ? squared(kGoesOnWithin * reading.last_turn_dps) : 0.0;
   const double on_variance = variance + within + swell_variance_;
   return (1.0 - share) * anew +
@@ -178,7 +180,8 @@ double Readings::beyond_limits(const DriftEstimate& estimate) const {
   return penalty;
 }
 
-// Prior odds of a turn against a stop: those of any steady stretch, or what it was before.
+// Prior log odds of a turn against a stop: those of any steady stretch, or, while the platform has
+// not moved on, those of continuing as in the last run.
 double Readings::log_turning(const Reading& reading, const SteadyWindow& window) {
   if (window.elsewhere || reading.last == Steady::kNo) return window.log_turning;
   const double persists = std::log(kGoesOn / (1.0 - kGoesOn));
@@ -228,9 +231,9 @@ void Readings::stand(Reading& reading, const SteadyWindow& window) {
   reading.log_weight -= beyond_limits(reading.bank.estimate());
 }
 
-// The platform stands, and what was thought to be known of the drifts is wrong: no model of drift
-// holds for ever, and without this a stop once refused would be refused for ever. The doubt is as
-// wide as what was found, so that its density falls with it; false where no gyro drifts so far.
+// The platform stands, and the estimated drifts are wrong. No model of drift holds for ever;
+// without this hypothesis a stop that was once refused would always be refused. Its variance is at
+// least the squared deviation, so its density falls with it. False where no gyro drifts so far.
 bool Readings::surprise(Reading& reading, const SteadyWindow& window, const DriftEstimate& known) {
   if (!window.elsewhere) return false;
   std::array<double, 2> variance{};
@@ -252,7 +255,7 @@ void Readings::begin_turn(Reading& reading, const SteadyWindow& window) {
     reading.turn[i] = {window.level_dps, window.level_variance, kTurnPrior[i]};
 }
 
-// Log density of the next level, if the platform turns on.
+// Log density of the next level, if the platform continues to turn.
 double Readings::follow_turn(Reading& reading, const SteadyWindow& window, double turn_dps,
                              double drift_growth) {
   std::array<double, kTurnKinds> log_density{};
@@ -278,7 +281,8 @@ double Readings::follow_turn(Reading& reading, const SteadyWindow& window, doubl
 }
 
 void Readings::go_on_steady(const SteadyWindow& window) {
-  // One for all: else the reading in which the turn is slowest would be the likeliest.
+  // One turn rate for all hypotheses: with a rate of its own, the hypothesis with the slowest turn
+  // would expect the least wander and be the likeliest.
   double turn_dps = 0.0;
   for (std::size_t i = 0; i < count_ && turn_dps == 0.0; ++i)
     turn_dps = slots_[i].steady == Steady::kTurns ? slots_[i].last_turn_dps : 0.0;
@@ -288,7 +292,7 @@ void Readings::go_on_steady(const SteadyWindow& window) {
       one.log_weight += one.bank.learn(window.length_s, window.standing);
       continue;
     }
-    // What both read drifts on while the platform turns.
+    // The level drifts with the biases while the platform turns.
     const auto growth = one.bank.estimate().growth;
     const double drift = weighted(window.weight, {growth[0], 0.0, growth[1]});
     one.log_weight += window.log_turning + follow_turn(one, window, turn_dps, drift);
@@ -337,7 +341,7 @@ void Readings::learn_maybe_step(double length_s, const DriftMeasurement& measure
                                 const DriftMeasurement& doubted, double away_dps, double variance,
                                 double first_share) {
   const std::size_t before = count_;
-  // Within the window the step may have been anywhere.
+  // The step may be anywhere in the window.
   const double doubt = variance + squared(away_dps);
   for (std::size_t i = 0; i < before; ++i) {
     for (std::size_t gyro = 0; gyro < 2; ++gyro) {
@@ -352,7 +356,7 @@ void Readings::learn_maybe_step(double length_s, const DriftMeasurement& measure
 }
 
 void Readings::suspect(std::size_t gyro) {
-  // Once: a gyro that comes and goes proves no more than one that has gone.
+  // Only once: a gyro that comes and goes proves no more than one that stays away.
   if (suspected_[gyro]) return;
   suspected_[gyro] = true;
   for (std::size_t i = 0; i < count_; ++i) {
@@ -381,9 +385,9 @@ std::size_t Readings::likeliest() const {
   return best;
 }
 
-// Weights sum to 1, the likeliest come first, and what weighs nothing is gone.
+// Normalizes the weights, puts the likeliest hypothesis first and drops those without weight.
 void Readings::settle() {
-  // By swaps: no bank may lose the memory that it has.
+  // Swaps keep the memory of every bank, so nothing is allocated.
   for (std::size_t i = 1; i < count_; ++i) {
     for (std::size_t j = i; j > 0 && slots_[j].log_weight > slots_[j - 1].log_weight; --j)
       std::swap(slots_[j], slots_[j - 1]);
@@ -399,7 +403,7 @@ void Readings::settle() {
     slots_[i].log_weight -= greatest + std::log(sum);
 }
 
-// Readings that have come to say the same are one again.
+// Merges hypotheses whose biases have become alike.
 void Readings::join_alike() {
   std::array<DriftEstimate, kKept> estimate;
   for (std::size_t i = 0; i < count_; ++i)

@@ -7,25 +7,25 @@ namespace vgyro::fusion {
 
 namespace {
 
-// A limit is reached from here on: quantisation may leave the last fraction out.
+// Share of a limit from which it counts as reached: quantisation may leave out the last fraction.
 constexpr double kLimitShare = 0.999;
-// No sensor clips below; a slow turn has flat tops.
+// No sensor clips below this; a slow turn has flat tops.
 constexpr double kClipMin_dps = 5.0;
 
-// A fine sensor repeats a value with a probability below 0.15: fifty in a row are no chance.
+// A fine sensor repeats a value with a probability below 0.15: fifty in a row are not chance.
 constexpr std::uint64_t kStuckSamples = 50;
 constexpr Duration kStuckTime = std::chrono::milliseconds(250);
 constexpr std::uint64_t kClipSamples = 8;
-// Beyond the longest run that it has ever shown by this.
+// Factors over the longest run that the sensor has shown.
 constexpr std::uint64_t kRunFactor = 10;
 constexpr std::uint64_t kClipRunFactor = 4;
 
-// A run of equal values this unlikely is no chance while something moves.
+// A run of equal values less likely than this is not chance while something moves.
 constexpr double kChance = 1e-6;
-// A healthy sensor leaps into a run more rarely than this.
+// A healthy sensor leaps into a run with less than this probability.
 constexpr double kLeapChance = 1e-3;
 constexpr std::uint64_t kRunMin = 3;
-// Motion that has just ended counts: what is frozen by it is frozen all the same.
+// Motion that has just ended counts too: a value that froze in it is still frozen.
 constexpr Duration kMovedLately = std::chrono::milliseconds(1500);
 
 // How much the other gyro must have moved while this one stood still. Sensors that hold an exact
@@ -36,24 +36,24 @@ constexpr std::uint64_t kUnmovedSamples = 5;
 // A filter, or a source slower than the bus, may lag behind by this or by its longest run.
 constexpr Duration kLagMin = std::chrono::milliseconds(250);
 constexpr Duration kLagMax = std::chrono::seconds(1);
-// A sensor that has never changed is not given so long: that it is alive is for it to show.
+// A sensor that has never changed gets less time: it has not shown yet that it is alive.
 constexpr Duration kLagUnproven = std::chrono::milliseconds(80);
-// Moving with the other one: by this share of its movement, within the blocks' memory.
+// A gyro moves with the other one if it moves by this share of it, within the blocks' memory.
 constexpr double kTogether = 0.5;
 constexpr Duration kTogetherWithin = std::chrono::seconds(6);
-// Behind a pause nothing is said of the time in it.
+// A longer pause ends a run: nothing is known of the time in it.
 constexpr Duration kPause = std::chrono::seconds(1);
 
 constexpr std::uint64_t kBlocksToKnow = 30;
 constexpr double kFineSteps = 3.0;
 // One block in 34 of a fine sensor looks coarse by chance.
 constexpr std::uint64_t kCoarseShare = 10;
-// White noise has 23 of 30, smooth motion a few.
+// Changes of direction in a block: white noise has 23 of 30, smooth motion a few.
 constexpr int kTurnsMin = 12;
 
-// Sensors that have never repeated a value in a thousand samples may do so all the same.
+// A sensor that has not repeated a value in a thousand samples may still do so.
 constexpr double kRepeatsMin = 0.02;
-// Their share is known from chance, and changes with vibration.
+// The share of repeats is a random sample, and changes with vibration.
 constexpr double kRepeatsMargin = 1.5;
 constexpr double kRepeatsMemory = 4096.0;
 
@@ -68,7 +68,7 @@ double Movement::MovementBlock::mean_sigma_dps() const {
 }
 
 Movement::Level Movement::MovementBlock::level() const {
-  // The neighbours of the block may have moved as much as it did itself.
+  // The rate may have moved as much between blocks as within this one.
   return {mean_dps(), kSigmas * mean_sigma_dps() + 2.0 * std::abs(last_dps - first_dps)};
 }
 
@@ -194,9 +194,9 @@ double Habit::chance_of_run(std::uint64_t times) const {
 }
 
 void Habit::close_block() {
-  // Of white noise they have six times its variance.
+  // Second differences of white noise have six times its variance.
   const double noise_dps = std::sqrt(bends_ / (6.0 * (kChangesPerBlock - 1)));
-  // Smooth motion that is far above the steps says nothing of the noise.
+  // Smooth motion far above the steps does not show the noise.
   const bool coarse = noise_dps <= kFineSteps * smallest_;
   if (coarse || turns_ >= kTurnsMin) ++blocks_;
   if (coarse) ++coarse_blocks_;
@@ -223,7 +223,8 @@ SensorWatch::Finding SensorWatch::judge(TimePoint t, double rate_dps, const Sens
     run_is_fault_ = true;
     return Finding::kSaturated;
   }
-  // What no short run can be is asked only of a long one: of a sensor that is well, hardly ever.
+  // The expensive checks run only in long runs of equal values, which a healthy sensor hardly ever
+  // has.
   const bool behind =
       run_ >= kUnmovedSamples && other != nullptr && stays_behind(t, rate_dps, *other);
   if (behind && !step_.any()) unproven_ = true;
@@ -268,7 +269,7 @@ void SensorWatch::begin_run(TimePoint t, double rate_dps, bool paused) {
   run_is_fault_ = false;
 }
 
-// This sample is another value than those before, or comes behind a pause.
+// This sample differs from those before, or comes after a pause.
 void SensorWatch::end_run(TimePoint t, double rate_dps, bool paused) {
   if (!run_is_fault_) {
     habit_.repeated(run_);
@@ -290,11 +291,12 @@ bool SensorWatch::clipped(double rate_dps) const {
 }
 
 bool SensorWatch::at_a_limit(double rate_dps) {
-  // A bound at zero is where a magnitude begins, not where a sensor ends.
+  // A bound at zero is the beginning of a magnitude, not the end of a sensor's range.
   if (limits_.highest_dps > 0.0 && rate_dps >= kLimitShare * limits_.highest_dps) return true;
   if (limits_.lowest_dps < 0.0 && rate_dps <= kLimitShare * limits_.lowest_dps) return true;
   if (std::abs(rate_dps) * kLimitShare > clip_dps_) {
-    clip_dps_ = std::numeric_limits<double>::infinity();  // it can say more: it was stuck there
+    clip_dps_ = std::numeric_limits<double>::infinity();  // it reaches more, so it was stuck there,
+                                                          // not clipped
   }
   if (run_ >= kClipSamples && clipped(rate_dps)) clip_dps_ = std::abs(rate_dps);
   return std::abs(rate_dps) >= kLimitShare * clip_dps_;
@@ -304,13 +306,13 @@ bool SensorWatch::repeats_too_long(TimePoint t) const {
   return habit_.fine() && run_ >= kRunFactor * habit_.longest_run() && run_time(t) >= kStuckTime;
 }
 
-// How far the other one may go before this one must have seen it.
+// How far the other gyro may move before this one must have seen it.
 double SensorWatch::unseen_dps(double rate_dps) const {
   const double hidden_dps = rate_dps == 0.0 ? 2.0 * limits_.dead_band_dps : 0.0;
   return std::max(kMovement_dps, kMovementSteps * habit_.step_dps()) + hidden_dps;
 }
 
-// The other one moves and this one does not. Its movement changes no more often than its blocks.
+// The other gyro moves and this one does not. Evaluated only when the other gyro has a new block.
 bool SensorWatch::stays_behind(TimePoint t, double rate_dps, const SensorWatch& other) {
   if (other.quick_.blocks() != asked_quick_) {
     asked_quick_ = other.quick_.blocks();
@@ -326,7 +328,7 @@ bool SensorWatch::stays_behind(TimePoint t, double rate_dps, const SensorWatch& 
   return other.movement_.between(run_begin_, t - lag) > unseen_dps(rate_dps);
 }
 
-// It has leapt to a value that it keeps, and the other one, which is alive, has not gone there.
+// This gyro has leapt to a value and keeps it; the other one, which is alive, has not moved as far.
 bool SensorWatch::left_the_other(double rate_dps, const SensorWatch& other) const {
   if (!leapt_ || !habit_.leaps_are_rare() || other.run_ >= kUnmovedSamples) return false;
   const auto before = quick_.before(run_begin_);
@@ -348,7 +350,7 @@ bool SensorWatch::is_no_chance(TimePoint t, const SensorWatch* other) const {
          (other != nullptr && other->movement_.between(from, t) > kMovement_dps);
 }
 
-// What was dead has come to life, and sees what the other one sees.
+// A dead gyro has come to life, and moves as the other one does.
 bool SensorWatch::moves_with(TimePoint t, const SensorWatch& other) const {
   if (!step_.any()) return false;
   const TimePoint from = std::max(alive_since_, t - kTogetherWithin);

@@ -1,12 +1,12 @@
 #pragma once
 
-// One gyro's raw values in order → is this a measurement at all? Finds values that stand still
-// where the sensor never did, values at the end of its range, and zeros of a dead band. It learns
-// from the sensor itself how long values repeat and how its noise compares with its steps; a coarse
-// sensor that repeats at rest is accepted until the other gyro moves; one that has never changed is
-// accepted only after it moves with the other. O(1) a sample, no allocation, and no judgement
-// depends on the time of day.
-// Judges one sample at a time: how long a finding lasts is for others to decide.
+// Is a gyro's raw value a measurement at all? Takes the values in order and finds values that stand
+// still where the sensor never did, values at the end of the range, and zeros of a dead band. It
+// learns from the sensor itself how long values repeat and how its noise compares with its steps. A
+// coarse sensor that repeats at rest is accepted until the other gyro moves; one that never changed
+// while the other gyro moved is accepted only after it moves with the other one. O(1) a sample, no
+// allocation, and no judgement depends on the time of day.
+// Judges one sample at a time; the caller decides how long a finding lasts.
 
 #include <array>
 #include <cstddef>
@@ -22,8 +22,8 @@ namespace vgyro::fusion {
 struct SensorLimits {
   double lowest_dps = -std::numeric_limits<double>::infinity();
   double highest_dps = std::numeric_limits<double>::infinity();
-  double dead_band_dps = 0.0;  ///< below this it says 0; 0: none
-  double lattice_dps = 0.0;    ///< all its values lie this far apart, or multiples; 0: not known
+  double dead_band_dps = 0.0;  ///< below this it sends 0; 0: no dead band
+  double lattice_dps = 0.0;    ///< its values are multiples of this apart; 0: not known
 };
 
 /// Means over blocks of time that follow each other from the first sample on: has the sensor moved,
@@ -32,12 +32,12 @@ class Movement {
  public:
   struct Level {
     double dps = 0.0;
-    double doubt_dps = 0.0;  ///< six sigma, and what it moved within the block
+    double doubt_dps = 0.0;  ///< 6 σ, and twice the change within the block
   };
 
   explicit Movement(Duration block) : length_(block) {}
 
-  /// A sample from before the open block is passed over.
+  /// A sample from before the open block is ignored.
   void add(TimePoint t, double rate_dps) {
     const Duration since = t - open_.begin;
     const bool inside = open_.count > 0 && since >= Duration::zero() && since < length_;
@@ -48,15 +48,15 @@ class Movement {
     open_.squares += step_dps * step_dps;
     open_.last_dps = rate_dps;
   }
-  /// By how much the means of the blocks inside [from, until] differ at least, six sigma taken off.
+  /// Least difference of the means of the blocks inside [from, until]: each mean moved by 6 σ.
   [[nodiscard]] double between(TimePoint from, TimePoint until) const;
   /// The newest block that ended at or before `t`, unless that was long ago.
   [[nodiscard]] std::optional<Level> before(TimePoint t) const;
-  /// The newest block, when it began at or behind `t`.
+  /// The newest block, if it began at or after `t`.
   [[nodiscard]] std::optional<Level> behind(TimePoint t) const;
-  /// Is a step of this size from one sample to the next beyond its noise of late?
+  /// Is a step of this size from one sample to the next beyond the recent noise?
   [[nodiscard]] bool is_leap(double step_dps) const;
-  /// So far: an unchanged count means that there is no new one.
+  /// Number of complete blocks so far.
   [[nodiscard]] std::uint64_t blocks() const { return closed_; }
 
  private:
@@ -66,9 +66,9 @@ class Movement {
     TimePoint begin;
     int count = 0;
     double first_dps = 0.0;
-    double sum_dps = 0.0;  ///< less the first, so that nothing is lost to rounding
+    double sum_dps = 0.0;  ///< less first_dps for each sample, so that rounding loses nothing
     double last_dps = 0.0;
-    double squares = 0.0;  ///< of the steps from sample to sample
+    double squares = 0.0;  ///< Σ of squared steps from sample to sample
     [[nodiscard]] double mean_dps() const { return first_dps + sum_dps / count; }
     [[nodiscard]] double mean_sigma_dps() const;
     [[nodiscard]] Level level() const;
@@ -86,11 +86,11 @@ class Movement {
   MovementBlock open_;
 };
 
-/// The sensor's resolution: how close two different values in a row have been of late. A message
-/// may carry far finer steps than the sensor makes.
+/// The sensor's resolution: the smallest recent difference between successive values. A message may
+/// carry far finer steps than the sensor makes.
 class ValueStep {
  public:
-  /// Coarser than any usable sensor: the step until values show a smaller one.
+  /// Coarser than any usable sensor: the step until the values show a smaller one.
   static constexpr double kUnknown_dps = 0.5;
 
   explicit ValueStep(double lattice_dps) : lattice_dps_(lattice_dps), dps_(worked_out_dps()) {}
@@ -103,7 +103,7 @@ class ValueStep {
   [[nodiscard]] double worked_out_dps() const;
   /// Two buckets make the memory: the last 2048 to 4096 changes.
   static constexpr std::uint32_t kBucket = 2048;
-  /// So few changes may all be large ones.
+  /// Fewer changes than this may all be large.
   static constexpr std::uint32_t kEnough = 8;
 
   double lattice_dps_;
@@ -111,25 +111,25 @@ class ValueStep {
   double smallest_before_dps_ = std::numeric_limits<double>::infinity();
   std::uint32_t in_bucket_ = 0;
   std::uint32_t seen_ = 0;  ///< up to kEnough
-  double dps_;              ///< worked_out_dps(): asked for at every pair, and seldom another one
+  double dps_;              ///< cached worked_out_dps(): read at every pair, seldom changed
 };
 
-/// How a sensor's values follow each other while it is well.
+/// How a healthy sensor's values follow each other.
 class Habit {
  public:
-  /// A value other than the one before.
+  /// The value differs from the one before.
   void change(double from_dps, double to_dps);
-  /// A run of equal values has ended after so many.
+  /// A run of `times` equal values has ended.
   void repeated(std::uint64_t times);
-  /// A run begins, with a leap or without.
+  /// A run begins, with or without a leap.
   void begins_run(bool leapt);
 
-  /// Its noise is far above its steps, as far as was ever seen: equal values in a row are chance.
+  /// The noise is far above the steps in nearly all blocks, so equal values in a row are chance.
   [[nodiscard]] bool fine() const;
   [[nodiscard]] std::uint64_t longest_run() const { return longest_run_; }
-  /// How likely a run of so many equal values is, on the large side.
+  /// Probability of a run of so many equal values, on the large side.
   [[nodiscard]] double chance_of_run(std::uint64_t times) const;
-  /// A source that is slower than the bus leaps all the time.
+  /// False for a source that is slower than the bus: it leaps all the time.
   [[nodiscard]] bool leaps_are_rare() const;
   /// Smallest step between values, on the large side while little is known.
   [[nodiscard]] double step_dps() const { return step_dps_; }
@@ -142,9 +142,10 @@ class Habit {
   int changes_ = 0;
   double step_before_ = 0.0;
   double bend_before_ = 0.0;
-  int turns_ = 0;       ///< second differences against the direction of the one before
-  double bends_ = 0.0;  ///< their squares
-  double smallest_ = std::numeric_limits<double>::infinity();  ///< but for zero
+  int turns_ = 0;       ///< second differences with the opposite sign of the one before
+  double bends_ = 0.0;  ///< Σ of squared second differences
+  /// Smallest second difference that is not 0.
+  double smallest_ = std::numeric_limits<double>::infinity();
   bool step_known_ = false;
   std::uint64_t blocks_ = 0;
   std::uint64_t coarse_blocks_ = 0;
@@ -155,8 +156,8 @@ class Habit {
   std::uint64_t repeats_in_bucket_ = 0;
   double samples_ = 0.0;
   double repeats_ = 1.0;          ///< share of samples that repeat the one before
-  double repeats_of_late_ = 1.0;  ///< of the last bucket
-  double step_dps_ = 0.5;         ///< coarser than any sensor worth the name
+  double repeats_of_late_ = 1.0;  ///< the same, in the last bucket
+  double step_dps_ = 0.5;         ///< coarser than any usable sensor
 };
 
 class SensorWatch {
@@ -166,17 +167,16 @@ class SensorWatch {
   enum class Finding : std::uint8_t {
     kSound,
     kSaturated,  ///< at the end of the range, known or found
-    kStuck,      ///< the value stands still and should not
-    kStanding,   ///< so it seems after some samples, and it may still be chance
-    kBlind       ///< 0 inside the dead band: anything smaller than that
+    kStuck,      ///< the value stands still and should change
+    kStanding,   ///< the value stands still for some samples; may still be chance
+    kBlind       ///< 0 inside the dead band: the rate is anything smaller
   };
-  /// The next sample. `other` is the watch of a gyro that turns with this one and is well; else
-  /// null.
+  /// The next sample. `other` is the watch of a healthy gyro that turns with this one, or null.
   Finding judge(TimePoint t, double rate_dps, const SensorWatch* other);
 
-  /// Of late, between values that differ.
+  /// Smallest recent difference between values: ValueStep::dps().
   [[nodiscard]] double step_dps() const { return step_.dps(); }
-  /// A sensor that has said one value only may be dead.
+  /// False while the sensor has sent only one value: it may be dead.
   [[nodiscard]] bool ever_changed() const { return step_.any(); }
 
  private:
@@ -185,7 +185,7 @@ class SensorWatch {
   void end_run(TimePoint t, double rate_dps, bool paused);
   [[nodiscard]] bool at_a_limit(double rate_dps);
   [[nodiscard]] bool at_the_top(double rate_dps) const;
-  // Of runs that are long enough for it.
+  // Called only in runs that are long enough.
   [[nodiscard]] [[gnu::cold, gnu::noinline]] bool clipped(double rate_dps) const;
   [[nodiscard]] [[gnu::cold, gnu::noinline]] bool repeats_too_long(TimePoint t) const;
   [[nodiscard]] [[gnu::cold, gnu::noinline]] bool stays_behind(TimePoint t, double rate_dps,
@@ -211,12 +211,13 @@ class SensorWatch {
   bool run_is_fault_ = false;  ///< found saturated or stuck
   bool leapt_ = false;         ///< into this run
   Duration longest_run_time_{0};
-  std::uint64_t asked_ = 0;        ///< blocks of the other one that were looked at
-  std::uint64_t asked_quick_ = 0;  ///< quick blocks of the other one that were looked at
-  bool unproven_ = false;          ///< dead from the start, until it moves with the other one
-  TimePoint alive_since_;          ///< its first change then
+  std::uint64_t asked_ = 0;        ///< blocks of the other gyro that were judged
+  std::uint64_t asked_quick_ = 0;  ///< quick blocks of the other gyro that were judged
+  bool unproven_ = false;          ///< dead from the start, until it moves with the other gyro
+  TimePoint alive_since_;          ///< time of its first change
   double peak_dps_ = 0.0;          ///< largest magnitude before this run
-  double clip_dps_ = std::numeric_limits<double>::infinity();  ///< found: it clips there
+  /// Magnitude at which it was found to clip.
+  double clip_dps_ = std::numeric_limits<double>::infinity();
 };
 
 }  // namespace vgyro::fusion

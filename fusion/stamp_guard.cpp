@@ -6,11 +6,11 @@ namespace vgyro::fusion {
 
 namespace {
 
-// A slow stream may lose a frame or two without a wait for confirmations.
+// A slow stream may lose a frame or two without waiting for confirmations.
 constexpr int kForwardIntervals = 3;
-// Even spacing: to a quarter.
+// Spacing is even within a quarter.
 constexpr int kSpacingShare = 4;
-// Nobody records for longer, but computers without a battery begin in 1970 and are set later.
+// No recording is longer, but computers without a battery start in 1970 and are set later.
 constexpr Duration kClockWasSet = std::chrono::hours(24) * 365 * 10;
 
 }  // namespace
@@ -48,7 +48,7 @@ void StampGuard::follow(Stream& stream, TimePoint time) {
   stream.confirmations = 0;
 }
 
-// One more stamp that is far from the last one: do they agree by now?
+// Counts one more stamp that is far from the last accepted one: are there enough that agree?
 bool StampGuard::confirm(Stream& stream, TimePoint time) {
   const Duration since = span(stream.candidate, time);
   const bool close_by = since > Duration::zero() && since <= kConfirmWithin;
@@ -64,7 +64,8 @@ bool StampGuard::confirm(Stream& stream, TimePoint time) {
     stream.close_by = true;
   }
   stream.candidate = time;
-  stream.spacing = std::clamp<Duration>(since, -kSlowest, 2 * kSlowest);  // beyond, even to none
+  // A spacing at these limits is even with no other one.
+  stream.spacing = std::clamp<Duration>(since, -kSlowest, 2 * kSlowest);
   return stream.confirmations >= (stream.close_by ? kConfirmations : kSlowConfirmations);
 }
 
@@ -84,7 +85,7 @@ StampGuard::StampVerdict StampGuard::consider(std::size_t stream_index, TimePoin
     return StampVerdict::kAccepted;
   }
   if (stream_index < kLeaders) return step_clock(stream_index, time);
-  // It was away from the gyros, and has come back to them.
+  // The stream was away from the gyros' time; is it back?
   if (!near_a_leader(time)) return StampVerdict::kUnconfirmed;
   stream.last = time;
   return StampVerdict::kAccepted;
@@ -102,7 +103,7 @@ StampGuard::StampVerdict StampGuard::step_clock(std::size_t stream_index, TimePo
   for (std::size_t leader = 0; leader < kLeaders; ++leader) {
     if (streams_[leader].seen) newest = std::max(newest, streams_[leader].last);
   }
-  // Nobody knows how long the step took; one microsecond keeps the order.
+  // How long the step took is not known; one microsecond keeps the order.
   const TimePoint next = newest + std::chrono::microseconds(1);
   const TimePoint raw = time - offset_;
   set_offset(next - raw);

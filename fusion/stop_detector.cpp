@@ -9,28 +9,29 @@ namespace vgyro::fusion {
 
 namespace {
 
-// A rate that no drift explains: only so much counts as an angle that was turned.
+// Least rate that counts as a turned angle: no drift explains it.
 constexpr double kTurning_dps = 2.0;
-// So much of it, or so long in unsteady blocks, and the platform has moved on.
+// Turned angle, or time in unsteady blocks, after which the platform has moved on.
 constexpr double kTurned_deg = 30.0;
 constexpr double kMovedOn_s = 20.0;
 
-// Wheels that stand while the platform does this are broken, or the platform is carried.
+// If the wheels stand while the platform turns this fast, their signal is faulty, or the vehicle is
+// carried.
 constexpr double kNoStand_dps = 1.0;
 constexpr double kNoStandSigmas = 6.0;
 
 // Weight of a new block in the recent level.
 constexpr double kRecent = 0.25;
 
-// Of the steady stretches that a gyro sees: stops; bends and circles of a road; platforms that turn
-// by themselves (ferry, turntable, ship at sea). With wheels that stand only the last are left, and
-// few of them.
+// Shares of a gyro's steady stretches: stops; bends and circles of a road; platforms that turn by
+// themselves (ferry, turntable, ship at sea). With standing wheels only the last are left, and
+// rare.
 constexpr double kStops = 0.70;
 constexpr double kRoadTurns = 0.25;
 constexpr double kPlatformTurns = 0.05;
 constexpr double kCarried = 0.03;
 
-// How long they last, on average; some stops are a parking.
+// Mean durations; some stops are parking.
 constexpr double kStop_s = 60.0;
 constexpr double kParking_s = 3600.0;
 constexpr double kParkings = 0.2;

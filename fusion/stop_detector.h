@@ -1,10 +1,9 @@
 #pragma once
 
 // Is the platform steady: standing, or turning at a constant rate? Judged block by block (about
-// half a second) from how the gyros' cells scatter and whether their means stay where they were,
-// and from the wheels where there are any. readings.h weighs which of the two it
-// is: this finds only that nothing changes, and how strongly wheels and time indicate a
-// turn.
+// half a second) from how the gyros' cells scatter, whether their means stay where they were, and
+// from the wheels if there are any. StopDetector finds only that nothing changes, and how strongly
+// wheels and time indicate a turn; readings.h weighs stop against turn.
 
 #include <array>
 #include <cstdint>
@@ -13,7 +12,7 @@
 
 namespace vgyro::fusion {
 
-/// One block as the detector sees it. A missing gyro has weight 0.
+/// One block, as input of the detector. A missing gyro has weight 0.
 struct BlockLevel {
   double length_s = 0.0;
   double cells = 0.0;
@@ -23,7 +22,7 @@ struct BlockLevel {
   std::array<double, 2> weight{};           ///< in the virtual rate
   double doubt_variance = 0.0;              ///< of the weighted drift
   double cell_variance = 0.0;               ///< of the virtual rate's cells about their mean
-  double noise_variance = 0.0;              ///< the same, as noise alone would have it
+  double noise_variance = 0.0;              ///< the same, from noise alone
 };
 
 class StopDetector {
@@ -40,7 +39,7 @@ class StopDetector {
     kSteady
   };
 
-  /// `moves_elsewhere`: about another axis the platform moves.
+  /// `moves_elsewhere`: the platform moves about another axis.
   Steadiness judge(const BlockLevel& block, Wheels wheels, bool moves_elsewhere = false);
   /// This axis moved in the last block, independent of other axes and wheels.
   [[nodiscard]] bool moves() const { return moves_; }
@@ -48,15 +47,16 @@ class StopDetector {
 
   /// The last block began a run of steady ones.
   [[nodiscard]] bool run_begins() const { return run_blocks_ == 1; }
-  /// What sway adds to the variance of one block's mean. Valid after judge().
+  /// Variance that sway adds to one block's mean. Valid after judge().
   [[nodiscard]] double sway_variance() const { return sway_variance_; }
-  /// Log of how much likelier a steady turn is than a stop, at the beginning of a run.
+  /// Log odds of a steady turn against a stop at the beginning of a run.
   [[nodiscard]] double log_turning(Wheels wheels) const;
-  /// What `length_s` seconds more of the present run add to it: turns end sooner than stops.
+  /// Change of these log odds in the last `length_s` seconds of the present run: turns end sooner
+  /// than stops.
   [[nodiscard]] double log_turning_gain(Wheels wheels, double length_s) const;
-  /// Since the last run the platform has moved on: it turned, rolled, or moved for long.
+  /// The platform has moved on since the last run: it turned, rolled, or moved for long.
   [[nodiscard]] bool moved_on() const { return moved_on_; }
-  /// A run has been used.
+  /// A run has ended: motion since it counts from 0.
   void stay() {
     moved_on_ = false;
     turned_deg_ = 0.0;

@@ -24,10 +24,10 @@ void TemperatureFilter::begin(double temperature_c) {
   curvature_c_s2_ = 0.0;
 }
 
-// Two exponentials a sample are most of what a sample costs, and a sensor keeps its pace: what was
-// worked out for an interval is kept.
+// Two exponentials are most of a sample's cost, and a sensor keeps its pace: the gains of an
+// interval are cached.
 const TemperatureFilter::Gains& TemperatureFilter::gains_for(Duration dt, double dt_s) {
-  // Stamps are in whole microseconds as a rule: neighbours go to different places.
+  // Stamps usually have whole microseconds, so neighbouring intervals use different places.
   Gains& gains = gains_[static_cast<std::size_t>(dt.count() / kStampStep.count()) % kGainsKept];
   if (gains.dt == dt) return gains;
   const double keep = std::exp(-dt_s / memory_s_);

@@ -19,13 +19,13 @@ class TemperatureFilter {
   static constexpr double kMemoryMax_s = 20.0;
   /// Memory for a sensor with steps of 1 K; it grows with the root of the step.
   static constexpr double kMemoryPerRootStep_s = 18.0;
-  /// After a longer silence, in memories, it begins anew.
+  /// After a longer silence, in memories, the filter restarts.
   static constexpr double kForgetAfter = 5.0;
 
   /// `step_c` is 0 for a sensor without steps.
   explicit TemperatureFilter(double step_c = 0.0);
 
-  /// A value at or before the last one's time is passed over.
+  /// A value at or before the last one's time is ignored.
   void add(TimePoint t, double temperature_c);
 
   /// NaN before the first value.
@@ -35,10 +35,10 @@ class TemperatureFilter {
   [[nodiscard]] double memory_s() const { return memory_s_; }
 
  private:
-  /// Intervals of which the gains are kept: those of a regular sender with some jitter.
+  /// Number of intervals whose gains are cached: those of a regular sender with some jitter.
   static constexpr std::size_t kGainsKept = 32;
   static constexpr Duration kStampStep = std::chrono::microseconds(1);
-  /// What a surprise of 1 K does, after an interval of `dt`.
+  /// Correction for a deviation of 1 K from the prediction, after an interval of `dt`.
   struct Gains {
     Duration dt{0};  ///< 0: none yet
     double temperature = 0.0;

@@ -1,4 +1,5 @@
-"""Lines of candump -L, made and read as arrays: every frame has 8 bytes, so every line has the same length."""
+"""Lines of candump -L, written and read as arrays: every frame has 8 bytes, so all
+lines have the same length."""
 
 import numpy as np
 
@@ -32,7 +33,7 @@ def lines(stamps_us, bus, can_id, payloads):
 
 
 def write(path, streams):
-    """streams: (stamps_us, bus, can_id, payloads); frames go out in the order of their stamps."""
+    """streams: (stamps_us, bus, can_id, payloads); frames are written in the order of their stamps."""
     order = np.argsort(np.concatenate([s[0] for s in streams]), kind="stable")
     with open(path, "wb") as file:
         file.write(np.concatenate([lines(*s) for s in streams])[order].data)

@@ -1,4 +1,4 @@
-"""What a gyro makes of the true rate: bias, scale, noise, drift, faults, resolution."""
+"""The errors of a gyro: bias, scale, noise, drift, faults, resolution."""
 
 import math
 from dataclasses import dataclass, field
@@ -11,7 +11,7 @@ FLICKER_GRID_S = 0.5
 
 @dataclass
 class Class:
-    """What data sheets say of a kind of gyro; ranges are drawn from logarithmically."""
+    """Data-sheet values of a kind of gyro; values are drawn from the ranges logarithmically."""
 
     name: str
     density: tuple  # deg/s/rtHz
@@ -21,7 +21,7 @@ class Class:
     warm_up: tuple  # deg/s
     step: tuple  # deg/s
     per_kelvin: tuple  # deg/s/K
-    hidden_slope: float  # deg/s^2 that temperature may cause where no temperature is sent
+    hidden_slope: float  # deg/s^2 that temperature may cause if no temperature is sent
 
 
 CLASSES = {
@@ -35,10 +35,10 @@ PAIRS = (("cheap MEMS", "cheap MEMS"), ("good MEMS", "good MEMS"), ("good MEMS",
          ("fog", "cheap MEMS"), ("fog", "fog"))
 PAIR_SHARES = (0.25, 0.25, 0.15, 0.1, 0.1, 0.15)
 RATES_HZ = (50.0, 100.0, 125.0, 200.0)
-# The frame's sigma ends at 0.08 deg/s; a gyro whose single samples are worse is sent less often in life too.
+# The frame's sigma ends at 0.08 deg/s; real gyros whose single samples are worse are also sent less often.
 WORST_SAMPLE_DPS = 0.08
-# In units of the class's scale error: the factory sorts out what is worse. What both gyros share of it nothing shows,
-# so it stays below what one can allow for: up to 0.25 % of a cheap MEMS, 0.0125 % of fog.
+# In units of the class's scale error: the factory rejects worse gyros. The part that both gyros share cannot be
+# observed, so it stays below the usual allowance: up to 0.25 % for a cheap MEMS, 0.0125 % for fog.
 WORST_SCALE = 2.5
 
 
@@ -58,7 +58,7 @@ class Gyro:
     phase_s: float
     ppm: float
     step_dps: float
-    lag_s: float  # from the housing's temperature to what drifts
+    lag_s: float  # from the housing's temperature to the drifting part's
     temperature_step_k: float
     drifts: list = field(default_factory=list)
     faults: list = field(default_factory=list)
@@ -109,7 +109,7 @@ class Drift:
 
 @dataclass
 class Thermal:
-    """The housing's temperature: up and down between two levels."""
+    """The housing's temperature: alternates between two levels."""
 
     swing_k: float
     half_s: float
@@ -121,7 +121,8 @@ class Thermal:
         return self.start_c + self.swing_k * 0.5 * (1 - np.cos(np.pi * x))
 
     def lagged_k(self, t, lag_s):
-        """Change of what drifts: first order behind the housing, which is a cosine; at the start they agree."""
+        """Temperature change of the drifting part: it follows the housing, which is a cosine, with a first-order
+        lag; at the start they agree."""
         w = math.pi / self.half_s
         angle = w * (t + self.phase_s) - math.atan(w * lag_s)
         settled = -0.5 * self.swing_k * np.cos(angle) / math.sqrt(1 + (w * lag_s) ** 2)
@@ -160,7 +161,7 @@ def drift_of(gyro, t, thermal, drifts):
 
 
 def sample(gyro, rng, duration_s, grid, rate, thermal):
-    """Instants in s and raw values of all frames that the gyro sends; what the faults leave."""
+    """Instants in s and raw values of all frames that the gyro sends, after the faults."""
     interval_s = (1 + gyro.ppm * 1e-6) / gyro.rate_hz
     t = np.round(np.arange(gyro.phase_s, duration_s, interval_s) * 1e6) * 1e-6
     true = np.interp(t, grid, rate)

@@ -1,6 +1,5 @@
-"""What is judged of VG_Rate: is the rate as right as its sigma, and is it there when both gyros are sound?
-
-Knows the world's truth and the frame's layout (dbc/vgyro.dbc), nothing else."""
+"""Tests VG_Rate: is the rate as accurate as its sigma, and is it valid when both gyros are sound? Uses only the
+world's truth and the frame's layout (dbc/vgyro.dbc)."""
 
 from dataclasses import dataclass
 
@@ -11,27 +10,28 @@ import candump
 RATE_ID = 0x610
 RATE_STEP_DPS, SIGMA_STEP_DPS, AGE_STEP_US = 5e-5, 2e-5, 500
 RATE_INVALID, SIGMA_UNKNOWN, AGE_OR_MORE = -(1 << 23), 0xFFF, 15
-OLDEST_US = 40_000  # that an age of "7.5 ms or more" may mean
-LATER_SAMPLES = 4  # as many of one gyro as may be meant
+OLDEST_US = 40_000  # largest age that "7.5 ms or more" may mean
+LATER_SAMPLES = 4  # number of one gyro's samples that may be meant
 INSTANT_BLOCK_S = 10.0
-WORST_SHARE = 0.01  # of a block, with no say in which instant is meant: a gyro's spike is larger than all the rest
+WORST_SHARE = 0.01  # of a block, ignored in the choice of the instant: a gyro's spike is larger than all other errors
 
 RUN_ENDS_S = 0.2
 SMOOTH_S = 1.0
 HEADING_S = 60.0
-FRAME_HOLDS_S = 0.1  # a rate is there for so long, if no newer frame comes
+FRAME_HOLDS_S = 0.1  # a rate is valid for this long if no newer frame comes
 
 LONGEST_BEYOND_6_S, LONGEST_BEYOND_4_S = 2.0, 20.0
 RATIO_LOW, RATIO_HIGH = 0.5, 2.0
 LEAST_VALID = 0.95
 KINDS = ("beyond 6 sigma", "beyond 4 sigma", "valid share", "ratio high", "ratio low")
-# What must hold, and for how many worlds it need not: chance and what both gyros hide leave some ratios astray.
+# The requirements, and the share of worlds that may miss each: chance, and errors that both gyros hide, leave some
+# ratios out of range.
 ALLOWED = {("beyond 6 sigma",): 0.0, ("beyond 4 sigma",): 0.0, ("valid share",): 0.0, ("ratio high", "ratio low"): 0.02}
 
 
 @dataclass
 class Rates:
-    """One entry per VG_Rate frame; sigma is NaN where it is not told, and half a step where the frame says 0."""
+    """One entry per VG_Rate frame; sigma is NaN if it is not available, and half a step if the frame holds 0."""
 
     stamps_us: np.ndarray
     age: np.ndarray
@@ -58,8 +58,8 @@ def decode(path):
 
 
 def candidate_instants_us(rates, samples_us):
-    """The instants that a frame may mean. The age is told in steps of 0.5 ms, the rate belongs to a gyro's sample: that of
-    the told instant; where the age is 7.5 ms or more one of the last samples that are old enough."""
+    """The instants that a frame may mean. The age has steps of 0.5 ms, and the rate belongs to a gyro's sample: that
+    of the resulting instant, or, if the age is 7.5 ms or more, one of the last samples that are old enough."""
     told = rates.stamps_us - rates.age * AGE_STEP_US
     open_age = rates.age == AGE_OR_MORE
     yield told
@@ -75,7 +75,7 @@ def candidate_instants_us(rates, samples_us):
 
 
 def misfit(error, block):
-    """Per block the sum of squares but for the worst errors."""
+    """Sum of squares per block, without the worst errors."""
     square = error * error
     order = np.lexsort((square, block))
     counts = np.bincount(block)
@@ -85,8 +85,8 @@ def misfit(error, block):
 
 
 def errors(rates, recording):
-    """Errors and instants of the valid rates, each with the candidate that fits best over ten seconds. One choice for so
-    many frames has no noise to profit from."""
+    """Errors and instants of the valid rates, each with the candidate that fits best over ten seconds. One choice
+    for so many frames cannot profit from their noise."""
     samples_us = [np.rint(t * 1e6).astype(np.int64) for t, _ in recording.samples]
     choices = [c[rates.valid] * 1e-6 for c in candidate_instants_us(rates, samples_us)]
     rate = rates.rate[rates.valid]
@@ -101,7 +101,7 @@ def errors(rates, recording):
 
 
 def longest_run_s(t, beyond):
-    """The longest stretch of exceedances that follow each other within 0.2 s, and where it begins."""
+    """Length and beginning of the longest stretch of exceedances that follow each other within 0.2 s."""
     at = t[beyond]
     if not len(at):
         return 0.0, 0.0
@@ -121,7 +121,7 @@ def smoothed(t, error):
 
 
 def worst_heading(t, error, sigma):
-    """Over 60 s: heading error in deg, and in units of the integral of sigma; with the places where they are worst."""
+    """Worst heading error over 60 s, in deg and in units of the integral of sigma, with their places."""
     if len(t) < 2:
         return 0.0, 0.0
     dt = np.minimum(np.diff(t, append=t[-1]), FRAME_HOLDS_S)
@@ -139,7 +139,7 @@ def worst_heading(t, error, sigma):
 
 
 def valid_share(rates, stretches):
-    """Of the time in these stretches, how much has a valid rate."""
+    """Share of the time in these stretches that has a valid rate."""
     length = sum(b - a for a, b in stretches)
     if length < 1.0:
         return None
@@ -151,7 +151,7 @@ def valid_share(rates, stretches):
 
 
 def mean_square(error, sigma):
-    """Mean of error^2/sigma^2; None where there is nothing to judge."""
+    """Mean of error^2/sigma^2; None if there is nothing to judge."""
     return float(np.mean((error / sigma) ** 2)) if len(error) > 100 else None
 
 
@@ -193,7 +193,7 @@ def failures(found):
 
 
 def judge(path, recording):
-    """All figures of one world, and how it failed."""
+    """All figures of one world, and the requirements that it failed."""
     found = figures(decode(path), recording)
     return {"seed": recording.world.seed, "failed": failures(found), "figures": found, "tags": recording.world.tags,
             "description": recording.description()}

@@ -1,7 +1,6 @@
-"""What a vehicle does: its yaw rate on a fine grid, the speed of its wheels, and what is done in words.
-
-A life is a rest followed by chapters; a chapter calls small acts (bend, stop, drive). Every length and height is drawn
-here; what must hold for the whole life (no stop for how long, how slow a turn may be) comes in as Limits."""
+"""The motion of a vehicle: its yaw rate on a fine grid, the speed of its wheels, and a description in words. A life
+is a rest followed by chapters; a chapter calls small acts (bend, stop, drive). Every length and height is drawn
+here; the requirements for the whole life (longest time without a stop, slowest turn) come in as Limits."""
 
 import math
 from dataclasses import dataclass
@@ -10,28 +9,28 @@ import numpy as np
 
 GRID_S = 0.002  # A quarter of the period of 125 Hz; the fastest motion here has 2.5 Hz.
 ROUGH_KNOT_S = 0.16  # Road noise: cubic splines on random knots, hence up to some 2.5 Hz.
-WANDER_KNOT_S = 1.6  # A driver who keeps the lane: some 0.25 Hz.
+WANDER_KNOT_S = 1.6  # A driver keeping the lane: some 0.25 Hz.
 SWAY_KNOT_S = 0.4
-SPLINE_RMS = 0.69  # Of a cubic B-spline on knots of variance 1.
+SPLINE_RMS = 0.69  # RMS of a cubic B-spline on knots of variance 1.
 
 
-QUIET_STOP_S = 8.0  # What counts as a stop where stops must come
-# How a car and a train speed up and brake, m/s^2.
+QUIET_STOP_S = 8.0  # Shortest stop that counts where stops are required.
+# Acceleration of a car and of a train, m/s^2.
 CAR_PULL, TRAIN_PULL = (1.2, 3.0), (0.5, 1.1)
-# Sideways acceleration that passengers bear, m/s^2: a fast vehicle turns slowly.
+# Lateral acceleration that passengers accept, m/s^2: a fast vehicle turns slowly.
 CAR_GRIP, TRAIN_GRIP = 4.5, 1.5
 
 
 @dataclass
 class Limits:
-    """What makes a life fair: drift that both gyros share shows at stops alone."""
+    """Limits that keep a life fair: drift that both gyros share shows only at stops."""
 
     longest_without_stop_s: float = math.inf
     slowest_smooth_dps: float = 0.0
 
 
 def smooth_noise(rng, count, knot_s):
-    """Unit variance, twice differentiable, of the bandwidth that the knots leave."""
+    """Noise of unit variance, twice differentiable, with the bandwidth of its knots."""
     per_knot = round(knot_s / GRID_S)
     x = np.arange(per_knot) / per_knot
     weights = np.array([(1 - x) ** 3, 3 * x**3 - 6 * x**2 + 4, -3 * x**3 + 3 * x**2 + 3 * x + 1, x**3]) / 6
@@ -41,7 +40,7 @@ def smooth_noise(rng, count, knot_s):
 
 
 class Life:
-    """Acts follow each other; `now` is where the next one begins."""
+    """A sequence of acts; the next one begins at `now`."""
 
     def __init__(self, rng, duration_s, rest_s, limits):
         self.rng, self.duration_s, self.limits = rng, duration_s, limits
@@ -64,7 +63,7 @@ class Life:
         return self.now >= min(end_s, self.duration_s)
 
     def add_bump(self, begin_s, length_s, height_dps, ramp_s):
-        """Rises and falls with a cosine: the steering is never turned at once."""
+        """Rises and falls with a cosine: steering is never turned in an instant."""
         first, last = (min(self.count, math.ceil(x / GRID_S)) for x in (begin_s, begin_s + length_s))
         if last <= first:
             return
@@ -86,7 +85,7 @@ class Life:
         return max(1.5, abs(speed - self.speed) / self.u(*self.pull))
 
     def go(self, speed, rough=1.0, wander=1.0):
-        """Rolls at this speed, with this share of the road's noise and wander."""
+        """Drives at this speed, with this share of the road's noise and wander."""
         self.set(speed, rough * self.road[0], wander * self.road[1], self.ramp_to(speed))
 
     def stop(self, length_s, people=False):
@@ -190,7 +189,7 @@ def circles(life, end_s):
         life.bend(life.side() * life.log_u(5, 30), hold, life.u(2, 5))
         if life.rng.random() < 0.3:
             life.stop(life.u(5, 40))
-        # Two thirds of the time something else, so that an unknown scale error is not all there is to see.
+        # Other motion for two thirds of the time, so that an unknown scale error does not dominate.
         city(life, min(end_s, life.now + hold * life.u(1.0, 2.5)))
 
 
@@ -230,7 +229,7 @@ def slow_turns(life, end_s):
 
 
 def ferry(life, end_s):
-    """The car stands on a ship that turns, docks, turns again; the ship's log tells nothing to the wheels."""
+    """The car stands on a ship that turns, docks, turns again; its wheels stand throughout."""
     steady = life.rng.random() < 0.2
     slowest = min(0.8, max(0.05, life.limits.slowest_smooth_dps))
     life.stop(life.u(10, 30))
@@ -289,7 +288,7 @@ CHAPTERS = CAR_CHAPTERS | {"rail": rail}
 
 
 def live(rng, duration_s, rest_s, chapters, limits):
-    """The chapters share what is left after the rest."""
+    """The chapters share the time that is left after the rest."""
     life = Life(rng, duration_s, rest_s, limits)
     for index, name in enumerate(chapters):
         share = (duration_s - life.now) / (len(chapters) - index)

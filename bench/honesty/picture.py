@@ -38,7 +38,7 @@ unset multiplot
 
 
 def thinned(columns):
-    """Every so-manieth row, and among those left out the one with the greatest error."""
+    """Every nth row, and of the rows in between the one with the greatest error."""
     error = np.abs(columns[:, 1])
     group = max(1, len(error) // (MOST_POINTS // 2))
     if group < 4:
@@ -50,7 +50,7 @@ def thinned(columns):
 
 
 def draw(folder, name, rates, recording):
-    """Writes NAME.svg and NAME.png; returns where."""
+    """Writes NAME.svg and NAME.png; returns their paths."""
     error, t = judge.errors(rates, recording)
     sigma = rates.sigma[rates.valid]
     order = np.argsort(t, kind="stable")

@@ -1,4 +1,4 @@
-"""Tables of what happened to many worlds, in Markdown."""
+"""Tables of the results of many worlds, in Markdown."""
 
 import statistics
 
@@ -53,7 +53,7 @@ def failing(results, kinds):
 
 
 def verdict(results):
-    """Whether what must hold does, kind by kind."""
+    """Are the requirements met, kind by kind?"""
     lines = []
     for kinds, share in judge.ALLOWED.items():
         failed, allowed = failing(results, kinds), int(share * len(results))
@@ -75,7 +75,7 @@ def one_world(result):
 
 
 def comparison(results, old):
-    """Which worlds fail now and did not, and the other way round; only those in both."""
+    """Worlds that fail now and did not before, and the reverse; only worlds in both results."""
     before = {r["seed"]: r for r in old}
     pairs = [(before[r["seed"]], r) for r in results if r["seed"] in before]
     lines = [f"{len(pairs)} worlds in both runs"]

@@ -1,8 +1,7 @@
-"""A world: one seed makes a pair of gyros, a vehicle's life, drifts, faults, what else is on the bus and what the
-configuration says. Nothing in here knows how the corrector works; the sizes are those of data sheets and of traffic.
-
-A seed always makes the same bytes. Each part draws from a stream of its own, so that leaving one out (wheels, say)
-leaves the others as they are."""
+"""A world: one seed makes a pair of gyros, a vehicle's life, drifts, faults, the other frames on the bus, and the
+configuration. Nothing in here depends on how the corrector works; the sizes are those of data sheets and of traffic.
+A seed always makes the same bytes. Each part has its own random stream, so that leaving one out (wheels, say) leaves
+the others unchanged."""
 
 import math
 from dataclasses import dataclass, field
@@ -16,14 +15,14 @@ from gyros import CLASSES, Drift, Fault, log_uniform
 
 EARTH_DPS = 15.041 / 3600
 COMMON_LAG_S = 240.0  # the longest time without a stop in worlds whose gyros drift together
-# A motion that no wheel sees and no shaking betrays is told from drift by nothing but its suddenness; what is
-# slower than this many times the drift that both gyros share in that time, nobody could know.
+# A motion without wheel speed or vibration differs from drift only by its suddenness: it must be this many times faster
+# than the drift that both gyros share in that time, or it could not be recognized.
 CLEAR_OF_DRIFT = 5.0
 # Drift that both gyros share, that began after the first rest and does not show in their difference either, cannot be
-# known before the next stop; nor can sigma allow for it always without being too large where there is none. It is
-# kept below so many sigma of a single sample of the pair.
+# known before the next stop; nor can sigma always allow for it without being too large elsewhere. It is kept below this
+# many sigma of a single sample of the pair.
 HIDDEN_SIGMAS = 3.0
-# A difference that moves tells that something drifts, and that what both share may be so many times as much.
+# A changing difference shows that something drifts; the shared drift may then be this many times as large.
 SHOWN_BY_DIFFERENCE = 3.0
 SOUND_AGAIN_S = 5.0  # after a fault ends
 
@@ -35,7 +34,7 @@ WHEEL_ID = 0x2A0
 class World:
     seed: int
     duration_s: float
-    rest_s: float  # how long the vehicle rests first
+    rest_s: float  # duration of the first rest
     calibration_s: float
     rest_dps: float
     gyros: list
@@ -54,7 +53,7 @@ class World:
 class Wheels:
     rate_hz: float
     phase_s: float
-    blind_below: float  # m/s: toothed wheels give no pulses then
+    blind_below: float  # m/s: below it toothed wheels give no pulses
     broken: bool
 
 
@@ -76,7 +75,7 @@ def draw_pair(rng):
 
 
 def draw_drifts(rng, pair, duration_s, rest_s):
-    """Fills the gyros' drifts; returns the kinds and, where there is one, the temperature."""
+    """Fills the gyros' drifts; returns the kinds and the temperature, if any."""
     kinds = ["none", "ramp", "warm-up", "thermal", "bias step", "two"]
     kind = kinds[rng.choice(6, p=[0.35, 0.15, 0.15, 0.15, 0.1, 0.1])]
     chosen = [] if kind == "none" else [kind]
@@ -111,7 +110,7 @@ def add_drift(rng, name, pair, first, both, times):
 
 
 def calm_hidden_heat(pair, thermal, sent):
-    """Without a temperature on the bus a drift by heat is bounded as a ramp is; with one, by twice that."""
+    """Limits drift by heat: without a temperature on the bus as a ramp is limited, with one to twice that."""
     steepest_k_s = abs(thermal.swing_k) * 0.5 * math.pi / thermal.half_s
     for g in pair:
         limit = CLASSES[g.kind].hidden_slope * (2 if sent else 1)
@@ -142,7 +141,7 @@ def draw_faults(rng, pair, duration_s, rest_s):
 
 
 def spare_the_last(pair):
-    """A step of the only gyro that is left is a turn for all that anybody can know."""
+    """Removes steps of the only gyro that is left: they cannot be distinguished from turns."""
     for k, gyro in enumerate(pair):
         for fault in gyro.faults:
             if fault.end_s == math.inf:
@@ -155,7 +154,7 @@ def sample_sigma_dps(pair):
 
 
 def changes_between_stops(world, drifts_of):
-    """How much each gyro drifts in the longest time without a stop, at every second."""
+    """Drift of each gyro over the longest time without a stop, for every second."""
     t = np.arange(world.rest_s, world.duration_s, 1.0)
     lag = int(COMMON_LAG_S)
     for g in world.gyros:
@@ -176,7 +175,7 @@ def calm_hidden_drift(world):
 
 
 def shared_drift_dps(world):
-    """The most that both gyros drift in the same way between two stops."""
+    """Largest drift that both gyros share between two stops."""
     a, b = changes_between_stops(world, lambda g: g.drifts)
     together = np.where(np.sign(a) == np.sign(b), np.minimum(np.abs(a), np.abs(b)), 0)
     return float(together.max(initial=0.0))
@@ -191,7 +190,7 @@ def draw_chapters(rng):
 
 
 def draw(seed, without=()):
-    """The plan of a world; cheap. `without` holds any of wheels, model, temperature, drift, scale, faults."""
+    """The plan of a world; cheap to make. `without` holds any of wheels, model, temperature, drift, scale, faults."""
     rng = stream(seed, 0)
     duration_s, rest_s = rng.uniform(900, 1500), rng.uniform(45, 90)
     rest_dps = 0.0 if rng.random() < 0.3 else float(f"{EARTH_DPS * rng.uniform(-1, 1):.5f}")
@@ -238,7 +237,7 @@ def limits_of(world):
 
 
 class Recording:
-    """What the world leaves: the truth and the frames."""
+    """The recording of a world: the truth and the frames."""
 
     def __init__(self, world):
         self.world = world
@@ -253,7 +252,7 @@ class Recording:
         return np.interp(t, self.grid, self.rate)
 
     def sound(self):
-        """Stretches in which both gyros are well, from the end of the first rest on."""
+        """Stretches in which both gyros are sound, from the end of the first rest on."""
         stretches = [(self.world.rest_s, self.world.duration_s)]
         for _, fault in self.world.faults():
             end = fault.end_s + (0.0 if fault.kind == "spike" else SOUND_AGAIN_S)
@@ -289,7 +288,7 @@ class Recording:
             yield to_us(t), 0, WHEEL_ID, payload
 
     def write(self, folder):
-        """vgyro.toml and what it names; returns the paths of configuration and log."""
+        """Writes vgyro.toml and the files that it names; returns the paths of configuration and log."""
         candump.write(folder / "in.log", list(self.frames()))
         (folder / "world.dbc").write_text(dbc_text(self.world))
         (folder / "vgyro.toml").write_text(config_text(self.world))

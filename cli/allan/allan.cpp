@@ -27,7 +27,7 @@ namespace vgyro::cli {
 
 namespace {
 
-// Where not even white noise can be told from nothing.
+// In a shorter recording not even white noise can be determined.
 constexpr double kSecondsMin = 10.0;
 
 Expected<AllanReport> judge(const AllanOptions& options, const gateway::Plan& plan,
@@ -38,7 +38,7 @@ Expected<AllanReport> judge(const AllanOptions& options, const gateway::Plan& pl
         name_of(options.logs),
         fmt::format("holds {:.1f} s of both gyros{}, too short to separate noise from drift",
                     seconds, about_axis(plan)),
-        fmt::format("{:g} s at the least; an hour at rest shows drift", kSecondsMin));
+        fmt::format("use at least {:g} s; an hour at rest shows drift", kSecondsMin));
   }
   AllanReport report{name_of(options.logs), {plan.gyros[0].name, plan.gyros[1].name}, {}, {}};
   report.axis = axis_name(plan);
@@ -64,7 +64,7 @@ Expected<std::vector<AllanReport>> judge_all(const AllanOptions& options,
   return reports;
 }
 
-// Of several axes each has a picture of its own.
+// One picture for each axis.
 std::vector<std::string> pictures_of(const AllanOptions& options,
                                      const std::vector<gateway::Plan>& pairs) {
   std::vector<std::string> paths;
@@ -91,7 +91,7 @@ nlohmann::ordered_json json_of(const std::vector<AllanReport>& reports) {
 
 Expected<void> write(const AllanOptions& options, const std::vector<AllanReport>& reports,
                      const std::vector<std::string>& pictures) {
-  // JSON on standard output stands there alone.
+  // If JSON goes to standard output, the text goes to stderr.
   put_text(options.json == "-" ? stderr : stdout, text_of(reports));
   if (!options.json.empty()) {
     if (auto done = write_json(options.json, json_of(reports)); !done) return done;
@@ -118,7 +118,7 @@ gap::GyroEvidence noise_evidence(const analysis::SeriesNoise& noise) {
   return gyro;
 }
 
-// Noise and biases, and no shapes: nothing but rest is judged here. The first log is read
+// Evidence of noise and biases, without shapes: only rest is evaluated here. The first log is read
 // once more for its digest and its beginning.
 Expected<void> leave_evidence(const AllanOptions& options, const std::vector<AllanReport>& reports,
                               const std::vector<gateway::Plan>& pairs,

@@ -99,7 +99,7 @@ class Picture {
     put(to, "$model{} << EOD\n", i);
     for (int k = 0; k < kModelPoints; ++k) {
       const double share = static_cast<double>(k) / (kModelPoints - 1);
-      // Where the fit did not look it has nothing to say.
+      // The fit is not drawn beyond its own frequency range.
       const double low_s =
           std::max(tau_s_.low,
                    series_[i]->fit->limited ? 0.5 / series_[i]->fit->frequency_max_hz : tau_s_.low);
@@ -151,7 +151,7 @@ class Picture {
     }
     put(to, "$curve{} u 1:2:3:4 w yerrorbars pt 7 ps 0.55 lw 1.2 lc rgb '{}' t {}\n", i,
         noise.fit ? "#222222" : kColours[i],
-        noise.fit ? "'measured, 95 % bounds'" : "'measured; it holds motion'");
+        noise.fit ? "'measured, 95 % bounds'" : "'measured; contains motion'");
   }
 
   static std::string part_title(const NoiseFit& fit, const PartOfModel& part) {

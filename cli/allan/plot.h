@@ -1,7 +1,7 @@
 #pragma once
 
 // The picture of `vgyro allan`: all three curves together, then each with its bounds, the fitted
-// model and the parts it is made of.
+// model and its parts.
 
 #include <string>
 
@@ -10,7 +10,7 @@
 
 namespace vgyro::cli {
 
-/// Error as run_gnuplot().
+/// Errors are those of run_gnuplot().
 Expected<void> draw_allan(const std::string& path, const AllanReport& report);
 
 }  // namespace vgyro::cli

@@ -49,7 +49,7 @@ std::string estimate_text(const Estimate& estimate, double scale) {
                               : "-";
 }
 
-// Columns are padded by what is seen: fmt counts code points.
+// Columns are padded to their visible width, because fmt counts code points.
 void row(std::string& text, const std::string& name, const std::string& unit,
          const std::array<std::string, 3>& cells) {
   fmt::format_to(std::back_inserter(text), "{:<23}{:<11}", name, unit);
@@ -102,7 +102,7 @@ std::string table(const AllanReport& report) {
                            : std::string("-");
         }));
   }
-  row(text, "drift that forgets", "deg/s, s", cells(report, [](const SeriesNoise& noise) {
+  row(text, "correlated drift", "deg/s, s", cells(report, [](const SeriesNoise& noise) {
         return noise.fit ? markov_text(*noise.fit) : std::string("-");
       }));
   row(text, "ramp", "deg/s²", cells(report, [](const SeriesNoise& noise) {
@@ -129,7 +129,8 @@ std::string motion_text(const AllanReport& report) {
   }
   if (const auto& removed = report.noise.removed) {
     text += fmt::format(
-        "Taken off the difference by least squares: {:+.3g} of the rate (scale factor), {:+.2g} ms "
+        "Removed from the difference by least squares: {:+.3g} of the rate (scale factor), {:+.2g} "
+        "ms "
         "of\nlag. What vibration and motion leave beyond that is in the difference's figures.\n",
         removed->scale, 1e3 * removed->lag_s);
   }
@@ -142,22 +143,24 @@ std::string caution(const std::string& name, const SeriesNoise& noise) {
   if (noise.filled_share > kFewFilled) {
     fmt::format_to(to,
                    "{}: {:.1f} % of the places on an even grid had no sample (lost, or very uneven "
-                   "stamps) and were bridged.\n",
+                   "stamps) and were filled in.\n",
                    name, 100.0 * noise.filled_share);
   }
   if (!noise.fit) return text;
   const NoiseFit& fit = *noise.fit;
   if (fit.limited) {
-    fmt::format_to(to,
-                   "{}: fitted below {:.3g} Hz; above, the spectrum is not that of these noises "
-                   "(a filter in the gyro, or vibration).\n",
-                   name, fit.frequency_max_hz);
+    fmt::format_to(
+        to,
+        "{}: fitted below {:.3g} Hz; above, the spectrum is not that of these noise terms "
+        "(a filter in the gyro, or vibration).\n",
+        name, fit.frequency_max_hz);
   }
   if (!fit.describes) {
-    fmt::format_to(to,
-                   "{}: these noises do not describe the record: around {:.2g} Hz it holds {:.2g} "
-                   "times the power of the fit, and the figures are a rough guide only.\n",
-                   name, fit.worst_hz, fit.worst_ratio);
+    fmt::format_to(
+        to,
+        "{}: these noise terms do not describe the record: around {:.2g} Hz it holds {:.2g} "
+        "times the power of the fit, and the figures are a rough guide only.\n",
+        name, fit.worst_hz, fit.worst_ratio);
   }
   return text;
 }
@@ -193,7 +196,7 @@ std::string correlation_text(const AllanReport& report) {
     return fmt::format("ρ, correlation of the white noises: {:+.3f} ± {:.3f}\n", rho->value,
                        rho->sigma);
   }
-  return "ρ, correlation of the white noises: not resolved; it takes a rest in which white noise "
+  return "ρ, correlation of the white noises: not resolved; this needs a rest in which white noise "
          "is "
          "seen.\n";
 }
@@ -281,7 +284,7 @@ nlohmann::ordered_json noise_json(const SeriesNoise& noise) {
 
 struct Gyro {
   std::size_t number;
-  std::optional<std::size_t> axis;  ///< of a unit's own
+  std::optional<std::size_t> axis;  ///< a unit's own axis
 };
 
 void effect(std::string& text, const Gyro& gyro, const char* kind, const std::string& parameters) {
@@ -291,7 +294,7 @@ void effect(std::string& text, const Gyro& gyro, const char* kind, const std::st
                  gyro.number, kind, axis, parameters);
 }
 
-// Flicker noise as three Gauss-Markov processes a decade apart around the bottom of the Allan
+// Flicker noise as three Gauss–Markov processes a decade apart, around the bottom of the Allan
 // curve.
 void add_flicker(std::string& text, const Gyro& gyro, const SeriesNoise& noise) {
   const double flicker = noise.fit->flicker_dps.value;

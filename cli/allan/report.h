@@ -1,6 +1,7 @@
 #pragma once
 
-// What `vgyro allan` says: as text, as JSON (docs/allan.md has the fields), and as TOML to paste.
+// The report of `vgyro allan`: as text, as JSON (docs/allan.md has the fields), and as TOML to
+// paste.
 
 #include <array>
 #include <optional>
@@ -18,17 +19,17 @@ struct AllanReport {
   std::array<std::string, 2> gyro_names;
   analysis::PairNoise noise;
   analysis::Recommendation recommendation;
-  std::string axis = {};  ///< of the vehicle; empty: of two single gyros
-  /// Of a pair about an axis: which of each unit's own lies along it.
+  std::string axis = {};  ///< axis of the vehicle; empty: two single gyros
+  /// For a pair about an axis: the axis of each unit's own that lies along it.
   std::array<std::optional<std::size_t>, 2> sensor_axis = {};
 };
 
 std::string to_text(const AllanReport& report);
 nlohmann::ordered_json to_json(const AllanReport& report);
 
-/// Lines for the configuration.
+/// Lines for the configuration file.
 std::string corrector_toml(const AllanReport& report);
-/// [[effect]] tables for the model file; empty where no gyro could be judged.
+/// [[effect]] tables for the model file; empty if no gyro could be evaluated.
 std::string model_toml(const AllanReport& report);
 
 }  // namespace vgyro::cli

@@ -365,7 +365,7 @@ std::optional<Error> explain_no_pair(const gateway::Status& status, const gatewa
   return Error{logs,
                fmt::format("the gyros {} and {} never spoke at the same time, or too shortly",
                            plan.gyros[0].name, plan.gyros[1].name),
-               "a recording in which both are there is needed"};
+               "use a recording that contains both gyros"};
 }
 
 // Why nothing came out, in words that lead to the remedy.

@@ -15,7 +15,7 @@ TEST(Allan, ChiSquareQuantilesAreThoseOfTheTables) {
 }
 
 TEST(Allan, DegreesOfFreedomShrinkWithAveraging) {
-  // Of white noise there are three halves of a term per average.
+  // White noise has three halves of a degree of freedom per average.
   EXPECT_NEAR(degrees_of_freedom(NoiseKind::kWhite, 100'000, 100), 1.5 * 1000, 10.0);
   for (const NoiseKind kind :
        {NoiseKind::kWhite, NoiseKind::kFlicker, NoiseKind::kWalk, NoiseKind::kQuantisation}) {
@@ -25,7 +25,7 @@ TEST(Allan, DegreesOfFreedomShrinkWithAveraging) {
 }
 
 TEST(Allan, NoTermReachesAcrossAGap) {
-  // Two parts at different levels, each constant: a term across would see the step.
+  // Two parts at different levels, each constant: a term across both would contain the step.
   const Series series{0.1,
                       {{0.0, std::vector<double>(50, 1.0)}, {9.0, std::vector<double>(60, 2.0)}}};
   const auto points = allan_deviation(series, [](double) { return NoiseKind::kWhite; });

@@ -1,4 +1,4 @@
-// Whether bytes are one quantity that moves as a rate could.
+// Tests whether bytes are one quantity that moves like a rate.
 
 #include "analysis/field.h"
 
@@ -27,7 +27,7 @@ bool as_a_rate(double (*value)(int)) {
 
 TEST(Field, ARateGoesToAndFroInSmallSteps) {
   EXPECT_TRUE(as_a_rate([](int i) { return std::round(3000.0 * std::sin(0.01 * i)); }));
-  // A coarse one, a dozen of steps.
+  // A coarse rate with a dozen steps.
   EXPECT_TRUE(as_a_rate([](int i) { return std::round(6.0 * std::sin(0.01 * i)); }));
 }
 
@@ -36,7 +36,7 @@ TEST(Field, CountersWrapsFlagsAndGrowthAreNoRate) {
   EXPECT_FALSE(as_a_rate([](int i) { return static_cast<double>(i / 3); }));
   EXPECT_FALSE(as_a_rate([](int i) { return static_cast<double>(i / 100 % 2); }));
   EXPECT_FALSE(as_a_rate([](int) { return 17.0; }));
-  // Read without its sign a rate leaps across all bits.
+  // A rate that is read without its sign leaps across the whole range.
   EXPECT_FALSE(as_a_rate(
       [](int i) { return std::fmod(65536.0 + std::round(300.0 * std::sin(0.01 * i)), 65536.0); }));
 }

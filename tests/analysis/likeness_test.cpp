@@ -1,5 +1,4 @@
-// Whether two signals feel one motion, on signals made here: the motion, the lag and the scale are
-// known.
+// Tests whether two signals feel the same motion, on signals with known motion, lag and scale.
 
 #include "analysis/likeness.h"
 

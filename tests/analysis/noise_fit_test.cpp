@@ -8,7 +8,7 @@ namespace vgyro::analysis {
 namespace {
 
 TEST(NoiseFit, ConstantRateIsNoNoise) {
-  // A simulated or dead sensor.
+  // The constant value of a simulated or dead sensor.
   const Series series{0.1, {{0.0, std::vector<double>(5000, 0.25)}}};
   EXPECT_FALSE(fit_noise(step_spectrum(series), {.interval_s = 0.1}).has_value());
 }

@@ -1,5 +1,5 @@
-"""Recordings of two gyros whose noise is known, made with NumPy from the definitions, and the Allan deviation
-done the plain way. Shares nothing with the product."""
+"""Recordings of two gyros with known noise, made with NumPy from the definitions, and the Allan deviation
+in its plain form. Shares nothing with the product."""
 
 import dataclasses
 import sys
@@ -54,7 +54,7 @@ bus = "can0"
 
 @dataclasses.dataclass(frozen=True)
 class Noise:
-    """Of one gyro; N deg/s/√Hz, K deg/s/√s, B deg/s, Q deg, ramp deg/s²."""
+    """The noise of one gyro: N deg/s/√Hz, K deg/s/√s, B deg/s, Q deg, ramp deg/s²."""
 
     n: float
     k: float = 0.0
@@ -66,8 +66,8 @@ class Noise:
 
 
 def flicker(rng, count, interval_s, b):
-    """Noise of power density B²/(2πf), two-sided: white noise shaped in the frequency domain, the middle of a
-    record four times as long, so that its ends do not meet."""
+    """Noise of power density B²/(2πf), two-sided: white noise shaped in the frequency domain. The middle
+    of a record four times as long is used, so that its ends do not meet."""
     size = 4 * count
     spectrum = np.fft.rfft(rng.normal(size=size))
     f = np.fft.rfftfreq(size, interval_s)
@@ -97,7 +97,7 @@ def rates(rng, noise, count, interval_s):
 
 
 def in_frames(rate_dps):
-    """What is left of the rates once they are in frames."""
+    """The rates as rounded in frames."""
     return np.round(rate_dps / STEP_DPS).astype(np.int64)
 
 
@@ -108,7 +108,7 @@ def stream(bus, can_id, stamps_us, rate_dps):
 
 
 def write_pair(path, rates_dps, interval_s, offset_us=(0, 0), jitter_us=None, kept=(None, None)):
-    """A candump log of both gyros. `kept`: masks of the frames that are in it."""
+    """Writes a candump log of both gyros. `kept`: masks of the frames that are in it."""
     streams = []
     for i in range(2):
         stamps = BEGIN_US + offset_us[i] + np.round(np.arange(len(rates_dps[i])) * interval_s * 1e6)
@@ -121,7 +121,7 @@ def write_pair(path, rates_dps, interval_s, offset_us=(0, 0), jitter_us=None, ke
 
 
 def allan_deviation(rate_dps, interval_s, m):
-    """Overlapping, from the averages themselves instead of from the angle."""
+    """Overlapping Allan deviation, from the averages instead of from the angle."""
     averages = np.convolve(rate_dps, np.full(m, 1.0 / m), mode="valid")
     difference = averages[m:] - averages[:-m]
     return np.sqrt(0.5 * np.mean(difference**2))

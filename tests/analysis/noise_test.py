@@ -1,6 +1,6 @@
 #!/usr/bin/python3
-"""Holds `vgyro allan` against recordings whose noise is known, made with NumPy: every estimate in units of its own
-stated error, over many seeds, through a candump log."""
+"""Tests `vgyro allan` on recordings with known noise, made with NumPy: every estimate in units of its own stated
+error, over many seeds, through a candump log."""
 
 import json
 import lzma
@@ -57,7 +57,7 @@ class Allan(unittest.TestCase):
         return rates
 
     def assert_normal(self, errors, what):
-        """Mean 0 and standard deviation 1, as far as so many can tell."""
+        """Mean 0 and standard deviation 1, within the statistics of so many errors."""
         errors = np.array(errors)
         self.assertLess(abs(errors.mean()), SIGMAS / math.sqrt(len(errors)), f"{what}: {errors}")
         self.assertLess(errors.std(), 1 + SIGMAS / math.sqrt(2 * len(errors)), f"{what}: {errors}")
@@ -76,7 +76,7 @@ class Allan(unittest.TestCase):
                     if not estimate["resolved"]:
                         unresolved.setdefault(letter, []).append((estimate["below"], truth))
                     else:
-                        # The likelihood is nearest to a normal one in the logarithm.
+                        # The likelihood is most nearly normal in the logarithm.
                         error = math.log(estimate["value"] / truth) if truth > 0 else math.inf
                         resolved.setdefault(letter, []).append(error * estimate["value"] / estimate["sigma"])
                 ramp = gyro["noise"]["ramp_dps_s"]
@@ -127,7 +127,7 @@ class Estimates(Allan):
             self.assertEqual(kinds, ["white_noise", "gauss_markov"] * 2)
 
     def test_no_bound_is_far_below_what_the_record_shows(self):
-        # A weak term that the criterion leaves out may still be likelier than none.
+        # A weak term that the criterion rejects may still be likelier than none.
         for seed in range(350, 390):
             self.record(seed, (Noise(n=2e-3, b=3e-4), Noise(n=2e-3, k=2e-5)), 6_000, 0.1)
             for gyro in self.judge(self.log)["gyros"]:
@@ -153,7 +153,7 @@ class Estimates(Allan):
         for offset_us in (0, 20_000):
             errors = []
             for seed in range(500, 512):
-                # Common noise of half the power; what is common reaches both at the same sample.
+                # Common noise of half the power, in the same samples of both gyros.
                 self.record(seed, (Noise(n=2e-3), Noise(n=2e-3, k=1e-4)), 20_000, 0.1, common=2e-3, offset_us=(0, offset_us))
                 rho = self.judge(self.log)["rho"]
                 # A shift by a fifth of a sample costs next to nothing at a tenth of the rate.
@@ -195,7 +195,7 @@ class Deviation(Allan):
                 for point in gyro["allan"][::3]:
                     total += 1
                     inside += point["low_dps"] <= 2e-3 / math.sqrt(point["tau_s"]) <= point["high_dps"]
-        # 80 records, whose points hang together little at every third octave.
+        # 80 records; points at every third octave are nearly independent.
         self.assertAlmostEqual(inside / total, 0.95, delta=SIGMAS * math.sqrt(0.95 * 0.05 / total) + 0.01)
 
 
@@ -219,7 +219,7 @@ class Motion(Allan):
             self.assertLess(abs(white["value"] - noise.n), SIGMAS * white["sigma"])
 
     def test_gentle_motion_behind_a_rest_is_none(self):
-        # Four seconds in which a turn begins gently; then it goes on.
+        # A turn begins gently within four seconds, and then continues.
         t = np.arange(12_000) * 0.1 - 600.0
         motion = np.where(t > 0, np.where(t < 4, 0.02 * t**2, 0.32 + 10 * np.sin(0.6 * (t - 4))), 0.0)
         self.record(8, (Noise(n=2e-3), Noise(n=6e-3, bias=-0.2)), 12_000, 0.1, motion=motion)
@@ -234,7 +234,7 @@ class Motion(Allan):
     def test_without_rest_only_the_difference_is_judged(self):
         motion = self.turning(12_000, 0.1, 0.0, 1e9)
         rates = self.record(3, self.NOISES, 12_000, 0.1, motion=motion)
-        # The second gyro reads 0.5 % more than there is.
+        # The second gyro reads 0.5 % too much.
         records.write_pair(self.log, [rates[0], rates[1] + 0.005 * motion], 0.1)
         result = self.judge(self.log)
         self.assertFalse(result["at_rest"])
@@ -259,7 +259,7 @@ class Motion(Allan):
         self.assertLess(abs(white["value"] - 2e-3), SIGMAS * white["sigma"])
 
     def test_what_is_not_such_noise_is_said(self):
-        # A filter: no white noise at high frequencies. The estimate comes from below it.
+        # A filter removes the white noise at high frequencies. The estimate comes from below it.
         rates = self.record(5, (Noise(n=2e-3), Noise(n=2e-3)), 40_000, 0.1)
         filtered = np.convolve(rates[0], np.full(8, 1 / 8), mode="same")
         records.write_pair(self.log, [filtered, rates[1]], 0.1)

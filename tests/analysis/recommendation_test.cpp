@@ -16,7 +16,7 @@ NoiseFit make_fit(double white, double walk) {
   return fit;
 }
 
-// Windows of a simulated drift, predicted as the corrector predicts them.
+// Variance of the prediction of a simulated drift, window by window, as in the corrector.
 double simulated_variance(double white, double walk, double ramp_dps_s, int order) {
   std::mt19937_64 engine(5);
   std::normal_distribution<double> normal;
@@ -52,7 +52,7 @@ TEST(Recommendation, PredictionVarianceIsThatOfSimulatedWindows) {
     for (const auto& [white, walk, ramp] :
          {std::array{1e-3, 1e-9, 0.0}, std::array{1e-9, 1e-3, 0.0}, std::array{1e-3, 1e-4, 1e-4}}) {
       const double simulated = simulated_variance(white, walk, ramp, order);
-      // A hundred steps stand for the window: 1.5 %.
+      // A window of a hundred steps approximates a continuous one within 1.5 %.
       EXPECT_NEAR(prediction_variance(make_fit(white, walk), walk, ramp, 20.0, order) / simulated,
                   1.0, 0.015 + 3.5 * of_variance)
           << order << " " << white << " " << walk;
@@ -64,7 +64,7 @@ TEST(Recommendation, WindowGrowsWithNoiseAndShrinksWithDrift) {
   const double base_s = recommend(make_fit(1e-3, 1e-4), 1e5).window_s;
   EXPECT_GT(recommend(make_fit(1e-2, 1e-4), 1e5).window_s, base_s);
   EXPECT_LT(recommend(make_fit(1e-3, 1e-3), 1e5).window_s, base_s);
-  // √1.5 N/K is the best there is; a shorter one within 10 % of its error is taken.
+  // √1.5 N/K is the optimum; a shorter window within 10 % of its error is chosen.
   EXPECT_LE(base_s, 12.0);
   EXPECT_GE(base_s, 5.0);
 }

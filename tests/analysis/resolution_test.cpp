@@ -1,5 +1,5 @@
-// Gyros of known noise, rounded to a step, against what is said of their noise: never a value that
-// the truth is far from, never a bound that the truth is above.
+// Gyros of known noise, rounded to a step: the reported noise is never a value far from the truth,
+// and never a bound below it.
 
 #include "analysis/resolution.h"
 
@@ -68,7 +68,7 @@ TEST(Resolution, StatesNoNoiseThatIsFarFromTheTruth) {
   }
 }
 
-// Drift that wanders over many steps shows, whatever hides the white noise; within a step it does
+// Drift over many steps shows, even if the step hides the white noise; drift within a step does
 // not.
 TEST(Resolution, BoundsTheDriftThatStaysWithinAStep) {
   const double seconds = kInterval_s * static_cast<double>(kSamples);

@@ -86,7 +86,7 @@ TEST(RestFinder, FindsEachStopWithoutItsEdges) {
   EXPECT_EQ(spans(rests_of(world)), "0-39 61-99 121-159 181-219 241-279");
 }
 
-// Noise that both have in common, as of one supply, is no motion.
+// Common noise, as from a shared supply, is not motion.
 TEST(RestFinder, IsNotMisledByNoiseInCommon) {
   World world;
   world.correlation = 0.6;
@@ -94,8 +94,8 @@ TEST(RestFinder, IsNotMisledByNoiseInCommon) {
   EXPECT_EQ(spans(rests_of(world)), "0-300");
 }
 
-// 5e-4 deg/s² on one gyro: after ten minutes it reads 0.3 deg/s more at rest, twice what any one
-// rest is allowed to be off.
+// 5e-4 deg/s² on one gyro: after ten minutes it reads 0.3 deg/s more at rest, twice the deviation
+// allowed within a single rest.
 TEST(RestFinder, FindsRestAgainThatDriftHasMoved) {
   World world;
   world.seconds = 1800.0;
@@ -116,7 +116,7 @@ TEST(RestFinder, FindsRestAgainBehindAStepOfOneGyrosBias) {
   EXPECT_GT(seconds_at_rest(rests_of(world)), 4.0 * 36.0);
 }
 
-// Whatever its quietest seconds are.
+// Not even in its quietest seconds.
 TEST(RestFinder, FindsNoneInAHover) {
   for (const double white : {5e-3, 0.055}) {
     for (std::uint64_t seed = 1; seed <= 5; ++seed) {
@@ -129,7 +129,7 @@ TEST(RestFinder, FindsNoneInAHover) {
   }
 }
 
-// A quarter of a turn's beginning is gentle: nothing of it is rest, at any noise that shows it.
+// The first quarter of a turn is gentle: none of it is rest, at any noise below the motion.
 TEST(RestFinder, LeavesOutTheGentleBeginningOfAMotion) {
   for (const double white : {5e-4, 5e-3}) {
     World world;
@@ -153,7 +153,7 @@ TEST(RestFinder, TakesASteadyTurnForNone) {
   EXPECT_EQ(spans(rests_of(world)), "");
 }
 
-// Both drift with the temperature of one board.
+// Both gyros drift with the temperature of one board.
 TEST(RestFinder, FollowsTwoGyrosThatWarmUpAlike) {
   World world;
   world.seconds = 900.0;

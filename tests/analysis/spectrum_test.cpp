@@ -40,8 +40,8 @@ TEST(Spectrum, RampIsItsOwnCoefficient) {
   }
 }
 
-// White noise and walk have the power that the fit ascribes to them, also where a long record is
-// looked at twice.
+// White noise and walk have the power that the fit expects, also in a long record, which is
+// transformed twice.
 TEST(Spectrum, LongRecordsHaveThePowerOfTheirNoise) {
   constexpr std::uint64_t kSeed = 71;
   SCOPED_TRACE(testing::Message() << "seed " << kSeed);

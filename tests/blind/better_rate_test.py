@@ -1,7 +1,7 @@
 #!/usr/bin/python3
-"""From a hidden effect to a better heading: the gateway drives a second recording with the model that was
-given and with the model that the gap workflow wrote from the first, and its rate is judged against the
-second recording's reference."""
+"""From a hidden effect to a better heading: the gateway processes a second recording with the given model and
+with the model that the gap workflow wrote from the first one, and its rate is compared with the second
+recording's reference."""
 
 import lzma
 import subprocess
@@ -23,13 +23,13 @@ CASES = [
     Case("single", 401, "scale_factor_asymmetry", short=True),
     Case("single", 402, "temperature_bias", short=True),
 ]
-# Of the heading error that the effect makes, what may remain: the rest is drift and noise. What temperature does the
-# gateway learns by itself where nobody tells it, so that less is left to gain.
+# Share of the effect's heading error that may remain: the rest is drift and noise. The gateway learns the effect of
+# temperature by itself if it is not given, so that less can be gained.
 REMAINS = {"scale_factor_asymmetry": 0.25, "temperature_bias": 0.5}
 
 
 def decoded(log, frame, names):
-    """Stamps and one array a name, of every frame of one kind in a candump log; Intel signals."""
+    """Stamps, and one array for each name, of all frames of one kind in a candump log; Intel signals."""
     stamps, payloads = [], []
     for line in log.open():
         stamp, _, text = line.split()[:3]
@@ -54,7 +54,8 @@ def frame_of(dbc, name):
 
 
 def heading_error_deg(folder, model, scratch):
-    """Of the virtual gyro over the folder's second recording: the largest so far, after each second."""
+    """Heading error of the virtual gyro over the folder's second recording: the largest so far, after each
+    second."""
     out = Path(scratch) / "out.log"
     subprocess.run(
         [runner.VGYRO, "replay", "--config", folder / "vgyro.toml", "--model", model]

@@ -1,6 +1,6 @@
 #!/usr/bin/python3
-"""A small blind set: the gap workflow names what the injector hid, and nothing else. bench/blind runs the
-whole protocol."""
+"""A small blind set: the gap workflow names the effects that the injector hid, and nothing else.
+bench/blind runs the whole protocol."""
 
 import multiprocessing
 import os
@@ -37,7 +37,7 @@ CASES = [
     Case("pair", 315, short=True),
     Case("outside", 312, "loud_minute", short=True),
 ]
-# Four minutes of a vehicle each. True once the workflow reaches them.
+# Drives of four minutes each. DRIVES_REACHED is true if the workflow solves them.
 DRIVES_REACHED = True
 DRIVES = [
     Case("clean", 334, reference=False, short=True, world="drive"),
@@ -59,7 +59,7 @@ def examine(case):
 
 
 class Judged:
-    """What is asked of a set of cases, examined once."""
+    """The requirements on a set of cases, which are run once."""
 
     cases = []
 
@@ -69,7 +69,7 @@ class Judged:
             cls.results = pool.map(examine, cls.cases, chunksize=1)
 
     def each(self, check):
-        """Calls check(answer, judged) for every case; what fails does not hide the others."""
+        """Calls check(answer, judged) for every case; a failure does not hide the others."""
         for case, answer, judged, trouble in self.results:
             with self.subTest(case.name):
                 self.assertIsNotNone(judged, trouble)

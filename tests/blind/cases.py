@@ -1,9 +1,7 @@
-"""What hides in a recording: a world, a group, a seed and what the group needs give one case, always the same.
-
-Worlds: bench, a rate table with its reference; drive, a vehicle on a road, as a rule without one (drive.py).
-
-Groups: clean, single, pair, triple, outside, decoy. Development seeds are below 1000, evaluation seeds
-from 1000 on."""
+"""The effects hidden in a recording: a world, a group, a seed and the group's parameters give one case,
+always the same. Worlds: bench, a rate table with its reference; drive, a vehicle on a road, usually without
+one (drive.py). Groups: clean, single, pair, triple, outside, decoy. Development seeds are below 1000,
+evaluation seeds from 1000 on."""
 
 import dataclasses
 
@@ -16,12 +14,12 @@ import strangers
 import surroundings
 from world import Gyro, World
 
-# Two of one set in one recording hide each other; who injects both asks for the impossible.
+# Two effects of one set in one recording mask each other, so they are never injected together.
 RIVALS = [
     {"saturation", "dead_band", "quantization", "stuck"},
     {"delay", "bandwidth", "clock_skew", "timestamp_jitter"},
 ]
-# A seed goes on hiding what it hid: what the catalogue learned since hides alone.
+# A seed must keep hiding the same effects: kinds that the catalogue gained later hide only alone.
 HIDE_ALONE = {"supply_voltage_bias", "run_in", "temperature_hysteresis", "bias_instability", "cross_axis"}
 HIDE_ALONE |= {"bandwidth_second_order"}
 DECOYS = ["shuffled", "reversed", "flat", "common"]
@@ -31,12 +29,12 @@ DECOYS = ["shuffled", "reversed", "flat", "common"]
 class Case:
     group: str
     seed: int
-    kind: str = ""  # of a single; what an outside or a decoy is
-    strength: float | None = None  # wanted |t|; None: as a bench meets it
+    kind: str = ""  # the kind of a single; the maker of an outside or a decoy
+    strength: float | None = None  # wanted |t|; None: a size that is usual on a bench
     reference: bool = True
     short: bool = False  # 240 s and 100 Hz, for tests
     world: str = "bench"
-    nothing_given: bool = False  # no model file: the workflow begins with nothing
+    nothing_given: bool = False  # no model file: the workflow begins without one
 
     @property
     def name(self):
@@ -53,7 +51,7 @@ class Case:
 
 
 def world_for(case, rng, motion_rng):
-    """The gyros come from `rng`, alike for both recordings of a case; all else from `motion_rng`."""
+    """The gyros come from `rng`, the same for both recordings of a case; everything else from `motion_rng`."""
     if case.world == "drive":
         return drive.world_for(case, rng, motion_rng)
     strong = case.group == "clean" and rng.random() < 0.5
@@ -105,22 +103,22 @@ def _chosen_kinds(case, rng):
 
 
 def shake(world, rng):
-    """Gives the platform the vibration without which its effect would be nothing."""
+    """Gives the platform the vibration that its effect needs."""
     world.acceleration = surroundings.Acceleration(world.motion.duration_s, rng, vibration=True)
 
 
 def feed(world, rng):
-    """Gives each gyro a supply voltage that moves, and lets it tell it."""
+    """Gives each gyro a changing supply voltage, and a signal for it."""
     world.supplies = [surroundings.Supply(world.motion.duration_s, rng) for _ in range(2)]
 
 
 def sway(world, rng):
-    """Lets the platform roll, and each gyro tell it."""
+    """Lets the platform roll, and gives each gyro a signal for it."""
     world.roll = surroundings.Roll(rng)
 
 
 def hidden_in(case, world, rng):
-    """(effects of the catalogue, functions outside it, name and gyro of what is outside)."""
+    """(effects of the catalogue, functions outside it, name and gyro of the one outside)."""
     if case.world == "drive" and case.group != "decoy":
         return drive.hidden_in(case, world, rng)
     found, odd, label = [], [], None
@@ -158,7 +156,7 @@ def hidden_in(case, world, rng):
 
 
 def recorded_temperatures(case, world, rng):
-    """What the temperature signals say; a decoy's have nothing to do with the gyros."""
+    """The values of the temperature signals; a decoy's are unrelated to the gyros."""
     end_s = world.motion.duration_s
     if case.group == "decoy" and case.kind == "flat":
         return [surroundings.Flat(26.0).value] * 2

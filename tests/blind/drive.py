@@ -1,5 +1,6 @@
-"""Drives: what a vehicle's gyros, temperatures and accelerometer are like, and what hides in them. The numbers are from
-data sheets: optical gyros beside MEMS ones, steps in which buses carry rates and temperatures, filters of sensors."""
+"""Drives: the properties of a vehicle's gyros, temperatures and accelerometer, and the effects hidden in them. The
+numbers are from data sheets: optical gyros and MEMS ones, steps in which buses carry rates and temperatures, filters
+of sensors."""
 
 import numpy as np
 
@@ -25,7 +26,7 @@ PAIRS = [
 ]  # fmt: skip
 RATE_STEPS_DPS = (0.01, 0.02, 0.05, 0.0625, 0.1)
 RATES_HZ = [(100, 100)] * 6 + [(50, 50), (200, 200), (100, 50), (50, 100), (100, 200), (125, 100)]
-# Beyond these nobody would believe a sensor of it.
+# Largest plausible sizes.
 MOST = {
     "bias": 2.0, "bias_ramp": 2e-3, "bias_step": 0.5, "warm_up": 0.5, "temperature_bias": 0.1,
     "temperature_bias_quadratic": 0.01, "temperature_rate_bias": 3.0, "g_sensitivity": 0.1,
@@ -34,21 +35,22 @@ MOST = {
     "scale_factor_cubic": 3e-5, "scale_factor_temperature": 3e-3, "delay": 0.06, "white_noise": 0.05,
     "rate_random_walk": 5e-3, "gauss_markov": 0.1, "rate_noise": 0.01, "clock_skew": 1000.0,
 }  # fmt: skip
-# Of these, what the better sorts may have: drift and offsets, and scale factors.
+# Share of these for the better sorts: drift and offsets, and scale factors.
 STEADY = {"fog": 0.02, "vibratory": 0.2, "mems": 1.0, "cheap mems": 1.0}
 TRUE_TO_SCALE = {"fog": 0.2, "vibratory": 0.3, "mems": 1.0, "cheap mems": 1.0}
-# Nor would anybody look for less than this share of what a bench meets.
+# Least size, as a share of that usual on a bench.
 LEAST_SHARE = 0.1
 LEAST = {"bandwidth": 2.0, "delay": 2e-4, "clock_skew": 2.0}
-# A seed goes on hiding what it hid: what the catalogue learns later hides in drives that ask for it (`kind`) alone.
+# A seed must keep hiding the same effects: kinds that the catalogue gained later hide only in drives that request them
+# (`kind`).
 LATER = {"cross_axis", "temperature_hysteresis", "run_in", "bias_instability", "lever_arm", "second_order"}
 HIDE = [k for k in kinds.KINDS if k not in LATER]
-FLICKER_TERMS = 3  # what a model file may hold
+FLICKER_TERMS = 3  # most terms in a model file
 LAG_KINDS = {"delay", "bandwidth", "clock_skew", "timestamp_jitter"}
 
 
 class Temperature:
-    """Warms up by some kelvin, and is blown at while driving; value and slope exact."""
+    """Warms up by some kelvin, and is cooled by the airflow while driving; value and slope are exact."""
 
     def __init__(self, duration_s, rng, shared=None):
         self.start_c = float(rng.uniform(5.0, 35.0)) if shared is None else shared.start_c + float(rng.uniform(0, 5))
@@ -71,7 +73,7 @@ class Temperature:
 
 
 class Acceleration:
-    """Of the vehicle: it speeds up, is pressed outwards in bends, climbs, and shakes as the road is rough."""
+    """The vehicle's acceleration: braking, bends, slopes, and shaking by the road's roughness."""
 
     GRID_HZ = 1000
     G = 9.81
@@ -113,7 +115,7 @@ def _log_uniform(rng, bounds, digits=3):
 
 
 def flicker_terms(coefficient, density, duration_s):
-    """Three Markov terms whose spectra together are B²/(2πf) where it stands above the white noise."""
+    """Three Gauss–Markov terms whose spectra together are B²/(2πf) where that exceeds the white noise."""
     crossing_hz = (coefficient / density) ** 2 / (2 * np.pi)
     shortest = float(np.clip(0.3 / (2 * np.pi * crossing_hz), 0.5, 0.05 * duration_s))
     taus = np.geomspace(shortest, 0.6 * duration_s, FLICKER_TERMS)
@@ -138,7 +140,7 @@ def _gyro(sort, duration_s, flickers, rng):
 
 
 def _filters(sorts, rng):
-    """Low-passes of the two sensors: none, both alike, or different; and whether noise passes them, too."""
+    """Low-passes of the two sensors: none, equal, or different; and whether noise passes through them too."""
     manner = str(rng.choice(["none", "alike", "different"], p=[0.4, 0.3, 0.3]))
     both = [float(round(rng.uniform(20.0, 50.0), 1)) for _ in range(2)]
     if manner == "alike":
@@ -148,14 +150,14 @@ def _filters(sorts, rng):
 
 
 def _clocks(rng):
-    """How much longer each gyro's sampling interval is than it should be, in ppm."""
+    """Error of each gyro's sampling interval, in ppm; positive: too long."""
     manner = str(rng.choice(["exact", "crystal", "oscillator"], p=[0.4, 0.4, 0.2]))
     widths = {"exact": 0.0, "crystal": 30.0, "oscillator": 8000.0}
     return manner, [round(float(rng.uniform(-1.0, 1.0) * widths[manner]), 2) for _ in range(2)]
 
 
 def world_for(case, rng, motion_rng):
-    """The gyros come from `rng`, alike for both recordings of a case; the drive from `motion_rng`."""
+    """The gyros come from `rng`, the same for both recordings of a case; the drive from `motion_rng`."""
     duration_s = 240.0 if case.short else 600.0
     sorts = list(PAIRS[rng.integers(len(PAIRS))])
     flickers = bool(rng.random() < 0.5)
@@ -197,7 +199,7 @@ def world_for(case, rng, motion_rng):
 
 
 def benign(world, case):
-    """(kind, gyro) of what is true of the gyros besides what hides: whoever names it is not wrong."""
+    """(kind, gyro) of true properties of the gyros besides the hidden effects: naming one is not wrong."""
     out = []
     for number, g in enumerate(world.gyros, 1):
         if g.rate_step > 1e-6:
@@ -212,7 +214,7 @@ def benign(world, case):
 
 
 def fits(kind, gyro, world, case):
-    """Whether this kind can hide in this world and be looked for."""
+    """Can this kind be hidden in this world and be found?"""
     g = world.gyros[gyro - 1]
     if kind == "bandwidth" and g.filters_hz:
         return False
@@ -226,7 +228,7 @@ def fits(kind, gyro, world, case):
 
 
 def most(kind, sort):
-    """The most that a sensor of this sort may have."""
+    """The largest size for a sensor of this sort."""
     if kind in kinds.RESPONSES:
         return MOST[kind] * TRUE_TO_SCALE[sort]
     if kind in kinds.OFFSETS + kinds.NOISES:
@@ -235,12 +237,12 @@ def most(kind, sort):
 
 
 def draw(kind, gyro, wanted_t, world, rng):
-    """effects.draw for a drive; None where the size would be nobody's gyro."""
+    """effects.draw for a drive; None if no gyro has such a size."""
     name, low, high = kinds.SIZE[kind]
     if kind in kinds.CLIPS or kind in kinds.DISTURBANCES and kind != "clock_skew":
         effect = kinds.draw(kind, gyro, wanted_t, world, rng)
         p, sigma = effect["parameters"], world.gyros[gyro - 1].density * np.sqrt(world.rates_hz[gyro - 1])
-        if kind == "spikes":  # what road noise does between two samples is no spike
+        if kind == "spikes":  # road noise changes as much between two samples
             p[name] = float(f"{p[name] + 20.0 * world.motion.road_dps * rng.uniform(0.3, 1.0):.4g}")
         if kind == "dead_band":
             p[name] = float(f"{max(p[name], 3.0 * sigma):.4g}")
@@ -270,7 +272,7 @@ def draw(kind, gyro, wanted_t, world, rng):
 
 
 def draw_somehow(kind, gyro, wanted_t, world, rng):
-    """draw, as weak as it must be to be a sensor's."""
+    """draw(), made weaker until a sensor can have it."""
     for wanted in (wanted_t, 12.0, 6.0, 3.0, 1.0, 0.1):
         if effect := draw(kind, gyro, wanted, world, rng):
             return effect
@@ -284,7 +286,7 @@ def _chosen(case, rng):
 
 
 def hidden_in(case, world, rng):
-    """As cases.hidden_in; a kind that cannot hide in this world gives way to the next."""
+    """Like cases.hidden_in; a kind that cannot hide in this world is replaced by the next."""
     count = {"single": 1, "pair": 2, "triple": 3}.get(case.group, 0)
     found, odd, label = [], [], None
     for kind in _chosen(case, rng) if count else []:

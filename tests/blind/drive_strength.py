@@ -1,7 +1,7 @@
-"""How plainly an effect shows in a drive. What both gyros feel is known only at the samples: what folds down from beyond
-half the sampling rate differs between two gyros that sample at instants of their own, and hides an effect as noise
-does. Its density follows from the road's spectrum; the |t| is then that of generalised least squares, as in
-strength.py. Turns, not road noise, are what a scale factor is counted on, so that the data show at least as much."""
+"""How plainly an effect shows in a drive. Motion that both gyros feel is known only at the samples: aliases from
+beyond half the sampling rate differ between two gyros with different sampling instants, and mask an effect like
+noise. Their density follows from the road's spectrum; the |t| is then that of generalised least squares, as in
+strength.py. The |t| of a scale factor counts turns, not road noise, so the data show at least as much."""
 
 import numpy as np
 
@@ -11,14 +11,14 @@ import strength
 
 SEGMENT_S = 10.0
 BLOCK_S = 0.1
-TURNS_DENSITY, TURNS_HZ = 100.0, 0.5  # of turns, far above any noise: nobody knows them but from the gyros
+TURNS_DENSITY, TURNS_HZ = 100.0, 0.5  # density of turns, far above any noise: they are known only from the gyros
 FLICKER_AS_WALK = 0.163  # K of a walk whose Allan deviation at 50 s is the flicker's
-UNKNOWN_DPS = 10.0  # of a bias that nobody gave
-SWEEPING_PPM = 50.0  # a sampling clock so far off sweeps through all offsets
+UNKNOWN_DPS = 10.0  # σ of an unknown bias
+SWEEPING_PPM = 50.0  # a sampling clock with this error sweeps through all offsets
 
 
 class Visible:
-    """Densities (two-sided) in which one gyro's effect is looked for, by stretch of ten seconds and frequency."""
+    """Densities (two-sided) in which one gyro's effect must be found, by stretch of ten seconds and frequency."""
 
     def __init__(self, world, gyro):
         self.world, self.gyro = world, gyro
@@ -35,7 +35,7 @@ class Visible:
         self.density = self._effective()
 
     def _of_gyro(self, number):
-        """(offset, filters, density²) of what a gyro makes of the motion."""
+        """(offset, filters, density²) of one gyro's response to the motion."""
         g, rate_hz = self.world.gyros[number - 1], self.world.rates_hz[number - 1]
         offset = self.world.offset_s if number == 2 else 0.0
         if abs(g.period_ppm) > SWEEPING_PPM:
@@ -65,11 +65,11 @@ class Visible:
         return out
 
     def slow(self):
-        """Of what is slower than a second, by stretch."""
+        """Density below one hertz, by stretch."""
         return self.density[:, self.f < 1.0].mean(axis=1)
 
     def at(self, values, t):
-        """The value of the stretch that holds each instant."""
+        """The value of the stretch that contains each instant."""
         return values[np.clip((t / SEGMENT_S).astype(int), 0, len(values) - 1)]
 
     def lateness(self):
@@ -80,7 +80,7 @@ class Visible:
 
 
 def _walks(world, gyro):
-    """K² of the gyro and of the other one, whose drift is in the way where there is no reference."""
+    """K² of the gyro and of the other one, whose drift counts too without a reference."""
     own, other = (
         g.walk**2 + (FLICKER_AS_WALK * g.flicker) ** 2 + 2.0 * g.markov_sigma**2 / g.markov_tau
         for g in (world.gyros[gyro - 1], world.gyros[2 - gyro])
@@ -89,9 +89,9 @@ def _walks(world, gyro):
 
 
 def _fisher_t(shape, white, alone, rests, walks, level_known):
-    """|t| of a shape on the first of two gyros: a Kalman filter of both drifts, which sees their difference in motion
-    (`white`: its variance a block) and at rest each by itself (`alone`: both variances). It is run on the shape, and
-    what it did not foresee, over its variance, is information."""
+    """|t| of a shape on the first of two gyros: a Kalman filter of both drifts measures their difference in motion
+    (`white`: its variance a block), and at rest each gyro by itself (`alone`: both variances). It runs on the shape;
+    the innovations, squared over their variance, are the information."""
     unknown = 0.0 if level_known else UNKNOWN_DPS**2
     m, n, p, q, r = 0.0, 0.0, unknown, unknown, 0.0  # means, variances, covariance
     information = 0.0
@@ -132,7 +132,7 @@ def per_unit(kind, p, world, gyro, see):
 
 
 def noise_t(kind, p, world, gyro, see, size):
-    """|t| of additional noise, as effects._noise_strength counts it."""
+    """|t| of additional noise, as computed by effects._noise_strength."""
     bins = SEGMENT_S * (see.f[1] - see.f[0])
     if kind in ("white_noise", "rate_noise"):
         more = np.full(len(see.middles), size**2)
@@ -149,7 +149,7 @@ def noise_t(kind, p, world, gyro, see, size):
 
 
 class _Even:
-    """What effects._noise_strength asks of a world: one gyro in noise that stays the same."""
+    """The interface that effects._noise_strength needs of a world: one gyro in constant noise."""
 
     def __init__(self, duration_s, rate_hz, density, walk):
         self.rates_hz, self._count = [rate_hz], int(duration_s * rate_hz)

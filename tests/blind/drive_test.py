@@ -1,6 +1,6 @@
 #!/usr/bin/python3
-"""The drives against judges of their own: road noise is one function of time that gyros fold at their own instants,
-low-passes are those of continuous signals, flicker has its Allan floor, effects are as strong as they claim to be."""
+"""Independent tests of the drives: road noise is one function of time that gyros alias at their own instants,
+low-passes are those of continuous signals, flicker has its Allan floor, effects have their stated strength."""
 
 import sys
 import unittest
@@ -50,7 +50,8 @@ class Road(unittest.TestCase):
         np.testing.assert_allclose(at_samples, values[::80], atol=1e-9)
 
     def test_is_as_large_between_the_points_of_its_grid_as_at_them(self):
-        """Two gyros sample at different places between them: a gain of its own there would be a scale factor."""
+        """Two gyros sample at different places between the grid points: a gain of its own there would look like a
+        scale factor."""
         drive_ = small_drive()
         at = np.arange(20.0, 100.0, 1.0 / road.GRID_HZ)
         turns = np.sin(2 * np.pi * 1.7 * drive_._grid)
@@ -59,7 +60,7 @@ class Road(unittest.TestCase):
             np.testing.assert_allclose(drive_._read(turns, t), np.sin(2 * np.pi * 1.7 * t), atol=5e-7)
 
     def test_folds_what_is_beyond_half_the_sampling_rate(self):
-        """Of samples at 50 Hz the power below 25 Hz is all of the road's, not only what lies there."""
+        """In samples at 50 Hz, the power below 25 Hz is the power of the whole road noise."""
         drive_ = small_drive(spectrum=road.Spectrum(1.0, 60.0, 4.0))
         t = np.arange(20.0, 119.0, 0.02)
         noise = (drive_.rate(t) - drive_.slow_rate(t)) / np.maximum(drive_.road_rms(t), 1e-9)
@@ -126,7 +127,7 @@ class Gyros(unittest.TestCase):
 
 class Strength(unittest.TestCase):
     def test_what_folds_hides_effects_as_much_as_the_density_says(self):
-        """Two gyros with offset instants: the variance of what one says beyond what the other foretells, below 1 Hz."""
+        """Two gyros with offset instants: the variance of one's rate that the other does not predict, below 1 Hz."""
         _, world = world_of(41)
         quiet = [dict(density=1e-6, walk=0.0, bias=0.0, flicker=0.0, filters_hz=(), period_ppm=0.0, rate_step=1e-9)] * 2
         world.gyros = [truth.Gyro(**g) for g in quiet]
@@ -137,14 +138,15 @@ class Strength(unittest.TestCase):
         world.motion = road.Drive(course, road.Spectrum(1.0, 40.0, 2.0), 0.5, np.random.default_rng(4))
         see = drive_strength.Visible(world, 2)
         left, right = (truth.reading(world, g, [], [], np.random.default_rng(5))[3] for g in (1, 2))
-        # Below 1 Hz there is nothing but what folded down; the difference is all that can be said without it.
+        # Below 1 Hz there are only aliases; the difference shows all of them.
         f, power = welch((right - left)[3000:23000], 0.01, 1000)
         found = power[(f > 0.2) & (f < 0.8)].mean() / 2
         expected = see.slow()[4:22].mean()
         self.assertLess(abs(np.log(found / expected)), np.log(1.6), (found, expected))
 
     def test_slow_effects_stand_out_as_in_generalised_least_squares(self):
-        """The filter's |t| against the textbook's formula with the whole covariance of both gyros, stops and all."""
+        """Compares the filter's |t| with the textbook's formula with the whole covariance of both gyros, including
+        stops."""
         rng = np.random.default_rng(8)
         count = 240
         shape, rests = np.cumsum(rng.standard_normal(count)), np.arange(count) % 60 < 15

@@ -1,5 +1,5 @@
-"""Every kind of effect with equations of its own: what it adds to a gyro, how large it must be to show
-with a wanted |t|, and, for those without such a number, what a bench would plausibly meet."""
+"""Every kind of effect with equations of its own: its contribution to a gyro, the size that shows with a wanted
+|t|, and, for kinds without such a number, a size that is plausible on a bench."""
 
 import numpy as np
 
@@ -20,7 +20,7 @@ CLIPS = ["saturation", "dead_band", "quantization"]
 DISTURBANCES = ["spikes", "stuck", "dropped_frames", "clock_skew", "timestamp_jitter"]
 KINDS = OFFSETS + RESPONSES + LAGS + NOISES + CLIPS + DISTURBANCES
 
-# The parameter that strength sets, and what a bench meets where no strength is asked for.
+# The parameter that the strength sets, and its range on a bench if no strength is given.
 SIZE = {
     "bias": ("value_dps", 0.003, 0.02),
     "bias_ramp": ("slope_dps_s", 1e-5, 5e-5),
@@ -60,20 +60,20 @@ SIZE = {
     "timestamp_jitter": ("sigma_s", 3e-4, 2e-3),
 }
 SIGNED = set(OFFSETS + RESPONSES + ["clock_skew"]) - {"angle_harmonic", "line"}
-# What the catalogue's words leave open.
+# Variants that the catalogue's definition leaves open.
 MANNERS = {
     "spikes": ["both ways", "one way"],
     "timestamp_jitter": ["late", "about the due time"],
     "dropped_frames": ["single", "in rows"],
 }
 REFERENCE_C, REFERENCE_V = 25.0, 5.0
-# Below these a stamp of whole microseconds and samples of finite rate decide, not the noise.
+# Beyond these, the stamps' microseconds and the finite sampling rate are the limit, not the noise.
 LEAST_DELAY_S = 3e-5
 HIGHEST_CUTOFF_HZ = 250.0
 
 
 def companions(kind, gyro, world, rng, plain):
-    """The parameters beside the size, drawn at random; `plain` where no strength is asked for."""
+    """The parameters beside the size, drawn at random; `plain`: no strength is given."""
     duration_s = world.motion.duration_s
     if kind == "bias_step":
         return {"at_s": round(float(rng.uniform(0.2, 0.8) * duration_s), 1)}
@@ -101,7 +101,7 @@ def companions(kind, gyro, world, rng, plain):
             "phase_rad": round(float(rng.uniform(0, 2 * np.pi)), 3),
         }
     if kind == "gauss_markov":
-        # Longer ones cannot be told from a random walk in some minutes, however strong they are.
+        # In some minutes, longer ones cannot be distinguished from a random walk, however strong they are.
         return {"tau_s": round(float(np.exp(rng.uniform(np.log(0.5), np.log(60.0 if plain else 10.0)))), 2)}
     if kind == "spikes":
         return {"rate_hz": round(float(rng.uniform(0.05, 0.4)), 3)}
@@ -111,15 +111,15 @@ def companions(kind, gyro, world, rng, plain):
 
 
 def lag_s(kind, p, size):
-    """By how much the reading comes late where the rate changes slowly."""
+    """Delay of the reading for a slowly changing rate."""
     if kind == "delay":
         return size
     return (2 * p["damping"] if kind == "bandwidth_second_order" else 1.0) / (2 * np.pi * size)
 
 
 def shape(kind, p, gyro, t, world, late_rate=None):
-    """What one unit of the effect adds to a reading at the instants t; a response to the late rate, which
-    is the true one where nothing delays it."""
+    """Contribution of one unit of the effect to a reading at the instants t; a response acts on the late rate,
+    which is the true one if nothing delays it."""
     if kind in RESPONSES:
         rate = world.motion.rate(t) if late_rate is None else late_rate
         if kind == "scale_factor_temperature":
@@ -162,13 +162,13 @@ def shape(kind, p, gyro, t, world, late_rate=None):
 
 
 def _log_bins(count):
-    """Numbers of Fourier frequencies 1…count, thinned in the logarithm, and how many each stands for."""
+    """Indices of Fourier frequencies 1…count, thinned logarithmically, and the number that each represents."""
     edges = np.unique(np.round(np.geomspace(1, count + 1, 400)).astype(int))
     return (edges[:-1] + edges[1:] - 1) / 2.0, np.diff(edges)
 
 
 def _noise_strength(kind, p, gyro, world, size):
-    """|t| of additional noise; of correlated drift beyond what a stronger walk explains."""
+    """|t| of additional noise; for correlated drift, the part that a stronger walk does not explain."""
     t, sigma, walk = world.times(gyro), *world.noise_seen(gyro)
     interval_s = 1.0 / world.rates_hz[gyro - 1]
     density = sigma * np.sqrt(interval_s)
@@ -200,7 +200,7 @@ def _noise_strength(kind, p, gyro, world, size):
 
 
 def _without_strength(kind, level, p, gyro, world, rng):
-    """Sizes of what no |t| can tell of; level 1 is plain, below is weaker, above stronger."""
+    """Sizes of effects without a |t|; level 1 is plain, below is weaker, above stronger."""
     name, low, high = SIZE[kind]
     sigma = world.gyros[gyro - 1].density * np.sqrt(world.rates_hz[gyro - 1])
     size = float(np.exp(rng.uniform(np.log(max(low, 1e-12)), np.log(max(high, 1e-12)))))
@@ -218,7 +218,8 @@ def _without_strength(kind, level, p, gyro, world, rng):
 
 
 def draw(kind, gyro, wanted_t, world, rng):
-    """An effect of this kind as {"kind", "gyro", "parameters", "t"}; `wanted_t` None: as a bench meets it."""
+    """An effect of this kind as {"kind", "gyro", "parameters", "t"}; `wanted_t` None: a size that is usual on a
+    bench."""
     p = companions(kind, gyro, world, rng, wanted_t is None)
     name, low, high = SIZE[kind]
     size_of_t = None

@@ -1,6 +1,6 @@
 #!/usr/bin/python3
-"""Makes recordings of two gyros that hide something from the gap workflow: a folder with configuration,
-DBC file, the model before, measured.log.xz and fresh.log.xz, and, elsewhere, the sealed answer."""
+"""Makes recordings of two gyros with effects hidden from the gap workflow: a folder with configuration, DBC file,
+the model before, measured.log.xz and fresh.log.xz, and, elsewhere, the sealed answer."""
 
 import argparse
 import json
@@ -18,11 +18,11 @@ import effects as kinds  # noqa: E402
 import recording  # noqa: E402
 import strangers  # noqa: E402
 
-VERSION = 1  # of what a seed means
+VERSION = 1  # version of the meaning of a seed
 
 
 def make(case, folder, answer_path, recordings=("measured", "fresh")):
-    """Writes the case; returns the answer. Of a drive the fresh recording may be left out."""
+    """Writes the case; returns the answer. For a drive the fresh recording may be left out."""
     root = [VERSION, case.seed, zlib.crc32(case.name.encode())]
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)

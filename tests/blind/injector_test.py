@@ -1,6 +1,6 @@
 #!/usr/bin/python3
-"""The injector against judges of its own: effects as strong as they claim to be, recordings that other
-programs decode, motion whose formulas hang together."""
+"""Independent tests of the injector: effects have their stated strength, other programs decode the recordings,
+and the motion's formulas are consistent."""
 
 import lzma
 import sys
@@ -85,7 +85,7 @@ class Strength(unittest.TestCase):
         np.testing.assert_allclose(seen, [np.hypot(2e-4, 6e-4) * 2.0, np.hypot(8e-6, 2e-5) / 2.0])
 
     def test_lags_are_as_large_as_their_first_order(self):
-        """delay and bandwidth, sized by −dΩ/dt, shift the reading by that much."""
+        """Delay and bandwidth, sized by −dΩ/dt, shift the reading by that much."""
         world = small_world(SEED, 100.0)
         t = world.times(1)
         for kind, parameters, lag_s in (
@@ -103,7 +103,7 @@ class Strength(unittest.TestCase):
             )
 
     def test_responses_are_to_the_rate_that_comes_late(self):
-        """One scale error makes every reading larger by it, late or not."""
+        """A scale error enlarges every reading by its share, late or not."""
         world = small_world(SEED, 100.0)
         lags = [
             {"kind": "delay", "gyro": 1, "parameters": {"seconds": 0.02}},
@@ -114,7 +114,7 @@ class Strength(unittest.TestCase):
             with_it, without = (
                 truth.reading(world, 1, es, [], np.random.default_rng(1))[3] for es in ([scale, *late], late)
             )
-            # The rate that is late, by the definition of each lag.
+            # The late rate, by the definition of each lag.
             t = world.times(1) - (0.02 if late[0]["kind"] == "delay" else 0.0)
             rate = world.motion.low_passed(t, 10.0) if late[-1]["kind"] == "bandwidth" else world.motion.rate(t)
             np.testing.assert_allclose(with_it - without, 2e-3 * rate, atol=1e-12)
@@ -214,9 +214,9 @@ class Truth(unittest.TestCase):
         self.assertGreater(np.abs(now - held).max(), 1.2 - 1e-9)
         moved = np.diff(held)
         dragged = np.abs(np.abs(now - held)[1:] - 1.2) < 1e-9
-        # But for what it was dragged by before the temperature turned round between two instants.
+        # Except for the part by which it was dragged before the temperature reversed between two instants.
         np.testing.assert_allclose(moved[~dragged], 0.0, atol=1e-4)
-        # Where it is dragged it goes where the temperature goes.
+        # While it is dragged, it moves in the direction of the temperature.
         self.assertTrue(np.all(moved[dragged] * np.diff(now)[dragged] >= -1e-12))
         self.assertEqual(held[0], now[0])
 

@@ -1,20 +1,22 @@
-"""Holds what the gap workflow named against the sealed answer.
+"""Compares the names of the gap workflow with the sealed answer.
 
-Right is an effect whose kind and gyro are true; where two readings of the data are the same (without a
-reference, gyro 1 + e and gyro 2 − e), also the other one, if it says so in `ambiguous_with`. Confidently
-wrong is an effect that is not true and does not hold the truth in `ambiguous_with` either; one that was
-not applied (`applied` false) is a set without the truth, which is told apart. On clean recordings, decoys
-and effects outside the catalogue every name is wrong, but for what is true of the gyros beside what hides
-(`benign`) and what another catalogue rightly calls the stranger."""
+An effect is right if its kind and gyro are true. If the data have two equal explanations (without a
+reference, gyro 1 + e and gyro 2 − e), the other one is right too, provided that `ambiguous_with` contains
+the truth. An effect is confidently wrong if it is not true and `ambiguous_with` does not contain the
+truth either; one that was not applied (`applied` false) is a set without the truth, and is counted
+separately. On clean recordings, decoys and effects outside the catalogue every name is wrong, except true
+properties of the gyros beside the hidden effects (`benign`) and the names that a later catalogue rightly
+gives a stranger."""
 
 import math
 
 import strangers
 
-# Drawn at random, a convention, or (of a frozen value) a matter of words by one sample: no truth to meet.
+# Parameters without a truth: drawn at random, a convention, or (for a frozen value) ambiguous by one sample.
 WITHOUT_TRUTH = {"reference_c", "size_dps/spikes", "from_s", "to_s"}
 EXACT = {"axis", "from", "harmonic"}
-# Statistical names beside the truth fit noise that is there; they are counted, but say nothing about the world.
+# Additional statistical names fit noise that is present; they are counted, but are no statement about the
+# world.
 NOISE = {"white_noise", "rate_random_walk", "gauss_markov", "rate_noise", "bias_instability"}
 
 
@@ -31,7 +33,7 @@ def _mirrored(found, truth, reference):
 
 
 def _same_wave(found, true):
-    """Amplitude and phase of a tone in one form: positive amplitude, phase next to the true one."""
+    """Amplitude and phase of a tone in a common form: positive amplitude, phase nearest to the true one."""
     found = dict(found)
     if "phase_rad" in found and "amplitude_dps" in found:
         if found["amplitude_dps"] * true["amplitude_dps"] < 0:
@@ -42,7 +44,8 @@ def _same_wave(found, true):
 
 
 def parameter_errors(found, true):
-    """Name → (error, σ) of each parameter that has a truth; a wrong axis or harmonic is infinitely off."""
+    """Name → (error, σ) of each parameter that has a truth; the error of a wrong axis or harmonic is
+    infinite."""
     values, sigma, errors = _same_wave(found["parameters"], true["parameters"]), found.get("sigma", {}), {}
     for name, truth in true["parameters"].items():
         if {name, f"{name}/{true['kind']}"} & WITHOUT_TRUTH or name not in values:
@@ -110,5 +113,5 @@ def judge(answer, gap, compared=None):
 
 
 def as_wished(answer, verdict):
-    """Nothing to complain of: what hides was named and nothing else."""
+    """Is the result as wished: the hidden effects are named and nothing else?"""
     return not verdict["wrong"] and not verdict["surplus"] and all(verdict["found"])

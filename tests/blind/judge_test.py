@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""The judge and bench/blind, on answers and results made by hand."""
+"""Tests of the judge and of bench/blind, on answers and results made by hand."""
 
 import json
 import math
@@ -159,7 +159,7 @@ else:
 
 
 class Sets(unittest.TestCase):
-    """What was not applied is no certain name."""
+    """An effect that was not applied is not a certain name."""
 
     @staticmethod
     def unapplied(*words, **more):

@@ -103,14 +103,14 @@ class Motion:
         )
 
     def low_passed(self, t, cutoff_hz):
-        """∫ a·exp(−a·s)·rate(t − s) ds by Gauss–Laguerre; exact for what changes slower than the cutoff."""
+        """∫ a·exp(−a·s)·rate(t − s) ds by Gauss–Laguerre; exact for changes slower than the cutoff."""
         nodes, weights = np.polynomial.laguerre.laggauss(24)
         lag_s = 1.0 / (2.0 * np.pi * cutoff_hz)
         return sum(w * self.rate(t - x * lag_s) for x, w in zip(nodes, weights))
 
     def low_passed_twice(self, t, cutoff_hz, damping):
-        """∫ h(s)·rate(t − s) ds with the response of w²/(p² + 2·damping·w·p + w²) to a shock, damping < 1: a sine that
-        dies away. Gauss–Laguerre takes the dying."""
+        """∫ h(s)·rate(t − s) ds with the impulse response of w²/(p² + 2·damping·w·p + w²), damping < 1: a decaying
+        sine. Gauss–Laguerre integrates the decay."""
         nodes, weights = np.polynomial.laguerre.laggauss(40)
         w = 2.0 * np.pi * cutoff_hz
         rings = np.sqrt(1.0 - damping**2)
@@ -121,7 +121,7 @@ class Motion:
         return total
 
     def angle_deg(self, t):
-        """∫ of the rate since t = 0: Simpson on a grid, Hermite between its points."""
+        """∫ of the rate since t = 0: Simpson's rule on a grid, Hermite interpolation between its points."""
         count = int(np.ceil((self.duration_s + 2.0) * GRID_HZ))
         h = 1.0 / GRID_HZ
         grid = np.arange(count + 1) * h

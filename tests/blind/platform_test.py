@@ -1,6 +1,6 @@
 #!/usr/bin/python3
-"""Blind recordings of two whole units: the gap workflow names what hides in one axis of one unit, in that unit's own axis,
-and nothing about the others. `bench/blind_units` plays more of them."""
+"""Blind recordings of two whole units: the gap workflow names the effect hidden in one axis of one unit, in that
+unit's own axis, and nothing about the others. `bench/blind_units` runs more of them."""
 
 import sys
 import tempfile
@@ -38,14 +38,14 @@ class Blind(unittest.TestCase):
                     self.assertEqual(set(judged["verdicts"].values()), {"no_gap"})
                 for error in judged["errors"]:
                     self.assertLess(abs(error), SIGMAS_MAX, judged)
-                # A reference tells which of the two has it: then it is certain, and the error has been judged.
+                # A reference shows which of the two has it: then it is certain, and its error has been judged.
                 if case.kind and case.reference:
                     self.assertEqual(len(judged["applied"]), 1)
                     self.assertEqual(len(judged["errors"]), 1)
 
 
 class World(unittest.TestCase):
-    """The world is what it says, by other means than it is made by."""
+    """Tests the world by other means than those that make it."""
 
     def test_an_effect_is_as_strong_as_the_case_wants_it(self):
         case = Case(410, "cross_axis", strength=12.0)

@@ -1,5 +1,5 @@
-"""A blind world of three axes: two whole units on one platform that rests, turns and sways. In each axis of each unit something
-else may hide. Has equations, frames and a configuration of its own, and shares no code with the product."""
+"""A blind world of three axes: two whole units on one platform that rests, turns and sways. Each axis of each unit
+may have a hidden effect. Has equations, frames and a configuration of its own, and shares no code with the product."""
 
 import dataclasses
 import json
@@ -12,7 +12,7 @@ AXES = "xyz"
 KINDS = ("cross_axis", "scale_factor", "scale_factor_asymmetry", "delay")
 UNIT_KINDS = ("delay",)  # of all axes of a unit at once
 RATE_HZ, REFERENCE_HZ, START_US = 50.0, 100.0, 1_700_000_000_000_000
-OFFSET_S = 0.0061  # of the second unit's samples
+OFFSET_S = 0.0061  # time offset of the second unit's samples
 FIRST_REST_S, DRIVE_S, STOP_S = 60.0, 120.0, 20.0
 DENSITIES = (2e-3, 8e-3)  # deg/s/√Hz, least and most, of an axis
 WALK_DPS_RTS = 1e-5
@@ -30,8 +30,8 @@ READS = "".join(f'rate_{axis} = "{axis.upper()}"\n' for axis in AXES)
 @dataclasses.dataclass(frozen=True)
 class Case:
     seed: int
-    kind: str = ""  # of what hides; empty: nothing
-    strength: float = 20.0  # |t| of it beside the noise in which it must be seen
+    kind: str = ""  # kind of the hidden effect; empty: none
+    strength: float = 20.0  # its |t| in the noise in which it must be found
     reference: bool = True
     seconds: float = 340.0
 
@@ -41,7 +41,8 @@ class Case:
 
 
 class Motion:
-    """Rest, then drives with stops between them: yaw turns to both sides, roll and pitch sway; all at once, and differently."""
+    """Rest, then drives with stops between them: yaw turns to both sides, roll and pitch sway; all at the same time,
+    independent of each other."""
 
     def __init__(self, seconds, rng):
         self.seconds = seconds
@@ -58,7 +59,8 @@ class Motion:
 
 
 def regressor(effect, motion, t):
-    """What one unit of the effect's size adds to the reading of its axis, or of each axis where it is the unit's."""
+    """Contribution of one unit of the effect's size to the reading of its axis, or of each axis for an effect of the
+    whole unit."""
     rate = motion.rate(t)
     if effect["kind"] == "cross_axis":
         return rate[:, AXES.index(effect["parameters"]["from"])]
@@ -74,8 +76,9 @@ SIZE_OF = {"cross_axis": "coefficient", "scale_factor": "error", "scale_factor_a
 
 
 def hidden(case, motion, densities, rng):
-    """What hides, as strong as the case wants it: |t| = size · √(Σ g² / variance), g less its mean, which a bias takes. What is
-    all the unit's is so strong about the axis that shows it best: the workflow looks at one after the other."""
+    """The hidden effect with the case's strength: |t| = size · √(Σ g² / variance), with g less its mean, which a
+    bias absorbs. An effect of the whole unit has this strength about the axis that shows it best: the workflow
+    treats one axis after the other."""
     if not case.kind:
         return []
     gyro, axis = int(rng.integers(1, 3)), AXES[rng.integers(3)]
@@ -133,7 +136,7 @@ def config_text(reference):
 
 
 def make(case, folder):
-    """Writes the recording with what is known of it; gives back the answer, which is written nowhere."""
+    """Writes the recording with its known parameters; returns the answer, which is not written."""
     folder = Path(folder)
     folder.mkdir(parents=True)
     rng = np.random.default_rng([case.seed, 3])
@@ -164,12 +167,12 @@ def label(effect):
 
 
 def told(effect):
-    """All readings of a named effect."""
+    """A named effect and all that it may also be."""
     return {label(effect), *(label(other) for other in effect.get("ambiguous_with", []))}
 
 
 def judge(truths, gap):
-    """Of one recording: what was found among the readings, with which error in sigma, and what is named that is not true."""
+    """For one recording: the effects found, with their errors in sigma, and the names that are false."""
     true = {label(e) for e in truths}
     named = gap["effects"]
     errors = []

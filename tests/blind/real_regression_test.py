@@ -1,6 +1,6 @@
 #!/usr/bin/python3
-"""The regression that judges names on real recordings, itself judged where the truth is known: it agrees with what is
-hidden, contradicts what is not, and says when it cannot tell."""
+"""Tests the regression that judges names on real recordings, with known truth: it agrees with hidden effects,
+contradicts absent ones, and reports when it cannot tell."""
 
 import sys
 import tempfile
@@ -40,7 +40,7 @@ class Judged(unittest.TestCase):
     def test_agrees_with_what_is_there(self):
         words = {of: self.judge(hidden, of) for of, (hidden, _, _) in self.made.items()}
         self.assertNotIn("contradicts", [word for word, _ in words.values()], words)
-        # Beside the drift of both gyros four minutes are short for a regression that knows nothing of drift.
+        # With the drift of both gyros, four minutes are short for a regression that does not model drift.
         self.assertGreaterEqual([word for word, _ in words.values()].count("agrees"), len(words) - 1, words)
 
     def test_sizes_are_the_true_ones(self):

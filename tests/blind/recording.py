@@ -58,7 +58,7 @@ BO_ 448 WHEEL: 8 STAND
 
 
 def dbc_text(world):
-    """The signals, each gyro's with the steps in which it sends."""
+    """The DBC file's text, with each gyro's own steps."""
     text = _DBC
     for number, g in enumerate(world.gyros, 1):
         text = text.replace(f"@RATE{number}", f"{g.rate_step:G}")
@@ -68,7 +68,7 @@ def dbc_text(world):
 
 def config_text(world):
     gyro = '[[gyro]]\nname = "{0}"\nbus = "{1}"\ndbc = "bench.dbc"\nmessage = "{2}_GYRO"\nrate = "YawRate"\n'
-    # Where a unit tells how it rolls its frame has no room for a counter.
+    # If a unit sends its roll rate, its frame has no room for a counter.
     gyro += 'temperature = "Celsius"\n' + ('rate_x = "Roll"\n' if world.roll else 'counter = "Alive"\n')
     gyro += 'supply_voltage = "Vcc"\n\n' if world.supplies else "\n"
     reference = '[reference]\nbus = "can0"\ndbc = "bench.dbc"\nmessage = "RATE_TABLE"\nrate = "Speed"\n\n'
@@ -92,7 +92,7 @@ def effect_text(gyro, kind, parameters):
 
 
 def model_text(world):
-    """The model before: what the gyros were known to be."""
+    """The model before: the known properties of the gyros."""
     text = "format = 1\n"
     for number, g in enumerate(world.gyros, 1):
         text += effect_text(number, "bias", {"value_dps": g.bias})

@@ -1,7 +1,7 @@
-"""How a vehicle turns about its vertical axis: stops, bends and lane changes as formulas of time, and road noise, a
-Gaussian process whose spectrum runs from 1 Hz to beyond half of any gyro's sampling rate. The sum is a function of
-continuous time: it is made on a grid many times as fine as the samples and read between the grid's points by a
-windowed sinc, so that a gyro that samples it folds what is too fast for it, at its own instants, as a real one does."""
+"""A vehicle's rotation about its vertical axis: stops, bends and lane changes as formulas of time, and road noise, a
+Gaussian process whose spectrum extends from 1 Hz to beyond half of any gyro's sampling rate. The sum is a function
+of continuous time: it is computed on a grid many times as fine as the samples and interpolated by a windowed sinc,
+so that a gyro that samples it aliases the fast part at its own instants, like a real one."""
 
 import dataclasses
 
@@ -10,10 +10,10 @@ import numpy as np
 from motion import EARTH_DPS, smooth_step
 
 GRID_HZ = 2000
-GUARD_S = 3.0  # of the grid before the first and behind the last instant: lags and the sinc reach there
+GUARD_S = 3.0  # margin of the grid before the first and after the last instant, for lags and the sinc
 HIGHEST_HZ = 240.0  # of road noise; an eighth of the grid's rate, where the sinc is exact to 3e-6
 TAPS, KAISER = 24, 12.0
-SLOW_HZ = 1.0  # turns are below, road noise is above
+SLOW_HZ = 1.0  # turns are slower, road noise is faster
 
 
 @dataclasses.dataclass(frozen=True)
@@ -45,7 +45,7 @@ class Spectrum:
 
 
 def draw_spectrum(rng):
-    """A narrow one, quiet beyond some 12 Hz, or one that reaches far beyond half the sampling rate."""
+    """A narrow spectrum, quiet beyond some 12 Hz, or one that extends far beyond half the sampling rate."""
     if rng.random() < 0.4:
         return Spectrum(float(rng.uniform(0.9, 1.3)), float(rng.uniform(9.0, 14.0)), float(rng.uniform(6.0, 9.0)))
     bumps = (
@@ -82,7 +82,7 @@ class Bend:
 
 
 class Course:
-    """When the vehicle stands, how fast it drives, how it turns, how rough the road is."""
+    """Stops, speed and turns of a vehicle, and the roughness of its road."""
 
     def __init__(self, duration_s, rest_s, rng):
         self.duration_s, self.rest_s = duration_s, rest_s
@@ -134,7 +134,7 @@ class Course:
         return total
 
     def roughness(self, t):
-        """How loud road noise is: by the speed and by the road, of mean square about 1 while driving."""
+        """Strength of the road noise, from the speed and the road; mean square about 1 while driving."""
         top = max(s.speed_mps for s in self.stretches)
         return (self.speed(t) / top) ** 0.8 * np.interp(t, *self.rough)
 
@@ -160,7 +160,7 @@ class Drive:
         return np.fft.irfft(white * np.sqrt(self.spectrum.power(f) * GRID_HZ / 2.0), count)
 
     def road_rms(self, t):
-        """What road noise is by its nature at the instants t, in deg/s rms."""
+        """Expected rms of the road noise at the instants t, in deg/s."""
         return self.course.roughness(t) * self._loudness
 
     def _read(self, values, t):
@@ -184,7 +184,7 @@ class Drive:
         return self._read(self._fine, t)
 
     def slow_rate(self, t):
-        """Without road noise."""
+        """The rate without road noise."""
         return self.course.turning(np.asarray(t, dtype=float))
 
     def acceleration(self, t):
@@ -194,14 +194,14 @@ class Drive:
         return self._read(self._lagged["slope"], t)
 
     def low_passed(self, t, *cutoffs_hz):
-        """Behind first-order low-passes, one after the other, each exact for a continuous signal."""
+        """The rate after first-order low-passes in series, each exact for a continuous signal."""
         if cutoffs_hz not in self._lagged:
             stages = lambda f: np.prod([1.0 / (1.0 + 1j * f / c) for c in cutoffs_hz], axis=0)
             self._lagged[cutoffs_hz] = self._filtered(stages)
         return self._read(self._lagged[cutoffs_hz], t)
 
     def angle_deg(self, t):
-        """∫ of the rate since t = 0; road noise turns little between two points of the grid."""
+        """∫ of the rate since t = 0; between two points of the grid, road noise turns little."""
         if self._angle is None:
             steps = 0.5 * (self._fine[1:] + self._fine[:-1]) / GRID_HZ
             self._angle = np.concatenate([[0.0], np.cumsum(steps)])

@@ -1,4 +1,4 @@
-"""Runs `vgyro gap` and `vgyro compare` on a case and reads what they wrote."""
+"""Runs `vgyro gap` and `vgyro compare` on a case and reads their output files."""
 
 import functools
 import json
@@ -18,7 +18,8 @@ class Failed(Exception):
 
 
 def _run(command, limit_s=None):
-    """Seconds and peak memory in MB; Failed with its last words when it ends badly, or ends after `limit_s`."""
+    """Returns seconds and peak memory in MB; raises Failed with the last output if the run fails, or is ended
+    after `limit_s`."""
     begun = time.monotonic()
     process = subprocess.Popen([str(c) for c in command], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
     watch = threading.Timer(limit_s, process.kill) if limit_s else None
@@ -40,8 +41,8 @@ def _run(command, limit_s=None):
 
 @functools.lru_cache
 def _choice(vgyro):
-    """Of an ambiguous effect model.toml shall hold the likeliest reading, or a fresh recording could not be compared
-    with what was found; a former build wrote it without being told."""
+    """For an ambiguous effect, model.toml must hold the likeliest explanation, or the result could not be
+    compared with a fresh recording; an older build does this without the option."""
     told = subprocess.run([str(vgyro), "gap", "--help"], capture_output=True, text=True, check=True).stdout
     return ["--accept", "likeliest"] if "--accept" in told else []
 

@@ -1,5 +1,5 @@
-"""Effects that no kind of the catalogue describes: what is named for them is named falsely.
-Each is made for (world, rng) and gives a function (world, gyro, t, rng) → deg/s on one gyro."""
+"""Effects that no kind of the catalogue describes: any name for them is false. Each maker takes (world,
+rng) and returns a function (world, gyro, t, rng) → deg/s on one gyro."""
 
 import numpy as np
 
@@ -35,7 +35,7 @@ def chirp(gyro, size, rng):
 
 
 def relaxation(gyro, size, rng):
-    """What each turn leaves behind: |rate| in per cent, through a memory of some seconds."""
+    """A remainder after each turn: per cent of |rate|, with a memory of some seconds."""
     tau_s = rng.uniform(8.0, 25.0)
 
     def add(world, t, _):
@@ -63,7 +63,7 @@ def loud_minute(gyro, size, rng):
 
 
 def hysteresis(gyro, size, rng):
-    """Temperature with play: what stays behind when it turns round."""
+    """Temperature with play: a part lags behind when the temperature reverses."""
     play_k = rng.uniform(1.0, 3.0)
 
     def add(world, t, _):
@@ -78,7 +78,7 @@ def hysteresis(gyro, size, rng):
 
 
 def hidden_axis(gyro, size, rng):
-    """Cross-coupling with a rotation that nobody records."""
+    """Cross-coupling with a rotation that is not recorded."""
     f, phase = np.exp(rng.uniform(np.log(0.01), np.log(1.5), 12)), rng.uniform(0, 2 * np.pi, 12)
 
     def add(world, t, _):
@@ -116,7 +116,7 @@ def tilt_times_rate(gyro, size, rng):
 
 
 def turning_up(gyro, size, rng):
-    """Something quadratic in the angular acceleration."""
+    """An effect quadratic in the angular acceleration."""
     return _on(gyro, lambda world, t, _: size * np.minimum((world.motion.acceleration(t) / 60.0) ** 2, 25.0))
 
 
@@ -137,7 +137,7 @@ def settling(gyro, size, rng):
 
 
 def wheel_hum(gyro, size, rng):
-    """A tone that turns with the wheels, and its second."""
+    """A tone at the wheels' frequency, and its second harmonic."""
     around_m, second = rng.uniform(1.8, 2.2), rng.uniform(0.2, 0.6)
 
     def add(world, t, _):
@@ -152,9 +152,9 @@ def wheel_hum(gyro, size, rng):
 
 ALL = [bursts, chirp, relaxation, loud_minute, hysteresis, hidden_axis, square_wave, coloured]
 ALL += [tilt_times_rate, turning_up]
-# What only a vehicle brings, or a catalogue that grew since may name.
+# Effects that occur only in vehicles, or that a later catalogue may name.
 ON_THE_ROAD = [late_warm_up, settling, wheel_hum]
 MAKERS = {maker.__name__: maker for maker in [*ALL, *ON_THE_ROAD]}
 OF_THE_BENCH = [maker.__name__ for maker in ALL]
-# Names that are right all the same, where the catalogue has them.
+# Names that are nevertheless right, if the catalogue has them.
 ALSO_RIGHT = {"settling": ["run_in"], "hysteresis": ["temperature_hysteresis"]}

@@ -1,12 +1,13 @@
-"""How plainly an effect shows: the t value that generalised least squares would have for it if noise
-and shape were known. Effects are injected by this number, whatever their unit."""
+"""How plainly an effect shows: the t value of generalised least squares with known noise and shape.
+Effects are injected by this number, whatever their unit."""
 
 import numpy as np
 
 
 def fisher_t(shape, sigma, walk, level_known=False):
-    """|t| of `shape` (what one unit of the effect adds to each sample) among white noise of `sigma` a
-    sample and a random walk of `walk` a step; the walk's start is unknown unless `level_known`."""
+    """|t| of `shape` (the contribution of one unit of the effect to each sample) in white noise of
+    `sigma` a sample and a random walk of `walk` a step; the walk's start is unknown unless
+    `level_known`."""
     if level_known:
         level, variance, start = 0.0, 0.0, 0
     else:
@@ -31,8 +32,8 @@ def noise_t(spectrum_ratio):
 
 
 def spectrum(frequencies_hz, interval_s, density, walk_density=0.0, sigma_dps=0.0, tau_s=1.0):
-    """Variance per frequency of sampled noise (times the interval: density²): white, random walk as its
-    increments make it, and an exponentially correlated part."""
+    """Variance per frequency of sampled noise (times the interval: density²): white noise, a random
+    walk by its increments, and an exponentially correlated part."""
     turn = 2.0 - 2.0 * np.cos(2 * np.pi * frequencies_hz * interval_s)
     keep = np.exp(-interval_s / tau_s)
     markov = sigma_dps**2 * (1 - keep**2) / ((1 - keep) ** 2 + keep * turn)

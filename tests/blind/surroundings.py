@@ -1,5 +1,5 @@
-"""What besides the rotation acts on the gyros: a temperature for each, the platform's acceleration, and,
-where wanted, a supply voltage for each."""
+"""Inputs of the gyros besides the rotation: a temperature for each, the platform's acceleration, and optionally a
+supply voltage for each."""
 
 import numpy as np
 
@@ -36,7 +36,7 @@ class Temperature:
         return float(np.ptp(self.value(np.arange(0.0, duration_s, 1.0))))
 
     def with_play(self, t, play_k):
-        """Where something stands that the temperature takes along only when it is `play_k` away from it."""
+        """Position of something that the temperature drags along only when it is `play_k` away."""
         grid = np.arange(0.0, t[-1] + 2 * self.GRID_S, self.GRID_S)
         out, at = [], None
         for now in self.value(grid).tolist():
@@ -45,7 +45,7 @@ class Temperature:
             if abs(now - at) > play_k:
                 at = now - np.copysign(play_k, now - at)
             out.append(at)
-        # Between two instants of the grid it is dragged or stands: the nearest place within the play.
+        # Between two instants of the grid it is dragged or stays: the nearest place within the play.
         before = np.array(out)[np.minimum((t / self.GRID_S).astype(int), len(out) - 1)]
         now = self.value(t)
         return now + np.clip(before - now, -play_k, play_k)
@@ -67,7 +67,7 @@ class Flat:
 
 
 class Supply:
-    """Levels between 4.6 and 5.1 V that change at random, at once: what a frame of 0.02 V a step carries as it is."""
+    """Levels between 4.6 and 5.1 V that jump at random, in steps that a frame of 0.02 V a step carries exactly."""
 
     STEP_V = 0.02
 
@@ -130,7 +130,7 @@ class Acceleration:
         return a
 
     def vibration_g2(self, t):
-        """Variance of |a| over the second before."""
+        """Variance of |a| over the previous second."""
         grid = np.arange(-1.0, self.duration_s + 1.0, 1.0 / self.GRID_HZ)
         size = np.linalg.norm(self.value(grid), axis=1)
         sums = np.cumsum(size), np.cumsum(size * size)

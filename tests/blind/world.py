@@ -1,4 +1,4 @@
-"""Everything that is true in one recording before a frame is made of it, and what each gyro reads."""
+"""The truth of one recording before frames are made from it, and the readings of each gyro."""
 
 import dataclasses
 
@@ -14,14 +14,14 @@ ACCELEROMETER_HZ, ACCELEROMETER_SIGMA_G = 100.0, 2e-3
 
 @dataclasses.dataclass(frozen=True)
 class Gyro:
-    """What the model file knows of one gyro."""
+    """The parameters of one gyro."""
 
     bias: float
     density: float  # deg/s/√Hz
     walk: float  # deg/s/√s
     markov_sigma: float = 0.0
     markov_tau: float = 1.0
-    # What only vehicles' gyros have: see drive.py.
+    # For vehicles' gyros only: see drive.py.
     flicker: float = 0.0  # coefficient B of bias instability, deg/s; the Allan floor is 0.664·B
     flicker_terms: tuple = ()  # (sigma, tau) of the Markov terms that stand for it in the model file
     filters_hz: tuple = ()  # the sensor's own first-order low-passes
@@ -40,13 +40,13 @@ class World:
     rates_hz: list
     offset_s: float  # of the second gyro's stamps
     reference: bool
-    supplies: list | None = None  # None: the gyros do not tell it
-    roll: surroundings.Roll | None = None  # likewise
+    supplies: list | None = None  # None: not sent
+    roll: surroundings.Roll | None = None  # None: not sent
     reference_hz: float = REFERENCE_HZ
     reference_sigma: float = REFERENCE_SIGMA_DPS
     accelerometer: bool = True
     speed: bool = False
-    traits: dict = dataclasses.field(default_factory=dict)  # for tables: what sort of a world it is
+    traits: dict = dataclasses.field(default_factory=dict)  # for tables: properties of the world
 
     def times(self, gyro):
         """True instants of a gyro's samples."""
@@ -58,8 +58,8 @@ class World:
         return t[t < self.motion.duration_s - 0.005] if ppm else t
 
     def noise_seen(self, gyro):
-        """White noise a sample and random walk a step in which an effect of this gyro must be seen:
-        beside a reference its own, else both gyros'."""
+        """White noise a sample and random walk a step in which an effect of this gyro must be found: its
+        own with a reference, else both gyros'."""
         seen = [self.gyros[gyro - 1]] if self.reference else self.gyros
         rate_hz = self.rates_hz[gyro - 1]
         return (
@@ -93,7 +93,7 @@ def flicker(count, interval_s, coefficient, rng):
 
 
 def late_rate(world, t, effects, gyro):
-    """What a gyro feels at the instants t, in deg/s: the rate behind its delays and its low-passes."""
+    """The rate that a gyro feels at the instants t, in deg/s, after its delays and its low-passes."""
     delay_s = sum(p["seconds"] for p in _of(effects, "delay"))
     twice = _of(effects, "bandwidth_second_order")
     cutoffs = [*world.gyros[gyro - 1].filters_hz, *(p["cutoff_hz"] for p in _of(effects, "bandwidth"))]
@@ -106,7 +106,7 @@ def late_rate(world, t, effects, gyro):
 
 
 def _white(g, count, rate_hz, density, rng):
-    """White noise; behind a low-pass of the sensor what is left of it at the samples."""
+    """White noise at the samples, after the sensor's low-pass if it has one."""
     if g.filtered_noise:
         sigma = density * np.sqrt(np.pi * g.filters_hz[0])
         return correlated(count, 1.0 / rate_hz, sigma, 1.0 / (2 * np.pi * g.filters_hz[0]), rng)
@@ -143,7 +143,7 @@ def reading(world, gyro, effects, strangers, rng):
     (world, gyro, t, rng) → deg/s outside the catalogue."""
     effects = [e for e in effects if e["gyro"] == gyro]
     t = world.times(gyro)
-    # It comes late first; what the sensor makes of a rate, it makes of that.
+    # The delay comes first; the sensor's other responses act on the late rate.
     rate = late_rate(world, t, effects, gyro)
     y = rate.copy()
     y += world.gyros[gyro - 1].bias

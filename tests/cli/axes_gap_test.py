@@ -1,6 +1,6 @@
 #!/usr/bin/python3
-"""What `vgyro gap` finds about two whole units, each name and size against what was put in. The searches are long,
-and test_gap takes the same code through the sanitizers."""
+"""The results of `vgyro gap` for two whole units: each name and size is compared with the injected effect. The
+searches are long; test_gap covers the same code with the sanitizers."""
 
 import json
 import re
@@ -18,7 +18,7 @@ class Found(Axes):
         found = self.gap("--accept", "gyro=2")
         self.assertEqual([axis["axis"] for axis in found["axes"]], list(AXES))
         named = {(one["axis"], one["parameters"]["from"]): one for one in found["effects"] if is_tilt(one)}
-        # Roll and pitch feel the yaw, which is ten times as quick as they are.
+        # Roll and pitch feel the yaw, which is ten times as fast as they are.
         for pair in (("x", "z"), ("y", "z")):
             one = named[pair]
             truth = TILTED[AXES.index(pair[0]), AXES.index(pair[1])]
@@ -27,12 +27,12 @@ class Found(Axes):
             self.assertTrue(one["applied"])
         for axis in found["axes"]:
             self.assertLess(axis["gap"]["after"], max(1.5 * axis["gap"]["band95"][1], 0.2 * axis["gap"]["before"]), axis["axis"])
-        # What is found about an axis is all that is found of it alone.
+        # The effects of the axes together are all effects.
         self.assertEqual(found["effects"], [effect for axis in found["axes"] for effect in axis["effects"]])
         self.assertEqual(sorted(path.name for path in (self.folder / "found").iterdir()),
                          ["gap.json", "model.toml", "report-x.html", "report-y.html", "report-z.html", "report.html"])
         self.pages()
-        # The model file is whole: with it the three axes have no gap.
+        # The model file is complete: with it the three axes have no gap.
         closed = self.compare(model="found/model.toml")
         for axis, before in zip(closed["axes"], found["axes"]):
             self.assertLess(axis["gap"]["value"], max(1.5 * axis["gap"]["band95"][1], 0.2 * before["gap"]["before"]))
@@ -48,15 +48,15 @@ class Found(Axes):
             self.assertEqual([other["file"] for other in own["pages"]], [f"report-{other}.html" for other in AXES])
 
     def test_a_unit_upside_down_is_told_in_its_own_axes_and_signs(self):
-        """And the gateway takes it back from there: the two agree to what is left of the tilt."""
-        # The sensor feels the vehicle's rate turned back, and is tilted besides.
+        """The gateway corrects it too: the two agree except for the rest of the tilt."""
+        # The sensor feels the vehicle's rate in its own axes, and is also tilted.
         felt = MOUNT.T @ TILTED
         drive = self.record(340.0, 2, felt, more_b=MOUNT_TEXT)
-        own = felt @ MOUNT  # of the unit's own axes
+        own = felt @ MOUNT  # about the unit's own axes
         found = self.gap("--accept", "gyro=2")
         self.assertLess(abs(found["gap"]["after"]), 0.2 * found["gap"]["before"])
         tilts = [one for one in found["effects"] if is_tilt(one)]
-        # The vehicle's x is the unit's y, and the other way round.
+        # The vehicle's x is the unit's y, and the reverse.
         self.assertGreaterEqual({(one["axis"], one["parameters"]["from"]) for one in tilts}, {("x", "z"), ("y", "z")})
         for one in tilts:
             truth = own[AXES.index(one["axis"]), AXES.index(one["parameters"]["from"])]
@@ -68,7 +68,7 @@ class Found(Axes):
         self.assertEqual(drive.seconds, 340.0)
 
     def test_what_is_the_whole_units_is_named_once(self):
-        """40 ms of delay: found about the axis that moves most, and known to the others."""
+        """40 ms of delay: found about the axis that moves most, and used for the others."""
         self.record(300.0, 4, lag_s=0.04)
         found = self.gap("--accept", "gyro=2")
         delays = [one for one in found["effects"] if one["kind"] == "delay" and one["applied"]]
@@ -83,7 +83,7 @@ class Found(Axes):
     def test_one_axis_writes_the_result_of_one_pair(self):
         self.record(120.0, 6, TILTED)
         self.gap()
-        found = self.gap("--axis", "x")  # replaces the result of all
+        found = self.gap("--axis", "x")  # replaces the result of all axes
         self.assertEqual(found["axis"], "x")
         self.assertNotIn("axes", found)
         self.assertEqual(sorted(path.name for path in (self.folder / "found").iterdir()), ["gap.json", "model.toml", "report.html"])

@@ -1,6 +1,6 @@
 #!/usr/bin/python3
-"""`vgyro gap`, `compare` and `allan` of two whole units: each axis against what was put into it, in units of the
-stated sigma; the axes together; one axis alone; what is said to a choice that cannot be."""
+"""`vgyro gap`, `compare` and `allan` of two whole units: each axis is compared with the injected values, in units of
+the stated sigma; the axes together; one axis alone; the errors for an impossible choice."""
 
 import json
 import re
@@ -10,7 +10,7 @@ import numpy as np
 
 from units_test import DBC, AXES, BIAS_A, BIAS_B, TILTED, Drive, Units, config, frames, gyro, log_of
 
-# One unit upside down, and a quarter turn besides: exchanged and flipped axes at once.
+# One unit upside down and turned by a quarter: axes exchanged and flipped at once.
 MOUNT = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
 MOUNT_TEXT = "mount = [[0, 1, 0], [1, 0, 0], [0, 0, -1]]"
 NOISE = 4e-3  # deg/s/sqrt(Hz), of each axis
@@ -25,7 +25,8 @@ def biases(unit, bias_dps):
 
 class Axes(Units):
     def record(self, seconds, seed, turn_b=np.eye(3), lag_s=0.0, more_b=""):
-        """A drive of two units as in.log, u.toml, and m.toml, which knows all but the turn and the lag of B."""
+        """A drive of two units as in.log, u.toml, and m.toml, which has everything except the rotation and the lag
+        of B."""
         print(f"seed {seed}")
         drive = Drive(seconds, seed)
         a = drive.unit(0.0, np.eye(3), BIAS_A)
@@ -92,7 +93,7 @@ class Table(Axes):
         self.write("truth.dbc", TRUTH_DBC)
 
     def with_table(self, seconds, seed):
-        """A drive of two units, one tilted, and a table that tells the truth 100 times a second."""
+        """A drive of two units, one tilted, and a reference with the true rate 100 times a second."""
         print(f"seed {seed}")
         drive = Drive(seconds, seed)
         t = np.arange(0.0017, seconds, 0.01)
@@ -112,7 +113,7 @@ class Reference(Table):
 
     def test_it_calibrates_a_platform_that_moves(self):
         drive = self.with_table(260.0, 13)
-        # Begun amid the first drive: nothing rests there.
+        # The log begins in the middle of the first drive, without rest.
         lines = self.read("in.log").splitlines(keepends=True)
         moving = [line for line in lines if float(line[1:line.index(")")]) > 1_700_000_065]
         rows, summary = self.replay("".join(moving), config(calibration='source = "reference"') + TABLE_OF_AXES)

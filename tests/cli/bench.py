@@ -1,5 +1,5 @@
-"""A test bench for the command line: runs the built `vgyro` in a folder of its own, and makes logs
-line by line. Knows the frames from the DBC text below and shares no code with the product."""
+"""A test bench for the command line: runs the built `vgyro` in a folder of its own, and makes logs line by
+line. Takes the frames from the DBC text below and shares no code with the product."""
 
 import os
 import struct
@@ -78,7 +78,7 @@ def line_b(us, rate_dps, bus="can1"):
 
 
 def two_gyros(seconds, begin_us=1_700_000_000_000_000, turn_dps=0.0032):
-    """Lines of gyro a and, 3 ms behind and mounted upside down, gyro b; 100 Hz, biases 0.5 and -0.3."""
+    """Lines of gyro a and, 3 ms later and mounted upside down, gyro b; 100 Hz, biases 0.5 and -0.3."""
     lines = []
     for i in range(round(seconds * 100)):
         true_dps = 0.0032 if i < 120 else turn_dps
@@ -113,7 +113,7 @@ class Bench(unittest.TestCase):
         return done
 
     def bad(self, *arguments, code=1, **options):
-        """What it says on stderr, after having failed with this code."""
+        """The text on stderr of a run that fails with this exit code."""
         done = self.run_vgyro(*arguments, **options)
         said = done.stderr.decode(errors="replace")
         self.assertEqual(done.returncode, code, said)

@@ -1,6 +1,6 @@
 #!/usr/bin/python3
-"""The benchmarks' command lines hold to the same rules as `vgyro`: numbers are numbers, names are names, and
-nothing is written over what is read. No benchmark is run."""
+"""The benchmarks' command lines follow the same rules as `vgyro`: numbers are numbers, names are names, and no input
+is overwritten. No benchmark is run."""
 
 import os
 import subprocess
@@ -27,7 +27,7 @@ class Benchmarks(unittest.TestCase):
         return done.stderr
 
     def test_a_picture_is_written_under_a_name_and_by_no_command(self):
-        # gnuplot takes a name that begins with a bar for a command.
+        # gnuplot runs a name that begins with a bar as a command.
         before = os.getcwd()
         os.chdir(self.folder)
         self.addCleanup(os.chdir, before)
@@ -38,7 +38,7 @@ class Benchmarks(unittest.TestCase):
         self.assertEqual(command_line.file_name("-o"), self.folder.resolve() / "-o")
 
     def test_every_number_is_finite_and_in_its_range(self):
-        # Of each benchmark that has one.
+        # Every option of this kind of each benchmark.
         options = {"whiteness.py": ("--stretch", "--lags", "--cell", "--quiet-dps", "--gap"), "throughput.py": ("--rounds", "--core"),
                    "faults": ("--sequences", "--seed", "--kills", "--hours", "--seconds"), "paper_table.py": ("--seeds",),
                    "accuracy": ("--seeds", "--first-seed", "--jobs"), "blind": ("--first-seed", "--limit", "--jobs"),
@@ -51,7 +51,7 @@ class Benchmarks(unittest.TestCase):
                         self.assertIn(name, self.said(script, *positional, f"{name}={word}"))
 
     def test_no_picture_is_drawn_over_the_recording(self):
-        # Nor over a file that it is another name of.
+        # Another name of an input is refused too.
         for name in ("a.toml", "a.log"):
             (self.folder / name).write_text(name)
         os.link(self.folder / "a.log", self.folder / "b.svg")

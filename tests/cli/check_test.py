@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""`vgyro check`: what it resolved, for people; and every bad input with its place and remedy."""
+"""`vgyro check`: it prints the resolved configuration; and every bad input gives an error with its place and remedy."""
 
 import unittest
 
@@ -14,7 +14,7 @@ class Check(bench.Bench):
         return self.bad("check", "vgyro.toml")
 
     def test_names_bus_id_signal_unit_and_scale(self):
-        # Nobody can trust a config whose meaning must be guessed.
+        # A user must see what the configuration means.
         text = self.good("check", "vgyro.toml").stdout.decode()
         self.assertIn("vgyro.toml: good", text)
         left = next(line for line in text.splitlines() if "gyro left" in line)
@@ -27,7 +27,7 @@ class Check(bench.Bench):
             self.assertIn(part, text)
 
     def test_names_calibration_corrector_and_output(self):
-        # The other half of what a run depends on.
+        # The other settings that a run depends on.
         text = self.good("check", "vgyro.toml").stdout.decode()
         for part in ("first 1 s of rest", "0.0032 deg/s", "mutual", "window 1 s", "order 1", "VG_Rate 610",
                      "VG_Bias 611", "VG_Model 612", "classic CAN"):
@@ -37,7 +37,7 @@ class Check(bench.Bench):
         self.assertNotIn("shadow", self.good("check", "vgyro.toml").stdout.decode())
         self.write("vgyro.toml", bench.CONFIG.replace("[output]", "[output]\ntransmit = false", 1))
         text = self.good("check", "vgyro.toml").stdout.decode()
-        self.assertRegex(text, r"(?m)^  shadow mode +the gateway sends none of what follows: transmit = false$")
+        self.assertRegex(text, r"(?m)^  shadow mode +the gateway sends none of these frames: transmit = false$")
         self.assertIn("[output] transmit must be true or false",
                       self.check_replaced("transmit = false", 'transmit = "no"'))
 
@@ -57,7 +57,7 @@ class Check(bench.Bench):
         self.assertRegex(text, r"(?m)^    gyro\[0\]\.name +[\"']left[\"'] +vgyro\.toml:\d+$")
         prints = [line.split()[1] for line in (alone + text).splitlines() if line.startswith("  fingerprint")]
         self.assertEqual(len(set(prints)), 2)
-        # Who is wrong is named, and not the file that it lies over.
+        # The error names the drop-in file, not the file that it overrides.
         self.write("vgyro.d/20-car.toml", "\n[calibration]\nresst_s = 7\n")
         self.assertIn('vgyro.d/20-car.toml:3: unknown key "resst_s" in [calibration]', self.bad("check", "vgyro.toml"))
         self.write("vgyro.d/20-car.toml", "[calibration]\nrest_s = \n")
@@ -80,7 +80,7 @@ class Check(bench.Bench):
         self.assertNotEqual(fingerprint(), first)
 
     def test_names_the_largest_bias(self):
-        # It decides what a stop may teach.
+        # The limit decides what a stop may teach.
         self.assertNotIn("at most", self.good("check", "vgyro.toml").stdout.decode().split("corrector")[0])
         self.write("vgyro.toml", bench.CONFIG.replace('rate = "RateZ"', 'rate = "RateZ"\nmax_bias_dps = 0.5', 1))
         self.assertRegex(self.good("check", "vgyro.toml").stdout.decode(), r"bias +at most 0\.5 deg/s")
@@ -90,12 +90,12 @@ class Check(bench.Bench):
         self.assertEqual(self.good("check", "vgyro.toml").stderr, b"")
 
     def test_lines_fit_a_terminal(self):
-        # Wrapped tables cannot be read.
+        # Wrapped tables are unreadable.
         for line in self.good("check", "vgyro.toml").stdout.decode().splitlines():
             self.assertLessEqual(len(line), 120, line)
 
     def test_bad_input_names_file_line_and_remedy(self):
-        # Each mistake: where it is, what is wrong, what would be right.
+        # Each mistake: its place, the problem and the remedy.
         cases = (
             ('temperature = "Temp"', 'temprature = "Temp"', 'vgyro.toml:7: ', 'did you mean "temperature"?'),
             ('message = "GYRO_A"', 'message = "GYRO_X"', 'vgyro.toml:5: ', 'did you mean "GYRO_A"?'),
@@ -115,7 +115,7 @@ class Check(bench.Bench):
                 self.assertEqual(len(said.splitlines()), 1, said)
 
     def test_tells_all_mistakes_at_once(self):
-        # One look, one edit.
+        # All mistakes are reported in one run.
         text = bench.CONFIG.replace('"RateZ"', '"RateX"').replace("sign = -1", "sign = 5").replace("order = 1", "order = 7")
         self.write("vgyro.toml", text)
         said = self.bad("check", "vgyro.toml").splitlines()
@@ -128,11 +128,11 @@ class Check(bench.Bench):
         self.assertIn("No such file", self.bad("check", "nowhere.toml"))
 
     def test_folder_is_no_config(self):
-        # Tab completion stops there.
+        # Tab completion stops at the folder.
         self.assertIn("directory", self.bad("check", "."))
 
     def test_odd_dbc_line_is_a_warning_with_its_place(self):
-        # The gyro's own signals are fine, so the file is usable; but the user should know.
+        # The gyro's own signals are fine, so the file is usable, with a warning.
         self.write("bench.dbc", bench.BENCH_DBC + "\nBO_ 300 HALF\n")
         done = self.good("check", "vgyro.toml")
         self.assertIn("warning: bench.dbc:", done.stderr.decode())

@@ -19,7 +19,7 @@ def commands():
 @unittest.skipIf(bench.SANITIZED, "the gap workflow takes minutes there")
 class Commissioning(bench.Bench):
     def test_every_command_of_the_guide_does_what_it_says(self):
-        (self.folder / "vgyro.toml").unlink()  # the bench's own
+        (self.folder / "vgyro.toml").unlink()  # the file of bench.py
         shutil.copytree(bench.SOURCE / "examples", self.folder / "examples")
         said = {}
         for line in commands():

@@ -1,6 +1,6 @@
 #!/usr/bin/python3
-"""`vgyro replay` of pairs that cannot be one as they are configured, and of many that can: simulated with drifts, scale
-errors, skew, delays, vibration, noise, defects, at rest and in motion. The healthy ones must never be accused."""
+"""`vgyro replay` of pairs that are impossible as configured, and of many healthy ones: simulated with drifts, scale
+errors, skew, delays, vibration, noise, defects, at rest and in motion. The healthy ones must never be contradicted."""
 
 import json
 import math
@@ -43,7 +43,7 @@ MOTIONS = {
     "a spin": lambda t: 300.0 * min(max(t - 6.0, 0.0) / 3.0, 1.0),
 }
 
-# What is wrong with gyro 2, beyond noise and bias, which both have; all of it is a sensor's, not the configuration's.
+# Errors of gyro 2 besides the noise and bias that both have; all are errors of a sensor, not of the configuration.
 EFFECTS = {
     "nothing": "",
     "drift": 'kind = "bias_ramp"\nslope_dps_s = 0.02',
@@ -107,7 +107,7 @@ class Contradiction(bench.Bench):
                   str(seed), "-o", "in.log")
 
     def misread(self, read):
-        """Gyro b's frames as another sender would have made them."""
+        """Gyro b's frames, encoded differently."""
         lines = []
         for line in self.read("in.log").splitlines():
             head, data = line.split("#")
@@ -117,7 +117,7 @@ class Contradiction(bench.Bench):
         self.write("in.log", "".join(lines))
 
     def refused(self):
-        """What is said, and the summary."""
+        """The messages and the summary of a replay that must fail."""
         said = self.bad("replay", "--config", "vgyro.toml", "-o", "out.log", "--json", "s.json", "in.log")
         return said, json.loads(self.read("s.json"))["pair"]
 
@@ -132,7 +132,7 @@ class Found(Contradiction):
         self.assertEqual(pair["contradiction"], "sign")
         self.assertAlmostEqual(pair["slope"], -1.0, delta=0.02)
         begin = rates(self.read("out.log"))[0][0]
-        # Some seconds of the second turn at the latest.
+        # Found within some seconds of the second turn at the latest.
         late = [(valid, state) for t, valid, state in rates(self.read("out.log")) if t > begin + 25.0]
         self.assertEqual(set(late), {(0, 5)})
 

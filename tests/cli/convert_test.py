@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""`vgyro convert`: from every form into those that are written; what is said of it."""
+"""`vgyro convert`: from every form into those that it writes, and its messages."""
 
 import unittest
 
@@ -46,7 +46,7 @@ class Convert(bench.Bench):
     def test_says_what_is_in_a_log_without_frames(self):
         self.good("convert", "-q", "-o", "out.blf", "in.log")
         blf = bytearray((self.folder / "out.blf").read_bytes())
-        blf[156] = 11  # the container becomes an object of LIN
+        blf[156] = 11  # the container becomes a LIN object
         self.write("lin.blf", bytes(blf))
         said = self.bad("convert", "-o", "out.asc", "lin.blf")
         self.assertIn("lin.blf: 0 frames, 1 other object passed over\n", said)
@@ -63,7 +63,7 @@ class Convert(bench.Bench):
         self.assertEqual(self.converted("a.log", "b.log"), LOG)
 
     def test_says_which_name_became_which_channel(self):
-        # The form has numbers only.
+        # The form has channel numbers only.
         self.write("in.log", LOG.replace("can1", "vcan7"))
         said = self.good("convert", "-o", "out.asc", "in.log").stderr.decode()
         self.assertEqual(said, "in.log: 3 frames\nout.asc: Vector ASC; channel 1 is can0, channel 2 is vcan7\n")

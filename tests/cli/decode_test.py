@@ -43,7 +43,7 @@ class Decode(bench.Bench):
         return [json.loads(line) for line in self.decode(log, dbc=dbc).splitlines()]
 
     def test_has_exactly_the_documented_form(self):
-        # Programs of others read this; the form may not drift.
+        # Other programs read this format; it must not change.
         text = self.decode("(1700000000.010000) can0 101#E8800000C409072F\n")
         self.assertEqual(text, '{"t": 1700000000.010000, "bus": "can0", "id": 257, "message": "GYRO_A", "signals": {'
                                '"RateZ": {"value": 0.033, "raw": 33000, "unit": "deg/s", "label": null}, '
@@ -52,13 +52,13 @@ class Decode(bench.Bench):
                                '"Status": {"value": 15, "raw": 15, "unit": "", "label": null}}}\n')
 
     def test_labels_come_from_the_dbc_file(self):
-        # "warming up" says more than 1.
+        # "warming up" is clearer than 1.
         one, = self.objects(bench.line_a(1, 0.0, 0, status=1))
         self.assertEqual(one["signals"]["Status"]["label"], "warming up")
         self.assertEqual(one["signals"]["Status"]["raw"], 1)
 
     def test_every_line_is_valid_json_whatever_the_payload(self):
-        # Random bits are NaN and infinity now and then, and neither is JSON.
+        # Random bits are sometimes NaN or infinity, which JSON does not have.
         import random
         rng = random.Random(5)
         lines = [f"({i}.{rng.randrange(10**6):06d}) can{rng.randrange(3)} "
@@ -90,7 +90,7 @@ class Decode(bench.Bench):
         self.assertEqual(one["signals"]["YawRate"]["value"], 6.0)
 
     def test_multiplexed_signals_appear_on_their_page_only(self):
-        # On another page the same bits are something else.
+        # On another page the same bits have another meaning.
         found = self.objects("(1.0) can0 190#01E8030000000000\n(2.0) can0 190#0218FC0000000000\n"
                              "(3.0) can0 190#0318FC0000000000\n", dbc=("other.dbc",))
         self.assertEqual([sorted(f["signals"]) for f in found], [["Page", "Volt"], ["Amp", "Page"], ["Page"]])
@@ -109,7 +109,7 @@ class Decode(bench.Bench):
         self.assertEqual(found[1]["signals"]["Exact"]["value"], 0.1)
 
     def test_time_keeps_the_digits_of_the_log(self):
-        # Nine digits where the log has them, six elsewhere.
+        # Nine digits if the log has them, else six.
         text = self.decode("(1700000000.123456789) can0 101#0000000000000000\n(5.000001) can0 101#0000000000000000\n")
         self.assertEqual(re.findall(r'"t": ([0-9.]+)', text), ["1700000000.123456789", "5.000001"])
 
@@ -119,17 +119,17 @@ class Decode(bench.Bench):
         self.assertEqual(sorted(one["signals"]), ["RateZ"])
 
     def test_remote_and_unknown_frames_are_passed_over(self):
-        # They carry no signals.
+        # These frames carry no signals.
         log = "(1.0) can0 101#R8\n(2.0) can0 555#00\n(3.0) can0 20000080#0000000000000000\n"
         self.assertEqual(self.decode(log), "")
 
     def test_text_is_for_people(self):
-        # One line a frame, labels instead of numbers where there are any.
+        # One line a frame, with labels instead of numbers if there are any.
         text = self.decode(bench.line_a(1_500_000, 0.033, 7), "--text")
         self.assertEqual(text, "1.500000  can0   101  GYRO_A  RateZ=0.033 deg/s  Temp=25 degC  Counter=7  Status=ok\n")
 
     def test_stdin_streams_line_by_line(self):
-        # As a monitor behind candump: a frame is seen when it comes, not when the log ends.
+        # As a monitor behind candump: a frame is printed when it comes, not when the log ends.
         process = subprocess.Popen([bench.VGYRO, "decode", "--dbc", "bench.dbc", "-"], stdin=subprocess.PIPE,
                                    stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, cwd=self.folder)
         try:
@@ -147,7 +147,7 @@ class Decode(bench.Bench):
         self.assertEqual(code, 0)
 
     def test_junk_lines_are_told_with_their_numbers(self):
-        # Counted, named, and the rest is decoded.
+        # Bad lines are counted and named, and the rest is decoded.
         self.write("in.log", bench.line_a(0, 0.0, 0) + "(1.0) can0 XYZ#00\nDROPCOUNT: 3\n" + bench.line_a(9, 0.0, 1))
         done = self.good("decode", "--dbc", "bench.dbc", "in.log")
         self.assertEqual(len(done.stdout.splitlines()), 2)
@@ -155,7 +155,7 @@ class Decode(bench.Bench):
         self.assertIn("2 of 2 frames decoded, 1 line not understood", done.stderr.decode())
 
     def test_bad_input_is_told(self):
-        # Each with what is wrong; exit code 1.
+        # Each bad file is reported with its problem; exit code 1.
         self.write("empty.log", "")
         self.write("prose.log", "hello\n")
         self.write("no.dbc", "hello\n")
@@ -167,7 +167,7 @@ class Decode(bench.Bench):
         self.assertIn("directory", self.bad("decode", "--dbc", "bench.dbc", "."))
 
     def test_the_exact_identifier_goes_before_the_pgn(self):
-        # Two senders of one parameter group, each with a layout of its own; of a third one nothing else is known.
+        # Two senders of one parameter group, each with a layout of its own; a third sender is unknown.
         self.write("turn.dbc", """\
 BO_ 2565876225 TURN_LEFT: 8 X
  SG_ Rate : 0|16@1- (0.01,0) [-300|300] "deg/s" X
@@ -181,7 +181,7 @@ BA_DEF_DEF_ "VFrameFormat" "J1939PG";
                          [("TURN_RIGHT", 4), ("TURN_LEFT", 1), ("TURN_RIGHT", 4), ("TURN_LEFT", 1)])
 
     def test_no_value_is_null(self):
-        # People integrate what stands there. raw and label stay.
+        # Users integrate the printed value. raw and label stay.
         self.write("codes.dbc", """\
 BO_ 2565868030 VDC2: 8 X
  SG_ Yaw : 24|16@1+ (0.0001220703125,-3.92) [0|0] "rad/s" X
@@ -212,7 +212,7 @@ VAL_ 256 State 0 "valid" 1 "invalid" 3 "SNA" ;
         self.assertIn("Rate=not available (0x7FFFFFFF)", text[2])
 
     def test_the_virtual_gyro_says_when_it_has_no_rate(self):
-        # Raw 0x800000 is no 419 deg/s to the left. VG_Valid's "invalid" is its value.
+        # Raw 0x800000 is not 419 deg/s to the left. VG_Valid's "invalid" is its value.
         self.write("vg.dbc", (bench.SOURCE / "dbc/vgyro.dbc").read_text())
         one, = self.objects("(1.0) can0 610#0000000080FFFFF0\n", dbc=("vg.dbc",))
         signals = one["signals"]
@@ -224,7 +224,7 @@ VAL_ 256 State 0 "valid" 1 "invalid" 3 "SNA" ;
         self.assertEqual(valid["VG_Rate"]["value"], 0)
 
     def test_a_file_that_decodes_nothing_is_told(self):
-        # The wrong file of two, or the wrong log.
+        # A frame that never comes: the wrong file of two, or the wrong log.
         self.write("in.log", "(1.0) can0 101#0000000000000000\n(2.0) can0 0CF02A3E#00\n")
         said = self.good("decode", "--dbc", "bench.dbc", "--dbc", "other.dbc", "in.log").stderr.decode()
         self.assertNotIn("none of its", said)
@@ -234,7 +234,7 @@ VAL_ 256 State 0 "valid" 1 "invalid" 3 "SNA" ;
         self.assertNotIn("bench.dbc", said)
 
     def test_a_missed_sender_is_told(self):
-        # The file does not say that it is J1939, so that only its own address matches.
+        # The file does not declare J1939, so that only its own address matches.
         self.write("silent.dbc", "VERSION \"\"\n\nBO_ 2565876225 TURN: 8 X\n SG_ Rate : 0|16@1- (0.01,0) [0|0] \"deg/s\" X\n")
         self.write("in.log", "(1.0) can0 18F02A13#0000000000000000\n(2.0) can0 0CF02A14#0000000000000000\n")
         said = self.good("decode", "--dbc", "silent.dbc", "in.log").stderr.decode()
@@ -242,7 +242,7 @@ VAL_ 256 State 0 "valid" 1 "invalid" 3 "SNA" ;
         self.assertIn("VFrameFormat = J1939PG", said)
 
     def test_full_disk_is_an_error(self):
-        # Half an output that looks whole is worse than none.
+        # A truncated output that looks complete is worse than none.
         self.write("in.log", "".join(bench.two_gyros(1)))
         with open("/dev/full", "wb") as full:
             self.assertIn("standard output", self.bad("decode", "--dbc", "bench.dbc", "in.log", stdout=full))

@@ -1,5 +1,6 @@
 #!/usr/bin/python3
-"""Check values of input frames, made here bit by bit and with binascii: what vgyro must take and what not."""
+"""Check values of input frames, computed here bit by bit and with binascii: which frames vgyro must accept and which
+not."""
 
 import binascii
 import json
@@ -70,7 +71,7 @@ def crc8(octets, polynomial, value, final):
 
 
 def protect_a(kind, frame):
-    """`frame` with its check value; the counter stands in it."""
+    """`frame` with its check value; it already contains the counter."""
     frame = bytearray(frame)
     if kind in ("profile_1c", "profile_11c"):
         frame[1] |= 0x20
@@ -102,7 +103,7 @@ DATA_ID |= {"profile_11a": DATA_ID["profile_1a"], "profile_11c": DATA_ID["profil
 
 
 def found(summary):
-    """Per gyro: frames, samples, and what was rejected for a cause."""
+    """For each gyro: frames, samples, and the rejected frames by cause."""
     return [(gyro["frames"], gyro["samples"], {cause: n for cause, n in gyro["rejected"].items() if n})
             for gyro in summary["gyros"]]
 
@@ -133,14 +134,14 @@ class InputProtection(bench.Bench):
         return json.loads(done.stdout)
 
     def test_what_a_sender_protects_is_taken(self):
-        # Every kind by each of its names, against check values that are made here.
+        # Every kind by each of its names, with check values computed here.
         for kind in DATA_ID:
             with self.subTest(kind=kind):
                 modulus = self.configure(kind)
                 self.assertEqual(found(self.summary(recording(kind, modulus=modulus))), 2 * [(400, 400, {})])
 
     def test_a_wrong_bit_is_noticed_and_counted(self):
-        # One frame in ten carries one wrong bit, wherever it may be.
+        # One frame in ten has one wrong bit at a random place.
         dice = random.Random(SEED)
         print("seed", SEED)
         for kind in DATA_ID:
@@ -166,7 +167,7 @@ class InputProtection(bench.Bench):
         self.assertRegex(text, r"crc +Crc, profile_5\n")
 
     def test_simulated_frames_carry_their_check_values(self):
-        # What simulate writes, replay takes.
+        # replay accepts the frames of simulate.
         for kind in ("profile_11c", "profile_22", "toyota"):
             with self.subTest(kind=kind):
                 self.configure(kind)
@@ -182,7 +183,7 @@ class InputProtection(bench.Bench):
 
 class RealCar(bench.Bench):
     def test_the_check_value_of_a_real_cars_frames_is_right(self):
-        # A Toyota's own traffic; a wrong byte in one frame of a hundred is found.
+        # Recorded traffic of a Toyota; a wrong byte in one frame of a hundred is found.
         folder = os.environ.get("VGYRO_RECORDINGS")
         if not folder:
             self.skipTest("VGYRO_RECORDINGS is not set to a folder with car_rav4")

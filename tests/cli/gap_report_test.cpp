@@ -15,7 +15,7 @@ GapSubject plain_subject() {
 }
 
 TEST(GapReportTest, HoldsTheFieldsOfTheInterface) {
-  // Programs rely on these names; gyros count from 1 there.
+  // Programs rely on these names, in which gyros count from 1.
   const Json json = gap_json(plain_subject(), made_up_result());
   EXPECT_EQ(json["format"], 1);
   EXPECT_EQ(json["verdict"], "partly_explained");
@@ -44,7 +44,7 @@ TEST(GapReportTest, NamesAnAxisByItsLetterAndGivesSigmaOfEstimatesAlone) {
 }
 
 TEST(GapReportTest, LeavesOutWhatAnUnexplainedRestDoesNotHave) {
-  // A slow rest has no frequency; null would be a number that was lost.
+  // A slow remainder has no frequency; null would mean a lost number.
   const Json rest = gap_json(plain_subject(), made_up_result())["unexplained"];
   EXPECT_EQ(rest[0]["frequency_hz"], 37.02);
   EXPECT_EQ(rest[0]["amplitude_dps"], 0.001);
@@ -65,7 +65,7 @@ TEST(GapReportTest, ComparisonHoldsTheFieldsOfTheInterface) {
 }
 
 TEST(GapReportTest, RoundsAParameterByLessThanAHundredthOfItsSigma) {
-  // Table, gap.json and model.toml say one number, and it is as good as the exact one.
+  // Table, gap.json and model.toml have the same number, which is as good as the exact one.
   for (const double sigma : {1e-9, 9.99e-7, 1.01e-5, 3e-3}) {
     gap::Result result = made_up_result();
     result.effects[0].sigma = {sigma};
@@ -78,7 +78,7 @@ TEST(GapReportTest, RoundsAParameterByLessThanAHundredthOfItsSigma) {
 }
 
 TEST(GapReportTest, RoundingStaysInsideTheLimitsOfTheKind) {
-  // A time constant of 0.4 ± 300 s would be rounded to nothing, which no model file may hold.
+  // A time constant of 0.4 ± 300 s would be rounded to 0, which no model file may hold.
   gap::Result result = made_up_result();
   result.effects[0].effect = {0, model::Kind::kWarmUp, {0.01, 0.4}};
   result.effects[0].sigma = {1e-3, 3000.0};

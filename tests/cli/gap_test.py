@@ -1,6 +1,6 @@
 #!/usr/bin/python3
-"""`vgyro gap` and `vgyro compare` from the outside: the files and fields that other programs rely on, and what bad input
-gets. Whether the right effects are found is the blind test's business."""
+"""`vgyro gap` and `vgyro compare` from the outside: the files and fields that other programs rely on, and the errors
+for bad input. Whether the right effects are found is tested by the blind test."""
 
 import hashlib
 import json
@@ -76,7 +76,7 @@ message = "TABLE"
 rate = "TableRate"
 """
 
-# With a comment, an odd order and no newline at the end: it is a person's file.
+# With a comment, an odd order and no newline at the end, like a file written by hand.
 MODEL = """\
 format = 1   # my two gyros
 
@@ -103,13 +103,13 @@ BEGIN_US = 1_700_000_000_000_000
 
 
 def true_rate(t, rest=True):
-    """Rest, then turns to and fro with a little sway; or all of it from the beginning."""
+    """Rest, then turns to and fro with a little sway; without `rest` the turns begin at once."""
     since = np.maximum(t - 30.0, 0.0) if rest else t + 7.0
     return 0.0032 + 10.0 * np.sin(2 * np.pi * since / 23.0) + 1.0 * np.sin(2 * np.pi * 0.7 * since)
 
 
 def recording(seconds=90.0, hz=50.0, rest=True, gyros=(1, 2), reference_until=1e9, scale_error=SCALE_ERROR):
-    """A candump log: gyro 2 has a scale error that the model does not know."""
+    """A candump log: gyro 2 has a scale error that is not in the model."""
     rng = np.random.default_rng(SEED)
     frames = []
     for gyro, bus, can_id, offset_us, bias, density, error in ((1, "can0", 0x101, 0, 0.031, 2e-4, 0.0),
@@ -131,12 +131,12 @@ LOG = recording()
 
 
 def page_data(page):
-    """What a report page draws."""
+    """The data that a report page draws."""
     return json.loads(re.search(r'<script type="application/json" id="data">(.*?)</script>', page.decode(), re.DOTALL).group(1))
 
 
 class GapBench(bench.Bench):
-    found = None  # what one run of the workflow gave: text, and files by name
+    found = None  # results of one run of the workflow: text, and files by name
 
     def setUp(self):
         super().setUp()
@@ -150,7 +150,7 @@ class GapBench(bench.Bench):
         return done, {path.name: path.read_bytes() for path in (self.folder / out).iterdir()}
 
     def once(self):
-        """The workflow takes seconds: run once, looked at by all tests."""
+        """The workflow takes seconds: it runs once, for all tests."""
         if GapBench.found is None:
             GapBench.found = self.gap("--model", "model.toml")
         return GapBench.found
@@ -226,7 +226,7 @@ class Fields:
 
 class Gap(GapBench):
     def test_finds_names_adds_and_shows_the_gap_shrink(self):
-        # The whole of it: three files, and what is in them.
+        # The complete result: three files and their contents.
         done, files = self.once()
         self.assertEqual(sorted(files), ["gap.json", "model.toml", "report.html"])
         result = json.loads(files["gap.json"])
@@ -251,13 +251,14 @@ class Gap(GapBench):
         self.assertEqual((after[-1]["gyro"], after[-1]["kind"]), (2, "scale_factor"))
         self.assertEqual(after[-1]["error"], json.loads(files["gap.json"])["effects"][0]["parameters"]["error"])
         self.assertRegex(text[len(MODEL):], r"# named by vgyro gap: error 0\.00\d+ ± ")
-        # The gateway takes it back.
+        # The gateway accepts the model.
         self.write("found.toml", text)
         self.assertIn("scale_factor", self.good("check", "--model", "found.toml", "vgyro.toml").stdout.decode())
         self.assertEqual(self.read("model.toml"), MODEL)
 
     def test_same_input_gives_the_same_bytes_and_replaces_an_earlier_result(self):
-        # Also where the configuration names the model: raw rates are judged, or there would be no bias to see. -q is silent.
+        # The same if the configuration names the model: raw rates are evaluated, otherwise there would be no bias to
+        # find. -q prints nothing.
         first = self.once()[1]
         self.write("vgyro.toml", GYROS + REFERENCE + '\n[corrector]\nmodel = "model.toml"\n')
         (self.folder / "out").mkdir()
@@ -267,7 +268,7 @@ class Gap(GapBench):
         self.assertEqual(sorted(second), sorted(first))
         for name in ("gap.json", "model.toml"):
             self.assertEqual(second[name], first[name], name)
-        # The page names the files that it was made from, as they were given, and the command.
+        # The page contains the command, and the names of its input files as given.
         pages = [page_data(files["report.html"]) for files in (first, second)]
         for page in pages:
             origin = page.pop("provenance")
@@ -293,7 +294,7 @@ class Gap(GapBench):
         Fields(self).result(result)
         self.assertTrue(any(note.startswith("the recording holds no rest") for note in result["notes"]), result["notes"])
         self.assertIn("note: the recording holds no rest", done.stdout.decode())
-        # Which gyro has the scale error nobody can tell.
+        # It cannot be determined which gyro has the scale error.
         scale = [effect for effect in result["effects"] if effect["kind"] == "scale_factor"]
         self.assertEqual(len(scale), 1)
         readings = [(reading["kind"], reading["gyro"]) for reading in scale[0]["ambiguous_with"]]
@@ -301,7 +302,7 @@ class Gap(GapBench):
 
 
 class Ambiguous(GapBench):
-    """Without a reference a scale factor of one gyro is as well one of the other."""
+    """Without a reference a scale factor of one gyro may as well be one of the other."""
 
     kept = {}  # one run for each choice: they take seconds
 
@@ -425,7 +426,7 @@ class Bounded(GapBench):
             self.assertEqual(files[name], self.once()[1][name], name)
 
     def interrupted(self, write):
-        """A run that reads from a pipe until `write` has done its part, and is then interrupted."""
+        """A run that reads from a pipe until `write` has finished, and is then interrupted."""
         os.mkfifo(self.folder / "pipe.log")
         with subprocess.Popen([bench.VGYRO, "gap", "--config", "vgyro.toml", "--model", "model.toml", "--measured", "pipe.log", "--out", "out"],
                               cwd=self.folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
@@ -478,7 +479,7 @@ class Compare(GapBench):
 
 class BadInput(GapBench):
     def refused(self, *parts, log="drive.log", model="model.toml"):
-        """Clear words, exit 1, and nothing written: neither the folder nor a part of it."""
+        """Expects a clear message, exit code 1, and nothing written: neither the folder nor a part of it."""
         names = self.names()
         for command, options in (("gap", ("--out", "out")), ("compare", ())):
             said = self.bad(command, "--config", "vgyro.toml", "--model", model, "--measured", log, *options)
@@ -495,7 +496,7 @@ class BadInput(GapBench):
         self.refused(r"one\.log: no frame of gyro right \(GYRO_B 102 on can1\)", r"interfaces are: can0", log="one.log")
 
     def test_one_gyro_whose_clock_is_years_off(self):
-        # Both spans are told, and no memory is taken for the years between.
+        # Both spans are reported, and no memory is used for the years between.
         for years in (1, -1, 10, 100):
             off_s = years * 365 * 86_400
             lines = (line if " can1 " not in line else bench.stamp(int(line[1:11]) * 1_000_000 + int(line[12:18]) + off_s * 1_000_000)
@@ -519,7 +520,7 @@ class BadInput(GapBench):
         self.refused(r"empty\.log: .*no CAN frame", log="empty.log")
 
     def test_model_with_an_unknown_kind_parameter_or_value(self):
-        # With the line, and the name that was meant.
+        # The error has the line, and the name that was meant.
         for text, parts in ((MODEL.replace('"white_noise"', '"white_nois"', 1), (r"model\.toml:14", r'did you mean "white_noise"\?')),
                             (MODEL.replace("value_dps", "value_dbs", 1), (r"model\.toml:6", r'did you mean "value_dps"\?')),
                             (MODEL.replace("gyro = 2", "gyro = 3", 1), (r"model\.toml:9", r"gyro = 1 or 2")),
@@ -528,7 +529,7 @@ class BadInput(GapBench):
             self.refused(*parts)
 
     def test_model_that_nothing_can_be_added_to(self):
-        # Told at once, not after the work.
+        # Reported at once, not after the work.
         self.write("model.toml", 'format = 1\neffect = [ {gyro = 1, kind = "bias", value_dps = 0.03} ]\n')
         names = self.names()
         said = self.bad("gap", "--config", "vgyro.toml", "--model", "model.toml", "--measured", "drive.log", "--out", "out")

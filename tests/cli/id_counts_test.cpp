@@ -1,5 +1,5 @@
-// Frames by identifier: every one counted, extended ones up to a bound that holds the first of
-// them.
+// Frames by identifier: every standard one is counted, extended ones up to a limit; the first of
+// them are kept.
 
 #include <map>
 #include <random>
@@ -36,7 +36,7 @@ TEST(IdCounts, CountEveryFrameAndOfTooManyExtendedIdentifiersTheFirst) {
       ++standard[{bus, id}];
       continue;
     }
-    // Some 6000 of them, close together and far apart.
+    // Some 6000 identifiers, close together and far apart.
     const auto id = static_cast<std::uint32_t>(random() % 1000 * (random() % 2 == 0 ? 1 : 0x10001));
     counts.add(bus, frame_of(id, can::kExtended));
     const bool known = extended.contains({bus, id});

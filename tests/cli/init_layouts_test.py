@@ -1,6 +1,6 @@
 #!/usr/bin/python3
-"""`vgyro init` without DBC files: the layout of two gyros is found among other traffic, and the DBC file that it writes,
-read by canmatrix, gives back the motion that went in. Frames are made here by Python alone; seeds are fixed."""
+"""`vgyro init` without DBC files: the layout of two gyros is found among other traffic, and the DBC file that it
+writes, read by canmatrix, reproduces the injected motion. Frames are made here by Python alone; seeds are fixed."""
 
 import io
 import logging
@@ -15,11 +15,11 @@ import numpy as np
 import bench
 
 logging.disable(logging.CRITICAL)
-with redirect_stdout(io.StringIO()):  # canmatrix tells on stdout which other formats it lacks
+with redirect_stdout(io.StringIO()):  # canmatrix prints the formats that it lacks to stdout
     import canmatrix.formats
 
 RAD = 180 / np.pi
-# What makes raw bytes of a number, how many bytes, the least and the greatest, the zero, usual scales in deg/s.
+# Encoding of a number in raw bytes, number of bytes, least and greatest value, zero, usual scales in deg/s.
 LAYOUTS = {
     "i16": (lambda n: struct.pack("<h", n), 0, (0.01, 0.02, 0.001 * RAD)),
     "i16 Motorola": (lambda n: struct.pack(">h", n), 0, (0.01, 0.005, RAD / 512)),
@@ -42,7 +42,7 @@ class Sensor:
         self.scale = chance.choice(scales)
         self.identifier, self.bus, self.sign = identifier, bus, sign
         self.size = len(self.pack(0))
-        self.place = chance.randrange(8 - self.size)  # a byte is left for the counter
+        self.place = chance.randrange(8 - self.size)  # one byte stays free for the counter
         self.chance = chance
 
     def frame(self, i, dps):
@@ -55,7 +55,7 @@ class Sensor:
 
 
 class Drive:
-    """10 s of rest, then bends; two sensors and what else is on a bus."""
+    """10 s of rest, then bends; two sensors among other traffic."""
 
     def __init__(self, seed, second=True):
         noise = np.random.default_rng(seed)
@@ -107,8 +107,8 @@ class InitLayouts(bench.Bench):
             (self.folder / name).unlink(missing_ok=True)
 
     def slopes(self, drive, text):
-        """Of each sensor that the written DBC file knows: its value as canmatrix reads it, over the truth; with the sign
-        of the configuration. The fit must leave nothing but noise: no bit is missing, none is too many."""
+        """For each sensor in the written DBC file: its value as read by canmatrix over the truth, with the sign of
+        the configuration. The fit must leave only noise: no bit is missing, none is too many."""
         with redirect_stdout(io.StringIO()):
             matrix = canmatrix.formats.loadp_flat(str(self.folder / "vgyro-guess.dbc"))
         slopes = {}

@@ -1,4 +1,4 @@
-// The parts of `vgyro init`: what is kept of a log, what names tell, which fields bytes hold.
+// The parts of `vgyro init`: the frames kept from a log, the meaning of names, the fields in bytes.
 
 #include <array>
 #include <cmath>
@@ -62,7 +62,7 @@ TEST(InitTraffic, ThinsALongLogEvenlyAndCountsAllOfIt) {
   EXPECT_EQ(stream.frames, std::uint64_t{kFrames});
   EXPECT_LE(stream.kept.size() * (sizeof(Stream::Kept) + 8), kBytesMost);
   EXPECT_GE(stream.kept.size() * (sizeof(Stream::Kept) + 8), kBytesMost / 5);
-  // Whole blocks, and from the log's end too.
+  // Complete blocks, also from the log's end.
   EXPECT_EQ(stream.kept[1].t_ns - stream.kept[0].t_ns, kSecond_ns / 100);
   EXPECT_GT(stream.kept.back().t_ns, 800 * kSecond_ns);
 }
@@ -136,7 +136,7 @@ TEST(InitSeries, LeavesOutWhatIsOutOfRangeOrComesTooEarly) {
   EXPECT_DOUBLE_EQ(series.step, 0.2);
 }
 
-// Motorola 16 bits at byte 1; a counter in the high nibble of byte 0; the rest is chance.
+// Motorola 16 bits at byte 1; a counter in the high nibble of byte 0; the rest is random.
 TEST(InitLayouts, FindTheFieldAndTheCounterAmongChance) {
   std::mt19937 random(kSeed);
   Traffic traffic;

@@ -1,7 +1,7 @@
 #!/usr/bin/python3
-"""`vgyro init` on made-up drives with each sensor of dbc/profiles beside a cheap MEMS: its proposal, what `vgyro check`
-says of it, and what `vgyro replay` makes of the same log with it. canmatrix puts the profile's frames together and reads
-vgyro's own, python-can writes the log: neither shares code with the product. Seeds are fixed."""
+"""`vgyro init` on made-up drives with each sensor of dbc/profiles and a cheap MEMS: its proposal, the result of
+`vgyro check`, and the result of `vgyro replay` on the same log with it. canmatrix encodes the profile's frames and
+decodes vgyro's own, python-can writes the log: neither shares code with the product. Seeds are fixed."""
 
 import binascii
 import io
@@ -17,7 +17,7 @@ import numpy as np
 import bench
 
 logging.disable(logging.CRITICAL)
-with redirect_stdout(io.StringIO()):  # canmatrix tells on stdout which other formats it lacks
+with redirect_stdout(io.StringIO()):  # canmatrix prints the formats that it lacks to stdout
     import canmatrix.formats
 
 PROFILES = bench.SOURCE / "dbc/profiles"
@@ -48,7 +48,7 @@ def load(path):
 
 
 def crc8_j1850(data):
-    """Bit by bit, and held against the catalogue's check value."""
+    """Bit by bit, and compared with the catalogue's check value."""
     crc = 0xFF
     for byte in data:
         crc ^= byte
@@ -61,7 +61,7 @@ assert crc8_j1850(b"123456789") == 0x4B
 
 
 class Profile:
-    """How a sensor of the market is put into frames: which message and signal is its yaw rate, and what goes beside it."""
+    """Encoding of a sensor of the market: the message and signal of its yaw rate, and the other signals."""
 
     def __init__(self, file, message, rate, per_dps=1.0, rate_hz=100.0, identifier=None, beside=None, seal=None, expect=()):
         self.file, self.message, self.rate, self.per_dps, self.rate_hz = file, message, rate, per_dps, rate_hz
@@ -145,7 +145,7 @@ class Drive:
 
     @staticmethod
     def encode(frame, values):
-        """canmatrix takes raw numbers, and wraps those that do not fit."""
+        """canmatrix accepts raw numbers, and wraps those that do not fit."""
         raw = {}
         for signal in frame.signals:
             value = values.get(signal.name, 0.0)
@@ -157,7 +157,7 @@ class Drive:
             z = self.sign * (1.004 * self.at(when - 0.004, self.rate_dps) - 0.7) + 0.05 * self.random.standard_normal()
             x = self.at(when, self.roll_dps) + 0.05 * self.random.standard_normal()
             data = struct.pack(">BhhbB", i % 15, round(x * 100), round(z * 100), 6, 0xA5)
-            total = binascii.crc32(data) & 0xFF  # a check value of a kind that nobody knows
+            total = binascii.crc32(data) & 0xFF  # a check value of an unknown kind
             self.put(when, "can1", 0x2C1, data + bytes([total]))
             wheel = self.at(when + 0.2, self.rate_dps) * 8 + self.at(when, self.roll_dps) * 20
             speed = (self.at(when + 0.25, self.rate_dps) - self.at(when + 0.15, self.rate_dps)) * 80
@@ -180,7 +180,7 @@ class InitProfiles(bench.Bench):
         return drive, said, self.read("vgyro.toml")
 
     def error_dps(self, drive, first):
-        """rms and valid share of VG_Rate over the motion, as canmatrix reads it, at the instants that it tells."""
+        """rms and valid share of VG_Rate over the motion, as read by canmatrix, at the instants of the frames."""
         frame = load(bench.SOURCE / "dbc/vgyro.dbc").frame_by_name("VG_Rate")
         errors, frames = [], 0
         for message in can.CanutilsLogReader(str(self.folder / "out.log")):
@@ -202,7 +202,7 @@ class InitProfiles(bench.Bench):
                 gyros = [gyro.split("\n[c")[0] for gyro in text.split("[[gyro]]")[1:]]
                 self.assertEqual(len(gyros), 2, said + text)
                 for beside in ("YawCrc", "YawStatus", "YawCounter", "YawRateMerit", "YawRateSign"):
-                    self.assertNotIn(beside, said)  # of the rate's name, but no rate
+                    self.assertNotIn(beside, said)  # named like the rate, but not a rate
                 where = [f'message = "{profile.message}"' in gyro for gyro in gyros]
                 self.assertEqual(sum(where), 1, said + text)
                 sensor, mems = gyros if where[0] else gyros[::-1]
@@ -217,7 +217,8 @@ class InitProfiles(bench.Bench):
                 first = 1 if where[0] else drive.sign
                 error_dps, share = self.error_dps(drive, first)
                 self.assertGreater(share, 0.98)
-                # The coarsest have 0.11 deg/s a bit; the two are 4 ms apart; a pair of a slow one is a mean over its interval.
+                # The coarsest have 0.11 deg/s a bit; the two are 4 ms apart; a slow gyro makes a pair with a mean over
+                # its interval.
                 self.assertLess(error_dps, 0.15 if profile.rate_hz >= 50.0 else 0.3, said)
 
 

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""`vgyro init`: the right pair out of mixtures of a vehicle's traffic whose truth is known. The frames are made here,
+"""`vgyro init`: finds the right pair in mixtures of a vehicle's traffic with known truth. The frames are made here,
 by Python alone; seeds are fixed."""
 
 import random
@@ -71,12 +71,12 @@ def crc8(data, crc=0xFF):
 
 
 def profile_1a(data, data_id):
-    """AUTOSAR E2E profile 1, both bytes of the data ID: what the CRC routine begins and ends with is taken back."""
+    """AUTOSAR E2E profile 1, both bytes of the data ID; the CRC routine's initial and final values are undone."""
     return crc8(bytes([data_id & 0xFF, data_id >> 8]) + data, 0x00) ^ 0xFF
 
 
 class Mixture:
-    """40 s: rest, then bends; what each sender says and when."""
+    """40 s: rest, then bends; the frames of each sender and their times."""
 
     def __init__(self, seed, fog=True, mems=True, copy="exact", rest_s=15.0):
         self.rest_s = rest_s
@@ -120,7 +120,7 @@ class Mixture:
             self.put(when + 0.005, "other", 0x300 + self.random.randrange(4), self.random.randbytes(8))
 
     def add_surroundings(self, seed, speed_kmh=60.0, gravity=9.81, creep_kmh=0.0):
-        """An accelerometer, wheel speeds that stand while the gyros do, and one acceleration alone."""
+        """An accelerometer, wheel speeds that are 0 while the gyros rest, and a single acceleration."""
         noise = np.random.default_rng(1000 + seed)
         for i, when in enumerate(np.arange(0.0135, 59.0, 0.02)):
             acc = struct.pack("<Bhhh", i % 15, *(round(100 * value) for value in
@@ -149,7 +149,7 @@ class Init(bench.Bench):
         self.write("all.dbc", mixture.dbc())
 
     def test_finds_the_pair_in_twenty_mixtures(self):
-        # Two sensors among a gateway's copies, other axes, and other things that turn.
+        # Two sensors among a gateway's copies, other axes, and other rotations.
         for seed in range(3 if bench.SANITIZED else 20):
             mixture = Mixture(seed, copy=("exact", "filtered")[seed % 2])
             with self.subTest(seed=seed, unit=mixture.unit, sign=mixture.sign, buses=mixture.buses):
@@ -203,7 +203,7 @@ class Init(bench.Bench):
         for part in ('message = "ACC"', 'x = "AccX"', 'y = "AccY"', 'z = "AccZ"', "1.00 g", 'counter = "AccCount"',
                      'crc = "AccCheck"', "found by trial"):
             self.assertIn(part, acceleration)
-        # A data ID is a constant in the check value: each low byte of 1c stands for 256 of 1a.
+        # A data ID is a constant in the check value: each low byte of 1c corresponds to 256 of 1a.
         self.assertRegex(acceleration, 'e2e = "profile_1[ac]"')
         self.assertRegex(text, r"rest_s = 3\d +# CHECK: all that this log has, from 0 s to (38|39|40) s")
         self.assertIn("vgyro.toml: good", self.good("check", "vgyro.toml").stdout.decode())
@@ -213,7 +213,7 @@ class Init(bench.Bench):
         self.assertNotRegex(report, r'"crc_wrong": [1-9]')
 
     def test_does_not_propose_what_contradicts_the_rest(self):
-        # Wheels that roll while the gyros rest would keep the corrector from every stop; no gravity, no accelerometer.
+        # Wheels that roll while the gyros rest would prevent every stop; a signal without gravity is no accelerometer.
         mixture = Mixture(4, rest_s=40.0)
         mixture.lines = [line for line in mixture.lines if " 106#" not in line[1]]
         mixture.add_surroundings(4, gravity=4.0, creep_kmh=3.0)

@@ -1,7 +1,7 @@
 #pragma once
 
-// A result with something of everything, and names that are hostile to a page, for the tests of
-// what is made of results.
+// A result with every kind of entry, and names that are hostile to a page, for the tests of its
+// output.
 
 #include <cmath>
 #include <numbers>

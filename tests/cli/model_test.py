@@ -10,7 +10,7 @@ import bench
 
 class ModelList(bench.Bench):
     def test_lists_every_kind_with_its_limits(self):
-        # The file is written by hand, from this list.
+        # Users write the file by hand from this list.
         text = self.good("model", "list").stdout.decode()
         for kind in ("scale_factor ", "angle_harmonic ", "gauss_markov ", "timestamp_jitter "):
             self.assertIn("\n  " + kind, text)
@@ -25,13 +25,13 @@ class ModelList(bench.Bench):
         kind = ""
         for line in lines:
             kind = line.split()[0] if re.match(r"  \S", line) else kind
-            if line.startswith("    may be taken for "):
-                others = set(line.removeprefix("    may be taken for ").strip().split(", "))
+            if line.startswith("    may be confused with "):
+                others = set(line.removeprefix("    may be confused with ").strip().split(", "))
                 self.assertLessEqual(others, kinds - {kind})
 
     def test_every_kind_is_told_and_has_equations_of_its_own(self):
-        """A kind that the catalogue learned is nowhere forgotten: the documentation's tables, what judges the
-        simulator and what hides from the gap workflow."""
+        """Every kind of the catalogue appears in the documentation's tables, in the tests of the simulator, and
+        among the kinds hidden from the gap workflow."""
         lines = self.good("model", "list").stdout.decode().splitlines()
         kinds = {line.split()[0] for line in lines if re.match(r"  \S", line)}
         source = lambda name: (bench.SOURCE / name).read_text(encoding="utf-8")
@@ -72,7 +72,7 @@ to_s = 6
 
 class ModelOfAConfig(bench.Bench):
     def test_check_says_what_becomes_of_each_effect(self):
-        # Before it is trusted.
+        # A user can check the model before trusting it.
         self.write("known.toml", MODEL)
         text = self.good("check", "--model", "known.toml", "vgyro.toml").stdout.decode()
         for pattern in (r"known.toml, 3 effects", r"takes back +bias +value_dps 0.5",
@@ -98,7 +98,7 @@ class ModelOfAConfig(bench.Bench):
         self.assertIn("temperature of gyro right", said)
 
     def test_replay_takes_it_off_and_says_so(self):
-        # The bias of gyro a is 0.5: with the model the plain mean is off by the other's alone.
+        # The bias of gyro a is 0.5: with the model, the plain mean has only the other gyro's error.
         self.write("known.toml", MODEL)
         self.write("in.log", "".join(bench.two_gyros(5)))
         summaries = []

@@ -1,6 +1,6 @@
 #!/usr/bin/python3
-"""The virtual rate in the makers' own layouts: read back with python-can and canmatrix, by the makers' DBC files,
-and compared with VG_Rate of the same instant."""
+"""The virtual rate in the makers' own layouts: decoded with python-can and canmatrix, by the makers' DBC files, and
+compared with VG_Rate of the same instant."""
 
 import collections
 import contextlib
@@ -23,10 +23,10 @@ with warnings.catch_warnings():
 PROFILES = bench.SOURCE / "dbc/profiles"
 RATE_STEP_DPS = 5e-5  # of VG_Rate
 DEG_PER_RAD = 180 / math.pi
-# What the CRC of the Bosch MM7 and of "crc8_j1850" is made with, and the value that everybody publishes for it.
+# The published check value of the CRC of the Bosch MM7 and of "crc8_j1850".
 CRC_CHECK = (b"123456789", 0x4B)
 
-# message: file, keys, unit in deg/s, step in deg/s; one of every file in dbc/profiles
+# message: file, keys, unit in deg/s, step in deg/s; one for every file in dbc/profiles
 LAYOUTS = {
     "MM7_Yaw": ("bosch_mm7.dbc", 'rate = "YawRate"\nvalid = "YawStatus == 0"\ncounter = "YawCounter"\n'
                                  'crc = "YawCrc"\ne2e = "crc8_j1850"', 1, 0.005),
@@ -45,12 +45,12 @@ LAYOUTS_MOST = 8
 IDS = {0x174: "MM7_Yaw", 0x0CF02AE2: "ARI", 0x09F11323: "RateOfTurn", 0x608: "RT_RateVehicle", 0x300: "ESP_02",
        0x091: "Yaw_Data_FD1", 0x600: "IMU04_YawAccX", 0x032: "MTi_RateOfTurn", 0x122: "SBG_ImuGyro",
        0x125: "HG1120_InertialZ"}
-# Those that have a word for "no valid rate"; the others are silent then.
+# Layouts with a code for "no valid rate"; the others are not sent then.
 SPEAKING = ("MM7_Yaw", "ARI", "RateOfTurn", "MTi_RateOfTurn", "SBG_ImuGyro")
 # Full scale, in deg/s, where the test turns faster.
 NARROW = {"MM7_Yaw": 163.84, "ESP_02": 163.84, "ARI": 252}
 
-# The frames of tests/gateway/output_layout_test.cpp, which were worked out by hand: what they say in the DBC file's unit.
+# The frames of tests/gateway/output_layout_test.cpp, which were computed by hand: their values in the DBC file's unit.
 GOLDEN = {
     "MM7_Yaw": {"C880000000000007": {"YawRate": 1, "YawStatus": 0, "YawCounter": 0},
                 "C88000000000011A": {"YawRate": 1, "YawStatus": 0, "YawCounter": 1},
@@ -95,8 +95,8 @@ def tables(names):
 
 
 def turning(seconds=4):
-    """At rest for a second and a half, then faster and faster to both sides; the last second beyond what cars' sensors
-    carry."""
+    """At rest for a second and a half, then faster and faster to both sides; in the last second beyond the range of
+    car sensors."""
     lines = []
     for number in range(100 * seconds):
         us = 1_700_000_000_000_000 + number * 10_000
@@ -107,7 +107,7 @@ def turning(seconds=4):
 
 
 def is_valid(name, signals, data):
-    """By the makers' own rules."""
+    """Is the rate valid by the makers' own rules?"""
     if name == "MM7_Yaw":
         return signals["YawStatus"].raw_value == 0
     if name == "ARI":
@@ -134,7 +134,7 @@ class OutputLayouts(bench.Bench):
         self.write("vgyro.toml", bench.CONFIG + more + tables(names))
         self.write("in.log", turning())
         done = self.good("replay", "--config", "vgyro.toml", "-o", "out.log", "--json", "-", "-q", "in.log")
-        # Iterated to its end, python-can's reader closes its file.
+        # python-can's reader closes its file after the last frame.
         return list(can.LogReader(str((self.folder / "out.log")))), json.loads(done.stdout)
 
     def test_the_oracle_has_the_published_crc(self):
@@ -164,7 +164,7 @@ class OutputLayouts(bench.Bench):
         messages, summary = self.replay(names)
         own = matrix_of(bench.SOURCE / "dbc/vgyro.dbc").frame_by_name("VG_Rate")
         truth, seen = {}, {name: {} for name in names}
-        before = collections.Counter()  # a frame may cause several rates: the first pairs go out together
+        before = collections.Counter()  # a frame may cause several rates: the first pairs are sent together
         for message in messages:
             instant = (message.timestamp, before[message.arbitration_id, message.timestamp])
             before[message.arbitration_id, message.timestamp] += 1
@@ -237,7 +237,7 @@ class OutputLayouts(bench.Bench):
             self.assertIn(part, text)
 
     def test_a_layout_that_would_be_read_back_is_refused(self):
-        """The gateway's own frames must not come in as a sensor's: not by their PGN either."""
+        """The gateway's own frames must not be received as a sensor's, not by their PGN either."""
         gyro = bench.CONFIG.replace('bus = "can1"\ndbc = "bench.dbc"\nmessage = "GYRO_B"\nrate = "Rate"',
                                     f'bus = "can1"\ndbc = "{PROFILES}/j1939_ari.dbc"\nmessage = "ARI"\nrate = "YawRate"')
         self.assertNotEqual(gyro, bench.CONFIG)
@@ -255,7 +255,7 @@ class OutputLayouts(bench.Bench):
 
 
 class Example(bench.Bench):
-    """examples/layouts.toml over the recording beside it, as examples/README.md says."""
+    """examples/layouts.toml on the recording beside it, as in examples/README.md."""
 
     FRAMES = {  # bus, identifier: file, message, signal, deg/s a unit, step in deg/s, ms between frames
         ("can2", 0x174): ("bosch_mm7.dbc", "MM7_Yaw", "YawRate", 1, 0.005, 10),

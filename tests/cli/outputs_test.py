@@ -1,6 +1,6 @@
 #!/usr/bin/python3
-"""What `vgyro` writes: never over what it reads, never by way of another program's syntax, and never
-lost without a word."""
+"""The outputs of `vgyro`: they never overwrite an input, never reach another program's syntax, and are never lost
+silently."""
 
 import json
 import os
@@ -40,7 +40,7 @@ class Outputs(bench.Bench):
         return {path.name: path.read_bytes() for path in self.folder.iterdir() if path.is_file()}
 
     def calls(self, output):
-        """Every option of every command that names a file to be written, with what it reads."""
+        """Every option of every command that names an output file, with the command's inputs."""
         config = ("--config", "vgyro.toml")
         replay = ("replay", "-q", *config, "--model", "model.toml")
         return (
@@ -52,7 +52,7 @@ class Outputs(bench.Bench):
         )
 
     def test_no_output_is_written_over_an_input(self):
-        # Under whatever name: a recording of a drive cannot be made again. A picture is only drawn under a picture's name.
+        # Under any name: a recording of a drive cannot be repeated. A picture is only drawn to a picture's name.
         for name in ("vgyro.toml", "bench.dbc", "model.toml", "in.log", "profile.csv"):
             os.link(self.folder / name, self.folder / f"{name}.svg")
             (self.folder / f"link_{name}.svg").symlink_to(name)
@@ -74,7 +74,7 @@ class Outputs(bench.Bench):
                     self.assertEqual(self.everything(), before)
 
     def test_no_input_is_overwritten_through_standard_input_or_output(self):
-        # What the shell has opened is the same file too.
+        # The same holds for a file that the shell has opened.
         before = self.everything()
         with open(self.folder / "in.log", "rb") as log:
             done = subprocess.run([bench.VGYRO, "replay", "-q", "--config", "vgyro.toml", "-o", "in.log", "-"], stdin=log,
@@ -88,7 +88,7 @@ class Outputs(bench.Bench):
         self.assertEqual(self.everything(), before)
 
     def test_two_outputs_are_not_one_file(self):
-        # Whether it is there already or not.
+        # Whether the file exists already or not.
         for first, second in (("a.svg", "a.svg"), ("a.svg", "./a.svg"), ("b.svg", "b.svg")):
             for call in (("replay", "-q", "-o", first, "--plot", second, "in.log"), ("replay", "-o", first, "--json", second, "in.log"),
                          ("allan", "--json", first, "--plot", second, "in.log")):
@@ -110,7 +110,7 @@ class Outputs(bench.Bench):
         self.good("replay", "-q", "--config", "vgyro.toml", "-o", "/dev/null", "--json", "/dev/null", "in.log")
 
     def test_a_picture_has_a_name_and_never_a_command(self):
-        # gnuplot takes a name that begins with a bar for a command.
+        # gnuplot runs a name that begins with a bar as a command.
         for name in ("|touch marker; .svg", "| touch marker #.png", "`touch marker`.svg", "'; system 'touch marker' #.svg"):
             for call in (("replay", "-q", "-o", "x.log"), ("allan",)):
                 with self.subTest((call, name)):
@@ -120,7 +120,7 @@ class Outputs(bench.Bench):
         self.assertFalse((self.folder / "marker").exists())
 
     def test_names_in_a_picture_are_text(self):
-        # A configuration may come from somebody else.
+        # A configuration may come from an untrusted source.
         name = "`touch marker` @x '; system 'touch marker' #"
         self.write("vgyro.toml", bench.CONFIG.replace('"left"', f'"{name}"'))
         self.write("`touch marker`.log", self.read("in.log"))
@@ -131,7 +131,7 @@ class Outputs(bench.Bench):
         self.assertFalse((self.folder / "marker").exists())
 
     def test_what_cannot_be_written_is_told(self):
-        # A full disk, into which a script's output goes unseen.
+        # A full disk, on which a script's output is lost unnoticed.
         config = ("--config", "vgyro.toml")
         model = ("--model", "model.toml")
         for call in (
@@ -155,7 +155,7 @@ class Outputs(bench.Bench):
                 self.assertIn("full.svg: cannot be written: No space left on device", self.bad(*call))
 
     def limited(self, *call):
-        """What it says when no file may become larger than 2 KB: a disk that is full in the middle."""
+        """The messages when no file may become larger than 2 KB, like on a disk that fills up."""
         def limit():
             signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
             resource.setrlimit(resource.RLIMIT_FSIZE, (2048, 2048))
@@ -206,7 +206,7 @@ class Outputs(bench.Bench):
             self.assertEqual(os.fstat(out.fileno()).st_ino, (self.folder / "out.log").stat().st_ino)
 
     def start_replay(self, log):
-        """A replay that has read `log` from a pipe whose writer goes on; its lines are on the way to x.log."""
+        """A replay that has read `log` from a pipe that stays open; its output is being written to x.log."""
         self.write("x.log", "earlier")
         running = subprocess.Popen([bench.VGYRO, "replay", "--config", "vgyro.toml", "-o", "x.log", "-"], stdin=subprocess.PIPE,
                                    stderr=subprocess.PIPE, cwd=self.folder)
@@ -252,7 +252,7 @@ class Outputs(bench.Bench):
         self.assertEqual((self.read("x.log"), self.hidden()), ("earlier", []))
 
     def test_a_closed_standard_output_is_no_place_for_a_file(self):
-        # The next file to be opened would get its number, and texts would go there.
+        # The next opened file would get the number of the closed stderr, and would receive its texts.
         done = subprocess.run([bench.VGYRO, "allan", "--config", "vgyro.toml", "--json", "a.json", "in.log"], stderr=subprocess.PIPE,
                               cwd=self.folder, check=False, preexec_fn=lambda: os.close(1))
         self.assertEqual(done.returncode, 1)
@@ -277,7 +277,7 @@ class Numbers(bench.Bench):
                ("gap", "--seed", "0 to 18446744073709551615"))
 
     def test_every_number_is_finite_whole_and_in_its_range(self):
-        # What is none is wrong usage, told with option, word and range before anything is done.
+        # A word that is no number is wrong usage, reported with option, word and range before anything is done.
         for command, option, allowed in self.OPTIONS:
             for word in (*self.WRONG, *(("1.5", "1e3", "18446744073709551616") if option == "--seed" else ())):
                 if (option, word) == ("--gyro-rate", "1,5"):
@@ -290,7 +290,7 @@ class Numbers(bench.Bench):
                         self.assertIn(f" from {allowed}", said)
 
     def test_a_seed_is_decimal(self):
-        # 010 is ten, as people write it, and not eight.
+        # 010 is ten, not eight.
         self.write("model.toml", MODEL)
         self.write("profile.csv", PROFILE)
         logs = [self.good("simulate", "-q", "--config", "vgyro.toml", "--model", "model.toml", "--profile", "profile.csv", "--seed",

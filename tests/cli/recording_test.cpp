@@ -109,7 +109,7 @@ class RecordingTest : public testing::Test {
   fs::path root_;
 };
 
-// Bytes worked out by hand from the DBC text: 0.5 deg/s is 500000 = 0007A120, 25 degC 2500 = 09C4.
+// Bytes computed by hand from the DBC text: 0.5 deg/s is 500000 = 0007A120, 25 degC 2500 = 09C4.
 constexpr std::string_view kLog =
     "(1700000000.000000) can0 103#40420F00\n"         // reference 1 deg/s
     "(1700000000.001000) can0 101#20A10700C40900\n"   // left 0.5, 25 degC, counter 0
@@ -164,8 +164,8 @@ TEST_F(RecordingTest, RestIsNotKnownWhereTheReferenceCalibrates) {
 }
 
 TEST_F(RecordingTest, TakesARepeatedStampWhenTheCounterMoved) {
-  // A bus that was read late stamps several frames alike; a frame that is left out would look like
-  // one that was dropped.
+  // A bus that was read late gives several frames the same stamp; a frame that is left out would
+  // look like a lost one.
   const auto recording = read(fmt::format("{}{}", kLog,
                                           "(1700000000.031000) can0 101#20A10700280A01\n"
                                           "(1700000000.012000) can1 102#0000803E\n"));
@@ -175,7 +175,7 @@ TEST_F(RecordingTest, TakesARepeatedStampWhenTheCounterMoved) {
 }
 
 TEST_F(RecordingTest, ModelFileIsNotAppliedToReadings) {
-  // What the model knows is to be judged: the raw rate is what was measured.
+  // The recording keeps the raw rate as measured, because the model itself is to be judged.
   put("known.toml", "format = 1\n[[effect]]\ngyro = 1\nkind = \"bias\"\nvalue_dps = 0.4\n");
   const auto recording =
       read(kLog, fmt::format("{}[corrector]\nmodel = \"known.toml\"\n", kConfig));
@@ -200,8 +200,8 @@ TEST_F(RecordingTest, TellsWhichGyroIsMissingAndWhatTheLogHolds) {
       << recording.error().message();
 }
 
-// Where every input is named and sent, the workflow knows every one. A new input is tried here
-// without being named, and wants its signal in this configuration.
+// If every input is configured and sent, the recording has every one. A new input is tested here
+// without being named, and needs its signal in this configuration.
 TEST_F(RecordingTest, HoldsEveryInputOfTheWorkflow) {
   std::string log;
   for (int i = 0; i < 100; ++i) {

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""`vgyro replay`: what comes out, what the summary counts, and what is said of bad input."""
+"""`vgyro replay`: its output, the counts of its summary, and its errors for bad input."""
 
 import collections
 import gzip
@@ -60,7 +60,7 @@ class Replay(bench.Bench):
 
 class Output(Replay):
     def test_frames_go_to_standard_output(self):
-        # The plain call is a filter: log in, log out.
+        # Without options it is a filter: log in, log out.
         out = frames(self.replay("in.log").stdout.decode())
         self.assertEqual({f[2] for f in out}, {RATE, BIAS, MODEL})
         self.assertEqual({f[1] for f in out}, {"can0"})
@@ -70,13 +70,13 @@ class Output(Replay):
         self.assertAlmostEqual(rates[-1], 0.0032, delta=3e-5)
 
     def test_each_line_carries_the_stamp_of_the_frame_that_caused_it(self):
-        # That is what makes an output log comparable with its input.
+        # The input's stamps make an output log comparable with its input.
         stamps = {line[1:18] for line in self.lines}
         for frame in frames(self.replay("in.log").stdout.decode()):
             self.assertIn(frame[0], stamps)
 
     def test_the_same_input_gives_the_same_bytes(self):
-        # On every run, into a file or a pipe, from a file, a pipe or an archive.
+        # The output is the same on every run, into a file or a pipe, from a file, a pipe or an archive.
         first = self.replay("in.log").stdout
         text = "".join(self.lines).encode()
         (self.folder / "in.log.xz").write_bytes(lzma.compress(text))
@@ -87,14 +87,14 @@ class Output(Replay):
         self.assertEqual(self.replay("in.log.xz").stdout, first)
 
     def test_several_logs_are_one_recording(self):
-        # candump -l begins a new file now and then.
+        # candump -l sometimes begins a new file.
         whole = self.replay("in.log").stdout
         self.write("first.log", "".join(self.lines[:301]))
         self.write("second.log", "".join(self.lines[301:]))
         self.assertEqual(self.replay("first.log", "second.log").stdout, whole)
 
     def test_logs_of_the_same_time_are_merged(self):
-        # One `candump -l` per bus is what people have. One more begins later, one comes packed from a pipe.
+        # Users often have one `candump -l` per bus. One more begins later, one comes compressed from a pipe.
         whole = self.replay("in.log").stdout
         for bus in ("can0", "can1"):
             self.write(f"{bus}.log", "".join(line for line in self.lines if f" {bus} " in line))
@@ -111,14 +111,14 @@ class Output(Replay):
         self.assertIn("is named twice", self.refuse("in.log", "in.log"))
 
     def test_stamps_have_as_many_digits_as_asked_for(self):
-        # canplayer stops at nine.
+        # canplayer does not accept nine digits.
         nine = [line.replace(") ", "000) ", 1) for line in self.lines]
         self.write("nine.log", "".join(nine))
         self.assertEqual(self.replay("--digits", "6", "nine.log").stdout, self.replay("in.log").stdout)
         self.assertEqual(self.replay("--digits", "9", "in.log").stdout, self.replay("nine.log").stdout)
 
     def test_what_was_passed_over_is_told(self):
-        # A byte-order mark costs nothing; NUL bytes of a power cut, and other lines, are counted.
+        # A byte-order mark is skipped; NUL bytes of a power cut, and other lines, are counted.
         text = b"\xef\xbb\xbf" + "".join(self.lines[:400]).encode() + b"a remark\n" + bytes(4096)
         (self.folder / "odd.log").write_bytes(text + "".join(self.lines[400:]).encode())
         done = self.replay("odd.log")
@@ -134,7 +134,7 @@ class Output(Replay):
         self.assertIsNotNone(rates[0])
 
     def test_map_takes_interfaces_of_the_log_for_those_of_the_config(self):
-        # Somebody else's log has somebody else's interface names.
+        # A foreign log has other interface names.
         renamed = "".join(self.lines).replace(" can0 ", " slcan7 ").replace(" can1 ", " can0 ")
         self.write("other.log", renamed)
         mapped = self.replay("--map", "slcan7=can0", "--map", "can0=can1", "other.log").stdout
@@ -156,7 +156,7 @@ class Output(Replay):
             self.assertRegex(line, r"^\(\d+\.\d{6}789\)")
 
     def test_stdin_streams(self):
-        # Live behind candump: frames come out before the input ends.
+        # Live behind candump: frames are written before the input ends.
         import select
         process = subprocess.Popen([bench.VGYRO, "replay", "--config", "vgyro.toml", "-q", "-"], stdin=subprocess.PIPE,
                                    stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, cwd=self.folder)
@@ -173,7 +173,7 @@ class Output(Replay):
         self.assertEqual(code, 0)
 
     def test_stderr_has_a_summary_and_no_progress_bar(self):
-        # In a log file escape sequences are noise; --quiet leaves nothing.
+        # A log file must not contain escape sequences; --quiet prints nothing.
         said = self.replay("-o", "out.log", "in.log").stderr.decode()
         self.assertNotRegex(said, "[\r\x1b]")
         for part in ("in.log: 800 frames", "gyro left", "gyro right", "valid rates", "ended in state running"):
@@ -182,7 +182,7 @@ class Output(Replay):
 
 
 class Table(Replay):
-    """--csv against the frames that went out beside it, read by the DBC file's own numbers."""
+    """Compares --csv with the frames of the same run, decoded with the DBC file's numbers."""
     HEADER = "t_s,rate_dps,sigma_dps,valid,state,bias1_dps,bias2_dps,heading_deg"
 
     def rows(self, lines, method):
@@ -205,7 +205,7 @@ class Table(Replay):
                     valid = word >> 55 & 1
                     self.assertEqual(row[3], str(valid))
                     self.assertEqual(row[4], states[word >> 52 & 7])
-                    # VG_Age counts in halves of a millisecond; the first pairs are older than it can say.
+                    # VG_Age counts halves of a millisecond; the first pairs are older than its range.
                     if word >> 60 < 15:
                         self.assertAlmostEqual(float(row[0]), stamp - (word >> 60) * 0.0005, delta=0.000251)
                     self.assertRegex(row[0], r"^\d+\.\d{6}$")
@@ -233,7 +233,7 @@ class Table(Replay):
             last = now
             # Each of some 700 rates is rounded to 1e-7 deg/s, each instant to 1e-6 s.
             self.assertAlmostEqual(float(row[7]), expected_deg, delta=1e-5)
-        # 1.2 s at rest before, of which the first is the calibration.
+        # 1.2 s at rest before, of which the first second is the calibration.
         self.assertAlmostEqual(expected_deg, 3.0 * 6.8, delta=0.05)
 
     def test_biases_are_those_of_the_drifts(self):
@@ -250,7 +250,7 @@ class Table(Replay):
 
 class Summary(Replay):
     def test_counts_agree_with_a_count_of_the_log(self):
-        # Frames by interface and id, counted here by a line of Python.
+        # Frames by interface and id, counted here in one line of Python.
         junk = ["(1700000001.000000) can1 555#00\n", "(1700000001.000000) can2 00000101#00\n"]
         lines = self.lines[:200] + junk * 3 + self.lines[200:]
         counted = collections.Counter()
@@ -287,7 +287,7 @@ class Summary(Replay):
         self.assertAlmostEqual(found["last_s"] - found["first_s"], 3.993, places=6)
 
     def test_several_logs_with_different_interfaces_are_kept_apart(self):
-        # Each log has its own first interface.
+        # Each log numbers its interfaces by itself.
         self.write("a.log", "".join(l for l in self.lines if "can0" in l))
         self.write("b.log", "(1700000009.0) can7 001#00\n" + "".join(l for l in self.lines if "can1" in l))
         done = self.run_vgyro("replay", "--config", "vgyro.toml", "--json", "-", "-q", "a.log", "b.log")
@@ -297,7 +297,7 @@ class Summary(Replay):
         self.assertEqual([log["frames"] for log in found["logs"]], [400, 401])
 
     def test_every_cause_of_rejection_is_counted(self):
-        # One spoilt frame of each kind among good ones, each counted where it belongs.
+        # One bad frame of each kind among good ones; each is counted under its own cause.
         lines = list(self.lines)
         a = [i for i, line in enumerate(lines) if " 101#" in line]
         b = [i for i, line in enumerate(lines) if " 102#" in line]
@@ -315,7 +315,7 @@ class Summary(Replay):
         self.assertEqual({k: v for k, v in right.items() if v},
                          {"truncated": 1, "not_finite": 2, "out_of_range": 1, "not_data": 1, "stamp_repeated": 1,
                           "stamp_jump": 1})
-        # Five good samples follow the invalid one before the gyro is believed again.
+        # Five good samples follow the invalid one before the gyro is used again.
         self.assertEqual({k: v for k, v in left.items() if v},
                          {"flagged_invalid": 1, "counter_repeated": 1, "recovering": 5})
         faults = found["gyros"][0]["faults"]
@@ -329,7 +329,7 @@ class Summary(Replay):
         self.assertAlmostEqual(found["out"]["mean_rate_dps"], 0.0032, delta=1e-3)
 
     def test_lost_frames_and_gaps_are_told(self):
-        # Two seconds of one gyro missing, and its counter says how many frames that was, less the silence.
+        # Two seconds of one gyro are missing; its counter shows how many frames that is, beside the silence.
         lines = [l for i, l in enumerate(self.lines) if not (" 101#" in l and 500 <= i < 508)]
         found = self.summary(lines=lines)
         self.assertEqual(found["gyros"][0]["missing_by_counter"], 4)
@@ -337,7 +337,7 @@ class Summary(Replay):
         lines = [l for l in bench.two_gyros(8) if not 1700000003.0 <= float(l[1:18]) < 1700000005.0]
         found = self.summary(lines=lines)
         self.assertEqual(found["gaps"]["count"], 1)
-        # Behind so long a pause two samples only confirm the new time.
+        # After such a long pause two samples only confirm the new time.
         self.assertAlmostEqual(found["gaps"]["longest"][0]["length_s"], 2.03, delta=0.02)
         self.assertAlmostEqual(found["gaps"]["longest"][0]["from_s"], 3.0, delta=0.05)
 
@@ -349,7 +349,7 @@ class Summary(Replay):
         self.assertEqual(found["final_state"], "running")
 
     def test_junk_lines_are_counted_with_their_numbers(self):
-        # The user can look at line 3.
+        # The line number lets the user find the line.
         lines = [*self.lines[:2], "(17) can0 nonsense\n", "DROPCOUNT: 5\n", *self.lines[2:]]
         log = self.summary(lines=lines)["logs"][0]
         self.assertEqual(log["malformed_lines"], 1)
@@ -359,32 +359,32 @@ class Summary(Replay):
         self.assertIn("line 3: ", said)
 
     def test_log_that_ends_inside_a_line_is_used_up_to_there(self):
-        # The disk was full, or the power went.
+        # The disk was full, or the power failed.
         lines = [*self.lines[:-1], self.lines[-1][:-6]]
         log = self.summary(lines=lines)["logs"][0]
         self.assertEqual((log["frames"], log["cut_off_lines"]), (799, 1))
         self.assertIn("ends inside line 800", self.replay("-o", "out.log", "in.log").stderr.decode())
 
     def test_json_is_valid_whatever_the_interfaces_are_called(self):
-        # A log may hold any bytes there.
+        # The interface name may contain any bytes.
         text = b"(1.0) c\xff\xfen 001#00\n" + "".join(self.lines).encode()
         self.write("in.log", text)
         json.loads(self.replay("--json", "-", "-q", "in.log").stdout)
 
     def test_json_on_standard_output_stands_alone(self):
-        # With `--json -` the frames go only where -o says.
+        # With `--json -` the frames go only to the file of -o.
         found = self.replay("--json", "-", "-q", "-o", "out.log", "in.log")
         self.assertEqual(json.loads(found.stdout)["format"], 1)
         self.assertGreater(len(self.read("out.log")), 1000)
 
     def test_summary_does_not_depend_on_the_run(self):
-        # Nothing of the machine or the hour is in it.
+        # The summary does not depend on the machine or the time.
         self.assertEqual(self.summary(), self.summary())
 
 
 def stops_and_turns(turns, begin_us=1_700_000_000_000_000):
-    """Lines of two gyros with noise: 15 s of rest, a stop of 10 s, and as many steady turns of 10 s at 20 deg/s, with
-    bends between them."""
+    """Lines of two gyros with noise: 15 s of rest, a stop of 10 s, and `turns` steady turns of 10 s at 20 deg/s,
+    with bends between them."""
     rng = random.Random(20240917)
     stretches = [(15, 0.0)] + [(6, None), (10, 0.0)] + [(6, None), (10, 20.0)] * turns + [(6, None)]
     lines, i, offset = [], 0, 0.0
@@ -401,7 +401,7 @@ def stops_and_turns(turns, begin_us=1_700_000_000_000_000):
 
 
 class Thoughts(Replay):
-    """What the corrector makes of its data is said in the text, in the JSON, and drawn."""
+    """The corrector's findings appear in the text, in the JSON, and in the picture."""
 
     def setUp(self):
         super().setUp()
@@ -417,7 +417,7 @@ class Thoughts(Replay):
         self.assertGreaterEqual(stops["refused"], 3)
         number = stops["learned"]
         self.assertIn(f"{number + stops['refused']} stops: {number} learned, {stops['refused']} refused (moving together)", said)
-        # Most were refused: a warning that says what to check.
+        # Most stops were refused: there is a warning with the settings to check.
         warnings = [line for line in said.splitlines() if line.startswith("warning: stops: ")]
         self.assertEqual(len(warnings), 1, said)
         for part in ("rate_dps", "latitude_deg", "max_bias_dps"):
@@ -428,7 +428,7 @@ class Thoughts(Replay):
         self.assertNotIn("warning", self.replay("-o", "out.log", "in.log").stderr.decode())
 
     def test_hypotheses_are_probabilities_with_a_name(self):
-        # The log ends within the stop of its beginning: standing.
+        # The log ends within its first stop: standing.
         found = self.summary(lines=stops_and_turns(0)[:2 * 3000])
         self.assertGreater(found["hypotheses"]["standing"], 0.9)
         for name, probability in found["hypotheses"].items():
@@ -466,7 +466,7 @@ class Thoughts(Replay):
             self.assertGreaterEqual(svg.count(colour), 1, f"{colour} is in its lane")
 
     def test_picture_shows_what_the_heading_came_to(self):
-        # The raw gyros read 0.5 and -0.3 deg/s too much; what the legend says of them is that, over the valid time.
+        # The raw gyros read 0.5 and -0.3 deg/s too much; the legend shows that, integrated over the valid time.
         self.write("in.log", "".join(stops_and_turns(4)))
         self.replay("-q", "-o", "out.log", "--csv", "out.csv", "--plot", "a.svg", "in.log")
         rows = [line.split(",") for line in self.read("out.csv").splitlines()[1:]]
@@ -514,7 +514,7 @@ class Thoughts(Replay):
         self.assertTrue("calibrating" in svg, "calibrating")
 
     def test_a_step_of_a_gyro_is_told_as_such_until_it_is_settled(self):
-        # In motion nobody can tell whose step it was: either gyro's is likely, and σ spans both.
+        # In motion it does not show which gyro stepped: either is likely, and σ covers both.
         rng, stepped = random.Random(3), []
         for k in range(3000):
             at, rate = 1_700_000_015_000_000 + k * 10_000, 8.0 * math.sin(2.0 * math.pi * k / 300)
@@ -559,19 +559,19 @@ class Thoughts(Replay):
 
 class BadInput(Replay):
     def test_missing_log(self):
-        # Told before anything is written over.
+        # Reported before anything is overwritten.
         self.write("out.log", "precious\n")
         self.assertIn("nowhere.log: cannot be opened: No such file", self.refuse("-o", "out.log", "nowhere.log"))
         self.assertEqual(self.read("out.log"), "precious\n")
 
     def test_second_log_missing(self):
-        # Not after an hour with the first one.
+        # Reported at once, not after an hour with the first log.
         self.write("out.log", "precious\n")
         self.assertIn("nowhere.log", self.refuse("-o", "out.log", "in.log", "nowhere.log"))
         self.assertEqual(self.read("out.log"), "precious\n")
 
     def test_empty_log_and_no_log_at_all(self):
-        # A log of nothing is no success.
+        # A log without frames is an error.
         self.write("empty.log", "")
         self.write("prose.log", "Dear diary,\nno frames today.\n")
         for log, what in (("empty.log", "holds no CAN frame"), ("/dev/null", "holds no CAN frame"),
@@ -581,17 +581,17 @@ class BadInput(Replay):
             self.assertIn("candump -L", said)
 
     def test_directory(self):
-        # Tab completion stops there.
+        # Tab completion stops at the folder.
         self.assertIn("is a directory, not a log", self.refuse("-q", "."))
 
     def test_damaged_archive(self):
-        # What came before the damage is not lost, but the end is told.
+        # The part before the damage is used, and the damage is reported.
         packed = lzma.compress("".join(self.lines).encode())
         (self.folder / "cut.log.xz").write_bytes(packed[: len(packed) // 2])
         self.assertIn("cut.log.xz: ends in the middle", self.refuse("-q", "cut.log.xz"))
 
     def test_the_content_of_a_log_counts_and_not_its_name(self):
-        # People rename files, and some programs unpack them on the way.
+        # Users rename files, and some programs unpack them in transfer.
         self.write("plain.log.xz", "".join(self.lines))
         (self.folder / "packed.log").write_bytes(gzip.compress("".join(self.lines).encode()))
         expected = self.replay("in.log").stdout
@@ -601,14 +601,14 @@ class BadInput(Replay):
         self.assertIn("is a ROS 1 bag", self.refuse("-q", "drive.bag"))
 
     def test_one_gyro_missing_lists_the_interfaces_of_the_log(self):
-        # Nine times out of ten it is the name of the interface.
+        # The usual cause is the name of the interface.
         self.write("in.log", "".join(self.lines).replace("can1", "vcan5"))
         said = self.refuse("-q", "in.log")
         for part in ("no frame of gyro right", "GYRO_B 102 on can1", "can0, vcan5", "--map LOGNAME=can1"):
             self.assertIn(part, said)
 
     def test_a_missed_sender_of_the_same_pgn_is_told(self):
-        # The DBC file does not say J1939, so that only its own address matches; then the address is another one.
+        # The DBC file does not declare J1939, so that only its own address matches, and the address is another one.
         dbc = ('BO_ 2565876225 TURN: 8 X\n SG_ Rate : 0|16@1- (0.01,0) [-300|300] "deg/s" X\n'
                'BO_ 512 REF: 8 X\n SG_ Rate : 0|16@1- (0.01,0) [-300|300] "deg/s" X\n')
         config = "".join(f'[[gyro]]\nname = "{name}"\nbus = "can0"\ndbc = "t.dbc"\nmessage = "{message}"\nrate = "Rate"\n'
@@ -626,7 +626,7 @@ class BadInput(Replay):
         self.assertIn("no frame 18F02A05 came (TURN), but the same PGN came from 0x13; another source_address", said)
 
     def test_a_counter_is_followed_over_all_pages(self):
-        # Four pages, a counter of two bits that counts every frame: on one page it stands still.
+        # Four pages, and a counter of two bits that counts every frame: on one page it does not change.
         self.write("t.dbc", """\
 BO_ 288 IMU: 8 X
  SG_ Page M : 0|2@1+ (1,0) [0|3] "" X
@@ -669,7 +669,7 @@ bus = "can1"
         self.assertEqual(lost["samples"] + lost["rejected"]["wrong_sequence"], 300)
 
     def test_gyro_without_a_usable_frame_says_why(self):
-        # All frames there and none used: the DBC file is not that of this gyro.
+        # All frames are present and none is usable: the DBC file is not that of this gyro.
         self.write("in.log", "".join(l[:-5] + "\n" if " 102#" in l else l for l in self.lines))
         said = self.refuse("-q", "in.log")
         for part in ("no frame of gyro right could be used", "400 truncated"):
@@ -682,7 +682,7 @@ bus = "can1"
         self.assertIn("never spoke at the same time", self.refuse("-q", "in.log"))
 
     def test_gyros_of_rates_too_far_apart_say_so(self):
-        # 5 kHz beside a frame in 1.5 s: the samples from one to the next do not fit.
+        # 5 kHz beside a frame every 1.5 s: the samples between two slow ones do not fit the buffer.
         begin_us = 1_700_000_000_000_000
         lines = [(i * 200, bench.line_a(begin_us + i * 200, 0.5, i)) for i in range(125_000)]
         lines += [(i * 1_500_000, bench.line_b(begin_us + i * 1_500_000, 0.3)) for i in range(16)]
@@ -703,7 +703,7 @@ bus = "can1"
             self.assertFalse((self.folder / "out.log").exists())
 
     def test_unwritable_output(self):
-        # /dev/full is a full disk; a folder that is not there cannot be written to.
+        # /dev/full is a full disk; a missing folder cannot be written to.
         self.assertIn("/dev/full: cannot be written: No space left", self.refuse("-q", "-o", "/dev/full", "in.log"))
         self.assertIn("/dev/full: cannot be written", self.refuse("-q", "-o", "out.log", "--json", "/dev/full", "in.log"))
         self.assertIn("nowhere/out.log: cannot be written: No such file", self.refuse("-o", "nowhere/out.log", "in.log"))
@@ -711,7 +711,7 @@ bus = "can1"
             self.assertIn("standard output: cannot be written", self.refuse("-q", "in.log", stdout=full))
 
     def test_output_over_the_input_is_refused(self):
-        # A slip that would destroy the recording.
+        # A typing mistake that would destroy the recording.
         before = self.read("in.log")
         os.link(self.folder / "in.log", self.folder / "other_name.log")
         for arguments in (("-o", "in.log", "in.log"), ("-o", "other_name.log", "in.log"), ("--json", "in.log", "in.log"),
@@ -720,18 +720,18 @@ bus = "can1"
             self.assertEqual(self.read("in.log"), before)
 
     def test_bad_map(self):
-        # The three ways to get it wrong.
+        # The three possible mistakes.
         self.assertIn("is not LOGNAME=CONFIGNAME", self.refuse("--map", "can0", "in.log"))
         self.assertIn("is not LOGNAME=CONFIGNAME", self.refuse("--map", "=can0", "in.log"))
         self.assertIn('did you mean "can1"?', self.refuse("--map", "x=cann1", "in.log"))
 
     def test_bad_config_is_told_as_by_check(self):
-        # The same words in both places.
+        # The message is the same in both commands.
         self.write("vgyro.toml", bench.CONFIG.replace("order = 1", "order = 8"))
         self.assertEqual(self.refuse("in.log"), self.bad("check", "vgyro.toml"))
 
     def test_uncalibrated_log_warns(self):
-        # Shorter than the rest that the config asks for: frames come out, none is valid.
+        # Shorter than the configured rest: frames are sent, none is valid.
         self.write("vgyro.toml", bench.CONFIG.replace("rest_s = 1.0", "rest_s = 10.0"))
         done = self.replay("-o", "out.log", "in.log")
         self.assertRegex(done.stderr.decode(), r"warning: calibration: not complete: [34]\.\d of 10 s")
@@ -740,7 +740,7 @@ bus = "can1"
 
 class Plot(Replay):
     def test_svg_and_png_are_drawn(self):
-        # A picture with something in it, and a PNG that is one.
+        # A picture that is not empty, and a valid PNG.
         self.replay("-q", "-o", "out.log", "--plot", "a.svg", "in.log")
         self.replay("-q", "-o", "out.log", "--plot", "a.png", "in.log")
         svg = self.read("a.svg")
@@ -754,27 +754,27 @@ class Plot(Replay):
         self.assertGreater(min(width, height), 500)
 
     def test_unknown_ending_is_refused_before_the_work(self):
-        # Not after an hour of replay.
+        # Reported at once, not after an hour of replay.
         for name in ("a.jpg", "a", "svg"):
             said = self.refuse("-o", "out.log", "--plot", name, "in.log")
             self.assertIn(".svg, .png or .pdf", said)
             self.assertFalse((self.folder / "out.log").exists())
 
     def test_picture_that_cannot_be_written_is_refused_before_the_work(self):
-        # Neither this.
+        # Reported at once too.
         said = self.refuse("-q", "-o", "out.log", "--plot", "nowhere/a.svg", "in.log")
         self.assertIn("nowhere/a.svg: cannot be written: No such file", said)
         self.assertFalse((self.folder / "out.log").exists())
 
     def test_missing_gnuplot_is_an_error_that_says_what_to_install(self):
-        # Not a crash by a broken pipe, however much there is to draw.
+        # No crash by a broken pipe, however much there is to draw.
         self.write("in.log", "".join(bench.two_gyros(30)))
         said = self.refuse("-q", "-o", "out.log", "--plot", "a.svg", "in.log", environment={"PATH": str(self.folder)})
         self.assertIn("gnuplot", said)
         self.assertIn("apt-get install gnuplot-nox", said)
 
     def test_names_with_quotes_draw(self):
-        # Names are the user's, gnuplot's syntax is not.
+        # Names may contain gnuplot's syntax, and must not be run as such.
         self.write("vgyro.toml", bench.CONFIG.replace('"left"', "\"it's `left`\""))
         self.replay("-q", "-o", "out.log", "--plot", "it's.svg", "in.log")
         self.assertGreater((self.folder / "it's.svg").stat().st_size, 1000)
@@ -782,7 +782,7 @@ class Plot(Replay):
 
 class Memory(Replay):
     def peak_kb(self, repeats):
-        """Peak resident memory of a replay from stdin of the same recording, again and again."""
+        """Peak resident memory of a replay from stdin of the same recording, repeated."""
         read_end, write_end = os.pipe()
         with open(self.folder / "out.log", "wb") as out:
             process = subprocess.Popen([bench.VGYRO, "replay", "--config", "vgyro.toml", "-q", "-"], stdin=read_end,

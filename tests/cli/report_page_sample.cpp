@@ -1,5 +1,5 @@
 // Writes the report page of a made-up result to standard output, for report_page_test.py; with an
-// argument the first page of a result of two axes.
+// argument, the first page of a result of two axes.
 
 #include <cstdio>
 #include <vector>
@@ -11,7 +11,7 @@ namespace {
 
 using vgyro::cli::AxisResult;
 
-// What is found about an axis is of the unit's own, which is another one.
+// The effects about an axis are of a unit's own axis, which is a different one.
 AxisResult made_up_axis(const char* axis, std::size_t sensor_axis) {
   AxisResult result{vgyro::cli::made_up_subject(), vgyro::cli::made_up_result()};
   result.subject.axis = axis;

@@ -1,6 +1,6 @@
 #!/usr/bin/python3
-"""The report page of a made-up result, in headless Chromium: it draws every plot, complains of nothing, fetches nothing,
-and takes no name for markup. Where there is no Chromium, only its text is judged, and the test counts as skipped."""
+"""The report page of a made-up result, in headless Chromium: it draws every plot, logs no error, fetches nothing,
+and treats no name as markup. Without Chromium only its text is checked, and the test counts as skipped."""
 
 import html
 import json
@@ -21,7 +21,7 @@ SKIPPED = 77
 
 HOSTILE = "</script><img src=x onerror=\"console.error('in')\">&amp; {{data}}"
 
-# Runs before everything else on the page: keeps what goes wrong.
+# Runs before everything else on the page: records errors.
 LISTENER = """<script>
 window.problems = [];
 for (const kind of ["error", "warn"]) console[kind] = (...what) => problems.push(kind + ": " + what.join(" "));
@@ -30,7 +30,7 @@ addEventListener("unhandledrejection", (event) => problems.push("rejected: " + e
 addEventListener("securitypolicyviolation", (event) => problems.push("policy: " + event.violatedDirective));
 </script>"""
 
-# Runs after it: what can be seen. Pixels are counted by the colour that the curve's role has in the style.
+# Runs after the page: records what is visible. Pixels are counted by the colour that the curve's role has in the style.
 PROBE = """<script>
 addEventListener("load", () => setTimeout(() => {
   const rgb = (name) => {
@@ -82,7 +82,7 @@ class Page(unittest.TestCase):
         cls.page = subprocess.run([BIN / "report_page_sample"], stdout=subprocess.PIPE, check=True, timeout=60).stdout.decode()
 
     def look(self, width=1200, *options):
-        """What the probe saw in a window of this width."""
+        """The result of the probe in a window of this width."""
         if not CHROMIUM:
             self.skipTest("chromium is not installed")
         if (width, options) not in self.seen:
@@ -99,13 +99,13 @@ class Page(unittest.TestCase):
                  "--enable-logging=stderr", f"--window-size={width},2000", "--virtual-time-budget=5000", *options, "--dump-dom", path.as_uri()],
                 capture_output=True, check=True, timeout=100)
         said = [line for line in done.stderr.decode(errors="replace").splitlines() if "CONSOLE" in line]
-        self.assertEqual([line for line in said if "willReadFrequently" not in line], [])  # the probe itself reads canvases
+        self.assertEqual([line for line in said if "willReadFrequently" not in line], [])  # this warning comes from the probe, which reads canvases
         found = re.search(r'<pre id="seen">(.*?)</pre>', done.stdout.decode(), re.DOTALL)
         self.assertTrue(found, "the page did not come to its end")
         return json.loads(html.unescape(found.group(1)))
 
     def test_holds_everything_itself(self):
-        # It is mailed and archived; nothing may be missing then.
+        # The page is mailed and archived, so it must be complete by itself.
         without_data = re.sub(r'<script type="application/json".*?</script>', "", self.page, flags=re.DOTALL)
         self.assertEqual(re.findall(r'<(?:script|img|iframe|link)[^>]*\s(?:src|href)="(?!data:)', without_data), [])
         self.assertEqual(re.findall(r"url\(\s*['\"]?(?!data:)[a-z]+:", without_data), [])
@@ -146,7 +146,7 @@ class Page(unittest.TestCase):
             self.assertIn(part, seen["text"])
 
     def test_takes_no_name_for_markup(self):
-        # A sensor's name and a log's name are anything that somebody typed.
+        # The names of sensors and logs may contain anything.
         seen = self.look()
         self.assertIn(HOSTILE, seen["text"])
         self.assertIn(HOSTILE, seen["title"])
@@ -160,14 +160,14 @@ class Page(unittest.TestCase):
             self.assertAlmostEqual(a, b, places=6)
 
     def test_is_dark_where_the_user_wants_it(self):
-        # Canvases take their colours from the style as the page does.
+        # Canvases take their colours from the style, like the page.
         seen = self.look(1200, "--blink-settings=preferredColorScheme=0")
         self.assertLess(sum(map(int, re.findall(r"\d+", seen["background"])[:3])), 3 * 60)
         self.assertTrue(all(pixels > 40 for plot in seen["painted"] for pixels in plot), seen["painted"])
 
     def test_fits_a_narrow_window(self):
-        # What is wider scrolls inside its own box.
-        for width in (500, 800, 1300):  # no narrower: a headless window has a least width
+        # Wider content scrolls inside its own box.
+        for width in (500, 800, 1300):  # a headless window cannot be narrower
             self.assertLessEqual(self.look(width)["overflow"], 0, width)
             self.assertEqual(self.look(width)["cut"], [], f"tables and pictures wider than their place at {width}")
 

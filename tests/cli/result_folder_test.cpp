@@ -36,7 +36,7 @@ class ResultFolderTest : public testing::Test {
 };
 
 TEST_F(ResultFolderTest, WritesAllFilesAndLeavesNothingBeside) {
-  // Parents are made; a slash at the end changes nothing.
+  // Parent folders are made; a trailing slash changes nothing.
   ASSERT_TRUE(write_result_folder(at("new/out/"), files_));
   EXPECT_EQ(read_file(at("new/out/a.json")).value(), "{}");
   EXPECT_EQ(read_file(at("new/out/b.toml")).value(), "x = 1\n");
@@ -44,7 +44,7 @@ TEST_F(ResultFolderTest, WritesAllFilesAndLeavesNothingBeside) {
 }
 
 TEST_F(ResultFolderTest, ReplacesAnEarlierResultWhole) {
-  // No file of the earlier one stays between those of the new one.
+  // No file of an earlier result stays among those of the new one.
   ASSERT_TRUE(write_result_folder(at("out"), files_));
   ASSERT_TRUE(write_result_folder(at("out"), {{"a.json", "[]"}, {"b.toml", ""}}));
   EXPECT_EQ(read_file(at("out/a.json")).value(), "[]");
@@ -61,7 +61,7 @@ TEST_F(ResultFolderTest, TakesAnEmptyFolderAndFollowsALink) {
 }
 
 TEST_F(ResultFolderTest, KeepsAFolderThatHoldsAnythingElse) {
-  // Somebody's measurements may lie there.
+  // The folder may contain a user's measurements.
   fs::create_directory(at("out"));
   put("out/a.json", "old");
   put("out/precious.log", "data");
@@ -86,7 +86,7 @@ TEST_F(ResultFolderTest, RefusesAFileAndAnEmptyName) {
 }
 
 TEST_F(ResultFolderTest, LeavesNothingWhenAFileCannotBeWritten) {
-  // Half a result would be taken for a whole one.
+  // An incomplete result would look complete.
   ASSERT_FALSE(write_result_folder(at("out"), {{"a.json", "{}"}, {"a.json/below", "x"}}));
   EXPECT_EQ(entries(), 0);
 }

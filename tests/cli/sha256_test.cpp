@@ -12,7 +12,7 @@ std::string sum_of(std::string_view text) {
 }
 
 TEST(Sha256, GivesTheSumsOfTheStandard) {
-  // FIPS 180-4's examples; each is what sha256sum prints.
+  // FIPS 180-4's examples; sha256sum prints the same.
   EXPECT_EQ(sum_of(""), "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855");
   EXPECT_EQ(sum_of("abc"), "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
   EXPECT_EQ(sum_of("abcdbcdecdefdefgefghfghighijhijkijkljklmklmnlmnomnopnopq"),

@@ -1,7 +1,7 @@
 #!/usr/bin/python3
-"""`vgyro compare` of what `vgyro simulate` played of the same model: they have one equation, so nothing is left over. A scale
-error of the rate itself instead of the late rate would be off by error * slope * delay, 4e-3 deg/s here; noise of 1e-4 deg/s
-a sample would show that at once."""
+"""`vgyro compare` on a recording that `vgyro simulate` made from the same model: both use one equation, so no
+residual remains. A scale error of the present rate instead of the late rate would cause an error of error * slope *
+delay, 4e-3 deg/s here; noise of 1e-4 deg/s a sample would show that at once."""
 
 import json
 import math
@@ -20,7 +20,7 @@ SEED = 29
 REST_S, LENGTH_S, RATE_HZ = 35.0, 95.0, 100.0
 SLOPE_DPS2, TURNS_HZ = 100.0, 0.4
 SCALE_ERROR, DELAY_S = 2e-3, 0.02
-# Of one sample. A hundred steps of the frame, so that rounding is no part of it.
+# Noise of one sample. A hundred steps of the frame, so that rounding does not matter.
 NOISE_DPS = 1e-4
 WRONG_DPS = SCALE_ERROR * SLOPE_DPS2 * DELAY_S
 MOST_DPS = WRONG_DPS / 50
@@ -41,7 +41,7 @@ class SimulateCompare(bench.Bench):
         self.noise = [effect("white_noise", gyro, density_dps_rthz=NOISE_DPS / math.sqrt(RATE_HZ)) for gyro in (1, 2)]
 
     def residual_dps(self, played, judged):
-        """What a gap of so many nats per sample says that the model is off by, root mean square, on top of the noise."""
+        """The rms model error, in addition to the noise, that corresponds to the gap in nats per sample."""
         self.write("played.toml", rig.model(*played, *self.noise))
         self.write("judged.toml", rig.model(*judged, *self.noise))
         config = ("--config", "vgyro.toml")
@@ -64,8 +64,8 @@ class SimulateCompare(bench.Bench):
         self.assertLess(self.residual_dps(effects, effects), MOST_DPS)
 
     def test_the_other_convention_would_be_seen(self):
-        """A gyro that is late but has the scale error of the rate of the instant is like one whose delay is shorter by
-        error * delay, as long as the rate is straight."""
+        """A late gyro with the scale error of the present rate is like one whose delay is shorter by error * delay,
+        while the rate is a straight line."""
         played = [effect("scale_factor", error=SCALE_ERROR), effect("delay", seconds=DELAY_S)]
         judged = [effect("scale_factor", error=SCALE_ERROR), effect("delay", seconds=DELAY_S / (1 + SCALE_ERROR))]
         self.assertGreater(self.residual_dps(played, judged), 0.2 * WRONG_DPS)

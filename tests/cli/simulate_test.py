@@ -1,7 +1,7 @@
 #!/usr/bin/python3
-"""`vgyro simulate` from the outside: frames of odd forms read back with canmatrix, what replay and allan find in
-a recording whose truth is known, the same bytes for the same seed, and what is said to bad input. That the
-equations of the effects are right is judged in tests/simulation/effects_test.py."""
+"""`vgyro simulate` from the outside: frames of unusual forms decoded with canmatrix, the results of replay and allan
+on a recording with known truth, the same bytes for the same seed, and the errors for bad input. The equations of the
+effects are tested in tests/simulation/effects_test.py."""
 
 import io
 import json
@@ -20,12 +20,13 @@ import rig  # noqa: E402
 from rig import effect  # noqa: E402
 
 logging.disable(logging.CRITICAL)
-with redirect_stdout(io.StringIO()):  # canmatrix tells on stdout which other formats it lacks
+with redirect_stdout(io.StringIO()):  # canmatrix prints the formats that it lacks to stdout
     import canmatrix.formats
 
 SEED = 17
 
-# The gyros' signals in one message of CAN FD; a temperature and a supply voltage that share a page of their own; a sender's sign bit.
+# The gyros' signals in one CAN FD message; a temperature and a supply voltage that share a page of their own; a
+# sender's sign bit.
 ODD_DBC = """\
 VERSION ""
 
@@ -162,7 +163,7 @@ class Simulate(bench.Bench):
             self.assertAlmostEqual(found, biases[i], delta=4 * noise[i] / math.sqrt(59) + 1e-5)
 
     def test_replay_with_the_same_model_gives_the_motion_back(self):
-        """Everything that can be taken back, at once and without noise, against the motion in closed form."""
+        """All effects that can be corrected, at once and without noise, compared with the motion in closed form."""
         def motion(t):
             return np.where(t < 35.0, 0.0, rig.rate(t - 35.0))
         self.write("model.toml", rig.model(
@@ -185,7 +186,7 @@ class Simulate(bench.Bench):
         gyros = json.loads(self.read("sum.json"))["gyros"]
         self.assertAlmostEqual(gyros[0]["supply_v"], rig.supply(60.0), delta=0.51 * rig.SUPPLY_STEP_V)
         self.assertNotIn("supply_v", gyros[1], "of a gyro that tells none")
-        # What is left is the straight line by which the pairs are interpolated.
+        # The remaining error comes from the linear interpolation of the pairs.
         self.assertGreater(wrong[0], 0.02, "there was nothing to take back")
         self.assertLess(wrong[1], 0.01)
 

@@ -1,7 +1,7 @@
 #!/usr/bin/python3
-"""Two whole units from the outside: the rates about all axes against the truth of a drive that is made here, in
-units of their own sigma; one axis and one unit that fall out; mounts; frames and tables; and what is said to
-bad input. Knows the frames from the DBC texts below and shares no code with the product."""
+"""Two whole units from the outside: the rates about all axes compared with the truth of a drive that is made here,
+in units of their own sigma; one axis and one unit that fall out; mounts; frames and tables; and the errors for bad
+input. Takes the frames from the DBC texts below and shares no code with the product."""
 
 import csv
 import hashlib
@@ -65,7 +65,7 @@ def config(more_a="", more_b="", calibration="rate_dps = [0.0, 0.0, 0.0]", outpu
 
 
 def rotation(vector_rad):
-    """Turns a vector by this one (Rodrigues)."""
+    """The matrix of a rotation by this vector (Rodrigues)."""
     angle = np.linalg.norm(vector_rad)
     if angle == 0.0:
         return np.eye(3)
@@ -92,7 +92,7 @@ class Drive:
         return drives[:, None] * np.stack([x, y, z], axis=1)
 
     def unit(self, offset_s, turn, bias_dps, density_dps_rthz=4e-3, walk_dps_rts=1e-4):
-        """Instants, and what a unit reads that is turned so against the vehicle."""
+        """Instants, and the readings of a unit that is rotated by `turn` against the vehicle."""
         t = np.arange(offset_s, self.seconds, 1.0 / RATE_HZ)
         walk = np.cumsum(self.random.standard_normal((len(t), 3)) * walk_dps_rts / np.sqrt(RATE_HZ), axis=0)
         noise = self.random.standard_normal((len(t), 3)) * density_dps_rthz * np.sqrt(RATE_HZ)
@@ -127,7 +127,7 @@ def frames(t, readings, identifier, counter=None):
 
 
 def yaw_frames(t, yaw_dps):
-    """(time, line) of each sample of unit B's yaw in a message of its own, 0.3 ms behind the others."""
+    """(time, line) of each sample of unit B's yaw in a message of its own, 0.3 ms after the others."""
     lines = []
     for i, t_s in enumerate(t):
         us = START_US + round(t_s * 1e6) + 300
@@ -146,7 +146,7 @@ def log_of(*streams):
     return "".join(line for _, line in sorted(line for stream in streams for line in stream))
 
 
-# What unit B reads of the vehicle's rate: y2 = W + W x theta, theta small, is a turn by -theta.
+# Unit B's reading of the vehicle's rate: y2 = W + W x theta, with a small theta, is a rotation by -theta.
 TILTED = rotation(-np.radians(TILT_DEG))
 
 
@@ -163,7 +163,7 @@ class Units(bench.Bench):
             return list(csv.DictReader(file)), json.loads(self.read("out.json"))
 
     def errors(self, rows, drive, axis, begin_s=0.0, end_s=1e9):
-        """Of the valid rates of an axis: how far off each is in its own sigmas, and in deg/s."""
+        """Errors of an axis's valid rates, in units of their own sigmas and in deg/s."""
         number = AXES.index(axis)
         kept = [row for row in rows if row[f"valid_{axis}"] == "1" and begin_s <= float(row["t_s"]) - START_US / 1e6 < end_s]
         t = np.array([float(row["t_s"]) - START_US / 1e6 for row in kept])
@@ -233,14 +233,14 @@ class Truth(Units):
             relative, _ = self.errors(rows, drive, axis)
             self.assertGreater(np.mean(relative ** 2), 0.8, axis)
             self.assertLess(np.mean(relative ** 2), 1.2, axis)
-        # The dead axis is what the other unit says of it.
+        # The rate about the dead axis is that of the other unit.
         relative, _ = self.errors(rows, drive, "y", 100.0)
         self.assertLess(np.mean(relative ** 2), 1.2)
         off = np.abs(np.array(summary["misalignment"]["angle_deg"]) - TILT_DEG)
         self.assertLess(np.max(off / np.array(summary["misalignment"]["sigma_deg"])), 4.0)
 
     def test_an_axis_may_come_at_a_rate_of_its_own(self):
-        """Yaw of one unit from another sensor, half as often."""
+        """Yaw of one unit comes from another sensor, half as often."""
         drive, a, b = self.drive(seed=14)
         t, readings = b
         lines = yaw_frames(t[::2], readings[::2, 2])
@@ -264,7 +264,7 @@ class Truth(Units):
                             ("[[0, 0, -1], [0, 1, 0], [1, 0, 0]]", np.array([[0, 0, -1], [0, 1, 0], [1, 0, 0]])),
                             ("[20, 0, 0]", rotation(np.radians([20, 0, 0])))):
             with self.subTest(mount=mount):
-                # The sensor feels the vehicle's rate turned back.
+                # The sensor feels the vehicle's rate in its own axes.
                 drive, a, b = self.drive(seconds=360.0, seed=6, turn=turn.T)
                 rows, _ = self.replay(log_of(frames(*a, 0x101), frames(*b, 0x102)), config(more_b=f"mount = {mount}"))
                 self.judge(rows, drive)
@@ -275,7 +275,7 @@ class Truth(Units):
         lines = yaw_frames(t, -readings[:, 2])
         text = config_of_own_yaw("sign = -1\n")
         rows, summary = self.replay(log_of(frames(*a, 0x101), frames(*b, 0x102), lines), text)
-        # Lines of axes whose messages differ stand at instants of their own.
+        # Axes in different messages have table lines at instants of their own.
         self.judge(rows, drive, axes="xy")
         relative, _ = self.errors(rows, drive, "z")
         # The stamp of the yaw message is 0.3 ms late, which is a skew to be learned.
@@ -346,7 +346,7 @@ class Frames(Units):
         self.assertEqual(summary["out"]["layouts"][0]["valid"], sum(row["valid_z"] == "1" for row in rows))
 
     def test_a_layout_carries_all_axes(self):
-        """In SBG's frame, of which y points to the right and z down."""
+        """In SBG's frame, in which y points to the right and z down."""
         _, a, b = self.drive(seconds=90.0, seed=15)
         rows, summary = self.replay(log_of(frames(*a, 0x101), frames(*b, 0x102)), config(output=SBG))
         self.assertEqual(self.judge_layout(rows), len(rows))
@@ -358,7 +358,7 @@ class Frames(Units):
             self.assertIn(said, checked)
 
     def judge_layout(self, rows):
-        """Each frame is the table's line, or says "not available"; how many there are."""
+        """Each frame equals the table's line, or holds "not available"; returns the number of frames."""
         lines = [line.split() for line in self.read("out.log").splitlines() if " 122#" in line]
         table = {axis: [float(row[f"rate_{axis}_dps"]) if row[f"valid_{axis}"] == "1" else None for row in rows] for axis in AXES}
         for i, line in enumerate(lines):
@@ -388,7 +388,7 @@ class Frames(Units):
         self.good("simulate", "--config", "u.toml", "--model", "m.toml", "--profile", "p.csv", "--seed", "5", "-q", "-o", "sim.log")
         rows, _ = self.replay(self.read("sim.log"), config(more_b="mount = [0, 0, 90]"))
         self.judge(rows, drive)
-        # What the model knows is taken off before anything is learned.
+        # The model's effects are corrected before anything is learned.
         rows, summary = self.replay(self.read("sim.log"), config(more_b="mount = [0, 0, 90]"), more=("--model", "m.toml"))
         self.judge(rows, drive)
         self.assertLess(np.max(np.abs(summary["misalignment"]["angle_deg"])), 0.05)
@@ -449,7 +449,7 @@ class BadInput(Units):
         self.refused(text, "both gyros are read from the same frame: IMU_A on can0")
 
     def test_a_mount_that_mixes_axes_of_two_messages_is_warned_of(self):
-        """Their rates may differ, which no file says."""
+        """The rates of the two messages may differ, which no file shows."""
         def unit(mount):
             return config().replace('message = "IMU_B"\nrate_x = "X"\nrate_y = "Y"\nrate_z = "Z"\ncounter = "Counter"\n',
                                     f'message = "IMU_B"\nrate_x = "X"\nrate_y = "Y"\ncounter = "Counter"\nmount = {mount}\n'
@@ -504,7 +504,7 @@ class BadInput(Units):
 
 
 class SingleAxis(bench.Bench):
-    """What two single gyros give is what they gave before units had axes, to the byte."""
+    """The output of two single gyros is the same, to the byte, as before whole units were supported."""
 
     EXAMPLES = {
         "optimal": "9eeac77ecbf0d990fec4f40aa28f97187d5677f0b439d77bb9eaa14198fbe25f",

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Help texts and wrong usage: what a user meets first."""
+"""Help texts and wrong usage, which a user meets first."""
 
 import re
 import subprocess
@@ -25,7 +25,7 @@ class Usage(bench.Bench):
         return self.good(*command, "--help").stdout.decode()
 
     def test_help_of_each_command_names_every_option(self):
-        # An option that help does not name does not exist.
+        # Help names every option.
         for command, options in COMMANDS.items():
             text = self.help_of(command)
             for option in options:
@@ -38,19 +38,19 @@ class Usage(bench.Bench):
             self.assertEqual(named - options - {"-h", "--help", "-L"}, set(), command)
 
     def test_help_fits_100_columns(self):
-        # Wrapped by the terminal it would be hard to read.
+        # Lines wrapped by the terminal are hard to read.
         for command in ((), *((c,) for c in COMMANDS)):
             for line in self.help_of(*command).splitlines():
                 self.assertLessEqual(len(line), 100, line)
 
     def test_help_names_every_command_and_exit_code(self):
-        # The way in.
+        # The entry point for new users.
         text = self.help_of()
         for part in (*COMMANDS, "Exit codes", "0 done", "1 bad input", "2 wrong usage"):
             self.assertIn(part, text)
 
     def test_wrong_usage_is_code_2_and_says_what_is_missing(self):
-        # Scripts tell a slip of the call from bad data by it.
+        # Scripts distinguish wrong usage from bad data by the exit code.
         for arguments, part in (
             ((), "no command is given"),
             (("fly",), "fly"),
@@ -96,7 +96,7 @@ class Usage(bench.Bench):
                 self.assertEqual(self.good("help", *command).stdout, self.good(*command, "--help").stdout)
 
     def test_help_names_manual_pages_and_no_file_of_the_source_tree(self):
-        # Who has installed the package has no docs/ beside it.
+        # Users of the package have no docs/ folder.
         for command in ((), *((c,) for c in COMMANDS), ("init",), ("simulate",), ("status",), ("recalibrate",)):
             text = self.help_of(*command)
             self.assertNotIn("docs/", text, command)

@@ -2,8 +2,8 @@
 //   vgyro_faults sequences COUNT FIRST_SEED    random faults; a failed seed goes to stderr
 //   vgyro_faults shifted COUNT FIRST_SEED      the same at other times of day: the same rates
 //   vgyro_faults drive HOURS                   a drive with stops
-// All print JSON. Truth and noise are made here, frames by hand, and what comes out is read from
-// its bits.
+// All print JSON. Truth, noise and frames are made by hand here, and the output is decoded from its
+// bits.
 
 #include <algorithm>
 #include <array>
@@ -148,8 +148,7 @@ struct Dice {
   double normal() { return std::normal_distribution<double>()(engine); }
 };
 
-// ---- random faults
-// -------------------------------------------------------------------------------
+// ---- random faults ------------------------------------------------------------------------------
 
 enum class Kind : unsigned {
   kSilent,
@@ -185,8 +184,8 @@ constexpr double kFaultsFrom_s = 5.0;
 constexpr double kFaultsTo_s = 15.0;
 // Two windows of the default length.
 constexpr double kRecovery_s = 20.0;
-// Six of the frame's own sigma, and VG_Age's step and an interpolated gap in a turn; what a fault
-// does to a reading is a hundred times that.
+// Six of the frame's own sigma, and an allowance for VG_Age's step and an interpolated gap in a
+// turn; a fault changes a reading a hundred times as much.
 constexpr double kSigmas = 6.0;
 constexpr double kErrorMost_dps = 0.05;
 constexpr double kLateMost_s = 0.02;
@@ -208,7 +207,7 @@ class Sequence final : public gateway::FrameSink, public can::Transmitter {
     }
   }
 
-  /// Nothing, or what went wrong.
+  /// Runs the sequence; returns the failure, or an empty string.
   std::string run() {
     struct Arrival {
       double t_s;
@@ -238,7 +237,7 @@ class Sequence final : public gateway::FrameSink, public can::Transmitter {
   [[nodiscard]] std::uint64_t stale() const { return queue_.counts().dropped_stale; }
   [[nodiscard]] double worst_dps() const { return worst_dps_; }
   [[nodiscard]] const std::vector<Fault>& faults() const { return faults_; }
-  /// All that VG_Rate said, but for check value and counter, and when.
+  /// The contents of all VG_Rate frames, without check value and counter, and their times.
   [[nodiscard]] const std::vector<std::uint8_t>& said() const { return said_; }
 
   void put(const Frame& frame, TimePoint /*stamp*/) override {
@@ -261,7 +260,7 @@ class Sequence final : public gateway::FrameSink, public can::Transmitter {
     }
     if (crc8(frame) != frame.data[0]) failure_ = "a frame with a wrong checksum";
     if (frame.id == 0x610) {
-      // Which rate it was: they are sent in the order in which they were made.
+      // Finds which rate this is: rates are sent in the order in which they were made.
       const double made_s = made_at(frame);
       if (t_s_ - made_s > kLateMost_s + 1e-9)
         failure_ = "a rate was sent " + std::to_string(t_s_ - made_s) + " s late at " +
@@ -312,13 +311,13 @@ class Sequence final : public gateway::FrameSink, public can::Transmitter {
   }
 
   void restart() {
-    // The file keeps what an earlier run knew until there is something better.
+    // The state file keeps the memory of an earlier run until there is a newer one.
     if (auto memory = pipeline_->memory()) kept_ = std::move(memory);
     pipeline_.emplace(plan_);
     if (kept_ && !pipeline_->resume(*kept_)) failure_ = "the state was refused";
     queue_ = can::TransmitQueue();
     made_.clear();
-    // A new process takes the first frame that it sees for new.
+    // A new process accepts the first frame that it receives as new.
     for (Fault& fault : faults_) {
       if (fault.kind == Kind::kFrozenFrame) fault.to_s = std::min(fault.to_s, t_s_);
     }
@@ -360,7 +359,7 @@ class Sequence final : public gateway::FrameSink, public can::Transmitter {
       stamp += std::chrono::milliseconds(dice_.below(2) == 0 ? jump_ms : -jump_ms);
     }
     if (active(Kind::kGarbage)) garbage();
-    // Read late: the stamp is the kernel's all the same.
+    // The frame is read late, but its stamp is still the kernel's.
     if (active(Kind::kLate, gyro)) {
       late_until_s_ = t_s_ + 0.2;
       held_[gyro].push_back({frame, stamp, t_s_});
@@ -427,8 +426,8 @@ class Sequence final : public gateway::FrameSink, public can::Transmitter {
     }
   }
 
-  // The instant is that of the cause less the age; an age beyond the field is anywhere in the last
-  // second.
+  // The rate's instant is that of the causing frame less the age; with an age beyond the field it
+  // is anywhere in the last second.
   [[nodiscard]] double error_of(const Rate& rate) const {
     const bool late = t_s_ < late_until_s_;
     if (rate.age_s && !late) return std::abs(rate.rate_dps - truth_dps(cause_s_ - *rate.age_s));
@@ -439,7 +438,7 @@ class Sequence final : public gateway::FrameSink, public can::Transmitter {
     return best;
   }
 
-  // A fault in a frame's way can only delay it: the newest of the same bytes is the one.
+  // A fault on a frame's way can only delay it, so the newest frame with the same bytes is the one.
   [[nodiscard]] double made_at(const Frame& frame) {
     const auto same = [&frame](const auto& one) { return one.second.data == frame.data; };
     const auto found = std::find_if(made_.rbegin(), made_.rend(), same);
@@ -447,7 +446,7 @@ class Sequence final : public gateway::FrameSink, public can::Transmitter {
   }
 
   Dice dice_;
-  Dice send_dice_;  ///< what the bus does must not change what the gyros do
+  Dice send_dice_;  ///< separate, so that the bus's faults do not change the gyros' noise
   gateway::Plan plan_;
   TimePoint start_;
   std::vector<std::uint8_t> said_;
@@ -458,13 +457,13 @@ class Sequence final : public gateway::FrameSink, public can::Transmitter {
   std::array<unsigned, 2> counters_{};
   std::array<Frame, 2> last_{};
   std::array<std::vector<Held>, 2> held_;
-  std::vector<std::pair<double, Frame>> made_;  ///< when
+  std::vector<std::pair<double, Frame>> made_;  ///< time at which each was made
   double t_s_ = 0.0;
   double offset_s_ = 0.0;  ///< of the clock behind the stamps
   TimePoint now_;          ///< of the clock behind the stamps
-  TimePoint steady_;       ///< of one that nobody sets
+  TimePoint steady_;       ///< of a clock that is never set
   double late_until_s_ = 0.0;
-  double cause_s_ = 0.0;  ///< when the frame that is being received was true
+  double cause_s_ = 0.0;  ///< time to which the frame being received refers
   double recovered_s_ = -1.0;
   std::uint64_t good_in_a_row_ = 0;
   std::uint64_t valid_ = 0;
@@ -514,7 +513,8 @@ int run_sequences(unsigned count, std::uint64_t first_seed) {
   return failed == 0 ? 0 : 1;
 }
 
-// VG_Bias keeps to the bus's time, so frames in between may come elsewhere; rates may not.
+// VG_Bias follows the bus's time, so its frames may come at other places between the rates; the
+// rates may not change.
 int run_shifted(unsigned count, std::uint64_t first_seed) {
   constexpr std::array kLater{std::chrono::milliseconds(37), std::chrono::milliseconds(12'345'678),
                               std::chrono::milliseconds(-499)};
@@ -538,8 +538,7 @@ int run_shifted(unsigned count, std::uint64_t first_seed) {
   return failed == 0 ? 0 : 1;
 }
 
-// ---- a long day
-// ----------------------------------------------------------------------------------
+// ---- a long day ---------------------------------------------------------------------------------
 
 std::uint64_t resident_kb() {
   std::ifstream file("/proc/self/statm");
@@ -549,7 +548,7 @@ std::uint64_t resident_kb() {
   return resident * static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE)) / 1024;
 }
 
-/// Five minutes of drive, the last twenty seconds of them at a stop.
+/// Periods of five minutes, with a stop in the last twenty seconds.
 double drive_dps(double t_s) {
   const double phase_s = std::fmod(t_s, 300.0);
   if (t_s < 60.0 || phase_s > 280.0) return 0.0;
@@ -617,7 +616,7 @@ int run_drive(double hours) {
     astray += samples - gyro.samples + gyro.missing;
     unpaired += gyro.unpaired;
   }
-  // The first may come before the other gyro's, the last waits for a partner.
+  // The first sample may come before the other gyro's, the last one waits for a partner.
   const std::uint64_t without_rate = samples - out.rates;
   std::printf(
       "{\"hours\": %g, \"frames\": %llu, \"seconds\": %.1f, \"rates\": %llu, \"without_rate\": "

@@ -46,7 +46,7 @@ struct Push {
   GyroSample sample;
 };
 
-/// In the order of the stamps, as one bus delivers them.
+/// Both streams in the order of their stamps, as one bus delivers them.
 std::vector<Push> merged(const Stream& a, const Stream& b) {
   std::vector<Push> pushes;
   for (const GyroSample& s : a)
@@ -60,7 +60,7 @@ std::vector<Push> merged(const Stream& a, const Stream& b) {
 
 struct Aligned {
   std::vector<AlignedPair> pairs;
-  std::vector<TimePoint> arrived;  ///< stamp of the push after which the pair was there
+  std::vector<TimePoint> arrived;  ///< stamp of the push that completed the pair
   int refused = 0;
   Aligner aligner;
 };
@@ -112,7 +112,7 @@ double line_b(double t_s) {
   return -2.0 - 1.3 * t_s;
 }
 
-// Lines have no curvature to be lost, so only rounding may differ.
+// Interpolation of lines is exact except for rounding.
 constexpr double kRounding = 1e-12;
 
 void expect_on_lines(const Aligned& result) {
@@ -122,7 +122,7 @@ void expect_on_lines(const Aligned& result) {
   }
 }
 
-// Gyros that one unit samples at one instant pass through bit by bit, without delay.
+// Gyros that one unit samples at the same instant pass unchanged and without delay.
 TEST(Aligner, LeavesEqualStampsAsTheyAre) {
   const Stream a = stream_of(100.0, 0ms, 10.0, noise(1));
   const Stream b = stream_of(100.0, 0ms, 10.0, noise(2));
@@ -138,8 +138,8 @@ TEST(Aligner, LeavesEqualStampsAsTheyAre) {
   }
 }
 
-// Two units on one bus have any phase to each other; on lines, interpolation is exact at all of
-// them, for both gyros.
+// Two units on one bus have any phase to each other; on lines, interpolation is exact at every
+// phase, for both gyros.
 TEST(Aligner, InterpolatesLinesExactlyAtEveryPhase) {
   for (Duration phase = 100us; phase < 10ms; phase += 700us) {
     SCOPED_TRACE(to_seconds(phase));
@@ -151,7 +151,7 @@ TEST(Aligner, InterpolatesLinesExactlyAtEveryPhase) {
   }
 }
 
-// At the same rate the gyro paces whose pairs are complete sooner.
+// At equal rates the gyro paces whose pairs are complete sooner.
 TEST(Aligner, LetsThePhaseWithTheShorterWaitPace) {
   for (Duration phase = 500us; phase < 10ms; phase += 1ms) {
     SCOPED_TRACE(to_seconds(phase));
@@ -163,7 +163,7 @@ TEST(Aligner, LetsThePhaseWithTheShorterWaitPace) {
   }
 }
 
-// The slower gyro paces: between its samples nothing is known of it.
+// The slower gyro paces: nothing is known between its samples.
 TEST(Aligner, LetsTheSlowerGyroPace) {
   for (const auto& [rate_a, rate_b] : {std::pair{100.0, 83.0}, {100.0, 50.0}, {500.0, 100.0}}) {
     SCOPED_TRACE(::testing::Message() << rate_a << " Hz and " << rate_b << " Hz");
@@ -179,7 +179,7 @@ TEST(Aligner, LetsTheSlowerGyroPace) {
   }
 }
 
-// Stamps jitter, and are true nevertheless: on lines it makes no difference.
+// Stamps that jitter are still true: on lines it makes no difference.
 TEST(Aligner, InterpolatesAtTheTrueStampsOfJitteringStreams) {
   for (std::uint64_t seed = 1; seed <= 10; ++seed) {
     for (const double rate_b : {100.0, 83.0, 500.0}) {
@@ -202,7 +202,7 @@ TEST(Aligner, InterpolatesAtTheTrueStampsOfJitteringStreams) {
   }
 }
 
-// A gyro five times faster is averaged over the pace interval, so that its noise falls as much as
+// A gyro five times faster is averaged over the pace interval, which lowers its noise as much as
 // five samples allow. The expected factor comes from the weights: the interpolant's mean over the
 // interval is a weighted sum of samples, here integrated numerically from their hat functions.
 TEST(Aligner, AveragesAFasterGyroAndReducesItsNoise) {
@@ -235,8 +235,8 @@ TEST(Aligner, AveragesAFasterGyroAndReducesItsNoise) {
   }
 }
 
-// The mean over whole intervals takes out what would otherwise alias: a tone at the pace's own
-// frequency looks like a constant to plain interpolation.
+// The mean over whole intervals removes what would otherwise alias: to plain interpolation, a tone
+// at the pace's own frequency looks like a constant.
 TEST(Aligner, AveragesATonesAliasAway) {
   const auto tone = [](double t_s) { return std::cos(2.0 * 3.14159265358979 * 100.0 * t_s); };
   const Aligned result =
@@ -246,13 +246,13 @@ TEST(Aligner, AveragesATonesAliasAway) {
     ASSERT_NEAR(pair.rate_dps[0], 0.0, 1e-9);
 }
 
-// A frame that two queues have swapped is put in its place while it can still matter.
+// A frame that two queues have swapped is put in its place while it can still be used.
 TEST(Aligner, PutsALateSampleInItsPlaceWhileItIsNotUsed) {
   const Stream a = stream_of(100.0, 0ms, 2.0, noise(1));
   const Stream b = stream_of(100.0, 3ms, 2.0, noise(2));
   std::vector<Push> swapped = merged(a, b);
-  // Each stream's sample 50 behind its sample 51, with nothing of the other stream between them
-  // that would complete a pair.
+  // Each stream's sample 50 comes after its sample 51, with no sample of the other stream between
+  // them that would complete a pair.
   const auto place = [&swapped](std::size_t gyro, TimePoint t) {
     return std::find_if(swapped.begin(), swapped.end(),
                         [&](const Push& p) { return p.gyro == gyro && p.sample.t == t; });
@@ -270,7 +270,7 @@ TEST(Aligner, PutsALateSampleInItsPlaceWhileItIsNotUsed) {
   }
 }
 
-// Too late is refused and told, because the pair has gone out.
+// A sample that is too late is refused: its pair is complete.
 TEST(Aligner, RefusesASampleThatComesTooLate) {
   const Stream a = stream_of(100.0, 0ms, 1.0, line_a);
   const Stream b = stream_of(100.0, 3ms, 1.0, line_b);
@@ -293,8 +293,8 @@ TEST(Aligner, RefusesAStampThatItHolds) {
   EXPECT_TRUE(aligner.push(1, kStart, 2.0)) << "of the other gyro it is another sample";
 }
 
-// Random reordering within each stream: some samples are refused, but no pair ever goes back or
-// holds what no line through the samples could give.
+// Random reordering within each stream: some samples are refused, but no pair goes back in time or
+// has a value that is not on the lines.
 TEST(Aligner, StaysInOrderUnderAnyReordering) {
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
     for (const double rate_b : {100.0, 500.0}) {
@@ -326,7 +326,7 @@ TEST(Aligner, InterpolatesOverThreeLostFramesAndNotOverFour) {
         std::count_if(result.pairs.begin(), result.pairs.end(), [lost](const AlignedPair& pair) {
           return seconds(pair.t) > 1.995 && seconds(pair.t) < 1.995 + 0.01 * (lost + 1);
         });
-    // a[0] stands before the first sample of b.
+    // a[0] comes before the first sample of b.
     const std::uint64_t unpaired = result.aligner.counts().unpaired[0] - 1;
     if (lost <= 3) {
       EXPECT_EQ(in_gap, lost + 1);
@@ -339,7 +339,7 @@ TEST(Aligner, InterpolatesOverThreeLostFramesAndNotOverFour) {
   }
 }
 
-// The same where the faster gyro is averaged: an interval with a gap in it has no mean.
+// If the faster gyro is averaged, an interval with a gap in it has no mean.
 TEST(Aligner, AveragesOverNoGap) {
   const Stream fast = without(stream_of(500.0, 0ms, 5.0, line_a), 2.0, 2.009);
   const Stream slow = stream_of(100.0, 0ms, 5.0, line_b);
@@ -350,7 +350,7 @@ TEST(Aligner, AveragesOverNoGap) {
   EXPECT_GE(result.pairs.size(), 495U);
 }
 
-// A gap of the pacing gyro itself makes no pairs, and none that reach over it.
+// A gap of the pacing gyro itself makes no pairs, neither in it nor across it.
 TEST(Aligner, MakesNoPairsWhereThePacingGyroIsSilent) {
   const Stream a = without(stream_of(100.0, 0ms, 20.0, line_a), 5.0, 15.0);
   const Aligned result = align(a, stream_of(100.0, 3ms, 20.0, line_b));
@@ -359,8 +359,8 @@ TEST(Aligner, MakesNoPairsWhereThePacingGyroIsSilent) {
   expect_on_lines(result);
 }
 
-// A silent other gyro: samples wait as long as there is room, then each costs one count; what
-// returns is paired again.
+// While the other gyro is silent, samples wait as long as there is room; then each one is counted.
+// When it returns, pairs are made again.
 TEST(Aligner, CountsWhatASilentGyroLeavesUnpaired) {
   const Stream a = stream_of(100.0, 0ms, 60.0, line_a);
   const Stream b = without(stream_of(100.0, 3ms, 60.0, line_b), 10.0, 50.0);
@@ -372,7 +372,8 @@ TEST(Aligner, CountsWhatASilentGyroLeavesUnpaired) {
   EXPECT_EQ(result.pairs.back().t, a.back().t);
 }
 
-// One gyro alone for hours: bounded memory is the type's own size, and everything is counted.
+// One gyro alone for hours: memory is bounded by the type's own size, and every lost sample is
+// counted.
 TEST(Aligner, HoldsNoMoreThanItsBuffersWhenOnlyOneGyroSpeaks) {
   Aligner aligner;
   for (int i = 0; i < 1'000'000; ++i)
@@ -383,7 +384,7 @@ TEST(Aligner, HoldsNoMoreThanItsBuffersWhenOnlyOneGyroSpeaks) {
   EXPECT_EQ(aligner.counts().unpaired[0], 1'000'000U - Aligner::kCapacity);
 }
 
-// In a full buffer there is no place for what is older than its oldest sample.
+// A full buffer has no place for a sample that is older than its oldest one.
 TEST(Aligner, RefusesALateSampleInAFullBufferRatherThanLoseANewOne) {
   Aligner aligner;
   for (int i = 0; i < static_cast<int>(Aligner::kCapacity); ++i)
@@ -392,7 +393,7 @@ TEST(Aligner, RefusesALateSampleInAFullBufferRatherThanLoseANewOne) {
   EXPECT_TRUE(aligner.push(0, kStart + 15ms, 1.0));
 }
 
-// A gyro that is switched on later is paired from its first neighbours on.
+// A gyro that is switched on later makes pairs from its first two samples on.
 TEST(Aligner, PairsAGyroThatComesMuchLater) {
   const Stream a = stream_of(100.0, 0ms, 60.0, line_a);
   const Stream b = stream_of(100.0, 40s + 3ms, 20.0, line_b);
@@ -404,7 +405,7 @@ TEST(Aligner, PairsAGyroThatComesMuchLater) {
   EXPECT_EQ(result.pairs.size() + result.aligner.counts().unpaired[0], a.size());
 }
 
-// A gap among the very first samples is no sign of a slow gyro, and must not teach the aligner to
+// A gap among the very first samples does not make a gyro slow, and must not make the aligner
 // bridge such gaps.
 TEST(Aligner, ChoosesAsIfAGapAmongTheFirstSamplesWereNotThere) {
   const Stream a = stream_of(100.0, 0ms, 20.0, line_a);
@@ -418,7 +419,7 @@ TEST(Aligner, ChoosesAsIfAGapAmongTheFirstSamplesWereNotThere) {
     EXPECT_FALSE(seconds(pair.t) > 9.994 && seconds(pair.t) < 10.502) << seconds(pair.t);
 }
 
-// One gyro breaks off and comes back when the other has long begun: both are 100-Hz gyros still.
+// One gyro breaks off and returns long after the other began: both are still 100-Hz gyros.
 TEST(Aligner, ChoosesRightlyWhenTheFirstGyroWasAwayAtTheStart) {
   const Stream a = without(stream_of(100.0, 0ms, 40.0, line_a), 0.2, 20.0);
   const Stream b = stream_of(100.0, 10s + 3ms, 30.0, line_b);
@@ -430,8 +431,7 @@ TEST(Aligner, ChoosesRightlyWhenTheFirstGyroWasAwayAtTheStart) {
   expect_on_lines(result);
 }
 
-// Clocks that are set again and again, up to the end of time: intervals of decades are no
-// intervals.
+// The clocks are set again and again, up to the end of time: a leap of decades is not an interval.
 TEST(Aligner, TakesNoLeapOfTheClockForAnInterval) {
   constexpr Duration kLeap{1'120'000'000'000'000'000};
   Aligner aligner;
@@ -448,7 +448,7 @@ TEST(Aligner, TakesNoLeapOfTheClockForAnInterval) {
     EXPECT_LE(aligner.interval(gyro), Aligner::kIntervalMax);
 }
 
-// Latency is bounded and is what `complete` says: one interval of the other gyro when
+// The latency, from pair.t to pair.complete, is bounded: one interval of the other gyro when
 // interpolating, half an interval of the pace more when averaging.
 TEST(Aligner, CompletesEveryPairWithinItsLatencyBound) {
   for (const double rate_b : {83.0, 100.0, 500.0, 1000.0}) {
@@ -472,8 +472,8 @@ TEST(Aligner, CompletesEveryPairWithinItsLatencyBound) {
   }
 }
 
-// Which of two buses the kernel serves first is chance; the pairs may not depend on it. Each stream
-// keeps its order, and arrives up to 50 ms later than its stamps say.
+// Which of two buses the kernel serves first is chance; the pairs must not depend on it. Each
+// stream keeps its order, and arrives up to 50 ms later than its stamps.
 TEST(Aligner, GivesTheSamePairsHoweverTheStreamsInterleave) {
   for (std::uint64_t seed = 1; seed <= 30; ++seed) {
     for (const double rate_b : {100.0, 83.0, 500.0}) {
@@ -515,7 +515,7 @@ TEST(Aligner, GivesTheSamePairsHoweverTheStreamsInterleave) {
   }
 }
 
-// After a step of the clock nothing is interpolated between the time before and behind it.
+// Nothing is interpolated across a step of the clock.
 TEST(Aligner, ForgetsItsSamplesButNotItsChoiceWhenCleared) {
   Aligned result = align(stream_of(100.0, 0ms, 1.0, line_a), stream_of(100.0, 3ms, 1.0, line_b));
   Aligner& aligner = result.aligner;
@@ -534,7 +534,7 @@ TEST(Aligner, ForgetsItsSamplesButNotItsChoiceWhenCleared) {
   EXPECT_NEAR(pair.rate_dps[1], line_b(1.03), kRounding);
 }
 
-// A gyro a hundred times faster still fits the buffers, and is averaged as any other.
+// A gyro a hundred times faster still fits the buffers, and is averaged like any other.
 TEST(Aligner, AveragesAGyroAHundredTimesFaster) {
   const Aligned result =
       align(stream_of(1000.0, 0ms, 20.0, line_a), stream_of(10.0, 300us, 20.0, line_b));
@@ -544,8 +544,7 @@ TEST(Aligner, AveragesAGyroAHundredTimesFaster) {
   expect_on_lines(result);
 }
 
-// As far as the buffers reach: a pair of gyros of which one says a thousand values to the other's
-// two.
+// The limit of the buffers: one gyro sends a thousand values to the other's one or two.
 TEST(Aligner, AveragesAGyroTwoThousandTimesFaster) {
   for (const double slow_hz : {3.0, 2.0, 1.0}) {
     const Aligned result =
@@ -561,8 +560,7 @@ TEST(Aligner, AveragesAGyroTwoThousandTimesFaster) {
   EXPECT_TRUE(result.aligner.too_far_apart());
 }
 
-// --- a choice that was made among garbage is made again
-// ------------------------------------------
+// --- a wrong first choice is corrected -----------------------------------------------------------
 
 Stream burst(int count, Duration phase) {
   Stream stream;
@@ -581,7 +579,7 @@ struct PacePair {
   double b_hz;
 };
 
-// Two queues that were emptied at once look like gyros of thirty kilohertz.
+// Two queues that are emptied at once look like gyros of thirty kilohertz.
 TEST(Aligner, ChoosesAgainWhenTheFirstSamplesWereABurst) {
   for (const PacePair pace :
        {PacePair{100.0, 100.0}, {100.0, 1000.0}, {1000.0, 100.0}, {83.0, 52.0}}) {
@@ -604,7 +602,7 @@ TEST(Aligner, ChoosesAgainWhenTheFirstSamplesWereABurst) {
   }
 }
 
-// A gyro that is set to another rate, and one that was choked at first.
+// A gyro that is set to another rate, and one that was slow at first.
 TEST(Aligner, FollowsAGyroToAnotherRate) {
   for (const PacePair rates :
        {PacePair{100.0, 10.0}, {10.0, 100.0}, {3.0, 100.0}, {1000.0, 50.0}}) {
@@ -623,7 +621,7 @@ TEST(Aligner, FollowsAGyroToAnotherRate) {
   }
 }
 
-// Jitter, losses and queues that deliver in heaps are no other pace: no pair is lost to a doubt.
+// Jitter, losses and queues that deliver in bursts are no change of pace, and cost no pair.
 TEST(Aligner, KeepsItsChoiceThroughJitterLossesAndHeaps) {
   Random random(31);
   Stream a = stream_of(100.0, 0ms, 300.0, line_a);

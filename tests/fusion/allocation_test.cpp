@@ -1,5 +1,5 @@
-// After start-up the frame path allocates nothing: a heap that is slow, full or torn must not come
-// between a frame and the rate. Counts every operator new of this program.
+// After start-up the frame path allocates nothing: a slow, full or corrupt heap must not delay or
+// stop the rate. Counts every operator new of this program.
 
 #include <atomic>
 #include <cstdlib>
@@ -36,7 +36,7 @@ void* counted_aligned(std::size_t bytes, std::size_t alignment) {
 
 }  // namespace
 
-// The whole family: where one were missing, its memory would be freed by another allocator's
+// All forms of operator new: if one were missing, its memory would be freed by another allocator's
 // delete.
 void* operator new(std::size_t bytes) {
   return counted(bytes);
@@ -107,7 +107,7 @@ TEST(Allocation, IsSeenByTheCounter) {
   EXPECT_GE(allocations_of([] { std::vector<double> values(100, 1.0); }), 1U);
 }
 
-// Waiting, late, refused, forgotten: no path of a sample goes through the heap.
+// Samples that wait, are late, refused or cleared: none of these paths uses the heap.
 TEST(Allocation, IsNotDoneByTheAligner) {
   Aligner aligner;
   Random random(1);
@@ -116,7 +116,7 @@ TEST(Allocation, IsNotDoneByTheAligner) {
               AlignedPair pair;
               for (int i = 0; i < kSamples; ++i) {
                 aligner.push(0, kStart + i * 10ms, random.normal());
-                // Reordered, with gaps, and silent for long: every path is walked.
+                // Reordered samples, gaps and long silence cover every path.
                 if (i % 1000 < 300) continue;
                 aligner.push(1, kStart + (i ^ 1) * 10ms + 3ms, random.normal());
                 while (aligner.pop(pair))
@@ -145,7 +145,7 @@ TEST(Allocation, IsNotDoneByAveragingEither) {
   EXPECT_GT(pairs, 1900U);
 }
 
-// A step of the clock is taken up in place.
+// A step of the clock is handled in place.
 TEST(Allocation, IsNotDoneByTheStampGuard) {
   StampGuard guard;
   EXPECT_EQ(allocations_of([&guard] {
@@ -175,7 +175,7 @@ TEST(Allocation, IsNotDoneByLeastSquares) {
   }
 }
 
-// From the first pair of the calibration through dozens of windows.
+// Covers everything from the first pair of the calibration through dozens of windows.
 TEST(Allocation, IsNotDoneByCalibratorAndCorrector) {
   for (int order = 0; order <= kOrderMax; ++order) {
     Calibrator calibrator(order, 20.0);
@@ -199,8 +199,8 @@ TEST(Allocation, IsNotDoneByCalibratorAndCorrector) {
   }
 }
 
-// The filters of all banks are made in start(), in memory that the construction set aside; then
-// windows, stops, one gyro alone, gaps and a jump.
+// The filters of all banks are made in start(), in memory that the constructor reserved; then
+// follow windows, stops, one gyro alone, gaps and a jump.
 TEST(Allocation, IsNotDoneByTheOptimalCorrector) {
   Calibrator calibrator(0, 20.0);
   const auto corrector = make_optimal_corrector({});
@@ -233,7 +233,7 @@ TEST(Allocation, IsNotDoneByTheOptimalCorrector) {
   EXPECT_GE(corrector->condition().disagreements, 1U);
 }
 
-// Readings are split, joined, swapped and given up: their banks' memory goes with them.
+// Hypotheses are split, merged, swapped and dropped, and the memory of their banks moves with them.
 TEST(Allocation, IsNotDoneByTheReadings) {
   Readings readings({});
   const DriftMemory none;

@@ -1,4 +1,4 @@
-// A rest whose platform sways: how far the calibration may be off by it.
+// The error of a calibration whose platform sways.
 
 #include "fusion/calibration_blocks.h"
 
@@ -52,7 +52,7 @@ double mean_error(const CalibrationBlocks& blocks) {
   return sum / length;
 }
 
-// One calibration in a thousand may be taken for sway.
+// One calibration in a thousand may look like sway.
 TEST(CalibrationBlocks, FindNoSwayInNoise) {
   constexpr std::uint64_t kRuns = 1000;
   for (const double seconds : {10.0, 60.0, 300.0}) {
@@ -65,7 +65,7 @@ TEST(CalibrationBlocks, FindNoSwayInNoise) {
   }
 }
 
-// A slope is no sway, however steep.
+// A slope is not sway, however steep.
 TEST(CalibrationBlocks, FindNoSwayInASlope) {
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
     Random random(seed);
@@ -73,8 +73,8 @@ TEST(CalibrationBlocks, FindNoSwayInASlope) {
   }
 }
 
-// What sway does to the mean of a calibration is covered by what is said of the blocks, where it is
-// far above the noise.
+// If the sway is far above the noise, the stated variance of the blocks covers the error that it
+// causes in the mean.
 TEST(CalibrationBlocks, CoverWhatSwayDoesToTheMean) {
   constexpr std::uint64_t kRuns = 200;
   for (const double period_s : {1.3, 2.7, 4.1, 7.3, 11.0}) {
@@ -95,7 +95,7 @@ TEST(CalibrationBlocks, CoverWhatSwayDoesToTheMean) {
   }
 }
 
-// Full, it merges neighbours and loses nothing of the mean.
+// When full, it merges neighbours and keeps the mean.
 TEST(CalibrationBlocks, KeepTheMeanOfALongRest) {
   Random random(3);
   const CalibrationBlocks blocks = rest(3600.0, 0.0, 1.0, random);

@@ -12,7 +12,7 @@ namespace {
 constexpr double kRest_s = 20.0;
 constexpr double kRate_hz = 100.0;
 
-/// Two gyros at rest unless something else is said.
+/// Two gyros, at rest by default.
 struct Pair {
   std::array<double, 2> bias_dps{0.033, -0.0074};
   std::array<double, 2> slope_dps_s{0.0, 0.0};
@@ -42,8 +42,9 @@ double feed(Calibrator& calibrator, const Pair& pair, Random& random, double fro
   return until_s;
 }
 
-// Biases and slopes come out within the errors that the injected noise explains, and those errors
-// have the size that least squares predicts: neither is the estimate lucky nor the theory wrong.
+// Biases and slopes are recovered within the errors that the injected noise explains, and these
+// errors have the size that least squares predicts: the estimate is not lucky, and the theory is
+// right.
 TEST(Calibrator, RecoversBiasAndSlopeWithinTheInjectedNoise) {
   constexpr double kSigma = 0.01;
   constexpr int kRuns = 400;
@@ -83,7 +84,7 @@ TEST(Calibrator, RecoversBiasAndSlopeWithinTheInjectedNoise) {
   }
 }
 
-// The end of the calibration is where the first window begins, to the digit.
+// The first window begins exactly at the end of the calibration.
 TEST(Calibrator, EndsAfterTheRestAndLeavesTheNextPairUnused) {
   Random random(1);
   Calibrator calibrator(1, kRest_s);
@@ -96,7 +97,7 @@ TEST(Calibrator, EndsAfterTheRestAndLeavesTheNextPairUnused) {
   EXPECT_FALSE(calibrator.result().in_motion);
 }
 
-// At rest the true rate is the Earth's; it is no bias.
+// At rest the true rate is the Earth's, which is not a bias.
 TEST(Calibrator, TakesTheTrueRateOff) {
   Random random(1);
   Calibrator calibrator(0, kRest_s);
@@ -106,7 +107,7 @@ TEST(Calibrator, TakesTheTrueRateOff) {
   EXPECT_NEAR(calibrator.result().bias_dps(1, 0.0), -0.1, 1e-14);
 }
 
-// Where a reference tells the rate, motion is no reason to wait, and none of it ends in the drift.
+// With a reference, the calibration does not wait for rest, and no motion enters the drift.
 TEST(Calibrator, LearnsInMotionWhereTheTrueRateIsKnown) {
   Calibrator calibrator(1, kRest_s, WhenMoving::kKnown);
   double t_s = 0.0;
@@ -119,8 +120,8 @@ TEST(Calibrator, LearnsInMotionWhereTheTrueRateIsKnown) {
   EXPECT_FALSE(calibrator.result().in_motion);
 }
 
-// Less than half of the time covered carries no fit: the calibration begins again with the next
-// pair and its result is as if the first attempt had never been.
+// If less than half of the time is covered, there is no fit: the calibration begins again with the
+// next pair, and its result does not depend on the first attempt.
 TEST(Calibrator, BeginsAgainAfterAHoleInTheStreams) {
   Random random(1);
   Pair pair;
@@ -133,7 +134,7 @@ TEST(Calibrator, BeginsAgainAfterAHoleInTheStreams) {
   EXPECT_NEAR(calibrator.result().bias_dps(0, 30.0), 0.033 + 0.03, 1e-13);
 }
 
-// A few lost frames are no hole.
+// A few lost frames do not make a hole.
 TEST(Calibrator, GoesOnOverShortGaps) {
   Random random(1);
   Calibrator calibrator(1, kRest_s);
@@ -143,7 +144,7 @@ TEST(Calibrator, GoesOnOverShortGaps) {
   EXPECT_NEAR(calibrator.result().bias_dps(0, 20.0), 0.033, 1e-14);
 }
 
-// The car drives off and stops again: the result holds the rest behind it and no motion.
+// The car drives off and stops again: the result contains the later rest and no motion.
 TEST(Calibrator, WaitsForRestWhereThePlatformMoves) {
   for (const double rate_dps : {0.3, -0.3, 5.0, 100.0}) {
     Random random(1);
@@ -161,7 +162,8 @@ TEST(Calibrator, WaitsForRestWhereThePlatformMoves) {
   }
 }
 
-// Who drives off a second before the end has rested long enough; what is learnt holds no motion.
+// A car that drives off a second before the end has rested long enough; the result contains no
+// motion.
 TEST(Calibrator, IsContentWithNineTenthsOfTheRest) {
   Random random(1);
   Pair pair;
@@ -174,7 +176,7 @@ TEST(Calibrator, IsContentWithNineTenthsOfTheRest) {
   EXPECT_NEAR(calibrator.result().bias_dps(0, end_s), 0.033, 1e-13);
 }
 
-// Noise alone is no motion, of any size, also where both gyros share half of its power.
+// Noise alone, of any size, is not motion, even if both gyros share half of its power.
 TEST(Calibrator, TakesNoNoiseForMotion) {
   for (const double sigma_dps : {1e-5, 0.01, 1.0}) {
     for (const double correlation : {0.0, 0.5}) {
@@ -193,7 +195,7 @@ TEST(Calibrator, TakesNoNoiseForMotion) {
   }
 }
 
-// Gyros warming up drift together, and exactly equal readings have no noise to compare with.
+// Warming gyros drift together, and exactly equal readings have no noise for comparison.
 TEST(Calibrator, TakesNoSlowDriftAndNoFrozenReadingForMotion) {
   Random random(1);
   Pair pair;
@@ -206,7 +208,7 @@ TEST(Calibrator, TakesNoSlowDriftAndNoFrozenReadingForMotion) {
   EXPECT_EQ(frozen.restarts(), 0U);
 }
 
-// On a ship there is never rest: the motion is accepted and told, and no slope is learnt from it.
+// A ship never rests: its motion is accepted and reported, and no slope is learned from it.
 TEST(Calibrator, AcceptsMotionWhereItIsToldToAndLearnsNoSlopeFromIt) {
   Random random(1);
   Pair pair;
@@ -231,7 +233,7 @@ TEST(Calibrator, TellsNoMotionWhereItWasAllowedAndThereWasNone) {
   EXPECT_NEAR(calibrator.result().sum.slope_at(30.0), 2e-3, 1e-13);
 }
 
-// A second of a slow gyro holds one or two pairs, whose noise must not be taken for motion.
+// A second of a slow gyro contains one or two pairs, whose noise must not look like motion.
 TEST(Calibrator, CompletesWithSlowGyrosToo) {
   for (const double rate_hz : {0.8, 1.0, 2.7, 5.0}) {
     for (std::uint64_t seed = 1; seed <= 50; ++seed) {
@@ -249,7 +251,7 @@ TEST(Calibrator, CompletesWithSlowGyrosToo) {
   }
 }
 
-// What was thrown away after a hole plays no part in the judgement of what was used.
+// Pairs that were discarded after a hole do not affect the detection of motion later.
 TEST(Calibrator, ForgetsMotionBeforeAHole) {
   Random random(1);
   Pair pair;
@@ -261,7 +263,8 @@ TEST(Calibrator, ForgetsMotionBeforeAHole) {
   EXPECT_FALSE(calibrator.result().in_motion);
 }
 
-// What somebody else saw counts as what was seen here: nine tenths are enough, less is nothing.
+// Motion detected elsewhere counts like motion detected here: nine tenths of the rest are enough,
+// less is not.
 TEST(Calibrator, IsEndedByMotionThatAnotherOneSees) {
   for (const double until_s : {17.0, 19.0}) {
     SCOPED_TRACE(until_s);

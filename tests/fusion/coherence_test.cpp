@@ -1,4 +1,4 @@
-// Two gyros on one platform, block by block, and what may look as if one of them felt nothing.
+// Two gyros on one platform, block by block, and conditions in which one of them may seem blind.
 
 #include "fusion/coherence.h"
 
@@ -33,7 +33,7 @@ class Pair {
 
   using Rate = std::function<double(double)>;
   Coherence coherence;
-  /// What each gyro reads, less noise.
+  /// The rate that each gyro feels, without noise.
   std::array<Rate, 2> rate{at_rest, at_rest};
 
   void block() {
@@ -62,7 +62,7 @@ class Pair {
     for (const double until = t_s + seconds; t_s < until;)
       block();
   }
-  /// Greatest since the beginning.
+  /// Greatest probability since the beginning.
   [[nodiscard]] double greatest(std::size_t gyro) const { return greatest_[gyro]; }
   [[nodiscard]] bool contradicted() const { return contradicted_; }
 
@@ -75,10 +75,10 @@ class Pair {
 };
 
 constexpr double kLikely = 0.5;
-/// Three blocks show a step: that much is suspicion, and no more.
+/// Largest probability of blindness from a step, which shows in three blocks.
 constexpr double kSuspicious = 0.2;
 
-// A few seconds of motion, and the gyro that stays where it is has lost the platform.
+// After a few seconds of motion, the gyro that stays constant is found blind.
 TEST(Coherence, FindsAGyroThatFeelsNoRotation) {
   for (std::size_t bad = 0; bad < 2; ++bad) {
     for (std::uint64_t seed = 1; seed <= 20; ++seed) {
@@ -100,7 +100,7 @@ TEST(Coherence, FindsAGyroThatFeelsNoRotation) {
   }
 }
 
-// Even a slow turn shows it, where it is far above the noise: 0.5 deg/s, there and back.
+// A slow turn is enough if it is far above the noise: 0.5 deg/s, to and fro.
 TEST(Coherence, FindsABlindGyroOnASlowPlatform) {
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
     Pair pair(seed);
@@ -119,7 +119,7 @@ TEST(Coherence, FindsNothingInNoiseAtRestForAHundredHours) {
   EXPECT_FALSE(pair.contradicted()) << "seed " << kSeed;
 }
 
-// The other gyro's bias jumps, again and again, at rest: this one has missed nothing.
+// The other gyro's bias jumps at rest, again and again: this gyro is not blind.
 TEST(Coherence, TakesNoStepForARotation) {
   for (const double step_dps : {0.06, 0.5, 5.0, 50.0}) {
     for (std::size_t bad = 0; bad < 2; ++bad) {
@@ -135,7 +135,7 @@ TEST(Coherence, TakesNoStepForARotation) {
   }
 }
 
-// Nor a drift, as fast as drifts can be.
+// A drift of the other gyro, as fast as drifts can be, does not make this one blind either.
 TEST(Coherence, TakesNoRampForARotation) {
   for (const double slope_dps_s : {1e-4, 1e-3, 1e-2, 3e-2}) {
     for (std::size_t bad = 0; bad < 2; ++bad) {
@@ -169,7 +169,7 @@ TEST(Coherence, AllowsScaleFactorsAndSkewsToDiffer) {
   }
 }
 
-// Somebody else's frames: both move, and not alike. It is said, and it ends with its cause.
+// Foreign frames: both gyros move, but not alike. This is reported, and ends when its cause ends.
 TEST(Coherence, SeesAForeignSignal) {
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
     SCOPED_TRACE(seed);
@@ -189,7 +189,7 @@ TEST(Coherence, SeesAForeignSignal) {
   }
 }
 
-// What a gap hides was not seen.
+// A change across a gap is no evidence.
 TEST(Coherence, ComparesNothingAcrossAGap) {
   for (const bool told : {false, true}) {
     Pair pair(5);

@@ -1,5 +1,5 @@
-// What a gyro reads and what the live path makes of it, for every kind of the catalogue, whatever
-// kinds it has: a new row is tried here without being named.
+// The readings of a gyro and their correction in the live path, for every kind of the catalogue: a
+// new row is tested here without being named.
 
 #include <algorithm>
 #include <cmath>
@@ -33,9 +33,9 @@ constexpr std::uint64_t kEffectsMost = 12;
 constexpr double kWire_dps = 0.5e-6;
 constexpr double kRateMost_dps = 300.0;
 constexpr double kRateStep_dps = 12.5;
-// What a gyro could have: it answers with a tenth at least, twice at most, and about as strongly at
-// all rates. The search for the rate begins at the reading, which must not be beyond what the model
-// was made for.
+// Responses that a gyro can have: a slope of at least a tenth and at most two, nearly the same at
+// all rates. The search for the rate begins at the reading, which must lie within the model's
+// range.
 constexpr double kSlopeLeast = 0.1;
 constexpr double kSlopeMost = 2.0;
 constexpr double kBendMost = 0.3;
@@ -80,7 +80,7 @@ model::TemperaturePast past_of(std::initializer_list<double> temperatures_c) {
   return past;
 }
 
-/// Each thing that may be unknown is, now and then.
+/// Every input that may be unknown is unknown now and then.
 Surroundings somewhere(Random& random, bool may_be_unknown) {
   const auto known = [&](double from, double to) {
     const double value = random.uniform(from, to);
@@ -100,7 +100,7 @@ Surroundings somewhere(Random& random, bool may_be_unknown) {
   return s;
 }
 
-/// From differences of what the gyro reads, not from the slopes that the correction goes by.
+/// Computed from differences of readings, not from the slopes that the correction uses.
 bool a_gyro_could_have(const std::vector<Effect>& effects, const Surroundings& s) {
   const Equation equation(effects);
   double least = 1e300;
@@ -115,7 +115,7 @@ bool a_gyro_could_have(const std::vector<Effect>& effects, const Surroundings& s
   return least >= kSlopeLeast && most <= kSlopeMost && most - least <= kBendMost * least;
 }
 
-/// Weaker responses, until a gyro could have them.
+/// Weakens the responses until a gyro can have them.
 void tame(std::vector<Effect>& effects, const Surroundings& s) {
   while (!a_gyro_could_have(effects, s)) {
     for (Effect& effect : effects) {
@@ -134,7 +134,7 @@ std::string text_of(const std::vector<Effect>& effects) {
   return text;
 }
 
-/// The most that the effects moved a reading.
+/// Returns the largest change of a reading by the effects.
 double expect_taken_back(std::vector<Effect> effects, const Surroundings& s) {
   tame(effects, s);
   const Equation equation(effects);
@@ -148,7 +148,7 @@ double expect_taken_back(std::vector<Effect> effects, const Surroundings& s) {
   return moved_dps;
 }
 
-/// A ramp comes behind a low-pass as it was 1 / (2 pi cutoff) earlier.
+/// Behind a low-pass a ramp is late by 1 / (2 pi cutoff).
 void expect_dated_back(const std::vector<Effect>& effects, const Surroundings& s, Random& random) {
   const Equation equation(effects);
   const Compensation compensation(effects);
@@ -166,7 +166,7 @@ void expect_dated_back(const std::vector<Effect>& effects, const Surroundings& s
   EXPECT_NEAR(rate_dps, ramp(t_s - to_seconds(compensation.lag())), kWire_dps) << text_of(effects);
 }
 
-/// Drawn, lost or a matter of frames and clocks: the reading goes through as it is.
+/// Effects that are random, lose frames, or concern frames and clocks leave the reading unchanged.
 void expect_left(const std::vector<Effect>& effects, const Surroundings& s) {
   const Equation equation(effects);
   const Compensation compensation(effects);
@@ -228,8 +228,8 @@ TEST(CompensationKinds, SeveralAtOnceAreTakenBackTogether) {
   }
 }
 
-/// Where docs/model-file.md says that an effect adds nothing: temperature and voltage at the
-/// effect's reference and steady, no acceleration.
+/// Conditions in which an effect adds nothing, by docs/model-file.md: temperature and voltage
+/// steady at the effect's reference, no acceleration.
 Surroundings at_reference(const Effect& effect) {
   Surroundings s{.t_s = 10.0, .temperature_c = 25.0, .temperature_slope_c_s = 0.0};
   s.acceleration_g = {0.0, 0.0, 0.0};

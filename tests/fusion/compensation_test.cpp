@@ -18,7 +18,7 @@ Effect effect(Kind kind, model::Parameters parameters) {
   return {.gyro = 0, .kind = kind, .parameters = parameters};
 }
 
-/// What a gyro with these effects reads: written out, not asked of the catalogue.
+/// The readings of a gyro with these effects, written out instead of taken from the catalogue.
 struct Gyro {
   double bias = 0.05, ramp = 2e-6, step = -0.01, warm = 0.03, per_k = 1.1e-3, per_k2 = 2e-5;
   double per_k_s = 0.4, per_g = 3e-3, per_g2 = 0.5, harmonic = 4e-3, line = 2e-3;
@@ -96,7 +96,7 @@ TEST(Compensation, OfNothingChangesNothing) {
   EXPECT_EQ(compensation.correct(0.1, {}), 0.1);
 }
 
-// A first frame that has not come is no reason to publish NaN.
+// A missing first frame must not cause NaN.
 TEST(Compensation, LeavesOutWhatDependsOnTheUnknown) {
   const Gyro gyro;
   const Compensation compensation(gyro.effects());
@@ -109,8 +109,8 @@ TEST(Compensation, LeavesOutWhatDependsOnTheUnknown) {
   EXPECT_NEAR(compensation.correct(reading, nothing), rate, 1e-9);
 }
 
-// A cubic that was fitted to ±100 deg/s turns back at 183: there, and beyond, the result is bounded
-// by the reading.
+// A cubic that was fitted to ±100 deg/s has its extremum at 183: there, and beyond, the result is
+// bounded by the reading.
 TEST(Compensation, StaysBoundedWhereTheModelHasNoInverse) {
   const Effect cubic = effect(Kind::kScaleFactorCubic, {-1e-5});
   const Compensation compensation({&cubic, 1});

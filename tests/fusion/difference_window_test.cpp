@@ -1,4 +1,4 @@
-// The regression of the two gyros' difference against a plain least squares over all cells.
+// Compares the regression of the two gyros' difference with plain least squares over all cells.
 
 #include "fusion/difference_window.h"
 
@@ -41,9 +41,9 @@ std::vector<RateCell> cells_of(int count, Rate&& rate, Slope&& slope, const Trut
   return cells;
 }
 
-/// What all cells together say of (b₁ − b₂, s, τ), by hand: a row for each cell, its regressors
-/// from a polynomial through five cells, noise weighted. A regressor counts where it exceeds five
-/// times its own noise; an acceleration may have been met half a millisecond apart.
+/// The estimate of (b₁ − b₂, s, τ) from all cells, by hand: a row for each cell, its regressors
+/// from a polynomial through five cells, noise weighted. A regressor counts if it exceeds five
+/// times its own noise; the gyros may have seen an acceleration half a millisecond apart.
 struct Plain {
   Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
   Eigen::Vector3d right = Eigen::Vector3d::Zero();
@@ -123,8 +123,7 @@ TEST(DifferenceWindow, IsTheLeastSquaresOverItsCells) {
   }
 }
 
-// What was not excited has no row: nothing is said of a scale factor at rest, nor of a skew in a
-// steady turn.
+// A regressor that was not excited has no row: the scale factor at rest, the skew in a steady turn.
 TEST(DifferenceWindow, SaysNothingOfWhatWasNotExcited) {
   Random random(11);
   const auto none = [](double /*t*/) { return 0.0; };
@@ -134,14 +133,14 @@ TEST(DifferenceWindow, SaysNothingOfWhatWasNotExcited) {
   const auto turn = cells_of(
       100, [](double t) { return 20.0 + 1e-3 * t; }, none, {}, random);
   const DriftMeasurement turning = measured(turn);
-  // Bias and scale factor are one where the rate is constant, but for its noise.
+  // At a constant rate, bias and scale factor differ only by the rate's noise.
   ASSERT_GE(turning.values.size(), 1);
   EXPECT_EQ(information_of(turning)(2, 2), 0.0);
   expect_same(turning, Plain(turn));
   EXPECT_EQ(measured({}).values.size(), 0);
 }
 
-// Errors in units of what the rows say, over many windows.
+// Errors in units of the rows' own σ, over many windows.
 TEST(DifferenceWindow, KnowsHowFarItIsOff) {
   constexpr int kRuns = 300;
   constexpr std::uint64_t kSeed = 12;
@@ -163,7 +162,7 @@ TEST(DifferenceWindow, KnowsHowFarItIsOff) {
     EXPECT_NEAR(square(i), 1.0, kSigmas * std::sqrt(2.0 / kRuns)) << i << ", seed " << kSeed;
 }
 
-// A window goes on from the cells of the one before; across a gap nothing is differentiated.
+// A window continues the cells of the one before; nothing is differentiated across a gap.
 TEST(DifferenceWindow, KeepsTheLastCellsButNotAcrossAGap) {
   Random random(13);
   const auto rate = [](double t) { return 10.0 * std::sin(0.7 * t) + 5.0; };

@@ -1,5 +1,5 @@
-// The bank of drift filters on drifts whose course is known: walks, ramps, gyros that warm up, and
-// biases that follow temperature.
+// The bank of drift filters on known drifts: walks, ramps, gyros that warm up, and biases that
+// follow temperature.
 
 #include "fusion/drift_bank.h"
 
@@ -58,7 +58,7 @@ class World {
     one.noise(0, 0) = both.noise(0, 0) + both.noise(1, 1);
     return one;
   }
-  /// Time passes, and nothing is measured.
+  /// Time passes without a measurement; returns the means.
   std::array<double, 2> pass(double length_s) {
     constexpr int kSteps = 20;
     std::array<double, 2> mean{};
@@ -89,8 +89,8 @@ double error_of(const DriftBank& bank, const World& world, int gyro) {
   return bank.estimate().mean(gyro) - world.bias(static_cast<std::size_t>(gyro));
 }
 
-// A ramp that two minutes of rest have shown is foretold for 100 s: no further off than σ says, and
-// better than if it were held for a level.
+// A ramp that shows in two minutes of rest is predicted for 100 s: within σ, and better than if its
+// level were held.
 TEST(DriftBank, ForetellsARampForAHundredSeconds) {
   for (const double share : {0.03, 0.1, 0.3}) {
     double square = 0.0;
@@ -148,8 +148,8 @@ TEST(DriftBank, ForetellsGyrosThatWarmUp) {
   }
 }
 
-// What it costs to think of slopes where there are none: σ against that of one filter that is told
-// there is a walk and nothing else, on the same data.
+// The cost of considering slopes when there are none: σ relative to one filter that models a walk
+// alone, on the same data.
 TEST(DriftBank, PaysLittleForSlopesThatAreNotThere) {
   constexpr std::array<double, 2> kWalk{3e-5, 6e-5};
   std::array<GyroParameters, 2> gyros;
@@ -199,8 +199,8 @@ TEST(DriftBank, PaysLittleForSlopesThatAreNotThere) {
   }
 }
 
-// Two stops, ten kelvins apart, tell the coefficient; further away it counts for more, and so does
-// its doubt.
+// Two stops, ten kelvins apart, determine the coefficient; farther away its effect grows, and its
+// uncertainty too.
 TEST(DriftBank, LearnsTheTemperatureCoefficientAtTwoStops) {
   constexpr std::array<double, 2> kCoefficient{1e-3, -3e-3};  // deg/s/K
   std::array<GyroParameters, 2> gyros;
@@ -250,7 +250,7 @@ TEST(DriftBank, LearnsTheTemperatureCoefficientAtTwoStops) {
   EXPECT_LT(square, 1.0 + kSigmas * std::sqrt(2.0 / (2.0 * kRuns))) << "seeds 1 to " << kRuns;
 }
 
-// A thermometer that is not there is no temperature.
+// A missing thermometer gives no temperature.
 TEST(DriftBank, PassesOverATemperatureThatIsNotKnown) {
   std::array<GyroParameters, 2> gyros;
   gyros[0].learns_temperature = gyros[1].learns_temperature = true;
@@ -269,7 +269,7 @@ TEST(DriftBank, PassesOverATemperatureThatIsNotKnown) {
   EXPECT_FALSE(memory.has_temperature[0] || memory.has_temperature[1]);
 }
 
-// Weights are probabilities, and what is saved says the same.
+// Weights are probabilities, also in the saved memory.
 TEST(DriftBank, SavesProbabilities) {
   World world(2, [](std::size_t gyro, double t_s) { return gyro == 0 ? 3e-4 * t_s : 0.0; });
   DriftBank bank({});

@@ -1,5 +1,5 @@
-// The drift filter against plain mathematics: the covariance of a walk's means written down, a
-// differential equation integrated step by step, and a filter at full rate.
+// Compares the drift filter with plain mathematics: the covariance of a walk's means in closed
+// form, a differential equation integrated step by step, and a filter at full rate.
 
 #include "fusion/drift_filter.h"
 
@@ -87,7 +87,7 @@ constexpr SlopeModel kAlike{.begin_dps_s = {0.0, 0.0},
                             .correlation = 0.98,
                             .relative = 0.0};
 
-// A hundred hours of everything that can come: the covariance never loses what makes it one.
+// A hundred hours of everything that can come: the covariance stays symmetric and positive.
 TEST(DriftFilter, KeepsASoundCovarianceForAHundredHours) {
   const std::vector<Sensors> all{
       {"two MEMS", {3e-3, 4e-3}, {2e-5, 3e-5}, {}},
@@ -154,8 +154,8 @@ TEST(DriftFilter, KeepsASoundCovarianceForAHundredHours) {
   }
 }
 
-// The means of a random walk over windows have a covariance that can be written down; the filter's
-// likelihoods multiply to the density of all of them together.
+// The means of a random walk over windows have a covariance in closed form; the filter's
+// likelihoods multiply to the density of all means together.
 TEST(DriftFilter, FindsTheLikelihoodThatAllWindowsHaveTogether) {
   constexpr int kWindows = 40;
   constexpr double kWalk = 2e-3;
@@ -201,8 +201,8 @@ TEST(DriftFilter, FindsTheLikelihoodThatAllWindowsHaveTogether) {
   EXPECT_NEAR(filter.covariance()(kBias1, kBias1), variance, 1e-9 * variance);
 }
 
-/// The same model as a differential equation: the states and the integral of what gyro k's drift
-/// has been since the window began, integrated by Runge and Kutta's method.
+/// The same model as a differential equation: the states, and the integral of each gyro's drift
+/// since the window began, integrated by the Runge–Kutta method.
 class PlainFilter {
  public:
   static constexpr int kStates = 6;  // walk 1, walk 2, term 1, term 2, ∫B₁, ∫B₂
@@ -218,7 +218,7 @@ class PlainFilter {
       flow_(4 + k, k) = flow_(4 + k, 2 + k) = 1.0;
       drive_(k, k) = walk[gyro] * walk[gyro];
       drive_(2 + k, 2 + k) = 2.0 * term.sigma_dps * term.sigma_dps / term.tau_s;
-      // The whole drift was seen: the walk holds what the term does not.
+      // The whole drift was measured: the walk is that less the term.
       const double square = term.sigma_dps * term.sigma_dps;
       p_(k, k) = bias_sigma * bias_sigma + square;
       p_(2 + k, 2 + k) = square;
@@ -247,7 +247,7 @@ class PlainFilter {
       x_ += h / 6.0 * (e + 2.0 * f + 2.0 * g + j);
     }
   }
-  /// h₁·mean of B₁ + h₂·mean of B₂ was `value`.
+  /// The measured value of h₁·mean of B₁ + h₂·mean of B₂ was `value`.
   void learn(double length_s, double h1, double h2, double value, double noise) {
     Vector h = Vector::Zero();
     h(4) = h1 / length_s;
@@ -269,8 +269,8 @@ class PlainFilter {
   Vector x_ = Vector::Zero();
 };
 
-// Walks and Gauss–Markov terms, windows short and long against their correlation time. Where a
-// window is below a thousandth of it the term is taken for a walk: hence 1e-5.
+// Walks and Gauss–Markov terms, in windows that are short and long relative to their correlation
+// time. In a window below a thousandth of it, the term is treated as a walk: hence 1e-5.
 TEST(DriftFilter, TreatsTheMeanOverAWindowExactly) {
   constexpr std::array<double, 2> kWalk{2e-4, 5e-5};
   constexpr std::array<GaussMarkov, 2> kTerms{GaussMarkov{4e-3, 40.0}, GaussMarkov{1e-3, 900.0}};
@@ -313,8 +313,8 @@ TEST(DriftFilter, TreatsTheMeanOverAWindowExactly) {
   }
 }
 
-/// Drifts with slopes and temperature coefficients as a differential equation, integrated the same
-/// way. The temperature stands still within a window.
+/// Drifts with slopes and temperature coefficients as a differential equation, integrated in the
+/// same way. The temperature is constant within a window.
 class PlainSlopes {
  public:
   static constexpr int kStates = 8;  // walks, slopes, coefficients, ∫B₁, ∫B₂
@@ -394,7 +394,7 @@ class PlainSlopes {
   std::array<double, 2> away_k_{};
 };
 
-/// Drift, slope and coefficient of a filter, as PlainSlopes numbers them.
+/// Drift, slope and coefficient of a filter, in the numbering of PlainSlopes.
 void expect_same(const DriftFilter& filter, const PlainSlopes& plain, double tolerance,
                  int window) {
   const DriftFilter::Slopes slopes = filter.slopes();
@@ -423,10 +423,11 @@ void expect_same(const DriftFilter& filter, const PlainSlopes& plain, double tol
   }
 }
 
-// Slopes that begin uncertain and those that come and go, apart and alike, windows short and long
-// against their time, temperatures that change in between. Slopes that are what they were are
-// treated exactly. What a slope's own walk adds to its drift within a window is taken for half of
-// that at the window's end: hence a share of the variance, which is less the shorter the windows.
+// Slopes that begin uncertain and slopes that come and go, independent and alike, in windows that
+// are short and long relative to their time constant, with temperatures that change in between.
+// Constant slopes are treated exactly. The part of a slope's own walk in the mean drift is
+// approximated by half of that at the window's end: hence a share of the variance, smaller for
+// shorter windows.
 TEST(DriftFilter, TreatsSlopesAndTemperaturesExactlyButForTheSlopesOwnWalk) {
   struct Case {
     const char* name;
@@ -435,7 +436,7 @@ TEST(DriftFilter, TreatsSlopesAndTemperaturesExactlyButForTheSlopesOwnWalk) {
     double tolerance;
   };
   SlopeModel dying = kWarm;
-  dying.relative = 0.0;  // that a slope's own walk grows with it is no linear equation
+  dying.relative = 0.0;  // a walk that grows with the slope is not a linear equation
   const SlopeModel warm = dying;
   dying.steady_dps_s = {};
   constexpr double kWindow_s = 10.0;
@@ -483,7 +484,7 @@ TEST(DriftFilter, TreatsSlopesAndTemperaturesExactlyButForTheSlopesOwnWalk) {
   }
 }
 
-// A prediction in two halves is one of the whole, whatever a slope does.
+// A prediction in two halves equals one over the whole, with any slopes.
 TEST(DriftFilter, PredictsTheSameInPieces) {
   for (SlopeModel slopes : {kWarm, kAlike}) {
     slopes.relative = 0.0;
@@ -501,7 +502,7 @@ TEST(DriftFilter, PredictsTheSameInPieces) {
       EXPECT_NEAR(pieces.covariance()(k, k) / whole.covariance()(k, k), 1.0, 1e-6);
       EXPECT_NEAR(pieces.slopes().with_drift(k, k) / whole.slopes().with_drift(k, k), 1.0, 1e-6);
     }
-    // ∫ r·exp(−t/τ): a slope that dies away moves its drift by r·τ in all.
+    // ∫ r·exp(−t/τ): a slope that fades changes its drift by r·τ in all.
     const double all = slopes.tau_s * -std::expm1(-1000.0 / slopes.tau_s);
     EXPECT_NEAR(whole.mean()(0), 1e-3 * all, 1e-12);
     EXPECT_NEAR(whole.mean()(1), -2e-3 * all, 1e-12);
@@ -513,7 +514,8 @@ struct Comparison {
   double variance = 0.0;        ///< greatest relative difference
 };
 
-/// Means over 10 s against 50 samples a second: ten windows of stop, then the difference alone.
+/// Means over 10 s compared with 50 samples a second: ten windows of stop, then the difference
+/// alone.
 Comparison against_full_rate(const std::array<double, 2>& walk, std::uint64_t seed) {
   constexpr std::array<double, 2> kWhite{1e-3, 2e-3};
   constexpr double kWindow_s = 10.0;
@@ -553,7 +555,7 @@ Comparison against_full_rate(const std::array<double, 2>& walk, std::uint64_t se
   return worst;
 }
 
-// Where nothing drifts a mean says all that its samples do: the two filters are one.
+// Without drift a mean contains all information of its samples: the two filters agree.
 TEST(DriftFilter, IsTheFilterAtFullRateWhereNothingDrifts) {
   for (const std::uint64_t seed : {1U, 2U, 3U}) {
     const Comparison worst = against_full_rate({0.0, 0.0}, seed);
@@ -562,7 +564,7 @@ TEST(DriftFilter, IsTheFilterAtFullRateWhereNothingDrifts) {
   }
 }
 
-// Drift of the size that a window of 10 s is made for: the mean loses next to nothing.
+// With drift of the size that a window of 10 s is made for, the mean loses hardly anything.
 TEST(DriftFilter, LosesLittleToTheFilterAtFullRate) {
   for (const std::uint64_t seed : {1U, 2U, 3U}) {
     const Comparison worst = against_full_rate({1e-5, 2e-5}, seed);

@@ -19,8 +19,8 @@ Polynomial random_polynomial(Random& random, int order, double from_s, double wi
   return p;
 }
 
-// A polynomial of the fit's order comes back, with no digit lost to the size of the time stamps or
-// to uneven sampling. The moments of order 3 have a condition number near 100 on a full window.
+// A polynomial of the fit's order is recovered without loss of digits to large time stamps or
+// uneven sampling. The moments of order 3 have a condition number near 100 on a full window.
 TEST(LeastSquares, IsExactOnPolynomialsOfItsOrder) {
   for (std::uint64_t seed = 1; seed <= 50; ++seed) {
     for (const double from_s : {0.0, 1234.5, 1e8}) {
@@ -47,8 +47,8 @@ TEST(LeastSquares, IsExactOnPolynomialsOfItsOrder) {
   }
 }
 
-// On data that is no polynomial at all, the sums give what an orthogonal solver of all the samples
-// gives.
+// On data that is not a polynomial, the sums give the same result as an orthogonal solver on all
+// the samples.
 TEST(LeastSquares, AgreesWithAnOrthogonalSolver) {
   for (std::uint64_t seed = 1; seed <= 50; ++seed) {
     SCOPED_TRACE(::testing::Message() << "seed " << seed);
@@ -81,8 +81,8 @@ TEST(LeastSquares, AgreesWithAnOrthogonalSolver) {
   }
 }
 
-// The header's promise: a value at the window's centre errs by σ/√n for orders 0 and 1. A parabola
-// knows its vertex less well: by 3/2 of that.
+// As the header states, a value at the window's centre has an error of σ/√n for orders 0 and 1, and
+// of 3/2 of that for a parabola's vertex.
 TEST(LeastSquares, ErrsAtTheCentreAsPredicted) {
   constexpr double kSigma = 0.02;
   constexpr int kSamples = 200;
@@ -142,8 +142,8 @@ TEST(LeastSquares, RefusesToCoverLessThanHalfOfTheWindow) {
   }
 }
 
-// Many samples at two instants cover the window but cannot carry a parabola; whatever comes out
-// must be a number or nothing, never a NaN that poisons the output.
+// Many samples at two instants cover the window but do not determine a parabola; the result must be
+// finite or absent, never a NaN.
 TEST(LeastSquares, MakesNoNanOfSamplesAtTwoInstants) {
   for (int order = 0; order <= kOrderMax; ++order) {
     LeastSquares window(order, 0.0, 10.0);

@@ -14,7 +14,7 @@ namespace {
 constexpr double kRadPerDeg = std::numbers::pi / 180.0;
 constexpr double kRate_hz = 50.0;
 
-/// Two units on a car: turns about z, some sway about x and y of all that a road has.
+/// Two units on a car: turns about z, some sway about x and y.
 struct Drive {
   std::array<double, 3> angle_rad{};
   std::array<double, 3> scale{};
@@ -33,7 +33,7 @@ std::array<double, 3> rate_at(const Drive& drive, double t_s) {
           drive.turns_dps * std::sin(0.31 * t_s) * std::sin(0.047 * t_s)};
 }
 
-/// (Ω × θ) + scale + skew, as the header says it.
+/// (Ω × θ) + scale + skew, as in the header.
 std::array<double, 3> second_at(const Drive& drive, double t_s) {
   std::array<double, 3> rate = rate_at(drive, t_s + drive.skew_s);
   const std::array<double, 3> w = rate;
@@ -121,7 +121,7 @@ TEST(Misalignment, StaysUnknownAtRest) {
   }
 }
 
-// About z alone a car shows what is about x and y, and the third stays as unsure as it was.
+// Motion about z alone shows θ about x and y; the third component stays as uncertain as it was.
 TEST(Misalignment, IsLearnedOnlyWhereTheMotionShowsIt) {
   const Drive drive{.angle_rad = {0.008, -0.006, 0.007}, .sway_dps = 0.0};
   Misalignment misalignment;
@@ -131,7 +131,8 @@ TEST(Misalignment, IsLearnedOnlyWhereTheMotionShowsIt) {
   EXPECT_GT(misalignment.sigma_rad()[2], 0.5 * Misalignment::kPrior_deg * kRadPerDeg);
 }
 
-// An axis of which only one unit is left is known to the others, whose differences show the tilt.
+// The rate about an axis that only one unit measures is used for the other axes, whose differences
+// show the tilt.
 TEST(Misalignment, IsLearnedFromTheOtherAxesWhereOneIsOfASingleUnit) {
   const Drive drive{.angle_rad = {0.008, -0.006, 0.007}};
   Misalignment misalignment;
@@ -189,7 +190,7 @@ TEST(Misalignment, GoesOnFromWhatWasKept) {
   EXPECT_FALSE(second.resume(first.memory(), NAN));
 }
 
-// A bias that steps within a segment is no rotation: one such segment must not spoil the rest.
+// A bias step within a segment is not a rotation: one such segment must not spoil the estimate.
 TEST(Misalignment, IsLittleMovedByAStepOfABias) {
   const Drive drive{.angle_rad = {0.008, -0.006, 0.007}};
   Misalignment misalignment;

@@ -62,7 +62,7 @@ TEST(MovingVariance, IsBounded) {
   EXPECT_NEAR(moving.variance(), 0.25, 1e-9);
 }
 
-// The stream had run ahead by an hour and has come back.
+// The stream had run ahead by an hour and returns.
 TEST(MovingVariance, BeginsAnewWhenTimeIsSetBack) {
   MovingVariance moving;
   for (int i = 0; i < 10; ++i)

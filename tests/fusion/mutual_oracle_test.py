@@ -1,7 +1,7 @@
 #!/usr/bin/python3
-"""Holds `vgyro replay` against the paper's method done the long way: every sample kept, every
-polynomial fitted with NumPy, predict, correct, cross-calibrate and average as five separate steps.
-The recordings have equal stamps for both gyros, so that the alignment is the identity."""
+"""Compares `vgyro replay` with the paper's method in its literal form: every sample kept, every polynomial fitted
+with NumPy, predict, correct, cross-calibrate and average as five separate steps. The recordings have equal stamps
+for both gyros, so that the alignment is the identity."""
 
 import dataclasses
 import itertools
@@ -23,10 +23,10 @@ import product  # noqa: E402
 
 SEED = 20240611
 REST_RATE_DPS = make_twin.EARTH_DPS
-# What rounding to the wire's step and the arithmetic of two programs may differ by.
+# Differences allowed for rounding to the wire's step and for the arithmetic of two programs.
 RATE_TOLERANCE_DPS = canlog.RATE_STEP_DPS / 2 + 1e-9
 BIAS_TOLERANCE_DPS = canlog.BIAS_STEP_DPS / 2 + 1e-9
-# Which gyro paces is decided with this many samples of each; the pairs till then go out together.
+# The pacing gyro is chosen with this many samples of each; the pairs until then are sent together.
 PAIRS_HELD = 8
 
 
@@ -114,9 +114,9 @@ def mutual_method(stamps_us, y, rest_s, window_s, order):
 
 
 def mutual_algebra(stamps_us, y, rest_s, window_s, order):
-    """The same in closed form: the sum of the drifts is the calibration's, extrapolated, and their
-    difference the fit to y_1 − y_2 over the last completed window. Done step by step, a cubic loses
-    all its digits within a thousand windows; this does not."""
+    """The same in closed form: the sum of the drifts is the calibration's, extrapolated, and their difference is the
+    fit to y_1 − y_2 over the last completed window. Step by step, a cubic loses all its digits within a thousand
+    windows; this form does not."""
     us = stamps_us - stamps_us[0]
     t = us * 1e-6
     rest_us, window_us = round(rest_s * 1e6), round(window_s * 1e6)
@@ -159,7 +159,7 @@ def import_canmatrix():
 
 
 class Replay:
-    """One folder with a config and a log; replays as often as asked."""
+    """One folder with a config and a log; replays as often as required."""
 
     def __init__(self, folder, log, rest_s, window_s=10.0, order=1):
         self.folder = Path(folder)
@@ -217,7 +217,7 @@ class MutualMethod(WithFolder):
         holds_from = np.array([d[0] for d in oracle.drifts])
         expected = np.array([[c(seconds) for c in d[1:]] for d in oracle.drifts])  # window, gyro, frame
         frame = np.arange(len(stamps_us))
-        # A VG_Bias sent for the very pair that completes a window may tell of before or of after.
+        # A VG_Bias sent for the very pair that completes a window may hold the drifts before or after it.
         last = np.searchsorted(holds_from, stamps_us, side="right") - 1
         before = np.searchsorted(holds_from, stamps_us, side="left") - 1
         known = before >= 0

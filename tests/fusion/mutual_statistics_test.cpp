@@ -1,4 +1,4 @@
-// What noise does to the paper's method, measured on many seeds against what the algebra predicts.
+// The effect of noise on the paper's method, measured on many seeds and compared with the algebra.
 
 #include <gtest/gtest.h>
 
@@ -19,8 +19,8 @@ Calibration calibrated(int order, double rest_s, double rate_hz, Random& random)
   }
 }
 
-// A slope fitted on a short rest is σ_slope·√12/(T√n) wrong, and the heading error that it makes
-// grows as ½σ_slope·t². Holding the bias alone costs far less, unless there is a slope to know.
+// A slope fitted on a short rest has σ_slope = σ·√12/(T√n), and its heading error grows as
+// ½σ_slope·t². Holding the bias alone costs far less, unless there really is a slope.
 TEST(MutualStatistics, HeadingErrorOfAFittedSlopeGrowsWithTheSquareOfTime) {
   constexpr double kRest_s = 60.0;
   constexpr double kRate_hz = 10.0;
@@ -53,7 +53,7 @@ TEST(MutualStatistics, HeadingErrorOfAFittedSlopeGrowsWithTheSquareOfTime) {
     EXPECT_NEAR(at_300_s.value() / predicted(order, 300.0), 1.0, allowed);
     EXPECT_NEAR(at_600_s.value() / predicted(order, 600.0), 1.0, allowed);
     if (order == 1) {
-      // ½σ_slope·t² alone is nearly all of it.
+      // ½σ_slope·t² alone is nearly all of the error.
       EXPECT_NEAR(at_600_s.value() / (0.5 * slope_sigma * 600.0 * 600.0), 1.0, 0.1 + allowed);
       EXPECT_GT(at_600_s.value(), 10.0 * predicted(0, 600.0));
     }
@@ -103,7 +103,8 @@ TEST(MutualStatistics, LinearExtrapolationByOneWindowCostsRootSeven) {
   EXPECT_NEAR(cost / std::sqrt(7.0), 1.0, allowed * std::sqrt(2.0));
 }
 
-// Equal weights let the worse gyro in with half of its noise: (σ₁² + σ₂²)/4 > σ₁² once σ₂ > √3·σ₁.
+// With equal weights the worse gyro contributes half of its noise: (σ₁² + σ₂²)/4 > σ₁² once σ₂ >
+// √3·σ₁.
 TEST(MutualStatistics, MeanIsWorseThanTheBetterGyroBeyondRootThree) {
   constexpr int kSamples = 20'000;
   for (const double ratio : {1.0, 1.6, std::sqrt(3.0), 1.87, 10.0}) {

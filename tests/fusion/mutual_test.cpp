@@ -1,4 +1,5 @@
-// The algebra of the paper's method, on random data: what it follows, what it cannot see.
+// The algebra of the paper's method, on random data: the drifts that it follows, and those that it
+// cannot.
 
 #include <algorithm>
 #include <limits>
@@ -68,8 +69,8 @@ class RandomDrive {
   std::array<double, 2> slope_dps_s_{};
 };
 
-// Averaging cancels the cross drifts: what the virtual gyro takes off is the calibration's own sum,
-// extrapolated for ever, whatever happened since.
+// Averaging cancels the cross drifts: the virtual gyro subtracts the calibration's own sum,
+// extrapolated for ever, whatever happens later.
 TEST(MutualCorrector, TakesOffTheExtrapolatedSumOfTheCalibrationAndNothingElse) {
   for (int order = 0; order <= kOrderMax; ++order) {
     for (const double window_s : {1.0, 7.3, 10.0}) {
@@ -96,7 +97,7 @@ TEST(MutualCorrector, TakesOffTheExtrapolatedSumOfTheCalibrationAndNothingElse) 
   }
 }
 
-// The product's closed form against the paper's steps done one by one.
+// Compares the product's closed form with the paper's steps one by one.
 TEST(MutualCorrector, DoesWhatThePapersStepsDo) {
   constexpr int kWindows = 50;
   constexpr double kWindow_s = 10.0;
@@ -135,7 +136,7 @@ TEST(MutualCorrector, DoesWhatThePapersStepsDo) {
           ASSERT_NEAR(ours[i].rate_dps, static_cast<double>(theirs.virtual_dps[i]), tolerance)
               << "window " << w;
         }
-        // The first pair behind the window closes it. From then on the published drifts are the
+        // The first pair after the window closes it. From then on the published drifts are the
         // paper's c_k = ½(p_k + P_k), extrapolated.
         samples.clear();
         ours.clear();
@@ -153,8 +154,8 @@ TEST(MutualCorrector, DoesWhatThePapersStepsDo) {
   }
 }
 
-// What both gyros drift in common after the calibration is not in their difference: it arrives in
-// the virtual rate undiminished, and no window ever corrects it.
+// Common drift after the calibration is not in the difference: it enters the virtual rate in full,
+// and no window corrects it.
 TEST(MutualCorrector, NeverCorrectsTheMeanDrift) {
   for (int order = 0; order <= kOrderMax; ++order) {
     for (std::uint64_t seed = 1; seed <= 5; ++seed) {
@@ -185,8 +186,8 @@ TEST(MutualCorrector, NeverCorrectsTheMeanDrift) {
   }
 }
 
-// What it does follow, it follows perfectly: from the second window on, a difference that changes
-// as the order allows is known at every instant, though the calibration knew nothing of it.
+// A difference that changes as the order allows is followed perfectly: from the second window on it
+// is known at every instant, even if the calibration had none of it.
 TEST(MutualCorrector, FollowsADifferenceThatChangesAsItsOrderAllows) {
   for (int order = 0; order <= kOrderMax; ++order) {
     for (std::uint64_t seed = 1; seed <= 5; ++seed) {
@@ -226,9 +227,9 @@ TEST(MutualCorrector, LagsOneWindowBehindARampThatItHoldsAsConstant) {
   EXPECT_NEAR(lag_s, kWindow_s, 1e-9);
 }
 
-// A gyro that reads a turn larger looks as if it drifted while the platform turns. The virtual rate
-// is only wrong while turning, but the drifts that were learnt in the turn are wrong behind it, and
-// so is a gyro that has to carry on alone with them.
+// A gyro that overstates a turn seems to drift while the platform turns. The virtual rate is wrong
+// only while turning, but the drifts learned in the turn are wrong after it, and so is a gyro that
+// continues alone with them.
 TEST(MutualCorrector, TakesAScaleFactorMismatchForDriftAndIsWrongWhenTheTurnEnds) {
   constexpr double kError = 1e-3;
   constexpr double kTurn_dps = 50.0;
@@ -251,8 +252,8 @@ TEST(MutualCorrector, TakesAScaleFactorMismatchForDriftAndIsWrongWhenTheTurnEnds
   }
 }
 
-// A gyro whose frames come late by τ reads Ω(t − τ): while the turn rate grows, that is τ·dΩ/dt of
-// drift, which remains when the rate no longer grows.
+// A gyro whose frames come late by τ reads Ω(t − τ): while the rate grows, that is τ·dΩ/dt of
+// apparent drift, which remains when the rate is constant again.
 TEST(MutualCorrector, TakesATimeSkewForDriftWhileTheRateGrows) {
   constexpr double kSkew_s = 0.01;
   constexpr double kGrowth_dps_s = 2.0;
@@ -271,8 +272,8 @@ TEST(MutualCorrector, TakesATimeSkewForDriftWhileTheRateGrows) {
   }
 }
 
-// Windows that a gap has emptied are skipped: the drift is held, and the grid stays where the
-// calibration's end has put it.
+// Windows emptied by a gap are skipped: the drift is held, and the grid stays aligned to the
+// calibration's end.
 TEST(MutualCorrector, SkipsTheWindowsOfAGapAndKeepsTheGrid) {
   const auto corrector = started(0, 10.0, calibration_of(constant(0.0), constant(7.0)));
   const auto feed = [&corrector](double from_s, double to_s, double difference) {
@@ -298,7 +299,7 @@ TEST(MutualCorrector, SkipsTheWindowsOfAGapAndKeepsTheGrid) {
   EXPECT_EQ(corrector->windows().completed, 2U);
 }
 
-// More windows than any integer counts.
+// More windows than any integer can count.
 TEST(MutualCorrector, PassesOverASilenceInWindowsOfNoLength) {
   const auto corrector = started(1, 1e-30, calibration_of(constant(0.5), constant(0.25)));
   corrector->update({kStart_s, {1.0, 1.0}});
@@ -317,14 +318,13 @@ TEST(MutualCorrector, PassesOverASilenceOfAnyLengthInOneStep) {
   EXPECT_NEAR(static_cast<double>(corrector->windows().skipped), 1e12, 1e12 * 1e-9);
 }
 
-// --- over a leap of time the lines are held
-// ------------------------------------------------------
+// --- lines are held across a leap of time --------------------------------------------------------
 
 Polynomial line(double at_s, double value, double slope) {
   return {.centre_s = at_s, .half_width_s = 1.0, .coefficient = {value, slope, 0.0, 0.0}};
 }
 
-/// Every eighth of a second, from gyros whose difference is what the calibration has taught.
+/// Feeds pairs every eighth of a second, from gyros whose difference is that of the calibration.
 void feed(Corrector& corrector, double from_s, double to_s, const Polynomial& difference) {
   for (int i = 0; from_s + i * 0.125 < to_s; ++i) {
     const double t_s = from_s + i * 0.125;
@@ -332,8 +332,8 @@ void feed(Corrector& corrector, double from_s, double to_s, const Polynomial& di
   }
 }
 
-// The clock is set, or the bus was silent: nobody knows what the drifts did, least of all a slope
-// that some seconds have taught. Every line goes on where it was.
+// The clock was set, or the bus was silent: the change of the drifts is unknown, and a slope
+// learned in some seconds does not show it. Every line continues from where it was.
 TEST(MutualCorrector, ExtendsNoLineOverALeapOfTime) {
   for (const double leap_s : {11.0, 3600.0, 72e3, 1e9}) {
     for (const double first_s : {kStart_s, 70.0, 75.0, 83.0}) {
@@ -345,7 +345,7 @@ TEST(MutualCorrector, ExtendsNoLineOverALeapOfTime) {
       const Drift before = corrector->drift(last_s);
       const double later_s = last_s + leap_s;
       const double change_dps = 1e-3 * leap_s;
-      // Within what a window may teach of it: the sum's and the difference's slope over ten
+      // Within the change that one window can bring: the sum's and the difference's slope over ten
       // seconds.
       const double most_dps = std::min(change_dps, 0.05);
       EXPECT_NEAR(corrector->drift(later_s).bias_dps[0], before.bias_dps[0], most_dps);
@@ -354,7 +354,7 @@ TEST(MutualCorrector, ExtendsNoLineOverALeapOfTime) {
       const Drift after = corrector->drift(later_s);
       for (const std::size_t gyro : {0U, 1U})
         EXPECT_NEAR(after.bias_dps[gyro], before.bias_dps[gyro], 1e-9);
-      // From there on it is the method again.
+      // From there on the method works as usual.
       EXPECT_NEAR(corrector->update({later_s + 1.0, {0.0, 0.0}}).rate_dps, rate_dps - 5e-4, 1e-6);
       EXPECT_DOUBLE_EQ(corrector->drift(later_s).slope_dps_s, 5e-4);
     }
@@ -368,8 +368,8 @@ TEST(MutualCorrector, ExtendsNoLineOverALeapWhileOneGyroIsAlone) {
   EXPECT_NEAR(alone(*corrector, 0, kStart_s + 1e6, 0.0).rate_dps, before_dps, 1e-12);
 }
 
-// One gyro is away for an hour: the line of the difference reaches over one window, as the method
-// uses it, and no further. The sum is the calibration's, as ever.
+// One gyro is missing for an hour: the line of the difference is extended over one window, as the
+// method uses it, and no further. The sum stays the calibration's.
 TEST(MutualCorrector, ExtendsTheDifferenceOverNoMoreThanOneWindowWithoutAFit) {
   const auto corrector = started(1, 10.0, calibration_of(constant(0.0), line(kStart_s, 0.0, 2e-3)));
   for (int i = 0; i < 3600; ++i)
@@ -379,7 +379,7 @@ TEST(MutualCorrector, ExtendsTheDifferenceOverNoMoreThanOneWindowWithoutAFit) {
   EXPECT_NEAR(drift.bias_dps[0] - drift.bias_dps[1], 2e-3 * 10.0, 1e-12);
 }
 
-// When one gyro falls silent, the other goes on less its own last drift.
+// When one gyro falls silent, the other continues less its own last drift.
 TEST(MutualCorrector, CarriesOnWithOneGyroLessItsOwnDrift) {
   const auto corrector = started(1, 10.0, calibration_of(constant(0.5), constant(0.1)));
   const VirtualRate first = alone(*corrector, 0, 61.0, 10.0);
@@ -389,7 +389,7 @@ TEST(MutualCorrector, CarriesOnWithOneGyroLessItsOwnDrift) {
   EXPECT_DOUBLE_EQ(alone(*corrector, 1, 61.0, 10.0).rate_dps, 10.0 - 0.2);
 }
 
-// The slope that is published is the one that is taken off: half of the sum's.
+// The published slope is the one that is subtracted: half of the sum's.
 TEST(MutualCorrector, PublishesTheSlopeThatItTakesOff) {
   Polynomial sum{.centre_s = 0.0, .half_width_s = 1.0, .coefficient = {0.0, 4e-5, 0.0, 0.0}};
   const auto corrector = started(1, 10.0, calibration_of(sum, constant(0.0)));
@@ -399,7 +399,7 @@ TEST(MutualCorrector, PublishesTheSlopeThatItTakesOff) {
   EXPECT_NEAR(at_60_s - at_61_s, 2e-5, 1e-15);
 }
 
-// The rival does nothing: what comes in is averaged and goes out, and it claims to know no drift.
+// The plain mean averages its input, and has no drift to report.
 TEST(MeanCorrector, AveragesAndKnowsNothing) {
   const auto mean = make_mean_corrector();
   EXPECT_FALSE(mean->needs_calibration());

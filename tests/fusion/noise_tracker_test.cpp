@@ -1,4 +1,4 @@
-// The noise of a pair, from samples whose noise is known.
+// Tests the noise of a pair from samples of known noise.
 
 #include "fusion/noise_tracker.h"
 
@@ -15,7 +15,7 @@ namespace {
 
 constexpr double kRate_hz = 50.0;
 
-/// Two gyros of a platform, sample by sample, and what a tracker is given of them.
+/// Two gyros on a platform, sample by sample, in the blocks that a tracker receives.
 class Pair {
  public:
   Pair(const std::array<double, 2>& white_dps_rthz, std::uint64_t seed, double rate_hz = kRate_hz)
@@ -23,10 +23,10 @@ class Pair {
 
   /// The true rate at a time, deg/s.
   std::function<double(double)> rate = [](double /*t_s*/) { return 0.0; };
-  /// What gyro 1 shows besides, deg/s.
+  /// Added to gyro 1's rate, deg/s.
   std::function<double(double)> spike = [](double /*t_s*/) { return 0.0; };
   std::array<double, 2> white;
-  double shared_white = 0.0;  ///< noise that both have
+  double shared_white = 0.0;  ///< noise common to both
   std::array<double, 2> scale{1.0, 1.0};
   double step_dps = 0.0;  ///< to which both values are rounded
   std::array<double, 2> noise_gain{1.0, 1.0};
@@ -63,8 +63,9 @@ class Pair {
   double count_ = 0.0;
 };
 
-// Relative standard errors: of N² from neighbouring cells' differences √(3/cells), four of five
-// cells having one; of samples √(2/samples), four of five being free at 5 a cell.
+// Relative standard errors: of N² from differences of neighbouring cells √(3/cells), as four of
+// five cells have a neighbour; of sample variances √(2/samples), as four of five samples are free
+// with 5 in a cell.
 double density_error(double seconds) {
   return std::sqrt(3.0 / (8.0 * seconds));
 }
@@ -90,7 +91,7 @@ TEST(NoiseTracker, MeasuresBothGyrosAtRest) {
   }
 }
 
-// Noise that both gyros have (vibration, supply) shows in the covariance.
+// Noise common to both gyros (vibration, supply) shows in the covariance.
 TEST(NoiseTracker, MeasuresWhatTheGyrosShareAtRest) {
   constexpr std::uint64_t kSeed = 6;
   Pair pair({1e-3, 2e-3}, kSeed);
@@ -104,7 +105,7 @@ TEST(NoiseTracker, MeasuresWhatTheGyrosShareAtRest) {
   EXPECT_NEAR(tracker.density()[2] / 5e-6, 1.0, kSigmas * density_error(600.0));
 }
 
-// In motion what both share is the motion, not noise.
+// In motion the common part is motion, not noise.
 TEST(NoiseTracker, TakesNoMotionForNoise) {
   constexpr std::uint64_t kSeed = 7;
   Pair pair({1e-3, 3e-3}, kSeed);
@@ -125,7 +126,8 @@ TEST(NoiseTracker, BelievesTheModelFile) {
   EXPECT_NEAR(tracker.density()[2] / 9e-6, 1.0, kSigmas * density_error(60.0));
 }
 
-// A pair's noise_gain tells how much of a raw sample's noise is left; the raw sample's is kept.
+// A pair's noise_gain is the remaining share of a raw sample's noise; the tracker reports the raw
+// sample's.
 TEST(NoiseTracker, KnowsAveragedSamplesFromRawOnes) {
   constexpr std::uint64_t kSeed = 9;
   Pair pair({1e-3, 3e-3}, kSeed);
@@ -150,7 +152,7 @@ TEST(NoiseTracker, GivesAStandingValueTheNoiseOfItsStep) {
 }
 
 // Ten times the noise, while the platform turns: the right gyro is named, its variance is found,
-// and it is forgiven afterwards.
+// and it is no longer named afterwards.
 TEST(NoiseTracker, FollowsARiseOfOneGyroInMotion) {
   for (std::size_t bad = 0; bad < 2; ++bad) {
     constexpr std::uint64_t kSeed = 12;
@@ -175,7 +177,7 @@ TEST(NoiseTracker, FollowsARiseOfOneGyroInMotion) {
   }
 }
 
-// Turning is no noise, however hard.
+// Turning is not noise, however hard.
 TEST(NoiseTracker, FindsNoRiseWhereThePlatformOnlyTurns) {
   constexpr std::uint64_t kSeed = 13;
   Pair pair({1e-3, 2e-3}, kSeed);
@@ -192,8 +194,8 @@ TEST(NoiseTracker, FindsNoRiseWhereThePlatformOnlyTurns) {
 
 // --- coarse values -------------------------------------------------------------------------------
 
-/// Mean square by which the mean of round(x + noise) is off, in units of the step: 40 places of x
-/// between two steps, drawn.
+/// Mean square error of the mean of round(x + noise), in units of the step: 40 places of x between
+/// two steps, drawn.
 double rounding_by_chance(double noise, Random& random) {
   constexpr int kPlaces = 40;
   constexpr int kDraws = 20'000;
@@ -207,14 +209,14 @@ double rounding_by_chance(double noise, Random& random) {
       mean += away / kDraws;
       squares += away * away / kDraws;
     }
-    // The draws' own variance falls out.
+    // Removes the draws' own variance.
     square += (mean * mean - (squares - mean * mean) / (kDraws - 1)) / kPlaces;
   }
   return square;
 }
 
-// Never less than it is, and no more than twice as much where it matters at all: one term of a
-// series stands for all of it.
+// Never less than the true value, and where it matters no more than twice as much: one term of a
+// series represents all of it.
 TEST(NoiseTracker, KnowsHowFarRoundingPutsAMeanOff) {
   constexpr double kStep_dps = 0.1;
   constexpr std::uint64_t kSeed = 21;
@@ -226,7 +228,7 @@ TEST(NoiseTracker, KnowsHowFarRoundingPutsAMeanOff) {
       tracker.set_resolution(gyro, kStep_dps);
     const double sample = squared(kStep_dps) * (squared(noise) + 1.0 / 12.0);
     tracker.resume({sample / kRate_hz, 0.0, sample / kRate_hz}, {sample, sample});
-    // What the draws leave: the square of a mean's standard error.
+    // Remaining error of the draws: the squared standard error of a mean.
     const double chance = squared(kStep_dps) * 4.0 * 0.35 / 20'000;
     for (std::size_t gyro = 0; gyro < 2; ++gyro) {
       EXPECT_GT(tracker.rounding_variance(gyro), 0.97 * truth - chance)
@@ -240,8 +242,8 @@ TEST(NoiseTracker, KnowsHowFarRoundingPutsAMeanOff) {
   EXPECT_EQ(fine.rounding_variance(0), 0.0) << "no step is known";
 }
 
-// Both step at the same instants, by as much: what is left to each is nothing, or a rounding error
-// below it. No number of it may become a NaN, or a noise of nothing.
+// Both gyros step at the same instants by the same amount: each one's own part is zero, or a
+// rounding error below zero. Nothing may become NaN, or a noise of 0.
 TEST(NoiseTracker, StaysFiniteWhereBothStepAlike) {
   for (const double step_dps : {1e-3, 0.1, 1.0 / 3.0}) {
     constexpr std::uint64_t kSeed = 22;
@@ -270,8 +272,8 @@ TEST(NoiseTracker, StaysFiniteWhereBothStepAlike) {
   }
 }
 
-// Scale factors differ, and the platform sways: what the louder one has in common with the other is
-// more than all of the other's own. Neither is left without noise.
+// Scale factors differ, and the platform sways: the louder gyro's common part exceeds all of the
+// other's signal. Neither gyro is left without noise.
 TEST(NoiseTracker, LeavesNoGyroWithoutNoiseWhereScalesDifferAndThePlatformSways) {
   for (const double scale : {0.9, 0.98, 1.02, 1.1}) {
     for (std::uint64_t seed = 1; seed <= 10; ++seed) {
@@ -282,7 +284,7 @@ TEST(NoiseTracker, LeavesNoGyroWithoutNoiseWhereScalesDifferAndThePlatformSways)
       for (const bool told : {false, true}) {
         NoiseTracker tracker({});
         pair.measure(tracker, 120.0, told);
-        // A twentieth of what both differ by is the least that is left to each.
+        // Each gyro keeps at least a twentieth of the difference's variance.
         EXPECT_GT(tracker.density()[0], 0.04 * (1e-6 + 9e-6)) << told;
         EXPECT_GT(tracker.density()[2], 0.04 * (1e-6 + 9e-6)) << told;
         EXPECT_GT(tracker.sample_variance()[0], 0.04 * (1e-6 + 9e-6) * kRate_hz) << told;
@@ -292,8 +294,8 @@ TEST(NoiseTracker, LeavesNoGyroWithoutNoiseWhereScalesDifferAndThePlatformSways)
   }
 }
 
-// A block of a rest like any other is usual, but for one in ten thousand; people who get in are
-// not.
+// All blocks of an ordinary rest are usual, except one in ten thousand; a block with boarding
+// passengers is not.
 TEST(NoiseTracker, KnowsAnUnusualBlock) {
   constexpr std::uint64_t kSeed = 23;
   Pair pair({1e-3, 3e-3}, kSeed);
@@ -312,8 +314,8 @@ TEST(NoiseTracker, KnowsAnUnusualBlock) {
            [&](const CellBlock& block) { EXPECT_FALSE(tracker.usual(block)) << block.from_s; });
 }
 
-// A value that is no measurement stands in one block, and spoils no other. Noise and motion, of
-// both gyros or of one that alone feels it, look like none. The smallest is twenty times the noise.
+// A value that is no measurement is found in its block and affects no other. Noise and motion, of
+// both gyros or felt by one alone, do not look like one. The smallest is twenty times the noise.
 TEST(NoiseTracker, KnowsABlockWithASpike) {
   constexpr std::uint64_t kSeed = 24;
   SCOPED_TRACE(::testing::Message() << "seed " << kSeed);

@@ -1,5 +1,5 @@
-// The optimal corrector when gyros jump, fall silent or grow noisy, when it is stopped and started
-// again, and on streams that are not even.
+// The optimal corrector when gyros jump, fall silent or grow noisy, when it is stopped and
+// restarted, and on uneven streams.
 
 #include <cmath>
 #include <limits>
@@ -28,13 +28,13 @@ double at_rest(double /*t_s*/) {
   return 0.0;
 }
 
-/// What a stretch of a run was like.
+/// Results of a stretch of a run.
 struct Stretch {
   Step last;
   double bias_square = 0.0;    ///< mean of the bias's (error/σ)²
-  double rate_square = 0.0;    ///< mean of the rate's
-  double rate_rms_dps = 0.0;   ///< of its error
-  double greatest_step = 0.0;  ///< of the drift that is taken off, from sample to sample, in σ
+  double rate_square = 0.0;    ///< mean of the rate's (error/σ)²
+  double rate_rms_dps = 0.0;   ///< rms of the rate's error
+  double greatest_step = 0.0;  ///< of the subtracted drift, from sample to sample, in σ
 };
 
 Stretch drive(OptimalRun& run, double seconds, const world::World::Rate& rate, Use use = Use::kBoth,
@@ -68,11 +68,11 @@ Stretch drive(OptimalRun& run, double seconds, const world::World::Rate& rate, U
 
 // --- a jump of one gyro --------------------------------------------------------------------------
 
-// Which gyro jumped cannot be seen: that is said, σ covers either, the rate does not follow by a
-// step, and the next stop tells.
+// It does not show which gyro jumped: this is reported, σ covers both cases, the rate does not
+// step, and the next stop decides.
 TEST(OptimalFaults, SayThatTheGyrosDisagreeUntilAStopTells) {
   constexpr std::uint64_t kRuns = 10;
-  // Σ of error² over σ², each gyro as often as its drift makes it the likelier one.
+  // Σ of error² over σ²; each gyro jumps as often as its drift makes it likely.
   double bias_square = 0.0;
   double rate_square = 0.0;
   const double drift = std::hypot(kGyros[0].walk, kGyros[1].walk);
@@ -96,7 +96,7 @@ TEST(OptimalFaults, SayThatTheGyrosDisagreeUntilAStopTells) {
       const Stretch stop = drive(run, 30.0, at_rest);
       EXPECT_FALSE(run.corrector->condition().disagree);
       EXPECT_LT(std::abs(stop.last.bias_error_dps), 4.0 * stop.last.bias_sigma_dps);
-      // Not nothing: a turn of just the size of the jump is not quite excluded.
+      // Not 0: a turn of exactly the size of the jump is not quite excluded.
       EXPECT_LT(stop.last.bias_sigma_dps, 2e-3);
     }
   }
@@ -126,7 +126,7 @@ TEST(OptimalFaults, BridgeADropOutOfEitherGyro) {
       EXPECT_FALSE(run.corrector->condition().disagree);
       square += std::pow(alone.last.bias_error_dps / alone.last.bias_sigma_dps, 2.0) / kRuns;
     }
-    // σ holds slopes as well, of which these gyros have none.
+    // σ also covers slopes, which these gyros do not have.
     EXPECT_GT(square, 0.4) << "seeds 1 to " << kRuns;
     EXPECT_LT(square, 1.0 + kSigmas * std::sqrt(2.0 / kRuns)) << "seeds 1 to " << kRuns;
   }
@@ -134,8 +134,8 @@ TEST(OptimalFaults, BridgeADropOutOfEitherGyro) {
 
 // --- a blind gyro --------------------------------------------------------------------------------
 
-// One gyro feels no rotation any more: it is named, the other one carries the rate, and what its
-// drift is known to is said of that one. Where it is the only one that is left, nothing is usable.
+// One gyro no longer feels rotation: it is named, the other one carries the rate, and the reported
+// σ of the drift is that gyro's. If the blind gyro is the only one left, no rate is usable.
 TEST(OptimalFaults, NameABlindGyroAndDoWithoutIt) {
   for (std::size_t bad = 0; bad < 2; ++bad) {
     for (std::uint64_t seed = 1; seed <= 10; ++seed) {
@@ -151,7 +151,7 @@ TEST(OptimalFaults, NameABlindGyroAndDoWithoutIt) {
       EXPECT_TRUE(run.corrector->condition().disagree);
       const Stretch after = drive(run, 60.0, winding);
       EXPECT_LT(after.rate_square, 1.3);
-      // A gyro alone at 50 Hz, and a share of 0.05 % of the blind one's at up to 25 deg/s.
+      // One gyro alone at 50 Hz, and 0.05 % of the blind one's error at up to 25 deg/s.
       EXPECT_LT(after.rate_rms_dps,
                 1.2 * std::hypot(kGyros[1 - bad].white * std::sqrt(50.0), 0.0125));
       const Use only = bad == 0 ? Use::kGyro1 : Use::kGyro2;
@@ -162,8 +162,8 @@ TEST(OptimalFaults, NameABlindGyroAndDoWithoutIt) {
   }
 }
 
-// What goes off the virtual rate is the drift of the gyro that it rests on, and so is σ of the
-// drift: with the noisier and faster drifting one left, it is that one's.
+// The subtracted drift is that of the gyro that carries the rate, and so is its σ: with the noisier
+// and faster drifting gyro left, its σ.
 TEST(OptimalFaults, SayTheDriftsSigmaOfTheGyroThatTheRateRestsOn) {
   constexpr std::uint64_t kSeed = 4;
   const Gyros gyros{world::Gyro{1e-3, 1e-5, 0.05}, world::Gyro{2e-3, 3e-4, -0.1}};
@@ -173,7 +173,7 @@ TEST(OptimalFaults, SayTheDriftsSigmaOfTheGyroThatTheRateRestsOn) {
   run.world.gyros_[0].blind = true;
   const Step step = drive(run, 60.0, winding).last;
   ASSERT_TRUE(run.corrector->condition().blind[0]);
-  // Within the minute that gyro 2 has been alone its walk has brought at least half of this.
+  // In the minute that gyro 2 has been alone, its walk contributes at least half of this.
   EXPECT_GT(step.bias_sigma_dps, 0.5 * gyros[1].walk * std::sqrt(60.0)) << "seed " << kSeed;
 }
 
@@ -221,12 +221,12 @@ TEST(OptimalMemory, GoesOnWhereItEnded) {
   const VirtualRate again = resumed->update(pair);
   for (std::size_t k = 0; k < 2; ++k)
     EXPECT_NEAR(again.corrected_dps[k], on.corrected_dps[k], 1e-12);
-  // The last window ended a while ago: weights and σ are those of now.
+  // The last window ended a while ago: weights and σ must be the present ones.
   EXPECT_NEAR(is.bias_sigma_dps / was.bias_sigma_dps, 1.0, 0.02) << "seed " << kSeed;
 }
 
-// σ² grows by K² a second, and by what a sensor takes on when it is switched off and on. That holds
-// for a memory that is sure of a walk; one that thinks slopes possible grows faster, never slower.
+// σ² grows by K² a second, and by the change of a sensor that was switched off and on. That holds
+// for a memory that is certain of a walk; with possible slopes it grows faster, never slower.
 TEST(OptimalMemory, AgesWithTheDrift) {
   OptimalRun run(kGyros, kRate_hz, 62, told(kGyros));
   run.calibrate();
@@ -258,7 +258,7 @@ OptimalSettings learning_temperature() {
   settings.gyros[0].learns_temperature = settings.gyros[1].learns_temperature = true;
   return settings;
 }
-/// Of a pair that drifts at a slope, of which nothing is told, after some stops.
+/// The memory of a pair with a ramp, with unknown parameters, after some stops.
 DriftMemory learned_memory(std::uint64_t seed, double ramp_dps_s, Drift& was, double& now_s) {
   Gyros gyros = kGyros;
   gyros[0].ramp_dps_s = ramp_dps_s;
@@ -276,7 +276,7 @@ DriftMemory learned_memory(std::uint64_t seed, double ramp_dps_s, Drift& was, do
   return *run.corrector->memory(now_s);
 }
 
-// Whatever has been learned, of slopes and of temperatures as well, is there again.
+// Everything learned is restored, slopes and temperature coefficients too.
 TEST(OptimalMemory, KeepsSlopesAndTemperatureCoefficients) {
   for (const double ramp_dps_s : {0.0, 5e-5, 3e-4}) {
     for (std::uint64_t seed = 1; seed <= 5; ++seed) {
@@ -310,8 +310,7 @@ TEST(OptimalMemory, KeepsSlopesAndTemperatureCoefficients) {
   }
 }
 
-// A memory that an older program has left says nothing of slopes and temperatures: it is taken for
-// what it says.
+// A memory from an older program has no slopes and temperatures; the rest of it is used.
 TEST(OptimalMemory, ReadsWhatOlderProgramsHaveKept) {
   for (std::uint64_t seed = 1; seed <= 5; ++seed) {
     SCOPED_TRACE(seed);
@@ -393,7 +392,7 @@ TEST(OptimalMemory, RefusesWhatCannotBe) {
 
 // --- uneven streams ------------------------------------------------------------------------------
 
-// Minutes without a sample, samples far apart, slow gyros: σ stays honest, and finite.
+// Minutes without a sample, samples far apart, slow gyros: σ stays true and finite.
 TEST(OptimalStreams, MayHaveGaps) {
   constexpr std::uint64_t kRuns = 30;
   double square = 0.0;
@@ -431,7 +430,7 @@ TEST(OptimalStreams, MayBeOfSlowGyros) {
       bias += (moving.bias_square + stop.bias_square) / 2.0 / kRuns;
       rate += moving.rate_square / kRuns;
     }
-    // A drift beyond three of its standard deviations may be a slow turn as well, at first.
+    // A drift beyond three standard deviations may also be a slow turn at first.
     EXPECT_GE(found + 2, kRuns) << rate_hz << " Hz";
     EXPECT_GT(bias, 0.7) << rate_hz << " Hz, seeds 1 to " << kRuns;
     EXPECT_LT(bias, 1.3) << rate_hz << " Hz, seeds 1 to " << kRuns;

@@ -1,7 +1,7 @@
 #pragma once
 
-// The optimal corrector on a simulated world, driven as the pipeline drives it: calibration at
-// rest, then pairs, or samples of one gyro alone.
+// The optimal corrector on a simulated world, called as by the pipeline: calibration at rest, then
+// pairs, or samples of one gyro alone.
 
 #include <algorithm>
 #include <array>
@@ -16,7 +16,7 @@
 
 namespace vgyro::fusion {
 
-/// Both gyros' N and K are told.
+/// Settings with both gyros' N and K given.
 inline OptimalSettings told(const std::array<world::Gyro, 2>& gyros) {
   OptimalSettings settings;
   for (std::size_t k = 0; k < 2; ++k) {
@@ -26,12 +26,12 @@ inline OptimalSettings told(const std::array<world::Gyro, 2>& gyros) {
   return settings;
 }
 
-/// A drive of turns and straights without end.
+/// An endless drive of turns and straights.
 inline double winding(double t_s) {
   return 15.0 * std::sin(0.5 * t_s) + 10.0 * std::sin(0.13 * t_s);
 }
 
-/// The same with a stop of `stop_s` at the end of every `period_s`, begun and left gently.
+/// The same drive with a stop of `stop_s` at the end of every `period_s`, with gentle transitions.
 struct Stops {
   double period_s = 120.0;
   double stop_s = 20.0;
@@ -51,7 +51,7 @@ struct Step {
   world::Instant now;
   VirtualRate virtual_rate;
   double rate_error_dps = 0.0;
-  double bias_error_dps = 0.0;  ///< of what is taken off the virtual rate
+  double bias_error_dps = 0.0;  ///< error of the drift that is subtracted from the virtual rate
   double bias_sigma_dps = 0.0;
 };
 
@@ -65,7 +65,7 @@ class OptimalRun {
         corrector(make_optimal_corrector(settings)),
         stop_rate_dps_(settings.stop_rate_dps.value_or(0.0)) {}
 
-  /// At the stops' rate. `bound` sees the same instants.
+  /// Calibrates at the rate of stops. `bound` receives the same instants.
   void calibrate(double rest_s = 60.0, world::Bound* bound = nullptr) {
     Calibrator calibrator(0, rest_s);
     for (;;) {

@@ -1,5 +1,5 @@
-// Is σ what it says where drifts are no walks, and where gyros are not what they were? Nothing is
-// told of noise and drift; sizes are drawn anew for each run, of the class that the gyros are of.
+// Is σ true if drifts are not walks, and if gyros change? Noise and drift are not given; sizes are
+// drawn for each run from the class of the gyros.
 
 #include <algorithm>
 #include <cmath>
@@ -24,12 +24,12 @@ const Gyros kGyros{world::Gyro{1e-3, 0.0, 0.05}, world::Gyro{2e-3, 0.0, -0.1}};
 double log_uniform(Random& random, double from, double to) {
   return from * std::exp(random.uniform(0.0, std::log(to / from)));
 }
-/// K as gyros have it: N times 2e-2 a second, give or take a factor of five.
+/// Typical K: N times 2e-2 a second, within a factor of five.
 double usual_walk(const world::Gyro& gyro, Random& random) {
   const double ratio = 2e-2 * std::pow(5.0, random.normal());
   return gyro.white * std::clamp(ratio, 1e-3, 0.2);
 }
-/// One pair in eight has slopes: it warms up, fast or slowly, or goes on at one.
+/// One pair in eight has slopes: it warms up, fast or slowly, or has a constant slope.
 void usual_slopes(Gyros& gyros, Random& random) {
   const double kind = random.uniform(0.0, 1.0);
   for (world::Gyro& gyro : gyros) {
@@ -48,7 +48,7 @@ double sign(Random& random) {
 struct Scenario {
   std::function<void(Gyros&, Random&)> prepare = [](Gyros& /*gyros*/, Random& /*random*/) {};
   world::World::Rate rate = [](double t_s) { return Stops().rate(t_s); };
-  /// At `event_s`.
+  /// Called at `event_s`.
   std::function<void(OptimalRun&, Random&)> event = [](OptimalRun& /*run*/, Random& /*random*/) {};
   double event_s = kCalibration_s;
   double judged_from_s = kCalibration_s;
@@ -63,7 +63,7 @@ struct Sureness {
   std::uint64_t disagreements = 0;  ///< of all runs
 };
 
-// Whatever is thought of the biases: a rate outside would be noise of both, many times over.
+// With any biases: a rate outside the two gyros would amplify their noise many times.
 void expect_between_the_gyros(const VirtualRate& rate) {
   constexpr double kRounding_dps = 1e-9;
   const auto [low, high] = std::minmax(rate.corrected_dps[0], rate.corrected_dps[1]);
@@ -149,7 +149,7 @@ TEST(OptimalSureness, IsTrueOfGyrosThatWarmUp) {
   expect_honest(sureness(scenario));
 }
 
-// Which of the two has stepped is drawn as their drifts make it likely, K₁² : K₂².
+// The gyro that steps is drawn with the odds of their drifts, K₁² : K₂².
 TEST(OptimalSureness, IsTrueOfAStep) {
   Scenario scenario;
   scenario.event_s = kCalibration_s + 130.0;
@@ -165,8 +165,8 @@ TEST(OptimalSureness, IsTrueOfAStep) {
   expect_honest(sureness(scenario));
 }
 
-// From ten seconds on. One time in two thousand, it is said, a gyro that seems blind is not, and
-// then the rate is off by all of a turn: σ of the rate holds that as well, and no run here has it.
+// From ten seconds on. σ allows for one case in two thousand in which the gyro that seems blind is
+// not, and the rate is off by all of a turn; no run here has this case.
 TEST(OptimalSureness, IsTrueOfABlindGyro) {
   constexpr double kLeast = 0.1;
   for (std::size_t bad = 0; bad < 2; ++bad) {
@@ -182,8 +182,8 @@ TEST(OptimalSureness, IsTrueOfABlindGyro) {
   }
 }
 
-// A gyro whose frames hold a value in five to a hundred seconds that is no measurement. Much finer
-// gyros than such a value: it would be the greatest contradiction of all.
+// A gyro with a value that is no measurement every five to a hundred seconds. Fine gyros, for which
+// such a value would be the greatest contradiction.
 TEST(OptimalSureness, IsTrueAmongSpikes) {
   for (std::size_t bad = 0; bad < 2; ++bad) {
     SCOPED_TRACE(::testing::Message() << "gyro " << bad + 1);
@@ -203,9 +203,9 @@ TEST(OptimalSureness, IsTrueAmongSpikes) {
   }
 }
 
-// Steps of three to seven times the noise of a sample: it does not average them out.
-// Rounding that stays where the value stays is doubt of the drift once, not anew in each window: σ
-// of the drift falls short of it by a third. The rate's own σ holds.
+// Steps of three to seven times the noise of a sample, which does not average them out. A rounding
+// error that stays while the value stays is not independent in each window, so σ of the drift is
+// too small by a third. The rate's own σ holds.
 TEST(OptimalSureness, IsTrueOfCoarseGyros) {
   constexpr double kMost = 2.5;
   Scenario scenario;
@@ -218,9 +218,9 @@ TEST(OptimalSureness, IsTrueOfCoarseGyros) {
   expect_honest(sureness(scenario), {.most_of_bias = kMost});
 }
 
-// A circle begins where a rest ends, and it is the first motion there is. Without a stop all hangs
-// on what is thought of drifts beforehand, so they are drawn as that says.
-// Slopes that no rest of a minute excludes make σ wider than most runs need.
+// A circle begins at the end of the rest and is the first motion. Without a stop everything depends
+// on the prior of drifts, so they are drawn from it. Slopes that a minute of rest does not exclude
+// make σ wider than most runs need.
 TEST(OptimalSureness, IsTrueOfACircleAfterARest) {
   constexpr double kLeast = 0.5;
   for (const double rate_dps : {0.1, 20.0}) {

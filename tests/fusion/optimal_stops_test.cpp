@@ -1,4 +1,4 @@
-// What the optimal corrector learns at stops, and what it must not.
+// What the optimal corrector learns at stops, and what it must not learn.
 
 #include <cmath>
 
@@ -18,7 +18,7 @@ constexpr std::uint64_t kRuns = 20;
 
 const Gyros kGyros{world::Gyro{1e-3, 3e-5, 0.05}, world::Gyro{2e-3, 6e-5, -0.1}};
 
-/// Runs until a time; the last step.
+/// Runs for `seconds`; returns the last step.
 Step drive(OptimalRun& run, double seconds, const world::World::Rate& rate) {
   Step step;
   for (const double until = run.world.now_s() + seconds; run.world.now_s() < until;)
@@ -30,8 +30,8 @@ double at_rest(double /*t_s*/) {
   return 0.0;
 }
 
-// Both drifts are off by what half an hour brings; a stop measures them as well as the noise
-// allows, no better, and σ says so.
+// Both drifts are off by the walk of half an hour; a stop measures them as well as the noise
+// allows, and σ is true.
 TEST(OptimalStops, TeachBothDrifts) {
   Rms before;
   Rms after;
@@ -42,11 +42,11 @@ TEST(OptimalStops, TeachBothDrifts) {
     const Step step = drive(run, 60.0, at_rest);
     after.add(step.bias_error_dps);
     EXPECT_TRUE(run.corrector->condition().stopped) << "seed " << seed;
-    // Noise beyond 3.5 standard deviations ends a stop now and then.
+    // Noise beyond 3.5 standard deviations occasionally ends a stop.
     EXPECT_GE(run.corrector->condition().stops, 1U) << "seed " << seed;
     EXPECT_LE(run.corrector->condition().stops, 3U) << "seed " << seed;
   }
-  // Noise N_v of a minute and K_v within it; a part of the stop waits for its verdict.
+  // Noise N_v of a minute and K_v within it; a part of the stop is still held back.
   const double white = 1e-3 * 2e-3 / std::hypot(1e-3, 2e-3);
   const double walk = 3e-5 * 6e-5 / std::hypot(3e-5, 6e-5);
   const double expected = std::sqrt(white * white / 60.0 + walk * walk * 60.0 / 3.0);
@@ -54,8 +54,8 @@ TEST(OptimalStops, TeachBothDrifts) {
   EXPECT_GT(before.value(), 3.0 * expected) << "else there was nothing to learn";
 }
 
-// A ferry or a turntable that comes to a steady rate in two minutes: nothing of it is learned, and
-// the heading is that of the truth.
+// A ferry or a turntable reaches a steady rate within two minutes: nothing is learned from it, and
+// the heading is true.
 TEST(OptimalStops, AreNotBelievedOnAPlatformThatTurnsSteadily) {
   for (const double turntable_dps : {0.1, -0.3, 1.0}) {
     for (std::uint64_t seed = 1; seed <= 5; ++seed) {
@@ -82,7 +82,7 @@ TEST(OptimalStops, AreNotBelievedOnAPlatformThatTurnsSteadily) {
 }
 
 // Both drifts jump together, unseen, while the platform turns: the first stop may be a slow turn,
-// but a few of them, with turns in between, are proof.
+// but a few stops, with turns in between, are proof.
 TEST(OptimalStops, AreBelievedAfterAllWhenTheDriftHasJumped) {
   for (std::uint64_t seed = 1; seed <= 5; ++seed) {
     SCOPED_TRACE(seed);
@@ -114,7 +114,7 @@ TEST(OptimalStops, TeachNothingWhereTheirRateIsUnknown) {
   EXPECT_GT(step.bias_sigma_dps, 2.0 * before);
 }
 
-// The Earth's rate on a platform that is known to stand: taken off what a stop measures.
+// The Earth's rate is subtracted from the measurement of a stop.
 TEST(OptimalStops, KnowTheRateThatAStopHas) {
   OptimalSettings settings = told(kGyros);
   settings.stop_rate_dps = 0.02;
@@ -139,8 +139,8 @@ TEST(OptimalStops, TeachNothingWhileTheWheelsRoll) {
   EXPECT_EQ(run.corrector->condition().stops, 1U);
 }
 
-// Passengers board: without wheels no stop, with them one, and the drift that is learned is no
-// further off than σ says.
+// Passengers board: without a wheel signal there is no stop, with it there is one, and the error of
+// the learned drift agrees with σ.
 TEST(OptimalStops, SurviveSwayWhereTheWheelsStand) {
   double square = 0.0;
   for (std::uint64_t seed = 1; seed <= kRuns; ++seed) {
@@ -160,7 +160,7 @@ TEST(OptimalStops, SurviveSwayWhereTheWheelsStand) {
   EXPECT_LT(square, 1.0 + kSigmas * std::sqrt(2.0 / kRuns)) << "seeds 1 to " << kRuns;
 }
 
-// A wheel sensor that says "standing" for ever: turns tell that it is dead.
+// A wheel sensor that always reports "standing": turns show that it is dead.
 TEST(OptimalStops, DoNotBelieveADeadWheelSensor) {
   for (std::uint64_t seed = 1; seed <= 5; ++seed) {
     SCOPED_TRACE(seed);

@@ -1,5 +1,5 @@
-// The optimal corrector against known truth, the filter at full rate that is told everything, and
-// its own statement of how sure it is.
+// Compares the optimal corrector with the truth, with the filter at full rate that knows all
+// parameters, and with its own σ.
 
 #include <cmath>
 #include <functional>
@@ -38,7 +38,7 @@ TEST(OptimalWeights, GiveTheLeastNoiseThatTwoGyrosCanHave) {
     Rms rate;
     for (int i = 0; i < kSamples; ++i) {
       const Step step = run.step(at_rest);
-      // The white noise is what is left of the error without the bias's.
+      // The rate's error less the bias's error is the white noise.
       rate.add(step.rate_error_dps - step.bias_error_dps);
     }
     const double least = 1e-6 * ratio * ratio / (1.0 + ratio * ratio);
@@ -47,7 +47,7 @@ TEST(OptimalWeights, GiveTheLeastNoiseThatTwoGyrosCanHave) {
   }
 }
 
-// R⁻¹1/(1ᵀR⁻¹1): a gyro that only repeats the other one's noise, and adds to it, gets nothing.
+// R⁻¹1/(1ᵀR⁻¹1): a gyro that has the other one's noise and more gets no weight.
 TEST(OptimalWeights, KnowNoiseThatTheGyrosShare) {
   constexpr std::uint64_t kSeed = 22;
   constexpr double kOwn1 = 1e-3;
@@ -94,8 +94,8 @@ std::vector<Drive> drives() {
            [stops](double t_s) { return stops.stopped(t_s); }}};
 }
 
-// The heading that is lost to the best filter there is, run by run: what the two have in common
-// falls out, so that few runs tell a wrong gain.
+// Heading error relative to the best possible filter, run by run: the common part cancels, so a few
+// runs reveal a wrong gain.
 TEST(Optimal, LosesLittleHeadingToTheBound) {
   const std::vector<Gyros> pairs{
       {world::Gyro{1e-3, 1e-5, 0.05}, world::Gyro{3e-3, 1e-4, -0.1}},
@@ -128,7 +128,7 @@ TEST(Optimal, LosesLittleHeadingToTheBound) {
   }
 }
 
-// --- how sure ------------------------------------------------------------------------------------
+// --- the truth of σ ------------------------------------------------------------------------------
 
 struct Sureness {
   double rate = 0.0;  ///< mean of (error/σ)²
@@ -140,12 +140,12 @@ struct Case {
   std::string name;
   Drive drive;
   Use use = Use::kBoth;
-  double scale_sigma = 0.0;  ///< of each gyro, drawn for each run
-  double delay_s = 0.0;      ///< of gyro 2
-  double noisier = 1.0;      ///< gyro 2, from half of the time on
+  double scale_sigma = 0.0;  ///< σ of each gyro's scale factor, drawn for each run
+  double delay_s = 0.0;      ///< delay of gyro 2
+  double noisier = 1.0;      ///< factor on gyro 2's noise, from half of the time on
   double seconds = 600.0;
   double rate_hz = kRate_hz;
-  double least = 0.8;  ///< of error² over σ²
+  double least = 0.8;  ///< least mean of error² over σ²
 };
 
 Sureness sureness(const Case& which, const Gyros& usual, bool is_told, std::uint64_t runs) {
@@ -198,7 +198,7 @@ std::vector<Case> cases() {
   made.push_back({.name = "gyro 2 alone", .drive = sway_stops, .use = Use::kGyro2});
   made.push_back({.name = "long without stops", .drive = sway, .seconds = 1800.0});
   made.push_back({.name = "scale mismatch", .drive = all[2], .scale_sigma = 0.007});
-  // Which gyro is late is not told; while they contradict each other σ is wide.
+  // It does not show which gyro is late; while the gyros contradict each other, σ is wide.
   made.push_back({.name = "skew", .drive = all[2], .delay_s = 0.01, .least = 0.2});
   made.push_back(
       {.name = "gyro 2 louder", .drive = sway, .noisier = 5.0, .seconds = 100.0, .rate_hz = 100.0});
@@ -206,15 +206,15 @@ std::vector<Case> cases() {
 }
 
 void expect_honest(const Case& which, const Sureness& found) {
-  // What two gyros' scale factors have in common does not show in their difference; σ holds the
-  // gyro that is noisier and drifts more for the likely culprit. Here both are equally bad, and
-  // what is said of them is short of that on average over pairs, by less than √2.
+  // A common scale factor does not show in the difference; σ assumes that the noisier and faster
+  // drifting gyro is the likelier cause. Here both are equally bad, and on average over pairs σ is
+  // too small by less than √2.
   const bool on_average = which.scale_sigma > 0.0;
   EXPECT_GT(on_average ? found.rate_squares : found.rate, which.least);
   EXPECT_LT(on_average ? found.rate_squares : found.rate, on_average ? 2.0 : 1.2);
 }
 
-// Both N and K told, and drift that soon exceeds the noise of a sample, so that σ must know it.
+// N and K are given, and the drift soon exceeds the noise of a sample, so σ must contain it.
 TEST(OptimalSigma, IsHonestWhereTheNoiseIsTold) {
   const Gyros gyros{world::Gyro{1e-3, 2e-4, 0.05}, world::Gyro{2e-3, 3e-4, -0.1}};
   for (const Case& which : cases()) {
@@ -236,7 +236,7 @@ TEST(OptimalSigma, IsHonestWhereTheNoiseIsEstimated) {
   }
 }
 
-// --- the same again ------------------------------------------------------------------------------
+// --- reproducibility -----------------------------------------------------------------------------
 
 TEST(Optimal, GivesTheSameBitsForTheSameInput) {
   const Gyros gyros{world::Gyro{1e-3, 2e-5, 0.05, 0.003}, world::Gyro{2e-3, 6e-5, -0.1}};

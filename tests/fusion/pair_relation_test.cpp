@@ -1,5 +1,5 @@
-// Healthy pairs of many kinds are never contradicted; pairs that cannot be one are, soon, and by
-// name.
+// Healthy pairs of many kinds are never contradicted; impossible pairs soon are, with the right
+// cause.
 
 #include "fusion/pair_relation.h"
 
@@ -21,8 +21,7 @@ namespace {
 
 constexpr double kPi = 3.14159265358979323846;
 
-// A platform's rate, deg/s, as a sum of smooth turns: what a car, a ship, a hand or a turntable
-// does.
+// A platform's rate, deg/s, as a sum of smooth turns: of a car, a ship, a hand or a turntable.
 class Motion {
  public:
   enum class Kind : std::uint8_t {
@@ -133,16 +132,16 @@ struct RelationGyro {
   double shake_dps = 0.0;  ///< vibration of its own, between 5 and 30 Hz
   std::vector<double> jumps_s;
   double jump_dps = 0.0;
-  double skew = 0.0;  ///< its clock runs so much fast
+  double skew = 0.0;  ///< relative error of its clock; positive: fast
   double clip_dps = 1e9;
   double spikes_hz = 0.0;
   double spike_dps = 0.0;
-  double sick_from_s = 1e9;  ///< from here to there …
+  double sick_from_s = 1e9;  ///< from here to sick_to_s …
   double sick_to_s = 1e9;
   double sick_noise_dps = 0.0;          ///< … it has this noise
   bool stuck = false;                   ///< … its value stands
   bool blind = false;                   ///< … it feels no rotation
-  std::function<double(double)> bytes;  ///< what becomes of its value on the way
+  std::function<double(double)> bytes;  ///< change of its value in transmission
 };
 
 struct RelationWorld {
@@ -153,7 +152,7 @@ struct RelationWorld {
 
 using Own = std::function<double(double)>;
 
-/// What the relation says at each pair; `own` is what gyro 2 feels instead of the platform's rate.
+/// Runs the relation over a world; `own` is the rate that gyro 2 feels instead of the platform's.
 class RelationRun {
  public:
   RelationRun(const RelationWorld& world, const Motion& motion, std::uint64_t seed,
@@ -269,7 +268,7 @@ TEST(PairRelationHealthy, IsNeverContradicted) {
     world.rate_hz = draw_rate_hz(draw);
     RelationGyro& other = world.gyros.at(draw.below(2));
     other = healthy_gyro(draw);
-    // Sampled so slowly strong vibration of one gyro is motion of its own.
+    // At such a slow sampling rate, strong vibration of one gyro looks like motion of its own.
     if (world.rate_hz < 50.0) other.shake_dps = std::min(other.shake_dps, 1.0);
     return world;
   });
@@ -290,7 +289,7 @@ TEST(PairRelationHealthy, IsNotContradictedWhereOneFallsSick) {
         break;
       case 1:
         sick.blind = true;
-        // Sampled so slowly a blind gyro's vibration is motion of its own.
+        // At such a slow sampling rate, a blind gyro's vibration looks like motion of its own.
         if (world.rate_hz < 100.0) sick.shake_dps = 0.0;
         break;
       case 2:
@@ -304,8 +303,8 @@ TEST(PairRelationHealthy, IsNotContradictedWhereOneFallsSick) {
   });
 }
 
-// A line that both feel, beyond half the sampling rate: what is left of it looks like slow motion,
-// and where the two are sampled at other instants their signs differ.
+// Both gyros feel a line beyond half the sampling rate: its alias looks like slow motion, and its
+// sign may differ because the two are sampled at different instants.
 TEST(PairRelationHealthy, IsNotContradictedByVibrationBeyondItsBand) {
   for (std::uint64_t seed = 0; seed < 400; ++seed) {
     Random draw(seed);
@@ -327,7 +326,7 @@ TEST(PairRelationHealthy, IsNotContradictedByVibrationBeyondItsBand) {
   }
 }
 
-// How far gyro 1 has to have moved before it is found, seconds into the recording.
+// Expects the contradiction to be found within `within_s` seconds.
 void expect_found(const char* name, RelationWorld world, Contradiction expected, double slope,
                   double within_s, const std::function<Own(const Motion&)>& own = {},
                   int missed_most = 0, int wrong_most = 0) {
@@ -378,7 +377,7 @@ TEST(PairRelation, FindsAWrongUnit) {
     RelationWorld world;
     world.gyros[1].slope = factor;
     world.gyros[1].white_dps = 0.01 * std::abs(factor);
-    // What is divided may be drift, where the platform turns slowly.
+    // On a slowly turning platform, a signal that is divided may look like drift.
     const bool divided = factor < 0.1;
     expect_found("unit", world, factor < 0.0 ? Contradiction::kSign : Contradiction::kScale, factor,
                  divided ? 240.0 : 60.0, {}, divided ? 2 : 0);
@@ -389,7 +388,7 @@ TEST(PairRelation, FindsALag) {
   for (const double delay_s : {1.0, -1.0, 2.0}) {
     RelationWorld world;
     world.gyros[1].delay_s = delay_s;
-    // A ship turns so slowly that a second is hardly more than what a pair may have.
+    // A ship turns so slowly that a delay of a second hardly exceeds the allowance of a pair.
     expect_found("lag", world, Contradiction::kLag, 1.0, 240.0, {}, 0, 1);
   }
 }
@@ -416,7 +415,7 @@ TEST(PairRelation, FindsTheWrongAxis) {
   });
 }
 
-// The raw value of 16 bits, of so many deg/s each, read otherwise than it was written.
+// A raw value of 16 bits, `step_dps` each, decoded otherwise than it was encoded.
 std::function<double(double)> misread(double step_dps, std::function<double(std::uint16_t)> read) {
   return [=](double value_dps) {
     const auto raw =
@@ -441,7 +440,8 @@ void expect_wrong_bytes_found(const char* name, const std::function<double(doubl
     }
   }
   std::printf("%s: missed %d of 48, longest %.1f s\n", name, missed, longest_s);
-  // Where a hand moves the platform all the time, wild values are not always told from its motion.
+  // If a hand moves the platform all the time, erratic values cannot always be distinguished from
+  // its motion.
   EXPECT_LE(missed, 3);
 }
 

@@ -15,8 +15,8 @@ Real PaperSteps::Drift::at(Real t_s) const {
   return value;
 }
 
-// Projection onto polynomials that are made orthogonal over the very samples, so that nothing is
-// lost to a badly conditioned matrix.
+// Projection onto polynomials that are orthogonal over these samples, to avoid a badly conditioned
+// matrix.
 PaperSteps::Drift PaperSteps::fit(Real from_s, Real width_s,
                                   const std::vector<PaperSample>& samples,
                                   const std::vector<Real>& values) const {

@@ -1,8 +1,8 @@
 #pragma once
 
-// The paper's mutual calibration with every step done as it is written: predict, correct,
-// cross-calibrate, average; all samples of a window kept. Shares no code with the product. In long
-// double, because P₁ and P₂ by themselves grow with every window and cancel only in their sum.
+// The paper's mutual calibration in its literal steps: predict, correct, cross-calibrate, average;
+// all samples of a window are kept. Shares no code with the product. In long double, because P₁ and
+// P₂ by themselves grow with every window and cancel only in their sum.
 
 #include <array>
 #include <vector>
@@ -27,13 +27,13 @@ class PaperSteps {
     std::vector<Real> virtual_dps;   ///< Ω_v at each sample
     std::array<Drift, 2> predicted;  ///< p_k
     std::array<Drift, 2> renewed;    ///< P_k of this window
-    Real largest_dps = 0;            ///< of all that the steps passed through
+    Real largest_dps = 0;            ///< largest magnitude in any step
   };
 
   PaperSteps(int order, std::array<Drift, 2> calibration)
       : order_(order), drift_(std::move(calibration)) {}
 
-  /// All samples of [from_s, from_s + width_s).
+  /// `samples`: all of [from_s, from_s + width_s).
   Window window(double from_s, double width_s, const std::vector<PaperSample>& samples);
 
  private:

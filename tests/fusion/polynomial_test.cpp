@@ -11,7 +11,7 @@ namespace {
 
 constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
 
-// The argument is centred and scaled: coefficients are values at the centre and over half a width.
+// The argument is centred and scaled: coefficients refer to the centre and to half a width.
 TEST(Polynomial, HasItsCoefficientsAboutTheCentre) {
   const Polynomial line{
       .centre_s = 100.0, .half_width_s = 5.0, .coefficient = {2.0, 0.5, 0.0, 0.0}};
@@ -24,13 +24,13 @@ TEST(Polynomial, HasItsCoefficientsAboutTheCentre) {
   EXPECT_EQ(cubic.slope_at(2.0), 2.0 + 12.0 + 48.0);
 }
 
-// A drift that nobody has fitted yet is none.
+// A drift without a fit is 0.
 TEST(Polynomial, IsZeroUntilItIsFitted) {
   EXPECT_EQ(Polynomial{}.at(1e9), 0.0);
   EXPECT_EQ(Polynomial{}.slope_at(1e9), 0.0);
 }
 
-// The slope goes out on the bus; it must be the derivative of what is subtracted.
+// The slope is sent on the bus; it must be the derivative of the subtracted drift.
 TEST(Polynomial, HasTheSlopeOfItsValues) {
   constexpr std::uint64_t kSeed = 1;
   SCOPED_TRACE(::testing::Message() << "seed " << kSeed);
@@ -43,13 +43,13 @@ TEST(Polynomial, HasTheSlopeOfItsValues) {
       c = random.uniform(-1.0, 1.0);
     const double t_s = p.centre_s + random.uniform(-2.0, 2.0) * p.half_width_s;
     const double h_s = 1e-3 * p.half_width_s;
-    // Central differences err by a cubic's third derivative, h²·c₃ in units of x.
+    // Central differences have an error of h²·c₃ for a cubic, in units of x.
     const double slope = (p.at(t_s + h_s) - p.at(t_s - h_s)) / (2.0 * h_s);
     ASSERT_NEAR(p.slope_at(t_s), slope, 2e-6 / p.half_width_s) << i;
   }
 }
 
-// Stamps of today are 1.7e9 s; the centred argument keeps the digits that an uncentred one loses.
+// Present stamps are 1.7e9 s; the centred argument keeps the digits that an uncentred one loses.
 TEST(Polynomial, KeepsItsDigitsFarFromTimeZero) {
   Polynomial here;
   here.half_width_s = 8.0;

@@ -1,6 +1,6 @@
 #pragma once
 
-// Random numbers of the fusion tests: fixed seeds, so that a failure can be looked at again.
+// Random numbers of the fusion tests, with fixed seeds, so that a failure can be reproduced.
 
 #include <cmath>
 #include <cstdint>
@@ -22,7 +22,7 @@ class Random {
   std::normal_distribution<double> normal_;
 };
 
-/// Root mean square of what was added.
+/// Root mean square of the added values.
 class Rms {
  public:
   void add(double value) {
@@ -38,7 +38,7 @@ class Rms {
   double count_ = 0.0;
 };
 
-/// Standard errors that a measured mean or rms may be off.
+/// Allowed deviation of a measured mean or rms, in standard errors.
 inline constexpr double kSigmas = 3.5;
 
 }  // namespace vgyro::fusion

@@ -1,5 +1,5 @@
-// Readings of a small world whose truth is known: two gyros with white noise and walks on a
-// platform that moves, stands, or turns steadily. Windows come as the corrector makes them.
+// The hypotheses (Readings) of a small world with known truth: two gyros with white noise and walks
+// on a platform that moves, stands, or turns steadily. Windows are those that the corrector makes.
 
 #include "fusion/readings.h"
 
@@ -21,8 +21,8 @@ constexpr std::array<double, 2> kWalk{3e-5, 6e-5};   // deg/s/√s
 constexpr std::array<double, 2> kBias{0.05, -0.1};   // deg/s
 constexpr double kWindow_s = 10.0;
 
-// A steady stretch is a stop in seven cases of ten; wheels that stand leave three turns in a
-// hundred. What a stretch's length tells is stop_detector_test's.
+// A steady stretch is a stop in seven cases of ten; with standing wheels, three in a hundred are
+// turns. The evidence of a stretch's length is tested in stop_detector_test.cpp.
 const double kLogTurning = std::log(0.3 / 0.7);
 const double kLogTurningOnWheels = std::log(0.03 / 0.97);
 
@@ -58,7 +58,7 @@ class World {
     for (double t = 0.0; t < seconds; t += kWindow_s)
       readings.learn(kWindow_s, difference(kWindow_s));
   }
-  /// A steady run; the platform has moved on before it, or not.
+  /// A steady run; `elsewhere`: the platform has moved on before it.
   void steady(double seconds, double rate_dps, bool elsewhere = true) {
     double length = 1.0;
     bool first = true;
@@ -69,7 +69,7 @@ class World {
     }
   }
   void end() { readings.end_steady(); }
-  /// The whole of it, after motion.
+  /// A complete steady run after motion.
   void stop(double seconds, double rate_dps = 0.0) {
     steady(seconds, rate_dps);
     end();
@@ -96,7 +96,7 @@ class World {
   double noise(std::size_t gyro, double length_s) {
     return random_.normal(kWhite[gyro] / std::sqrt(length_s));
   }
-  /// The biases' means over a window; afterwards they are those at its end.
+  /// Returns the biases' means over a window; afterwards the biases are those at its end.
   std::array<double, 2> pass(double length_s) {
     constexpr int kSteps = 10;
     std::array<double, 2> mean{};
@@ -162,13 +162,13 @@ TEST(Readings, HaveProbabilitiesThatSumToOne) {
     world.move(100.0);
   }
   world.readings.split_step(0.05, 1e-6, 0.3);
-  // Of many readings the least likely are given up.
+  // Of many hypotheses the least likely are dropped.
   EXPECT_NEAR(world.readings.stepped(0), 0.3, 1e-3);
   EXPECT_NEAR(world.readings.stepped(0) + world.readings.stepped(1), 1.0, 1e-12);
 }
 
-// The probability of a turn is what it says: among stretches drawn as they are said to come, turns
-// are as many as the probabilities add up to, and so in each part of the scale.
+// The probability of a turn is calibrated: among stretches drawn from the prior, the number of
+// turns equals the sum of the probabilities, also in each part of the scale.
 TEST(Readings, MeanWhatTheySayOfATurn) {
   constexpr int kStretches = 1500;
   constexpr std::uint64_t kSeed = 2;
@@ -182,7 +182,7 @@ TEST(Readings, MeanWhatTheySayOfATurn) {
     world.calibrate();
     world.move(draw.uniform(60.0, 1800.0));
     const bool turns = draw.uniform(0.0, 1.0) < 0.3;
-    // As likely between 0.02 and 0.2 as between 2 and 20 deg/s, about even below.
+    // 0.02 to 0.2 deg/s is as likely as 2 to 20 deg/s; below, the density is about constant.
     const double size = 0.02 * (std::exp(draw.uniform(0.0, std::log(60.02 / 0.02))) - 1.0);
     const double rate = (draw.below(2) == 0 ? 1.0 : -1.0) * size;
     world.steady(1.0, turns ? rate : 0.0);
@@ -198,7 +198,7 @@ TEST(Readings, MeanWhatTheySayOfATurn) {
   }
 }
 
-// Wheels that stand make a stop of what would be a slow turn without them.
+// With standing wheels a stretch is a stop that would be a slow turn without them.
 TEST(Readings, HoldAStretchForAStopSoonerOnStandingWheels) {
   constexpr std::uint64_t kSeed = 3;
   World alone(kSeed);
@@ -211,7 +211,7 @@ TEST(Readings, HoldAStretchForAStopSoonerOnStandingWheels) {
   alone.steady(10.0, 0.004);
   wheels.steady(10.0, 0.004);
   EXPECT_GT(wheels.readings.standing(), alone.readings.standing()) << "seed " << kSeed;
-  // Yet what no drift can be is a turn even so: a ferry's deck.
+  // A level that no drift explains is a turn even then: a ferry's deck.
   World ferry(kSeed);
   ferry.calibrate();
   ferry.move(300.0);
@@ -220,8 +220,8 @@ TEST(Readings, HoldAStretchForAStopSoonerOnStandingWheels) {
   EXPECT_GT(ferry.readings.turning(), 0.99) << "seed " << kSeed;
 }
 
-// A healthy pair, calibrated and never in doubt by much: slow turns, ferries and turntables teach
-// it nothing. Every one of them for twenty minutes, with stops in between.
+// A healthy, calibrated pair with small uncertainty learns nothing from slow turns, ferries and
+// turntables. Each lasts twenty minutes, with stops in between.
 TEST(Readings, LearnNoSlowTurn) {
   for (const double rate_dps : {0.05, -0.1, 0.2, -0.5, 1.0}) {
     for (std::uint64_t seed = 1; seed <= 10; ++seed) {
@@ -240,8 +240,8 @@ TEST(Readings, LearnNoSlowTurn) {
   }
 }
 
-// A run of steady windows that a ferry ends by casting off without a shake: the new level is
-// another run, and the stop before it keeps what it taught.
+// A ferry casts off without a shake during a run of steady windows: the new level is a new run, and
+// the result of the stop before it stays.
 TEST(Readings, KeepAStopApartFromTheTurnThatFollowsIt) {
   constexpr std::uint64_t kSeed = 4;
   World world(kSeed);
@@ -255,8 +255,8 @@ TEST(Readings, KeepAStopApartFromTheTurnThatFollowsIt) {
     EXPECT_LT(std::abs(world.error(gyro)), 4.0 * world.sigma(gyro)) << gyro;
 }
 
-// Both drifts have jumped together, by far more than was thought possible: the first stop looks
-// like a turn. A few, in places that a platform has moved between, are proof.
+// Both drifts have jumped together by far more than expected: the first stop looks like a turn. A
+// few stops, in places that the platform has moved between, are proof.
 TEST(Readings, FindAJumpOfBothDriftsAfterAFewStops) {
   for (const double jump_dps : {0.02, -0.05, 0.1}) {
     for (std::uint64_t seed = 1; seed <= 10; ++seed) {
@@ -278,8 +278,8 @@ TEST(Readings, FindAJumpOfBothDriftsAfterAFewStops) {
   }
 }
 
-// Repetition alone is no proof. A circle with a wobble, a turntable that is switched on and off, a
-// ferry in a swell: the platform has not moved on between one steady run and the next.
+// Repetition alone is no proof: a circle with a wobble, a turntable that is switched on and off, a
+// ferry in a swell. The platform has not moved on between one steady run and the next.
 TEST(Readings, AreNotPersuadedByRepetitionAlone) {
   struct Case {
     const char* name;
@@ -316,10 +316,10 @@ TEST(Readings, AreNotPersuadedByRepetitionAlone) {
 
 // --- slopes --------------------------------------------------------------------------------------
 
-// Both drifts run away at a constant slope from some time on; stops show it. The slope that is said
-// is the true one within its sigma.
+// From some time on both drifts have a constant slope, which stops show. The estimated slope agrees
+// with the true one within its σ.
 TEST(Readings, FindTheSlopeOfARamp) {
-  // Of the size that sensors of this class have: a tenth to a third of N a second.
+  // Slopes of the size that sensors of this class have: a tenth to a third of N a second.
   for (const double share : {0.1, 0.3}) {
     for (std::uint64_t seed = 1; seed <= 10; ++seed) {
       SCOPED_TRACE(::testing::Message() << share << " N a second, seed " << seed);
@@ -344,8 +344,8 @@ TEST(Readings, FindTheSlopeOfARamp) {
 
 // --- steps ---------------------------------------------------------------------------------------
 
-// Which gyro has stepped two gyros cannot tell: both readings stay, and the doubt covers either.
-// A stop decides, for the right one.
+// Two gyros cannot show which one has stepped: both hypotheses stay, and σ covers either. A stop
+// decides for the right one.
 TEST(Readings, LeaveAStepOpenUntilAStopSettlesIt) {
   constexpr double kStep_dps = 0.05;
   constexpr double kFirst = 0.2;  // K₁² : K₂²
@@ -369,7 +369,7 @@ TEST(Readings, LeaveAStepOpenUntilAStopSettlesIt) {
       world.stop(30.0);
       world.move(60.0);
       EXPECT_FALSE(world.readings.ambiguous());
-      // A turn of just the step's size is not quite excluded.
+      // A turn of exactly the step's size is not quite excluded.
       EXPECT_LT(world.readings.stepped(0) + world.readings.stepped(1), 0.01) << "settled";
       for (int gyro = 0; gyro < 2; ++gyro) {
         EXPECT_LT(world.sigma(gyro), 0.1 * kStep_dps) << gyro;
@@ -379,7 +379,7 @@ TEST(Readings, LeaveAStepOpenUntilAStopSettlesIt) {
   }
 }
 
-// The gyro that falls out after a step was likely the one that stepped.
+// The gyro that falls out after a step was probably the one that stepped.
 TEST(Readings, SuspectAGyroThatFallsOut) {
   for (std::size_t bad = 0; bad < 2; ++bad) {
     World world(5);
@@ -391,7 +391,7 @@ TEST(Readings, SuspectAGyroThatFallsOut) {
   }
 }
 
-// Two readings are ambiguous only where both are likely, and further apart than each is wide.
+// Two hypotheses are ambiguous only if both are likely, and differ by more than their σ.
 TEST(Readings, AreAmbiguousOnlyWhereTheReadingsDiffer) {
   const auto after = [](double step_dps, double first_share) {
     World world(6);
@@ -458,7 +458,7 @@ TEST(EstimateMixer, GivesTheMomentsOfItsParts) {
     const double of_i = mean[static_cast<std::size_t>(i)];
     EXPECT_NEAR(value(found, i), of_i, 1e-12) << i;
     for (int j = 0; j < 6; ++j) {
-      if ((i >= 4) != (j >= 4) && std::min(i, j) >= 2) continue;  // slopes with scale: not told
+      if ((i >= 4) != (j >= 4) && std::min(i, j) >= 2) continue;  // slopes with scale: not reported
       double expected = 0.0;
       for (std::size_t n = 0; n < parts.size(); ++n) {
         expected += weights[n] * (covariance(parts[n], i, j) +
@@ -482,7 +482,7 @@ TEST(EstimateMixer, GivesTheMomentsOfItsParts) {
   }
 }
 
-// Two readings of a step, against two banks that were each told which gyro it was.
+// Compares two hypotheses of a step with two banks, each of which was given one gyro's step.
 TEST(Readings, AreTheMixtureOfTheBanksThatTheyStandFor) {
   constexpr double kStep_dps = 0.05;
   constexpr double kVariance = 1e-6;
@@ -500,13 +500,13 @@ TEST(Readings, AreTheMixtureOfTheBanksThatTheyStandFor) {
   };
   learn(5.0);
   world.readings.split_step(kStep_dps, kVariance, kFirst);
-  // A reading says what it thinks of the step by its shift: a gyro's and the other one's, less.
+  // The share of each hypothesis follows from the shift of each bias in the mixture.
   DriftEstimate one = world.readings.estimate();
   const double away_1 = one.mean(kBias1) - banks[0].estimate().mean(kBias1);
   const double away_2 = one.mean(kBias2) - banks[0].estimate().mean(kBias2);
   EXPECT_NEAR(away_1, kFirst * kStep_dps, 1e-12);
   EXPECT_NEAR(away_2, -(1.0 - kFirst) * kStep_dps, 1e-12);
-  // Spread between the two, and what each doubts.
+  // Spread between the two, and the variance of each.
   const double spread = kFirst * (1.0 - kFirst) * squared(kStep_dps);
   const double doubt_1 =
       one.covariance(kBias1, kBias1) - banks[0].estimate().covariance(kBias1, kBias1) - spread;

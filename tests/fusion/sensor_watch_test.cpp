@@ -37,7 +37,7 @@ Signal noisy(Signal signal, double sigma_dps, Random& random) {
       [signal, sigma_dps, &random](double t_s) { return signal(t_s) + random.normal(sigma_dps); };
 }
 
-/// Each value said `times` times.
+/// The signal, each value held for `period_s`.
 Signal held(Signal signal, double period_s) {
   double since_s = -1e9;
   double value = 0.0;
@@ -91,8 +91,7 @@ struct Two {
   std::array<double, 2> last_s{};
 };
 
-// --- healthy sensors are believed
-// ------------------------------------------------------------------
+// --- healthy sensors -----------------------------------------------------------------------------
 
 // A car's yaw rate has steps of a quarter of a degree per second and stands at 0 through every
 // halt; beside it any other gyro. Hours of town: not one finding.
@@ -110,7 +109,7 @@ TEST(SensorWatchHealthy, CoarseSensorOfACarMayStandAtZeroForMinutes) {
   }
 }
 
-// Its engine shakes it while it drives, and is switched off when it parks.
+// The engine shakes the sensor in the drive, and is switched off when the car parks.
 TEST(SensorWatchHealthy, CoarseSensorMayFallQuietWhenTheEngineStops) {
   for (const double shaken_dps : {0.1, 0.2, 0.4}) {
     Random random(5);
@@ -140,7 +139,7 @@ TEST(SensorWatchHealthy, FineSensorsAreBelieved) {
   }
 }
 
-// No noise at all, as a simulation may have it: rest is exactly constant.
+// No noise at all, as in some simulations: rest is exactly constant.
 TEST(SensorWatchHealthy, NoiselessSensorsMayRest) {
   Two two;
   two.run(rounded(town, 1e-6), rounded(town, 1e-6), 0.0, 2000.0);
@@ -148,7 +147,7 @@ TEST(SensorWatchHealthy, NoiselessSensorsMayRest) {
   EXPECT_TRUE(two.all_sound(1));
 }
 
-// A parked car warms up: the other gyro's drift is no motion, nor is a slammed door, nor an engine
+// A parked car warms up: the other gyro's drift is not motion, nor is a slammed door, nor an engine
 // that starts to shake.
 TEST(SensorWatchHealthy, DriftAndVibrationOfTheOtherAreNoMotion) {
   Random random(6);
@@ -162,7 +161,7 @@ TEST(SensorWatchHealthy, DriftAndVibrationOfTheOtherAreNoMotion) {
   EXPECT_TRUE(two.all_sound(0)) << two.first_s[0].value_or(0.0);
 }
 
-// A filter makes one gyro later than the other: it does move, after a while.
+// A filter delays one gyro: it moves a little later than the other.
 TEST(SensorWatchHealthy, LateSensorIsNotStuck) {
   Random random(7);
   Two two;
@@ -171,8 +170,7 @@ TEST(SensorWatchHealthy, LateSensorIsNotStuck) {
   EXPECT_TRUE(two.all_sound(0)) << two.first_s[0].value_or(0.0);
 }
 
-// --- its step
-// --------------------------------------------------------------------------------------
+// --- its step ------------------------------------------------------------------------------------
 
 double step_after(const SensorLimits& limits, const Signal& signal, double to_s) {
   SensorWatch watch(limits);
@@ -190,13 +188,14 @@ TEST(SensorWatchStep, IsHalfADegreeOrTheFramesUntilTwoValuesDiffer) {
   watch.judge(kStart, 0.0, nullptr);
   watch.judge(kStart + std::chrono::seconds(1), 0.0, nullptr);
   EXPECT_FALSE(watch.ever_changed());
-  // One leap is no step.
+  // One leap does not give the step.
   watch.judge(kStart + std::chrono::seconds(2), 24.0, nullptr);
   EXPECT_TRUE(watch.ever_changed());
   EXPECT_EQ(watch.step_dps(), 0.5);
 }
 
-// Its lattice, whatever finer steps the frame could carry, at rest as after hours of driving.
+// The step is the sensor's lattice, even if the frame could carry finer steps, at rest as well as
+// after hours of driving.
 TEST(SensorWatchStep, IsTheLatticeOfACoarseSensor) {
   for (const double noise_dps : {0.0, 0.1, 0.3}) {
     for (const double lattice_dps : {0.0, 1e-3}) {
@@ -206,7 +205,8 @@ TEST(SensorWatchStep, IsTheLatticeOfACoarseSensor) {
           << noise_dps << " deg/s, frame " << lattice_dps << " deg/s, seed 21";
     }
   }
-  // The frame's own step is that of the sensor: exactly, though the difference of two is rounded.
+  // The frame's own step is the sensor's: exactly, although the difference of two values is
+  // rounded.
   Random random(22);
   const Signal coarse = rounded(noisy(town, 0.3, random), 0.1);
   EXPECT_EQ(step_after({.lattice_dps = 0.1}, coarse, 600.0), 0.1);
@@ -216,7 +216,7 @@ TEST(SensorWatchStep, IsSmallInAFineSensorAndForgetsWhatIsLongPast) {
   Random random(23);
   EXPECT_LT(step_after({}, noisy(town, 0.05, random), 100.0), 1e-3);
   EXPECT_NEAR(step_after({}, rounded(noisy(town, 0.05, random), 1e-3), 100.0), 1e-3, 1e-12);
-  // It was fine, and a filter of its own makes it coarse from now on.
+  // The sensor was fine, and its own filter makes it coarse from now on.
   const Signal fine = noisy(town, 0.3, random);
   const Signal coarse = rounded(noisy(town, 0.3, random), kCarStep_dps);
   const Signal both = [&](double t_s) { return t_s < 100.0 ? fine(t_s) : coarse(t_s); };
@@ -235,8 +235,8 @@ TEST(SensorWatchStep, IsNotTheRoundingOfFloats) {
 
 // --- stuck ---------------------------------------------------------------------------------------
 
-// Noise far above the steps: a value that repeats for a quarter of a second is no chance, at rest
-// as in motion, whatever the other gyro does.
+// With noise far above the steps, a value that repeats for a quarter of a second is not chance, at
+// rest or in motion, whatever the other gyro does.
 TEST(SensorWatchStuck, FineSensorIsFoundWithinASecondAtRestAndInMotion) {
   for (const bool moving : {false, true}) {
     for (const double rate_hz : {50.0, 100.0, 500.0}) {
@@ -252,7 +252,7 @@ TEST(SensorWatchStuck, FineSensorIsFoundWithinASecondAtRestAndInMotion) {
       EXPECT_LE(*two.first_s[0] - 120.0, 10.0 * 8.0 / rate_hz + 0.3) << rate_hz << " Hz, seed 8";
       EXPECT_GT(two.of(0, Finding::kStuck), 0U);
       EXPECT_TRUE(two.all_sound(1));
-      // The first other value is the end of it: the rest is for whoever waits for it.
+      // The first different value ends the finding; the caller decides how long to wait after it.
       const std::uint64_t before = two.of(0, Finding::kStuck);
       two.run(rounded(noisy(truth, 0.02, random), 1e-3), noisy(truth, 0.02, random), 125.0, 130.0,
               rate_hz);
@@ -261,7 +261,7 @@ TEST(SensorWatchStuck, FineSensorIsFoundWithinASecondAtRestAndInMotion) {
   }
 }
 
-// A coarse sensor that stands still is believed at rest, and found when the other one turns.
+// A coarse sensor that stands still is accepted at rest, and found when the other one turns.
 TEST(SensorWatchStuck, CoarseSensorIsFoundWhenTheOtherMoves) {
   for (std::uint64_t seed = 0; seed < 20; ++seed) {
     Random random(seed);
@@ -284,7 +284,7 @@ TEST(SensorWatchStuck, CoarseSensorIsFoundWhenTheOtherMoves) {
   }
 }
 
-// Without another gyro that is well there is no such evidence.
+// Without a healthy other gyro there is no such evidence.
 TEST(SensorWatchStuck, CoarseSensorIsBelievedWithoutTheOther) {
   SensorWatch watch({});
   for (int i = 0; i < 100'000; ++i)
@@ -292,7 +292,7 @@ TEST(SensorWatchStuck, CoarseSensorIsBelievedWithoutTheOther) {
               Finding::kSound);
 }
 
-// The same value before and after a pause says nothing of the pause.
+// The same value before and after a pause is no evidence of standing still.
 TEST(SensorWatchStuck, PauseIsNoStandstill) {
   Random random(9);
   Two two;
@@ -302,8 +302,8 @@ TEST(SensorWatchStuck, PauseIsNoStandstill) {
   EXPECT_TRUE(two.all_sound(0));
 }
 
-// It freezes, or says 0, while the platform turns: a handful of values that its own noise makes
-// impossible are enough. The other one is believed all the while.
+// The sensor freezes, or sends 0, while the platform turns: a handful of values that its own noise
+// makes impossible are enough. The other gyro is accepted throughout.
 TEST(SensorWatchStuck, FineSensorIsHeldAsideAfterAHandfulOfEqualValuesInATurn) {
   for (const double step_dps : {1e-4, 1e-3, 5e-3}) {
     for (const bool to_zero : {false, true}) {
@@ -335,8 +335,8 @@ TEST(SensorWatchStuck, FineSensorIsHeldAsideAfterAHandfulOfEqualValuesInATurn) {
   }
 }
 
-// A coarse sensor may well repeat its value in a turn, but not leap to another one and stay there
-// while the other one goes on.
+// A coarse sensor may repeat its value in a turn, but not leap to another one and stay there while
+// the other gyro continues.
 TEST(SensorWatchStuck, CoarseSensorThatLeapsToAConstantInASteadyTurnIsFound) {
   for (std::uint64_t seed = 0; seed < 20; ++seed) {
     Random random(seed);
@@ -357,11 +357,10 @@ TEST(SensorWatchStuck, CoarseSensorThatLeapsToAConstantInASteadyTurnIsFound) {
   }
 }
 
-// --- dead from the start
-// -------------------------------------------------------------------------
+// --- dead from the start -------------------------------------------------------------------------
 
-// One value since the power came: nobody can say that it is alive. As soon as the other one
-// undoubtedly moves it is set aside.
+// A sensor that has sent one value since power-on may be dead. It is set aside as soon as the other
+// one plainly moves.
 TEST(SensorWatchDead, SensorThatHasNeverChangedIsSetAsideInTheFirstTenthsOfATurn) {
   for (const double value : {0.0, 0.7, -150.0}) {
     for (const double acceleration_dps_s : {3.0, 25.0, 200.0}) {
@@ -385,7 +384,7 @@ TEST(SensorWatchDead, SensorThatHasNeverChangedIsSetAsideInTheFirstTenthsOfATurn
   }
 }
 
-// It begins to say other values: not before they are those of the other one is it believed.
+// It begins to send other values, and is accepted only once they agree with the other gyro's.
 TEST(SensorWatchDead, SensorThatWasDeadIsBelievedWhenItMovesWithTheOther) {
   Random random(42);
   const auto drive = [](double t_s) {
@@ -405,7 +404,7 @@ TEST(SensorWatchDead, SensorThatWasDeadIsBelievedWhenItMovesWithTheOther) {
   EXPECT_TRUE(two.all_sound(1));
 }
 
-// A coarse one that is well says 0 until it moves, and that is all that is asked of it.
+// A healthy coarse sensor sends 0 until it moves, and is not dead.
 TEST(SensorWatchDead, CoarseSensorThatRestedFromTheStartIsNotDead) {
   for (const double lag_s : {0.0, 0.1}) {
     for (std::uint64_t seed = 0; seed < 30; ++seed) {
@@ -426,8 +425,7 @@ TEST(SensorWatchDead, CoarseSensorThatRestedFromTheStartIsNotDead) {
   }
 }
 
-// --- what time it is
-// -----------------------------------------------------------------------------
+// --- time of day ---------------------------------------------------------------------------------
 
 /// Every finding, one after the other.
 std::string findings_from(TimePoint start) {
@@ -483,7 +481,8 @@ TEST(SensorWatchSaturated, ZeroIsNoEndOfARange) {
               Finding::kSound);
 }
 
-// Nobody said where it clips: eight equal values at the top tell, and the next time one does.
+// The clipping level is not given: eight equal values at the top show it, and the next time a
+// single one is enough.
 TEST(SensorWatchSaturated, ClipIsFoundFromARunAtTheTop) {
   Random random(10);
   Two two;
@@ -508,7 +507,8 @@ TEST(SensorWatchSaturated, ClipIsFoundFromARunAtTheTop) {
   EXPECT_EQ(two.of(0, Finding::kStuck), 0U);
 }
 
-// It stuck once at its fastest; what is faster later shows that this was no clip.
+// The sensor was stuck once at its fastest value; a faster one later shows that it did not clip
+// there.
 TEST(SensorWatchSaturated, ClipIsForgottenWhenTheSensorExceedsIt) {
   Random random(11);
   Two two;
@@ -524,7 +524,8 @@ TEST(SensorWatchSaturated, ClipIsForgottenWhenTheSensorExceedsIt) {
 
 // --- dead band -----------------------------------------------------------------------------------
 
-// An exact 0 says "less than the dead band", and is no standstill while the other stays within it.
+// An exact 0 means "less than the dead band", and is no standstill while the other gyro stays
+// within the band.
 TEST(SensorWatchDeadBand, ZeroTellsNothingAndIsNotStuck) {
   Random random(12);
   const auto creep = [](double t_s) { return t_s < 60.0 ? town(t_s) : 0.9 * std::sin(0.3 * t_s); };

@@ -15,7 +15,7 @@ using StampVerdict = StampGuard::StampVerdict;
 constexpr std::size_t kReference = 2;
 constexpr TimePoint kStart = time_from_ns(1'700'000'000'000'000'000);
 
-/// A guard with all streams running at 100 Hz up to `until` behind kStart.
+/// A guard with all streams running at 100 Hz from kStart to kStart + until.
 StampGuard running_until(Duration until) {
   StampGuard guard;
   TimePoint t;
@@ -37,7 +37,7 @@ Checked check(StampGuard& guard, std::size_t stream, Duration since_start) {
   return {verdict, t - kStart};
 }
 
-// As long as stamps are in order nothing is changed, wherever the clock began.
+// Stamps in order are not changed, wherever the clock began.
 TEST(StampGuard, PassesOrderlyStampsOnUnchanged) {
   for (const TimePoint start : {time_from_ns(0), kStart}) {
     StampGuard guard;
@@ -60,7 +60,7 @@ TEST(StampGuard, RefusesARepeatedStamp) {
   EXPECT_EQ(check(guard, 1, 110ms).verdict, StampVerdict::kAccepted) << "streams may share a stamp";
 }
 
-// Two queues of one kernel deliver a little out of order: that is no clock that was set.
+// Two queues of one kernel deliver slightly out of order: the clock was not set.
 TEST(StampGuard, LetsSmallReorderingPass) {
   StampGuard guard = running_until(1s);
   const Checked late = check(guard, 0, 1s - 249ms);
@@ -100,7 +100,7 @@ TEST(StampGuard, RefusesOutliersThatDoNotAgree) {
   EXPECT_EQ(check(guard, 0, 1010ms).since_start, 1010ms);
 }
 
-// Nor do stamps that follow each other at no rate of any gyro.
+// Stamps whose spacing fits no gyro confirm nothing either.
 TEST(StampGuard, RefusesOutliersThatLieFarApart) {
   StampGuard guard = running_until(1s);
   for (int i = 1; i < 100; ++i)
@@ -108,8 +108,8 @@ TEST(StampGuard, RefusesOutliersThatLieFarApart) {
   EXPECT_EQ(check(guard, 0, 1010ms).since_start, 1010ms);
 }
 
-// Centuries lie between the stamps that a damaged log may hold, and nothing overflows between them
-// (the sanitizers would say so); good stamps are taken again behind any of it.
+// Centuries lie between the stamps that a damaged log may hold, and their differences do not
+// overflow (the sanitizers would report it); good stamps are accepted again afterwards.
 TEST(StampGuard, SurvivesEveryStampThatALogMayHold) {
   constexpr TimePoint kEarliest = time_from_ns(0);
   constexpr TimePoint kLatest = time_from_ns(9'000'000'000'000'000'000);
@@ -128,8 +128,8 @@ TEST(StampGuard, SurvivesEveryStampThatALogMayHold) {
   EXPECT_EQ(guard.check(0, kStart + 2010ms, t), StampVerdict::kAccepted);
 }
 
-// A computer without a battery begins in 1970; once its clock is right, half a century has not
-// passed, and what is known of the biases still holds.
+// A computer without a battery begins in 1970. When its clock is set, the monotone axis does not
+// jump by half a century, so the biases stay valid.
 TEST(StampGuard, TakesDecadesForAClockThatWasSet) {
   StampGuard guard;
   TimePoint t;
@@ -145,8 +145,8 @@ TEST(StampGuard, TakesDecadesForAClockThatWasSet) {
   EXPECT_EQ(t, time_from_ns(0) + 1s + 10ms + 1us);
 }
 
-// What still has the stamps of 1970 when the gyros' clock has been set lies before the axis begins:
-// heard for the first time or not, it is no time that the estimation could take.
+// A stream that still has stamps of 1970 after the gyros' clock was set lies before the beginning
+// of the axis; such stamps are never accepted, whether the stream is new or not.
 TEST(StampGuard, TakesNothingFromBeforeTheAxisBegins) {
   StampGuard guard;
   TimePoint t;
@@ -163,7 +163,7 @@ TEST(StampGuard, TakesNothingFromBeforeTheAxisBegins) {
   EXPECT_GE(t, TimePoint{});
 }
 
-// A silent bus comes back after minutes: the third stamp is believed, and time goes on as it says.
+// A silent bus returns after minutes: the third stamp is accepted, and time continues from it.
 TEST(StampGuard, BelievesThreeAgreeingStampsBehindALongGap) {
   StampGuard guard = running_until(1s);
   EXPECT_EQ(check(guard, 0, 600s).verdict, StampVerdict::kUnconfirmed);
@@ -181,7 +181,8 @@ TEST(StampGuard, TakesAnOrdinaryPauseAtOnce) {
   EXPECT_EQ(check(guard, 0, 2s).verdict, StampVerdict::kAccepted);
 }
 
-// One stamp a few seconds ahead would make all that follow look set back, and move the axis.
+// If one stamp a few seconds ahead were accepted, all later ones would look set back, and the axis
+// would move.
 TEST(StampGuard, IsNotMovedByOneStampSecondsAhead) {
   StampGuard guard = running_until(1s);
   EXPECT_EQ(check(guard, 0, 6s).verdict, StampVerdict::kUnconfirmed);
@@ -193,8 +194,8 @@ TEST(StampGuard, IsNotMovedByOneStampSecondsAhead) {
   EXPECT_EQ(guard.offset(), 0ns);
 }
 
-// The host's clock was set back: the axis goes on from the newest time of any stream, and the other
-// streams follow without a step of their own.
+// The host's clock was set back: the axis continues from the newest time of any stream, and the
+// other streams follow without a step of their own.
 TEST(StampGuard, TakesASteppedBackClockUpMonotonically) {
   for (const Duration step : {300ms, 1000ms, 3'600'000ms}) {
     StampGuard guard = running_until(1s);
@@ -246,12 +247,12 @@ TEST(StampGuard, KeepsTheAxisMonotoneOverManySteps) {
       newest = std::max(newest, t);
     }
     EXPECT_GT(steps, 10);
-    // Each step costs the five stamps till one stream has sent three.
+    // Each step costs five stamps until one stream has sent three.
     EXPECT_GE(accepted, 20'000 - 6 * (steps + 5));
   }
 }
 
-// A reference has a clock of its own more often than not: it waits until it agrees with the gyros.
+// A reference often has a clock of its own: it waits until that agrees with the gyros.
 TEST(StampGuard, LetsNoReferenceSetTheClockBack) {
   StampGuard guard = running_until(100s);
   for (int i = 0; i < 1000; ++i)
@@ -275,7 +276,7 @@ TEST(StampGuard, LetsNoReferenceAheadMoveTheGyrosTime) {
       << "and its own clock, set right with theirs, is believed at once";
 }
 
-// When the gyros' clock steps back, a reference on the same host goes on with them.
+// When the gyros' clock steps back, a reference on the same host continues with them.
 TEST(StampGuard, CarriesTheReferenceOverAStepOfTheGyrosClock) {
   StampGuard guard = running_until(10s);
   for (int i = 0; i < 3; ++i)
@@ -285,10 +286,9 @@ TEST(StampGuard, CarriesTheReferenceOverAStepOfTheGyrosClock) {
   EXPECT_EQ(reference.since_start, 10s + 5ms + 1us);
 }
 
-// --- streams that make it hard
-// -------------------------------------------------------------------
+// --- difficult streams ---------------------------------------------------------------------------
 
-/// How many of these stamps are accepted, in whatever way.
+/// How many of these stamps are accepted, with any accepting verdict.
 int accepted_of(StampGuard& guard, std::size_t stream, Duration from, Duration interval, int count,
                 int times_each = 1) {
   int accepted = 0;
@@ -301,7 +301,7 @@ int accepted_of(StampGuard& guard, std::size_t stream, Duration from, Duration i
   return accepted;
 }
 
-// One frame a second, and one of them a little late, or lost.
+// One frame a second; one of them is slightly late, or lost.
 TEST(StampGuard, GoesOnWithAStreamOfOneHertzBehindALateFrame) {
   StampGuard guard;
   EXPECT_EQ(accepted_of(guard, 0, 0s, 1s, 10), 10);
@@ -323,7 +323,7 @@ TEST(StampGuard, TakesStreamsThatAreSlowerThanASecond) {
   EXPECT_EQ(accepted_of(guard, 0, 0s, 6s, 100), 1) << "that is no gyro";
 }
 
-// A relay that sends everything twice, or the last but one again, over a hole and a step back.
+// A relay sends everything twice, or the last but one again, across a hole and a step back.
 TEST(StampGuard, BelievesDoubledFramesBehindAHole) {
   for (const Duration from : {12s, 600s, 5s}) {
     StampGuard guard = running_until(10s);
@@ -338,7 +338,7 @@ TEST(StampGuard, BelievesDoubledFramesBehindAHole) {
   EXPECT_EQ(accepted, 98);
 }
 
-// A reference that had run ahead comes back to the gyros' time and is heard again.
+// A reference that had run ahead returns to the gyros' time and is accepted again.
 TEST(StampGuard, HearsAReferenceAgainThatHadRunAhead) {
   StampGuard guard = running_until(10s);
   EXPECT_GT(accepted_of(guard, kReference, 3600s, 10ms, 100), 90);

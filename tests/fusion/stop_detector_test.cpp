@@ -1,6 +1,6 @@
-// Blocks as two gyros of known noise would make them, on platforms that stand, turn and sway. What
-// a steady stretch is, stop or turn, is not judged here any more: readings_test.cpp has the tests
-// of ferries, turntables and drifts that have jumped.
+// Blocks of two gyros of known noise, on platforms that stand, turn and sway. The detector does not
+// decide between stop and turn: readings_test.cpp has the tests of ferries, turntables and drifts
+// that have jumped.
 
 #include "fusion/stop_detector.h"
 
@@ -45,7 +45,7 @@ class Platform {
       squares += cell * cell;
     }
     level.cell_variance = (squares - sum * sum / kCells) / (kCells - 1);
-    // The gyros' own noises differ; their mean is the cells'.
+    // The gyros' own noise differs; their mean is the cells'.
     const double apart = random_.normal(kWhite / std::sqrt(2.0 * kBlock_s));
     for (std::size_t k = 0; k < 2; ++k) {
       level.excess_variance[k] = kWhite * kWhite / kBlock_s;
@@ -53,14 +53,14 @@ class Platform {
     }
     return detector.judge(level, wheels);
   }
-  /// Blocks of this steadiness among those of some seconds at a constant rate.
+  /// Number of blocks with this steadiness in some seconds at a constant rate.
   int count(Steadiness steadiness, double seconds, double rate_dps = 0.0) {
     int found = 0;
     for (int i = 0; i < static_cast<int>(seconds / kBlock_s); ++i)
       found += block(rate_dps) == steadiness ? 1 : 0;
     return found;
   }
-  /// Motion through an angle, about 10 deg/s, as a driver turns: not steadily, not even within a
+  /// Motion through an angle at about 10 deg/s, like a driver's turn: not steady, not even within a
   /// block.
   void turn(double angle_deg) {
     const double sway = sway_dps;
@@ -69,7 +69,7 @@ class Platform {
       block(10.0);
     sway_dps = sway;
   }
-  /// As a wave moves it: about no rate.
+  /// Motion like in a wave, with a mean rate of 0.
   void shake(double seconds) {
     const double sway = sway_dps;
     sway_dps = 0.5;
@@ -97,8 +97,8 @@ TEST(StopDetector, IsSureOfASteadyStretchAfterTwoAndAHalfSeconds) {
   EXPECT_EQ(platform.block(0.0), Steadiness::kUnsure) << "begins anew after a reset";
 }
 
-// Noise alone seldom ends a stretch: the limits stand at 3.5 standard deviations. It is the same
-// for a turn at a constant rate, however fast: which of the two it is, is for others to say.
+// Noise alone seldom ends a stretch: the limits are at 3.5 standard deviations. The same holds for
+// a turn at a constant rate, however fast: the detector does not distinguish the two.
 TEST(StopDetector, KeepsALongStretchAtWhateverRate) {
   for (const double rate_dps : {0.0, 0.1, -1.0, 40.0}) {
     constexpr std::uint64_t kSeed = 2;
@@ -110,7 +110,7 @@ TEST(StopDetector, KeepsALongStretchAtWhateverRate) {
   }
 }
 
-// A rate that changes by ten standard deviations of a block each time is no constant one.
+// A rate that changes by ten standard deviations of a block each time is not constant.
 TEST(StopDetector, CallsAChangingRateMotion) {
   constexpr std::uint64_t kSeed = 3;
   Platform platform(kSeed);
@@ -127,8 +127,8 @@ TEST(StopDetector, FindsNothingSteadyWhileTheWheelsRoll) {
   EXPECT_EQ(platform.count(Steadiness::kMoving, 600.0), 1200);
 }
 
-// Boarding passengers and wind are no motion where the wheels say so, and their sway is told: half
-// to twice of what a cell scatters by, on average.
+// With standing wheels, boarding passengers and wind are not motion, and their sway is reported:
+// half to twice the scatter of a cell, on average.
 TEST(StopDetector, AllowsAStandingVehicleToSway) {
   constexpr std::uint64_t kSeed = 7;
   Platform platform(kSeed);
@@ -148,7 +148,7 @@ TEST(StopDetector, AllowsAStandingVehicleToSway) {
   EXPECT_EQ(platform.count(Steadiness::kSteady, 120.0), 0) << "that is motion";
 }
 
-// Wheels that stand while the platform turns are broken, until they have rolled.
+// A wheel signal that stands while the platform turns is ignored until the wheels have rolled.
 TEST(StopDetector, DoesNotBelieveADeadWheelSensor) {
   constexpr std::uint64_t kSeed = 8;
   Platform platform(kSeed);
@@ -171,8 +171,8 @@ TEST(StopDetector, DoesNotBelieveADeadWheelSensor) {
   EXPECT_EQ(platform.detector.log_turning(Wheels::kStanding), believed);
 }
 
-// A ferry's deck turns under wheels that stand, but not as fast as this; a step of the drift that
-// was doubted as much is no turn.
+// A ferry's deck turns under standing wheels, but not this fast; a step within the drift's
+// uncertainty is not a turn.
 TEST(StopDetector, TakesNoDoubtOfTheDriftForATurnUnderStandingWheels) {
   constexpr std::uint64_t kSeed = 9;
   Platform platform(kSeed);
@@ -183,9 +183,9 @@ TEST(StopDetector, TakesNoDoubtOfTheDriftForATurnUnderStandingWheels) {
   }
 }
 
-// --- what is said of a turn ----------------------------------------------------------------------
+// --- the odds of a turn --------------------------------------------------------------------------
 
-// Stops are commoner than steady turns; wheels that stand make a turn rare.
+// Stops are commoner than steady turns; with standing wheels a turn is rare.
 TEST(StopDetector, HoldsAStopForLikelierAndMoreSoOnWheels) {
   const StopDetector detector;
   const double unknown = detector.log_turning(Wheels::kUnknown);
@@ -194,7 +194,7 @@ TEST(StopDetector, HoldsAStopForLikelierAndMoreSoOnWheels) {
   EXPECT_LT(detector.log_turning(Wheels::kStanding), unknown - 1.0);
 }
 
-// What a stretch's length tells does not depend on how it is cut into windows.
+// The evidence of a stretch's length does not depend on how it is cut into windows.
 TEST(StopDetector, TellsTheSameOfALengthHoweverItIsCut) {
   for (const Wheels wheels : {Wheels::kUnknown, Wheels::kStanding}) {
     Platform platform(10);
@@ -210,7 +210,8 @@ TEST(StopDetector, TellsTheSameOfALengthHoweverItIsCut) {
   }
 }
 
-// A bend ends within a minute. Under wheels that stand there are no bends, so their end tells less.
+// A bend ends within a minute. With standing wheels there are no bends, so the length is weaker
+// evidence.
 TEST(StopDetector, HoldsWhatLastsForAStop) {
   Platform road(11);
   Platform wheels(11);
@@ -234,7 +235,7 @@ TEST(StopDetector, KnowsWhetherThePlatformHasMovedOn) {
   platform.detector.stay();
   EXPECT_FALSE(platform.detector.moved_on());
 
-  // Somebody gets in, a wave comes: a few seconds that are not steady, and nothing has turned.
+  // A passenger gets in, or a wave comes: a few seconds are not steady, and nothing has turned.
   platform.shake(5.0);
   platform.count(Steadiness::kSteady, 10.0);
   EXPECT_FALSE(platform.detector.moved_on()) << "seed " << kSeed;
@@ -255,7 +256,7 @@ TEST(StopDetector, KnowsWhetherThePlatformHasMovedOn) {
 }
 
 // A turn of 90 deg whose rate changes from block to block, each of them smooth in itself: one
-// smooth block is no steady stretch, and the angle counts on.
+// smooth block is no steady stretch, and the angle still accumulates.
 TEST(StopDetector, CountsATurnThroughSmoothBlocks) {
   constexpr std::uint64_t kSeed = 13;
   Platform platform(kSeed);

@@ -76,8 +76,8 @@ TEST(TemperatureFilter, FollowsASwingSeenInFineSteps) {
   EXPECT_LT(worst.temperature_c, 0.01);
 }
 
-// Sensors of cars: one degree a step. The slope is poor, but nowhere near the 100 K/s that a
-// difference of neighbouring values would give, and better than none at all.
+// Car sensors: one degree a step. The slope is poor, but far below the 100 K/s that a difference of
+// neighbouring values would give, and better than none.
 TEST(TemperatureFilter, MakesTheBestOfACoarseSensor) {
   const Worst worst = follow(1.0, 300.0, 1800.0, swing, swing_slope);
   EXPECT_LT(worst.slope_c_s, 0.25 * 0.105);
@@ -108,8 +108,8 @@ TEST(TemperatureFilter, GivesTheSameAtAnyRateOfValues) {
   EXPECT_NEAR(slow.slope_c_s(), fast.slope_c_s(), 1e-3);
 }
 
-// What was worked out for one interval is not used for another: a filter that has seen thousands of
-// different ones goes on as one that begins there, but for what it knows.
+// Gains of one interval are not used for another: a filter that has seen thousands of different
+// intervals continues like one that begins there, except for its state.
 TEST(TemperatureFilter, TakesEachIntervalForWhatItIs) {
   constexpr std::uint64_t kSeed = 7;
   std::mt19937_64 random(kSeed);

@@ -1,8 +1,8 @@
 #pragma once
 
-// A world whose truth is known: two gyros with white noise and random-walk drift on one platform,
-// and the best linear estimator for it, a Kalman filter at full rate that is told N, K and the true
-// stops. Shares no code with what it judges.
+// A world with known truth: two gyros with white noise and random-walk drift on one platform, and
+// the best linear estimator for it, a Kalman filter at full rate that knows N, K and the true
+// stops. Shares no code with the product.
 
 #include <array>
 #include <cmath>
@@ -21,16 +21,16 @@ struct Gyro {
   double scale = 0.0;
   double delay_s = 0.0;
   double ramp_dps_s = 0.0;  ///< slope of the bias, from the beginning on
-  double warm_dps = 0.0;    ///< of the bias at the beginning, dying away …
-  double warm_tau_s = 1.0;  ///< … with this time
+  double warm_dps = 0.0;    ///< of the bias at the beginning, fading …
+  double warm_tau_s = 1.0;  ///< … with this time constant
   double step_dps = 0.0;    ///< its values are multiples of this
   bool blind = false;       ///< it feels no rotation
-  double spikes_hz = 0.0;   ///< so often a value is no measurement, but 1 to 50 deg/s off
+  double spikes_hz = 0.0;   ///< rate of values that are no measurement, but 1 to 50 deg/s off
 };
 
 struct Instant {
   double t_s = 0.0;
-  double rate_dps = 0.0;  ///< true
+  double rate_dps = 0.0;  ///< true rate
   bool stopped = false;   ///< for the bound: the true rate is known
   std::array<double, 2> reading_dps{};
   std::array<double, 2> bias_dps{};

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""The random worlds and their judge, held against themselves: rates made of the truth and known noise, no product."""
+"""Tests the random worlds and their judge on rates made from the truth and known noise, without the product."""
 
 import sys
 import tempfile
@@ -23,7 +23,7 @@ def quiet_world(seed=SEED):
 
 
 def rates(recording, error_dps, sigma_dps=SIGMA_DPS, age=0):
-    """What a gateway would send with gyro 1's frames from the end of the calibration on."""
+    """The rates that a gateway would send with gyro 1's frames from the end of the calibration on."""
     t, _ = recording.samples[0]
     rate = recording.truth(t) + error_dps(t)
     stamps_us = np.rint(t * 1e6).astype(np.int64) + age * judge.AGE_STEP_US
@@ -50,7 +50,8 @@ class Worlds(unittest.TestCase):
             fast = np.abs(np.gradient(recording.truth(t), t)) > 3
             self.assertGreater(fast.sum(), 300)
             step = np.diff(gyro_error)[fast[1:]] / np.sqrt(2)
-            # Of 300 samples and more a variance has a standard deviation of 8 %; four of them, and flicker and walk.
+            # A variance from 300 samples or more has a standard deviation of 8 %: four of these, and an allowance for
+            # flicker and walk.
             self.assertLess(abs(np.mean(step**2) / expected**2 - 1), 0.35)
 
     def test_frames_come_back_as_they_were_written(self):

@@ -1,4 +1,4 @@
-"""Where the judge from outside is: bench/honesty, which shares nothing with the product or with other tests."""
+"""Path of the independent judge: bench/honesty, which shares nothing with the product or with other tests."""
 
 import os
 import sys

@@ -1,6 +1,6 @@
 #!/usr/bin/python3
-"""Twelve worlds that together hold every ingredient: a valid rate is as right as its sigma, and it is there.
-`bench/honesty/run --seed N --plot` draws what happened; the bench runs thousands."""
+"""Twelve worlds that together contain every ingredient: a valid rate is as accurate as its sigma, and it
+is available. `bench/honesty/run --seed N --plot` draws a world; the bench runs thousands."""
 
 import importlib.machinery
 import importlib.util
@@ -16,7 +16,7 @@ import judge  # noqa: E402
 import report  # noqa: E402
 import worlds  # noqa: E402
 
-# A greedy cover of all ingredients among the seeds 5000 to 5999; whether they pass played no part.
+# A greedy cover of all ingredients among the seeds 5000 to 5999, chosen without regard to the results.
 SEEDS = (5404, 5312, 5350, 5323, 5037, 5278, 5005, 5050, 5112, 5476, 5525, 5617)
 LOOKED_AT = range(5000, 5300)
 

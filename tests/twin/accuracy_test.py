@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""`vgyro replay --method optimal` on short simulated drives: its errors in units of what the injected noise
+"""`vgyro replay --method optimal` on short simulated drives: its errors in units of those that the injected noise
 allows the best possible filter. bench/accuracy measures the same at length. Seeds are printed."""
 
 import dataclasses
@@ -17,13 +17,13 @@ from judge import expectation, motion, rivals, score  # noqa: E402
 from judge import pair as gyro_pair  # noqa: E402
 
 SEEDS = (1, 2, 3)
-# Mean square of this many standard normal numbers, with one chance in a thousand to be above.
+# Mean square of this many standard normal numbers that chance exceeds once in a thousand.
 LUCK = {3: 5.42, 6: 3.74, 24: 2.13}
-# rms distance from the bound's heading, in its σ: an independent error of that size adds 5 % and 25 %,
-# and three seeds must not decide.
+# rms distance from the bound's heading, in its σ: an independent error of that size adds 5 % and 25 %; the margin
+# allows for three seeds.
 APART = {mode: math.sqrt((limit**2 - 1.0) * LUCK[len(SEEDS)]) for mode, limit in (("given", 1.05), ("estimated", 1.25))}
-# At rest the heading of the bound is what it has not learned in the last seconds, some thousandths of a
-# degree; the product learns in steps of seconds and is that much behind.
+# At rest the bound's heading contains only what it has not learned in the last seconds, some thousandths of a degree;
+# the product learns in steps of seconds and is that much behind.
 BEHIND_AT_REST = 1.5
 STEP_SIGMAS = 3.0
 STEP_MEAN_S = 2.0
@@ -44,7 +44,7 @@ def bias_sigma_dps(frames, t_s):
 
 
 class Judge(unittest.TestCase):
-    """The judge itself, before anybody is judged."""
+    """Tests of the judge itself."""
 
     def test_the_bounds_heading_errors_are_as_large_as_its_covariance_says(self):
         for name, scenario, run_s in (("mems", motion.SCENARIOS["stops"], 600.0), ("fog_mems", DROPOUT, 300.0)):
@@ -140,7 +140,7 @@ class Accuracy(unittest.TestCase):
                         self.check_ferry(pair, recording, frames, f"{name} seed {seed} {mode}")
 
     def check_ferry(self, pair, recording, frames, name):
-        """At the end of each ferry the bias is as well known as before it, within the bound's σ."""
+        """At the end of each ferry the bias is known as well as before it, within the bound's σ."""
         stamps, bias = canlog.virtual_bias(frames)
         t = (stamps - gyro_pair.START_US) * 1e-6
         paired = rivals.pair_up(recording)

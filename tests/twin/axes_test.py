@@ -1,6 +1,7 @@
 #!/usr/bin/python3
-"""Two whole units on short simulated drives, tilted against each other: the angles about all axes in units of what the injected
-noise allows a filter that knows the tilt. bench/accuracy_axes measures the same at length. Seeds are printed."""
+"""Two whole units on short simulated drives, tilted against each other: the errors of the angles about all axes in
+units of those that the injected noise allows a filter that knows the tilt. bench/accuracy_axes measures the same at
+length. Seeds are printed."""
 
 import functools
 import math
@@ -16,14 +17,14 @@ from judge.pair import PAIRS  # noqa: E402
 
 SEEDS = (1, 2, 3)
 RUN_S = 600.0
-# Mean square of nine standard normal numbers (axes and seeds), with one chance in a thousand to be above.
+# Mean square of nine standard normal numbers (axes and seeds) that chance exceeds once in a thousand.
 LUCK = 3.1
 # rms distance from the bound's angle, in its sigma: an independent error of that size adds a quarter.
 APART = math.sqrt((1.25**2 - 1.0) * LUCK)
 
 
 class OneAxis:
-    """Of a motion about three, what the expectation of one asks for."""
+    """One axis of a motion about three, in the form that the expectation of one axis needs."""
 
     def __init__(self, true, axis):
         self.true, self.axis, self.standing = true, axis, true.standing
@@ -38,7 +39,7 @@ def judged(pair, scenario, seed):
 
 
 class Judge(unittest.TestCase):
-    """The judge itself, before anybody is judged."""
+    """Tests of the judge itself."""
 
     def test_the_bounds_angles_are_as_large_as_its_covariance_says(self):
         pair = PAIRS["mems"]
@@ -52,12 +53,13 @@ class Judge(unittest.TestCase):
                 first, _ = axes.angle_errors(paired.t_s, rivals.rate_errors(pair, paired)[0]["bound"], RUN_S)
                 sigma = expectation.heading_sigmas_deg(pair.gyros, OneAxis(recording.motion, axis), [RUN_S / 2])[RUN_S / 2]
                 squares.append((first / sigma) ** 2)
-        # Of 24 numbers: within what chance does once in a thousand.
+        # 24 numbers: chance exceeds this limit once in a thousand.
         self.assertLess(np.mean(squares), 2.13)
         self.assertGreater(np.mean(squares), 0.35)
 
     def test_a_banked_turn_turns_the_vehicle_about_the_vertical(self):
-        """Body rates put together as rotations: after a leg that ends on its first heading the vehicle stands as it began."""
+        """Body rates are combined as rotations: after a leg that ends on its first heading the vehicle stands as it
+        began."""
         true = axes.Motion(axes.SCENARIOS["banked"], RUN_S, np.random.default_rng(5))
         t = np.arange(motion.BEGIN_S, motion.BEGIN_S + 299.0, 0.005)
         sway = true.rate(t)
@@ -70,7 +72,7 @@ class Judge(unittest.TestCase):
         heading = np.degrees(np.arctan2(attitude[1, 0], attitude[0, 0]))
         self.assertAlmostEqual(heading, np.sum(yaw) * dt, delta=0.5)
         self.assertLess(np.degrees(np.arccos(np.clip(attitude[2, 2], -1, 1))), 0.5)
-        # What the motion says is that, with sway on x and y.
+        # The motion's rates are these, with sway on x and y.
         np.testing.assert_allclose(sway[2] - motion.EARTH_DPS, body[2], atol=0.05)
         self.assertLess(np.std(sway[0] - body[0]), 1.0)
 
@@ -79,7 +81,7 @@ class Judge(unittest.TestCase):
         t = recording.axes[0].gyros[1].t_s
         rates = recording.motion.rate(t)
         off = np.stack([one.gyros[1].error_dps for one in recording.axes])
-        cross = np.cross(rates.T, np.radians(axes.TILT_DEG)).T  # of a small turn by -theta
+        cross = np.cross(rates.T, np.radians(axes.TILT_DEG)).T  # for a small rotation by -theta
         moving = ~recording.motion.standing(t)
         left = (off - cross)[:, moving]
         self.assertLess(np.max(np.abs(left - left.mean(axis=1)[:, None])), 0.02)
@@ -100,7 +102,8 @@ class Product(unittest.TestCase):
                 self.assertLess(np.sqrt(np.mean(np.square(distances))), APART, distances)
 
     def test_on_the_second_drive_the_tilt_is_known(self):
-        """A mean of both units is off by half the tilt for ever; who has learned it is near the bound."""
+        """The mean of both units always has an error of half the tilt; once the tilt is learned, the rate is near
+        the bound."""
         for seed in SEEDS:
             found = judged("fog_mems", "tilted", seed)
             with self.subTest(seed=seed):

@@ -1,5 +1,5 @@
-"""candump logs as NumPy arrays: written and read a whole recording at a time, and the bits of the
-frames that the tests need. Shares nothing with the product, so that it can judge it."""
+"""candump logs as NumPy arrays: writes and reads a whole recording at a time, and extracts the bits of
+the frames that the tests need. Shares nothing with the product, so that it can judge it."""
 
 import dataclasses
 import lzma

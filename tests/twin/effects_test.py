@@ -1,7 +1,7 @@
 #!/usr/bin/python3
-"""Every effect that the gateway takes back, on a recording that has it: with the model file the virtual
-rate is as good as on a recording without the effect; without the file it is many standard errors worse.
-Errors are 1-s means of VG_Rate less the true rate, in units of their injected noise. Seeds are printed."""
+"""Every effect that the gateway corrects, on a recording that has it: with the model file the virtual rate is as
+good as on a recording without the effect; without the file it is many standard errors worse. Errors are 1-s means
+of VG_Rate less the true rate, in units of their injected noise. Seeds are printed."""
 
 import math
 import sys
@@ -17,11 +17,11 @@ import effects_twin  # noqa: E402
 import product  # noqa: E402
 
 SEED = 11
-# Of a 1-s mean of ½(y₁ + y₂).
+# σ of a 1-s mean of ½(y₁ + y₂).
 SIGMA_DPS = 0.5 * math.hypot(*effects_twin.WHITE)
 # Mean square of the normalised error over some 115 seconds: 1 ± 0.13.
 GOOD = 1.0 + 4 * 0.13
-LEARNED_S = 20.0  # the slope of the temperature is known by then
+LEARNED_S = 20.0  # by then the slope of the temperature is known
 
 
 def effect(kind, gyro=1, **parameters):
@@ -61,7 +61,7 @@ class Effects(unittest.TestCase):
         self.assertGreater(without, at_least)
 
     def test_without_effects_the_error_is_the_injected_noise(self):
-        # The yardstick itself.
+        # Tests the yardstick itself.
         recording = effects_twin.make([], seed=SEED)
         with tempfile.TemporaryDirectory(prefix="vgyro-") as name:
             config = effects_twin.write_config(name)
@@ -131,25 +131,25 @@ class Effects(unittest.TestCase):
         self.judge([effect("angle_harmonic", 2, harmonic=4, amplitude_dps=0.02, phase_rad=1.9)])
 
     def test_line(self):
-        # Slow enough to be seen in 1-s means.
+        # Slow enough to show in 1-s means.
         self.judge([effect("line", frequency_hz=0.31, amplitude_dps=0.006, phase_rad=0.4)])
 
     def test_delay_of_one_gyro(self):
         self.judge([effect("delay", seconds=0.02)])
 
     def test_delay_of_both_gyros(self):
-        # Nothing in the difference of the two tells this one.
+        # The common part does not show in the difference of the two.
         self.judge([effect("delay", seconds=0.006), effect("delay", 2, seconds=0.004)], at_least=5.0)
 
     def test_bandwidth(self):
-        # A group delay leaves what is of second order in rate/cutoff.
+        # A group delay leaves an error of second order in rate/cutoff.
         self.judge([effect("bandwidth", 2, cutoff_hz=40.0)], good=2.0)
 
     def test_bandwidth_of_second_order(self):
         self.judge([effect("bandwidth_second_order", 2, cutoff_hz=40.0, damping=0.7)], good=2.0)
 
     def test_many_at_once(self):
-        # They depend on one another: the response is of the rate that is left when the offsets are off.
+        # The effects depend on one another: the response acts on the rate without the offsets.
         self.judge(
             [
                 effect("bias", value_dps=0.05),

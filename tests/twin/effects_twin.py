@@ -1,6 +1,6 @@
-"""Recordings of two gyros with known effects: the equations of docs/model-file.md in NumPy, on a motion
-with turns both ways, a swing of temperature and a rough road. Shares nothing with the product, so that it
-can judge what the product takes back."""
+"""Recordings of two gyros with known effects: the equations of docs/model-file.md in NumPy, on a motion with turns
+both ways, a swing of temperature and a rough road. Shares nothing with the product, so that it can judge the
+product's corrections."""
 
 import cmath
 import dataclasses
@@ -23,7 +23,7 @@ TEMPERATURE_STEP_C = 0.01
 ACCELERATION_STEP_G = 1e-4
 ROLL_STEP_DPS = 2e-3
 WHITE = (2e-4, 3e-4)  # N of gyro 1 and 2, deg/s/sqrt(Hz)
-PHASES_S = (0.0, 0.0013)  # of the gyros' samples
+PHASES_S = (0.0, 0.0013)  # time offsets of the gyros' samples
 ACCELEROMETER_PHASE_S = -0.0004
 
 DBC = """\
@@ -85,7 +85,7 @@ fd = true
 
 
 def rate_of(t, top_dps):
-    """The Earth's at rest, then turns to the left and to the right, some of them quick."""
+    """The Earth's rate at rest, then turns to the left and to the right, some of them quick."""
     after = t - REST_S - 1.0
     begin = np.clip(after / 2.0, 0.0, 1.0)
     ease = begin * begin * (3.0 - 2.0 * begin)
@@ -94,7 +94,7 @@ def rate_of(t, top_dps):
 
 
 def roll_of(t):
-    """About the axis of the road, driving over its waves."""
+    """Rate about the direction of travel, on a road with waves."""
     return 14.0 * np.sin(2 * np.pi * t / 7.3) + 6.0 * np.sin(2 * np.pi * t / 1.9)
 
 
@@ -103,7 +103,7 @@ def temperature_of(t, gyro):
 
 
 def followed(temperature, play_k):
-    """Dragged along by the temperature, once that is further away than the play."""
+    """The position of something that the temperature drags along once it is farther away than the play."""
     out, at = np.empty_like(temperature), temperature[0]
     for i, now in enumerate(temperature):
         if now - at > play_k:
@@ -127,7 +127,7 @@ def acceleration_of(t, rng):
 
 
 def trailing_variance(values, count):
-    """Of the last `count` values, fewer at the beginning."""
+    """Variance of the last `count` values, fewer at the beginning."""
     sums = np.concatenate([[0.0], np.cumsum(values)])
     squares = np.concatenate([[0.0], np.cumsum(values**2)])
     last = np.arange(1, len(values) + 1)
@@ -154,7 +154,7 @@ class Recording:
 
 
 def added(effect, t, rate, truth, gyro, acceleration, vibration):
-    """What one effect adds to the readings at times t; rate is what the sensing element turns at."""
+    """Contribution of one effect to the readings at times t; `rate` is the rate of the sensing element."""
     p = effect
     temperature = temperature_of(t, gyro)
     excess = temperature - p.get("reference_c", 25.0)
@@ -223,7 +223,7 @@ def sensed_rate(effects, truth, t):
             keep = math.exp(-2 * math.pi * effect["cutoff_hz"] * dt)
             out = np.empty_like(rate)
             state = rate[0]
-            # The mean of both ends of a step: its own lag is of second order.
+            # The mean of both ends of a step has a lag of second order only.
             for i, value in enumerate(0.5 * (rate + np.concatenate([rate[:1], rate[:-1]]))):
                 state = keep * state + (1.0 - keep) * value
                 out[i] = state
@@ -243,7 +243,7 @@ def make(effects, length_s=150.0, top_dps=60.0, seed=1):
     truth = Truth(fine, rate, np.radians(turned))
     seeds = np.random.SeedSequence(seed).spawn(3)
 
-    # The accelerometer speaks first: its first frame is zero of the model's time.
+    # The accelerometer sends first: its first frame is time zero of the model.
     t_frame = np.arange(count) / RATE_HZ
     a = acceleration_of(t_frame, np.random.default_rng(seeds[2]))
     a_raw = np.rint(a / ACCELERATION_STEP_G).astype(np.int16)
@@ -285,7 +285,7 @@ class Rates:
 
 
 def read_rates(data):
-    """VG_Rate as dbc/vgyro_fd.dbc has it: the CAN FD frame tells the instant to the microsecond."""
+    """VG_Rate as in dbc/vgyro_fd.dbc: the CAN FD frame holds the instant to the microsecond."""
     payloads = [line.split(b"610##")[1][1:65] for line in data.splitlines() if b" 610##" in line]
     frames = np.frombuffer(bytes.fromhex(b"".join(payloads).decode()), dtype=np.uint8).reshape(-1, 32)
     rate = np.ascontiguousarray(frames[:, 4:8]).view("<i4")[:, 0] * 1e-6

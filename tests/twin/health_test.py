@@ -1,6 +1,6 @@
 #!/usr/bin/python3
-"""Sick gyros on the twin, through log and frames: what the heading loses, what VB_Health, VG_Quality and
-the summary say of it. The faults are put into the frames here; the truth is the twin's. Seeds are printed."""
+"""Faulty gyros on the twin, through log and frames: the loss of heading, and the contents of VB_Health, VG_Quality
+and the summary. The faults are put into the frames here; the truth is the twin's. Seeds are printed."""
 
 import json
 import sys
@@ -22,7 +22,7 @@ SEED = 7
 SUSPECT = (4, 8)
 MISSING = (1, 2)
 METHODS = ("mutual", "optimal")
-# Of one sample of the worse gyro, and of its bias after the rest, a walk of two minutes on it.
+# σ of one sample of the worse gyro, and of its bias after the rest and a walk of two minutes.
 SIGMA_DPS = 3e-4 * np.sqrt(RATE_HZ)
 BIAS_SIGMA_DPS = float(np.hypot(3e-4 / np.sqrt(REST_S), 2e-6 * np.sqrt(RUN_S)))
 HEADING_SIGMA_DEG = RUN_S * BIAS_SIGMA_DPS
@@ -55,7 +55,7 @@ class Played:
         self.health = canlog.intel(bias.payloads, 59, 5)
 
     def health_within(self, begin_s, end_s):
-        """All bits that were set at any time."""
+        """All bits that were set at any time between these."""
         return int(np.bitwise_or.reduce(self.health[(self.bias_t > begin_s) & (self.bias_t < end_s)], initial=0))
 
     def heading_error(self, options, begin_s, end_s):
@@ -69,7 +69,7 @@ class Played:
 
 
 def rates_of(streams, method, later_us):
-    """VG_Rate's stamps, and what it says behind its E2E header, of the recording made so much later."""
+    """VG_Rate's stamps and payloads without the E2E header, for the recording shifted by later_us."""
     later = [canlog.Stream(s.bus, s.can_id, s.stamps_us + later_us, s.payloads) for s in streams]
     with tempfile.TemporaryDirectory(prefix="vgyro-") as folder:
         folder = Path(folder)
@@ -88,7 +88,7 @@ class SickGyros(unittest.TestCase):
         return options, make_twin.simulate(options)
 
     def check(self, spoil, gyro, fault, begin_s, end_s, bit, turn_dps=40.0, late_s=0.6):
-        """Between begin and end this gyro is sick: it is told, and the heading does not suffer."""
+        """Between begin and end this gyro is faulty: this is reported, and the heading does not suffer."""
         options, twin = self.twin(turn_dps)
         lost_deg = spoil(options, twin)
         for method in METHODS:
@@ -107,12 +107,12 @@ class SickGyros(unittest.TestCase):
                 self.check_step(played, options, end_s)
 
     def check_step(self, played, options, at_s):
-        """Over the two seconds in which the gyro returns the rate does not step by more than it says itself."""
+        """Over the two seconds in which the gyro returns, the rate does not step by more than its own σ allows."""
         before = (played.t > at_s - 2.0) & (played.t < at_s)
         after = (played.t > at_s + 0.1) & (played.t < at_s + 2.1)
         sigma_dps = played.sigma[before | after]
         if np.isnan(sigma_dps).all():
-            return  # the method makes no statement
+            return  # the method gives no σ
         error = played.rate - make_twin.true_rate(played.t, options)
         step_dps = error[after].mean() - error[before].mean()
         print(f"  step at the return {step_dps:+.5f} deg/s, sigma {np.nanmax(sigma_dps):.5f} deg/s")
@@ -144,7 +144,7 @@ class SickGyros(unittest.TestCase):
         for method in METHODS:
             with self.subTest(method=method):
                 played = Played(twin, method)
-                # The first turn, of which the eight samples that told of the clip were used.
+                # The first turn, in which the eight samples that revealed the clip were used.
                 error_deg = played.heading_error(options, REST_S, REST_S + 20.5)
                 print(f"clipped {method}: heading error {error_deg:+.4f} deg, in the plain mean {lost_deg / 2:+.1f} deg")
                 self.assertLess(abs(error_deg), 0.02 * abs(lost_deg / 2))
@@ -155,7 +155,7 @@ class SickGyros(unittest.TestCase):
 
     def test_what_time_it_is_changes_no_rate(self):
         options, twin = self.twin()
-        # A coarse one, which only the other one's movement can convict.
+        # A coarse gyro, whose fault only the other one's movement reveals.
         put_rate(twin.streams[0], np.full(len(twin.t_s[0]), True), np.rint(twin.reading_dps[0] / 0.25) * 0.25)
         spells = ((0, 30.0, 40.0, 0.0), (1, 50.0, 50.2, None), (1, 60.0, 70.0, None))
         for gyro, begin_s, end_s, value in spells:

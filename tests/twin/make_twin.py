@@ -1,10 +1,10 @@
 #!/usr/bin/python3
-"""Makes a recording of two vibratory gyros on a rate table, as the paper's experiment had them: a
-candump log of GYRO_A (can0) and GYRO_B (can1), frames as in examples/twin.dbc.
+"""Makes a recording of two vibratory gyros on a rate table, as in the paper's experiment: a candump
+log of GYRO_A (can0) and GYRO_B (can1), frames as in examples/twin.dbc.
 
-Each gyro reads  rate + bias + random walk + white noise.  N is the angle random walk coefficient
-(IEEE 952; two-sided spectral density N²): one sample of dt seconds has sigma N/sqrt(dt). K is the
-rate random walk coefficient: the walk's step over dt has sigma K·sqrt(dt)."""
+Each gyro reads rate + bias + random walk + white noise. N is the angle random walk coefficient (IEEE
+952; two-sided spectral density N²): one sample of dt seconds has sigma N/sqrt(dt). K is the rate
+random walk coefficient: the walk's step over dt has sigma K·sqrt(dt)."""
 
 import argparse
 import dataclasses
@@ -43,7 +43,7 @@ GYROS = (
 @dataclasses.dataclass(frozen=True)
 class Options:
     scenario: str = "rest"
-    rest_s: float = 60.0  # at rest before the run: the calibration
+    rest_s: float = 60.0  # rest before the run, for the calibration
     run_s: float | None = None
     rate_hz: float = 500.0
     turn_dps: float = 50.0
@@ -73,7 +73,7 @@ def smooth_step(x):
 
 
 def drive_rate(t, top_dps):
-    """A minute, repeated: a left turn, a right turn, a slalom of a fifth of their rate."""
+    """A repeated minute: a left turn, a right turn, and a slalom at a fifth of their rate."""
     u = np.mod(t, 60.0)
 
     def bump(begin, length):
@@ -85,7 +85,7 @@ def drive_rate(t, top_dps):
 
 
 def true_rate(t, options):
-    """The rate about the gyros' axis, Earth's included, t seconds after the start."""
+    """The rate about the gyros' axis, including the Earth's, t seconds after the start."""
     after = t - options.rest_s
     if options.scenario == "rest":
         return np.full_like(t, EARTH_DPS)

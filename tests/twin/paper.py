@@ -1,5 +1,5 @@
-"""The paper's two experiments on the twin: what the virtual gyro and the plain mean are off by, and
-what the injected noise lets one expect of them."""
+"""The paper's two experiments on the twin: the errors of the virtual gyro and of the plain mean, and those
+expected from the injected noise."""
 
 import dataclasses
 import sys
@@ -22,7 +22,7 @@ RUNS = {"rest": 120.0, "turn": 900.0}
 
 @dataclasses.dataclass(frozen=True)
 class Errors:
-    mean_dps: float  # of the run's mean rate
+    mean_dps: float  # error of the run's mean rate
     worst_window_dps: float  # largest |mean error| of any 10-s window
     angle_deg: float  # integral of the error over the run
 
@@ -32,7 +32,7 @@ def options_of(run, seed):
 
 
 def scored_from_s(run):
-    """The ramp to 50 deg/s is no part of the run."""
+    """The ramp to 50 deg/s is not part of the run."""
     return REST_S + (make_twin.RAMP_S if run == "turn" else 0.0)
 
 
@@ -72,10 +72,10 @@ class Expectation:
 
 
 def expect(run, method):
-    """The mean error over the run is a linear functional of both gyros' white noise and walks. For
-    `mutual` the walk-in-common and white noise of the half sum matter alone: minus the calibration's
-    line, extrapolated to the middle of the run."""
-    rate_hz = 20.0  # of the integration; the noises are densities
+    """The mean error over the run is a linear functional of both gyros' white noise and walks. For `mutual` only
+    the common walk and the white noise of the half sum matter, less the calibration's line, extrapolated to the
+    middle of the run."""
+    rate_hz = 20.0  # rate of the integration; the noise is given as densities
     t = (np.arange((scored_from_s(run) + RUNS[run]) * rate_hz) + 0.5) / rate_hz
     weights = np.zeros_like(t)
     scored = t >= scored_from_s(run)

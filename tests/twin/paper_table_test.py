@@ -1,6 +1,6 @@
 #!/usr/bin/python3
-"""The paper's rows on the simulated twin: `mutual` beside the plain mean, each held against what the
-injected noise lets one expect. Seeds are printed; the figures are what they are."""
+"""The paper's rows on the simulated twin: `mutual` and the plain mean, each compared with the errors expected from
+the injected noise. Seeds are printed; the figures are not tuned."""
 
 import sys
 import unittest

@@ -60,7 +60,7 @@ def replay_command(config, log, out, method=None, extra=()):
 
 
 def replay(config, log, out, method=None, extra=()):
-    """Runs to the end and returns the output log's bytes; raises with what the program said."""
+    """Runs to the end and returns the output log's bytes; raises with the program's messages."""
     done = subprocess.run(replay_command(config, log, out, method, extra), capture_output=True, check=False)
     if done.returncode != 0:
         raise RuntimeError(f"{done.args}: exit code {done.returncode}\n{done.stderr.decode(errors='replace')}")

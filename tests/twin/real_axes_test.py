@@ -1,6 +1,6 @@
 #!/usr/bin/python3
-"""bench/real_axes.py on files made here in the publishers' forms: it reads what was put in, finds the rotation that was put in,
-and so does the product from the log that it makes."""
+"""bench/real_axes.py on files made here in the publishers' forms: it reads the injected data and finds the injected
+rotation, and so does the product from the log that it makes."""
 
 import contextlib
 import csv
@@ -29,7 +29,7 @@ RATE_HZ, SECONDS, SEED = 120.0, 60.0, 6
 
 
 def segments(count, lag_s=0.0):
-    """Of each a table of both units: time and rates, the second turned and late."""
+    """For each segment a table of both units: time and rates, the second unit turned and late."""
     print(f"seed {SEED}")
     rng = np.random.default_rng(SEED)
     turn = axes.rotation(-np.radians(TILT_DEG))
@@ -91,7 +91,8 @@ class Files(unittest.TestCase):
             real_axes.report(units, 10.0, None)
         text = said.getvalue()
         self.assertIn("unit 2 is late by +20 ms", text)
-        # Lag taken off, the rotation explains nearly all of what is slow; half a millisecond of lag, the step, and noise stay.
+        # With the lag removed, the rotation explains nearly all of the slow difference; half a millisecond of lag, the
+        # step, and noise remain.
         aligned = text[text.index("lag taken off"):]
         for share in re.findall(r"\(([+-]\d+) %\)", aligned.splitlines()[1]):
             self.assertGreater(int(share), 90, text)

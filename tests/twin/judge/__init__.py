@@ -1,2 +1,2 @@
-"""Judges `vgyro replay` from outside: simulated drives with known truth, simple rivals, and the best
-that any linear estimator can do. Shares nothing with the product."""
+"""Judges `vgyro replay` independently: simulated drives with known truth, simple rivals, and the
+best result of any linear estimator. Shares nothing with the product."""

@@ -1,5 +1,6 @@
-"""Two whole units in three axes: what they read on a motion with a tilt between them, and how far off the product's angles about
-each axis are, beside the bound of one axis, which knows the tilt. Each axis of a unit has a message of its own."""
+"""Two whole units in three axes: their readings on a motion with a tilt between them, and the errors of the
+product's angles about each axis, compared with the bound of one axis, which knows the tilt. Each axis of a unit has
+a message of its own."""
 
 import csv
 import dataclasses
@@ -45,7 +46,7 @@ SCENARIOS = {
 
 
 def rotation(vector_rad):
-    """Turns a vector by this one (Rodrigues)."""
+    """The matrix of a rotation by this vector (Rodrigues)."""
     angle = float(np.linalg.norm(vector_rad))
     if angle == 0.0:
         return np.eye(3)
@@ -55,7 +56,7 @@ def rotation(vector_rad):
 
 
 class Motion:
-    """The rates about x, y and z: the drive with stops of one axis, and what roll and pitch do with it."""
+    """The rates about x, y and z: the drive with stops of one axis, and its effect through roll and pitch."""
 
     def __init__(self, scenario, run_s, rng):
         self.drive = motion.Motion(motion.SCENARIOS["stops"], run_s, rng)
@@ -65,7 +66,7 @@ class Motion:
         sway = np.stack([motion.band_noise(self._t, rng) for _ in range(2)]) * driving
         yaw = self.drive._rate - motion.EARTH_DPS
         if scenario.banked:
-            # Euler angles: the heading turns about the vertical, the vehicle about it is rolled.
+            # Euler angles: the heading turns about the vertical, and the vehicle is rolled.
             bank = np.radians(BANK_S * yaw)
             self._rates = np.stack([np.degrees(np.gradient(bank, self._t)), yaw * np.sin(bank), yaw * np.cos(bank)])
         else:
@@ -91,7 +92,7 @@ class Motion:
 
 @dataclasses.dataclass(frozen=True)
 class AxisRecording:
-    """Of one axis, as the judges of one axis take it."""
+    """The recording of one axis, in the form that the judges of one axis need."""
 
     motion: Motion
     dt_s: float
@@ -111,7 +112,7 @@ class Recording:
 
 
 def tilt(scenario):
-    """What unit 2 reads of the vehicle's rate."""
+    """Unit 2's reading of the vehicle's rate."""
     return rotation(-np.radians(TILT_DEG)) if scenario.tilted else np.eye(3)
 
 
@@ -160,7 +161,8 @@ def config_text():
 
 
 def model_text(pair):
-    """N and K of every axis. The tilt stays to be learned: its axes stand in messages of their own, of which no cross_axis is taken."""
+    """N and K of every axis. The tilt is left to be learned: the axes are in messages of their own, for which
+    cross_axis is not corrected."""
     return "format = 1\n" + "".join(
         f'[[effect]]\ngyro = {unit + 1}\nkind = "{kind}"\n{key} = {value!r}\n'
         for unit, gyro in enumerate(pair.gyros)
@@ -189,7 +191,7 @@ def replay(log, pair, mode):
 
 
 def angle_errors(t_s, error_dps, run_s, halves=2):
-    """Error of the angle over each half of the run: a second drive is judged by itself."""
+    """Error of the angle over each half of the run: the second drive is judged by itself."""
     lengths = np.diff(t_s, append=t_s[-1])
     edges = motion.BEGIN_S + np.linspace(0.0, run_s, halves + 1)
     return [float(np.dot(error_dps, lengths * ((t_s >= begin) & (t_s < end)))) for begin, end in zip(edges[:-1], edges[1:])]

@@ -1,5 +1,5 @@
-"""What the injected noise lets one expect of the bound: the standard deviation of its heading error. N and
-K are densities, so steps of half a second do."""
+"""Expected errors of the bound from the injected noise: the standard deviation of its heading error. N
+and K are densities, so steps of half a second are enough."""
 
 import numpy as np
 
@@ -9,7 +9,7 @@ STEP_S = 0.5
 
 
 def heading_sigmas_deg(gyros, true, horizons_s):
-    """Of the bound's heading error, at each horizon after the begin of the motion."""
+    """σ of the bound's heading error, at each horizon after the beginning of the motion."""
     ends = {round((motion.BEGIN_S + horizon_s) / STEP_S): horizon_s for horizon_s in horizons_s}
     t = np.arange(max(ends)) * STEP_S
     there = np.stack([true.there(k, t) for k in range(2)])
@@ -31,7 +31,8 @@ def heading_sigmas_deg(gyros, true, horizons_s):
 
 
 def _step(kind, gain, weight):
-    """How the errors after a step come from those before (3, 3), and from the readings' noise (3, 2)."""
+    """Matrices that give the errors after a step from those before (3, 3) and from the readings' noise
+    (3, 2)."""
     drift = np.eye(2, 5)
     noise = np.eye(2, 5, k=3)
     if kind == rivals.DIFFERENCE:

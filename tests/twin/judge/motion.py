@@ -1,5 +1,5 @@
-"""What the platform does: true rate, standstills, drop-outs and temperature of each scenario. Seconds
-count from the first sample; each scenario begins at rest, for the calibration."""
+"""The platform's motion: true rate, standstills, drop-outs and temperature of each scenario. Seconds count from the
+first sample; each scenario begins at rest, for the calibration."""
 
 import dataclasses
 
@@ -31,7 +31,7 @@ class Scenario:
     scale_error_2: float = 0.0
     delay_2_s: float = 0.0
     gone_s: tuple = ((), ())  # per gyro: (from, to) after BEGIN_S
-    # The estimate without a model file lacks knowledge that the bound has.
+    # The estimate without a model file lacks information that the bound has.
     blind_without_model: bool = False
 
 
@@ -88,7 +88,7 @@ class Motion:
         self.run_s = run_s
         self.length_s = BEGIN_S + run_s
         self.stops = stops_of(scenario, run_s)
-        # The grid reaches beyond both ends: clocks differ, and stamps may be late.
+        # The grid extends beyond both ends: clocks differ, and stamps may be late.
         self._from_s = -1.0
         self._t = self._from_s + np.arange(int((self.length_s + 3.0) * GRID_HZ)) / GRID_HZ
         self._rate = self._make(self._t - BEGIN_S, rng)
@@ -97,7 +97,7 @@ class Motion:
         return np.interp(t_s, self._t, self._rate)
 
     def standing(self, t_s):
-        """Standing still, and known to be: the calibration and the true stops."""
+        """The platform stands still and this is known: the calibration and the true stops."""
         standing = t_s < CALIBRATION_S
         for begin, end in self.stops:
             standing |= (t_s >= BEGIN_S + begin) & (t_s < BEGIN_S + end)
@@ -130,7 +130,7 @@ class Motion:
         return EARTH_DPS + rate
 
     def _driving(self, t):
-        """1 while driving, 0 where the vehicle stands, with gentle edges of 3 s."""
+        """1 while driving, 0 while the vehicle stands, with gentle edges of 3 s."""
         driving = smooth_step(t / 3.0)
         if not self.scenario.stops:
             return driving

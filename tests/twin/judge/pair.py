@@ -1,6 +1,5 @@
-"""Two gyros and what they read on a motion. A sample is the rate at the instant of its stamp (the
-motion holds nothing near half the sample rate) plus one frame's share of white noise, N²/dt; the
-random walk steps by K·sqrt(dt)."""
+"""Two gyros and their readings on a motion. A sample is the rate at the instant of its stamp (the motion has no
+power near half the sample rate) plus one frame's share of white noise, N²/dt; the random walk steps by K·sqrt(dt)."""
 
 import dataclasses
 
@@ -47,19 +46,19 @@ CLOCK_2 = 2e-5  # gyro 2's interval is longer by this share
 
 
 def sample_rate_hz(pair, scenario):
-    """The paper's pair has the paper's rate where the recording stays short."""
+    """The paper's pair has the paper's rate if the recording stays short."""
     return 500.0 if pair.name == "twin" and scenario.drive == "turn" else 100.0
 
 
 @dataclasses.dataclass(frozen=True)
 class Readings:
-    """Of one gyro; errors are readings less the true rate at the instant of the stamp."""
+    """The readings of one gyro; errors are readings less the true rate at the instant of the stamp."""
 
     t_s: np.ndarray
     error_dps: np.ndarray  # all of them
     drift_dps: np.ndarray  # bias, walk and temperature
     walk_dps: np.ndarray  # bias and walk
-    random_dps: np.ndarray  # bias, walk and white noise: what is left to who knows the other effects
+    random_dps: np.ndarray  # bias, walk and white noise: the error without the known effects
     there: np.ndarray  # bool: sent
 
 
@@ -75,7 +74,7 @@ class Recording:
     streams: tuple
 
     def log(self):
-        """As candump lines."""
+        """The recording as candump lines."""
         lines = _Lines()
         canlog.write(lines, self.streams)
         return b"".join(lines)
@@ -116,7 +115,7 @@ def _read(gyro, k, t, dt, true, rng):
 
 
 def model_text(pair, scenario):
-    """The model file that says what the recording is made of; biases stay to be learnt."""
+    """The model file with the true parameters of the recording; biases are left to be learned."""
     effects = []
     for k, gyro in enumerate(pair.gyros):
         effects.append((k, "white_noise", f"density_dps_rthz = {gyro.white_dps_rthz!r}"))

@@ -1,5 +1,5 @@
-"""The bound, and what simpler means make of the same recording. All work on the gyros' errors, paired
-in time without loss, so no rival suffers from alignment."""
+"""The bound, and the results of simpler means on the same recording. All use the gyros' errors,
+paired in time without loss, so no rival suffers from alignment."""
 
 import dataclasses
 import functools
@@ -8,7 +8,7 @@ import numpy as np
 
 from judge import motion
 
-FIRST_SIGMA_DPS = 1.0  # of a bias of which nothing is known
+FIRST_SIGMA_DPS = 1.0  # of an unknown bias
 
 
 @dataclasses.dataclass(frozen=True)
@@ -110,7 +110,7 @@ def bound_drifts(gyros, paired):
 
 
 def weights_of(gyros, there):
-    """Fast weights (2, n): by the white noise; a missing gyro has none."""
+    """Weights (2, n) by the white noise alone; a missing gyro has none."""
     w = np.array([g.white_dps_rthz**-2.0 for g in gyros])[:, None] * there
     total = w.sum(axis=0)
     return np.where(total > 0.0, w / np.where(total > 0.0, total, 1.0), 0.0)
@@ -120,7 +120,7 @@ def weights_of(gyros, there):
 
 
 def averaged(error, there):
-    """Half the sum; a gyro alone counts wholly."""
+    """Half the sum; a gyro alone counts in full."""
     return (error * there).sum(axis=0) / np.maximum(there.sum(axis=0), 1)
 
 
@@ -129,7 +129,7 @@ def calibration_means(paired):
 
 
 def last_stop_means(paired):
-    """Per gyro and instant: the mean over the last standstill that has ended."""
+    """For each gyro and instant, the mean over the last standstill that has ended."""
     means = np.empty_like(paired.error_dps)
     edges = np.flatnonzero(np.diff(paired.standing.astype(int))) + 1
     bounds = [0, *edges, len(paired.t_s)]

@@ -1,4 +1,4 @@
-"""One recording, judged: heading, bias and σ of `vgyro replay` and of its rivals."""
+"""Scores of one recording: heading, bias and σ of `vgyro replay` and of its rivals."""
 
 import functools
 import subprocess
@@ -17,7 +17,7 @@ BIAS_SIGMA_STEP_DPS = 1e-5
 NOT_AVAILABLE = 0xFFF
 AGE_STEP_US, AGE_MAX_US = 500, 7500
 DEGRADED = 3
-# A σ of fewer steps than this is the wire's, not the product's.
+# A σ of fewer steps than this is limited by the wire's resolution.
 STEPS_MIN = 5
 MODES = ("given", "estimated")
 HORIZONS_S = (120.0, motion.MINUTES_15_S, motion.HOUR_S)
@@ -25,7 +25,7 @@ HORIZONS_S = (120.0, motion.MINUTES_15_S, motion.HOUR_S)
 
 @functools.cache
 def takes_model():
-    """Whether this build can be given a model file."""
+    """Does this build accept a model file?"""
     said = subprocess.run([product.VGYRO, "replay", "--help"], capture_output=True, text=True, check=False)
     return "--model" in said.stdout
 
@@ -46,8 +46,8 @@ def replay(recording, log, pair, method, mode=None):
 
 
 def instants_s(rate, recording):
-    """What each VG_Rate refers to. VG_Age has steps of 0.5 ms and an end; the instant is a sample's of the
-    gyro that paces, so its stamps, less its known delay, say it exactly."""
+    """The instant of each VG_Rate. VG_Age has steps of 0.5 ms and a largest value; the instant is that of a sample
+    of the pacing gyro, so its stamps, less its known delay, give it exactly."""
     about_us = rate.stamps_us - rate.age_us - gyro_pair.START_US
     ended = rate.age_us >= AGE_MAX_US
     paired = rate.state != DEGRADED
@@ -63,7 +63,7 @@ def instants_s(rate, recording):
 
 
 def heading_errors(t_s, error_dps, run_s, horizons_s):
-    """After each horizon within the run; between two instants the error is held."""
+    """Heading error after each horizon within the run; between two instants the error is held."""
     lengths = np.diff(t_s, append=t_s[-1])
     return {
         horizon: float(np.dot(error_dps, lengths * ((t_s >= motion.BEGIN_S) & (t_s < motion.BEGIN_S + horizon))))
@@ -81,7 +81,7 @@ def mean_square(values):
 
 
 def judge_product(recording, pair, frames, horizons_s=HORIZONS_S):
-    """Heading errors; mean squares of what VG_Rate, VG_Bias and VG_Model claim."""
+    """Heading errors, and mean squares of errors in units of the σ in VG_Rate, VG_Bias and VG_Model."""
     run_s = recording.motion.run_s
     rate = canlog.virtual_rate(frames)
     t = instants_s(rate, recording)
@@ -109,7 +109,7 @@ def true_drifts(recording, t_s):
 
 
 def judge_bias(recording, pair, frames):
-    """VG_Bias and VM_BiasSigma, over the second half of the run. What is taken off the virtual rate is
+    """VG_Bias and VM_BiasSigma, over the second half of the run. The drift subtracted from the virtual rate is
     weighted as the bound weighs it."""
     run_s = recording.motion.run_s
     stamps, bias = canlog.virtual_bias(frames)
@@ -147,7 +147,7 @@ def judge_rivals(recording, pair, horizons_s=HORIZONS_S):
 
 
 def judge(pair, scenario, run_s, seed, modes=MODES, mutual=True):
-    """Everybody on one seed's recording: name → figures. The product is under its modes."""
+    """All methods on one seed's recording: name → figures. The product is under its modes."""
     recording = gyro_pair.simulate(pair, scenario, run_s, seed)
     judged = judge_rivals(recording, pair)
     log = recording.log()
