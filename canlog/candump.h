@@ -89,6 +89,10 @@ class CandumpReader final : public LogReader {
   LogCounts counts_;
 };
 
+/// Longest name of an interface: the kernel allows 15 characters, logs of other tools a little
+/// more.
+inline constexpr std::size_t kInterfaceNameMax = 31;
+
 /// Longest text of a line that format_line writes, newline included.
 inline constexpr std::size_t kLineBytesMax = 200;
 
