@@ -90,6 +90,10 @@ class CandumpReader final : public LogReader {
   LogCounts counts_;
 };
 
+/// Longest name of an interface: the kernel allows 15 characters, logs of other tools a little
+/// more.
+inline constexpr std::size_t kInterfaceNameMax = 31;
+
 /// Longest line that format_line() writes, including the newline.
 inline constexpr std::size_t kLineBytesMax = 200;
 

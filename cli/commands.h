@@ -136,5 +136,6 @@ struct StatusOptions {
 };
 int run_status(const StatusOptions& options);
 int run_recalibrate(const WhichGateway& which);
+int run_capture(const WhichGateway& which);
 
 }  // namespace vgyro::cli

@@ -38,6 +38,7 @@ struct Options {
   SimulateOptions simulate;
   StatusOptions status;
   WhichGateway recalibrate;
+  WhichGateway capture;
   std::string method;
 };
 
@@ -384,6 +385,16 @@ CLI::App* add_recalibrate(CLI::App& app, WhichGateway& which) {
   return command;
 }
 
+CLI::App* add_capture(CLI::App& app, WhichGateway& which) {
+  CLI::App* command = app.add_subcommand(
+      "capture", "Have the running gateway write the last minutes of its inputs to a file");
+  add_which(*command, which);
+  command->footer(
+      "For root only. Prints the folder with the recording. The gateway must run with --capture,\n"
+      "see vgyrod(8).");
+  return command;
+}
+
 // CLI11 would only report that a subcommand is missing.
 std::optional<vgyro::Error> unknown_command(const CLI::App& app,
                                             const std::vector<std::string>& words) {
@@ -447,6 +458,7 @@ int run(int argc, char** argv) {
   CLI::App* simulate = add_simulate(app, options.simulate);
   CLI::App* status = add_status(app, options.status);
   CLI::App* recalibrate = add_recalibrate(app, options.recalibrate);
+  CLI::App* capture = add_capture(app, options.capture);
   std::vector<std::string> words = words_of(argc, argv);
   if (const auto unknown = unknown_command(app, words)) {
     report(*unknown);
@@ -472,6 +484,7 @@ int run(int argc, char** argv) {
   if (simulate->parsed()) return run_simulate(options.simulate);
   if (status->parsed()) return run_status(options.status);
   if (recalibrate->parsed()) return run_recalibrate(options.recalibrate);
+  if (capture->parsed()) return run_capture(options.capture);
   // Frames are the main result: they go to standard output unless a summary or a table does.
   const bool output_given = replay->count("--output") > 0;
   const bool stdout_taken = options.replay.json == "-" || options.replay.csv == "-";

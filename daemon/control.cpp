@@ -17,6 +17,7 @@ namespace {
 constexpr const char* kInterfaceName = "org.vgyro.Gateway1";
 constexpr const char* kPath = "/org/vgyro/Gateway1";
 constexpr const char* kNothingToSave = "org.vgyro.Error.NothingToSave";
+constexpr const char* kNoCapture = "org.vgyro.Error.NoCapture";
 
 /// Writes one dictionary {string: variant} or {string: number}; the first error stays.
 class Dictionary {
@@ -219,6 +220,26 @@ int append_hypotheses(sd_bus_message* reply, const Snapshot& now) {
   return fields.close();
 }
 
+// Empty where the inputs are not recorded.
+int append_captures(sd_bus_message* reply, const Snapshot& now) {
+  Dictionary fields(reply, "{sv}");
+  if (now.capture) {
+    const CaptureStatus& capture = *now.capture;
+    fields.put("directory", capture.directory);
+    fields.put("held_s", capture.ring.seconds);
+    fields.put("held_frames", capture.ring.frames);
+    fields.put("held_bytes", capture.ring.bytes);
+    fields.put("frames_dropped", capture.ring.dropped);
+    fields.put("is_writing", capture.is_writing);
+    fields.put_counts("written", capture.written,
+                      [](std::size_t i) { return to_string(static_cast<CaptureCause>(i)); });
+    fields.put("failed", capture.failed);
+    fields.put("held_back", capture.held_back);
+    fields.put("last", capture.last);
+  }
+  return fields.close();
+}
+
 int append_text(sd_bus_message* reply, std::string_view text) {
   return sd_bus_message_append(reply, "s", std::string(text).c_str());
 }
@@ -311,6 +332,7 @@ constexpr Property kProperties[] = {
     {"Axes", append_axes},
     {"Buses", append_buses},
     {"Counters", append_counters},
+    {"Captures", append_captures},
 };
 
 }  // namespace
@@ -346,6 +368,8 @@ const sd_bus_vtable Control::kInterface[] = {
     SD_BUS_PROPERTY("Axes", "aa{sv}", on_get, 0, SD_BUS_VTABLE_PROPERTY_EMITS_CHANGE),
     SD_BUS_PROPERTY("Buses", "aa{sv}", on_get, 0, SD_BUS_VTABLE_PROPERTY_EMITS_INVALIDATION),
     SD_BUS_PROPERTY("Counters", "a{st}", on_get, 0, SD_BUS_VTABLE_PROPERTY_EMITS_INVALIDATION),
+    SD_BUS_PROPERTY("Captures", "a{sv}", on_get, 0, SD_BUS_VTABLE_PROPERTY_EMITS_INVALIDATION),
+    SD_BUS_METHOD("Capture", "", "s", on_capture, SD_BUS_VTABLE_UNPRIVILEGED),
     SD_BUS_METHOD("Recalibrate", "", "", on_recalibrate, SD_BUS_VTABLE_UNPRIVILEGED),
     SD_BUS_METHOD("SaveState", "", "", on_save_state, SD_BUS_VTABLE_UNPRIVILEGED),
     SD_BUS_VTABLE_END};
@@ -426,7 +450,7 @@ void Control::tell_changes() {
       bus_, kPath, kInterfaceName, "State", "Quality", "Restored", "Valid", "Disagree",
       "Contradiction", "ContradictionText", "Ambiguous", "RatesTooFarApart", "Hypotheses",
       "RateDps", "SigmaDps", "BiasSigmaDps", "CalibratedS", "ConfigRefused", "Transmit",
-      "Fingerprint", "LastStopAgeS", "Gyros", "Buses", "Counters", nullptr);
+      "Fingerprint", "LastStopAgeS", "Gyros", "Buses", "Counters", "Captures", nullptr);
 }
 
 int Control::on_get(sd_bus*, const char*, const char*, const char* property, sd_bus_message* reply,
@@ -443,6 +467,24 @@ int Control::on_get(sd_bus*, const char*, const char*, const char* property, sd_
 int Control::on_recalibrate(sd_bus_message* call, void* self, sd_bus_error*) {
   static_cast<Control*>(self)->gateway_.recalibrate();
   return sd_bus_reply_method_return(call, "");
+}
+
+// Answered when it is on the disk, which may take seconds; sd-bus goes on meanwhile.
+int Control::on_capture(sd_bus_message* call, void* self, sd_bus_error* error) {
+  return or_no_memory([&] {
+    const std::shared_ptr<sd_bus_message> asked(sd_bus_message_ref(call), &sd_bus_message_unref);
+    const Expected<void> begun =
+        static_cast<Control*>(self)->gateway_.capture([asked](const Expected<std::string>& folder) {
+          if (folder) {
+            sd_bus_reply_method_return(asked.get(), "s", folder->c_str());
+          } else {
+            sd_bus_reply_method_errorf(asked.get(), kNoCapture, "%s",
+                                       folder.error().message().c_str());
+          }
+        });
+    if (!begun) return sd_bus_error_set(error, kNoCapture, begun.error().message().c_str());
+    return 1;
+  });
 }
 
 int Control::on_save_state(sd_bus_message* call, void* self, sd_bus_error* error) {

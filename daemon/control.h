@@ -23,6 +23,8 @@ class Control {
     std::function<const Snapshot&()> snapshot;
     std::function<void()> recalibrate;
     std::function<Expected<void>()> save_state;
+    /// Has the recorded inputs written; the answer is the folder, or why there is none.
+    std::function<Expected<void>(std::function<void(const Expected<std::string>&)> answer)> capture;
   };
 
   /// Serves its bus within `events`, which must outlive it, under the name `bus_name`.
@@ -48,6 +50,7 @@ class Control {
                     sd_bus_message* reply, void* self, sd_bus_error* error);
   static int on_recalibrate(sd_bus_message* call, void* self, sd_bus_error* error);
   static int on_save_state(sd_bus_message* call, void* self, sd_bus_error* error);
+  static int on_capture(sd_bus_message* call, void* self, sd_bus_error* error);
   static int on_name(sd_bus_message* reply, void* self, sd_bus_error* error);
   static const sd_bus_vtable kInterface[];
 

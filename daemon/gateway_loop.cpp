@@ -69,15 +69,17 @@ GatewayLoop::Setup::Setup(gateway::Plan the_plan, TurnClock& clock, Log& log)
 }
 
 GatewayLoop::GatewayLoop(LoadedConfig config, LoadPlan load, std::string instance,
-                         StateKeeper* keeper, MetricsFile* metrics, Log& log)
+                         Companions companions, Log& log)
     : loader_(std::move(load)),
-      keeper_(keeper),
-      metrics_(metrics),
+      keeper_(companions.keeper),
+      metrics_(companions.metrics),
+      capture_(companions.capture),
       log_(log),
       clock_(&read_clock<CLOCK_REALTIME>, &read_clock<CLOCK_MONOTONIC>),
       setup_(std::make_unique<Setup>(std::move(config.plan), clock_, log)) {
   snapshot_.fingerprint = std::move(config.fingerprint);
   snapshot_.instance = std::move(instance);
+  if (capture_ != nullptr) capture_->use(setup_->plan, snapshot_.fingerprint);
 }
 
 GatewayLoop::~GatewayLoop() {
@@ -194,11 +196,14 @@ Expected<void> GatewayLoop::start_events() {
 Expected<void> GatewayLoop::run() {
   std::array<epoll_event, 16> ready{};
   started_ = clock_.steady();
-  control_.emplace(events_.get(),
-                   Control::Gateway{.snapshot = [this]() -> const Snapshot& { return snapshot(); },
-                                    .recalibrate = [this] { recalibration_wanted_ = true; },
-                                    .save_state = [this] { return save_state(); }},
-                   bus_name_of(snapshot_.instance), log_);
+  control_.emplace(
+      events_.get(),
+      Control::Gateway{
+          .snapshot = [this]() -> const Snapshot& { return snapshot(); },
+          .recalibrate = [this] { recalibration_wanted_ = true; },
+          .save_state = [this] { return save_state(); },
+          .capture = [this](Capture::Answer answer) { return ask_for_capture(std::move(answer)); }},
+      bus_name_of(snapshot_.instance), log_);
   if (Expected<void> armed = serve_events(false); !armed) return armed;
   notifier_.ready(status_line());
   set_alarm();
@@ -211,6 +216,7 @@ Expected<void> GatewayLoop::run() {
   }
   notifier_.stopping();
   if (keeper_ != nullptr) keeper_->finish(memory());
+  if (capture_ != nullptr) capture_->finish();
   setup_->reporter->summarize(setup_->pipeline.status(), traffic());
   return {};
 }
@@ -304,8 +310,9 @@ void GatewayLoop::hand_on_arrivals() {
     const auto index = static_cast<can::BusIndex>(bus - setup_->buses.data());
     newest_stamp_ = arrival.stamp;
     setup_->pipeline.receive(index, *arrival.frame, arrival.stamp, *this);
-    bus->take();
     flush();
+    if (capture_ != nullptr) capture_->put(index, *arrival.frame, arrival.stamp);
+    bus->take();
   }
 }
 
@@ -397,6 +404,7 @@ void GatewayLoop::second_passed() {
   const std::string line = status_line();
   notifier_.status(line);
   log_.debug("{}", line);
+  if (capture_ != nullptr) capture_->second_passed(setup_->pipeline.status(), clock_.wall());
   control_->second_passed();
   if (metrics_ != nullptr && metrics_->second_passed()) metrics_->write(snapshot());
   const std::optional<gateway::SavedState> known = memory();
@@ -481,6 +489,14 @@ Expected<void> GatewayLoop::save_state() {
   return {};
 }
 
+Expected<void> GatewayLoop::ask_for_capture(Capture::Answer answer) {
+  if (capture_ == nullptr) {
+    return fail({}, "the gateway keeps no recording of its inputs",
+                "start it with --capture DIR; for the service, /etc/default/vgyrod has the line");
+  }
+  return capture_->ask(std::move(answer), clock_.wall());
+}
+
 // Once in a turn: a request for all properties asks for each of them.
 const Snapshot& GatewayLoop::snapshot() {
   if (std::exchange(snapshot_at_, clock_.steady()) == clock_.steady() && snapshot_.plan != nullptr)
@@ -496,6 +512,7 @@ const Snapshot& GatewayLoop::snapshot() {
   snapshot_.config_refused = reload_refused_;
   snapshot_.log_lines_lost = log_.lost();
   snapshot_.service_messages_lost = notifier_.failures();
+  if (capture_ != nullptr) snapshot_.capture = capture_->status();
   for (auto* values :
        {&snapshot_.bias_sigma_dps, &snapshot_.slope_dps_s, &snapshot_.slope_sigma_dps_s})
     values->fill(std::numeric_limits<double>::quiet_NaN());
@@ -534,6 +551,7 @@ Expected<void> GatewayLoop::take_reloaded() {
       set_log_level(**loaded, log_);
       snapshot_.fingerprint = std::move((*loaded)->fingerprint);
       log_.info("the configuration's fingerprint is {}", snapshot_.fingerprint);
+      if (capture_ != nullptr) capture_->use(setup_->plan, snapshot_.fingerprint);
     }
   }
   if (reload_refused_) {

@@ -16,6 +16,7 @@
 #include "base/error.h"
 #include "can/transmit.h"
 #include "daemon/bus.h"
+#include "daemon/capture.h"
 #include "daemon/control.h"
 #include "daemon/deadline_timer.h"
 #include "daemon/host_time.h"
@@ -35,13 +36,19 @@
 
 namespace vgyro::daemon {
 
+/// What the loop serves beside the rates. Each may be null: it is not wanted.
+struct Companions {
+  StateKeeper* keeper = nullptr;  ///< across a restart
+  MetricsFile* metrics = nullptr;
+  Capture* capture = nullptr;
+};
+
 class GatewayLoop final : private gateway::FrameSink {
  public:
   /// `load` reads the configuration again, beside the loop. `instance` is the name of one of
-  /// several gateways, or empty. `keeper` is null where nothing is kept across a restart, `metrics`
-  /// if they are not configured.
-  GatewayLoop(LoadedConfig config, LoadPlan load, std::string instance, StateKeeper* keeper,
-              MetricsFile* metrics, Log& log);
+  /// several gateways, or empty.
+  GatewayLoop(LoadedConfig config, LoadPlan load, std::string instance, Companions companions,
+              Log& log);
   GatewayLoop(const GatewayLoop&) = delete;
   GatewayLoop& operator=(const GatewayLoop&) = delete;
   ~GatewayLoop() override;
@@ -98,6 +105,7 @@ class GatewayLoop final : private gateway::FrameSink {
   void recalibrate();
   std::optional<gateway::SavedState> memory();
   Expected<void> save_state();
+  Expected<void> ask_for_capture(Capture::Answer answer);
   /// `keep`: goes on with what was learned, where the gyros are the same.
   Expected<void> replace_setup(gateway::Plan plan, bool keep);
   Expected<void> try_to_replace_setup(gateway::Plan plan, bool keep);
@@ -119,6 +127,7 @@ class GatewayLoop final : private gateway::FrameSink {
   StateKeeper* keeper_;
   gateway::Inheritance inheritance_;  ///< from a setup that was given up
   MetricsFile* metrics_;
+  Capture* capture_;
   Log& log_;
   Notifier notifier_;
   TurnClock clock_;

@@ -1,4 +1,6 @@
+#include <chrono>
 #include <csignal>
+#include <cstdint>
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
@@ -9,10 +11,12 @@
 #include <vector>
 
 #include <CLI/CLI.hpp>
+#include <fmt/format.h>
 
 #include "base/instance_name.h"
 #include "base/printable.h"
 #include "base/spelling.h"
+#include "daemon/capture.h"
 #include "daemon/gateway_loop.h"
 #include "daemon/log.h"
 #include "daemon/metrics.h"
@@ -27,6 +31,32 @@ constexpr int kBadInput = 1;
 constexpr int kWrongUsage = 2;
 constexpr int kSystemTrouble = 3;
 
+// Two gyros at 500 Hz fill 5 MB in ten minutes. A vehicle computer's memory card is written to only
+// for a capture, and keeps some weeks of them.
+constexpr double kCaptureMinutes = 10.0;
+constexpr double kCaptureMemory_mib = 16.0;
+constexpr double kCaptureDisk_mib = 256.0;
+constexpr int kCaptureKeep = 20;
+// A fault that comes and goes gives a day of it 24 captures, not thousands.
+constexpr double kCaptureInterval_min = 60.0;
+// Beyond these limits a number is a slip of the pen.
+constexpr double kMinutesMost = 1440.0;
+constexpr double kMemoryMost_mib = 4096.0;
+constexpr double kDiskMost_mib = 1'048'576.0;
+constexpr int kKeepMost = 10'000;
+constexpr double kIntervalMost_min = 10'080.0;
+constexpr double kMebibyte = 1'048'576.0;
+constexpr double kSecondsPerMinute = 60.0;
+
+struct CaptureOptions {
+  std::string directory;  ///< empty: nothing is recorded
+  double minutes = kCaptureMinutes;
+  double memory_mib = kCaptureMemory_mib;
+  double disk_mib = kCaptureDisk_mib;
+  int keep = kCaptureKeep;
+  double interval_min = kCaptureInterval_min;
+};
+
 struct Options {
   std::string config;
   std::string method;
@@ -35,6 +65,7 @@ struct Options {
   bool forget = false;
   std::string metrics;
   std::string instance;
+  CaptureOptions capture;
 };
 
 // An unknown option comes first: it is often the reason why another one is missing.
@@ -58,6 +89,30 @@ std::string in_directory(const char* variable, const char* file) {
   if (directories == nullptr || *directories == '\0') return {};
   const std::string_view all(directories);
   return std::string(all.substr(0, all.find(':'))) + '/' + file;
+}
+
+// A relative one stands in the service's state directory, so that one line is right for every
+// instance.
+std::string capture_directory(const std::string& given) {
+  if (given.empty() || given.front() == '/') return given;
+  const std::string in_state = in_directory("STATE_DIRECTORY", given.c_str());
+  return in_state.empty() ? given : in_state;
+}
+
+vgyro::daemon::Capture::Options capture_options(const Options& options) {
+  const CaptureOptions& capture = options.capture;
+  return {.directory = capture_directory(capture.directory),
+          .instance = options.instance,
+          .ring = {.seconds = static_cast<std::int64_t>(capture.minutes * kSecondsPerMinute),
+                   .bytes = static_cast<std::size_t>(capture.memory_mib * kMebibyte)},
+          .disk = {.count = static_cast<std::size_t>(capture.keep),
+                   .bytes = static_cast<std::uint64_t>(capture.disk_mib * kMebibyte)},
+          .interval_s = static_cast<int>(capture.interval_min * kSecondsPerMinute)};
+}
+
+vgyro::TimePoint wall_now() {
+  const auto now = std::chrono::system_clock::now().time_since_epoch();
+  return vgyro::TimePoint{std::chrono::duration_cast<vgyro::Duration>(now)};
 }
 
 int run(const Options& options, vgyro::daemon::Log& log) {
@@ -84,8 +139,19 @@ int run(const Options& options, vgyro::daemon::Log& log) {
   }
   std::optional<vgyro::daemon::MetricsFile> metrics;
   if (!options.metrics.empty()) metrics.emplace(options.metrics, log);
+  std::optional<vgyro::daemon::Capture> capture;
+  if (!options.capture.directory.empty()) {
+    capture.emplace(capture_options(options), log);
+    if (const vgyro::Expected<void> opened = capture->open(wall_now()); !opened) {
+      log.error("{}", opened.error().message());
+      return kBadInput;
+    }
+  }
   vgyro::daemon::GatewayLoop loop(std::move(*loaded), load, options.instance,
-                                  keeper ? &*keeper : nullptr, metrics ? &*metrics : nullptr, log);
+                                  {.keeper = keeper ? &*keeper : nullptr,
+                                   .metrics = metrics ? &*metrics : nullptr,
+                                   .capture = capture ? &*capture : nullptr},
+                                  log);
   if (const vgyro::Expected<void> started = loop.start(); !started) {
     log.error("{}", started.error().message());
     return kBadInput;
@@ -105,20 +171,31 @@ int run_with_log(const Options& options) {
   }
 }
 
-}  // namespace
+void add_capture_options(CLI::App& app, CaptureOptions& capture) {
+  CLI::Option* directory =
+      app.add_option("--capture", capture.directory,
+                     "keeps the last minutes of the inputs in memory and writes them into this "
+                     "directory when the gyros contradict each other, when most stops are refused, "
+                     "and for `vgyro capture`; a relative one is in $STATE_DIRECTORY")
+          ->type_name("DIR");
+  const auto add = [&](const char* name, auto& value, double least, double most,
+                       const std::string& text) {
+    app.add_option(name, value, text)
+        ->check(CLI::Range(least, most))
+        ->needs(directory)
+        ->capture_default_str();
+  };
+  add("--capture-minutes", capture.minutes, 1.0, kMinutesMost, "minutes kept in memory");
+  add("--capture-memory", capture.memory_mib, 1.0, kMemoryMost_mib, "MiB of memory for them");
+  add("--capture-disk", capture.disk_mib, 1.0, kDiskMost_mib,
+      "MiB of captures in the directory; the oldest are removed");
+  add("--capture-keep", capture.keep, 1.0, kKeepMost,
+      "captures in the directory; the oldest are removed");
+  add("--capture-interval", capture.interval_min, 0.0, kIntervalMost_min,
+      "minutes at least between two captures of the same cause");
+}
 
-int main(int argc, char** argv) {
-  CLI::App app(
-      "vgyrod: a gateway that reads two gyros from CAN and sends one better gyro.\n"
-      "Runs in the foreground until SIGTERM; as a service: systemctl start vgyrod.",
-      "vgyrod");
-  Options options{.config = {},
-                  .method = {},
-                  .model = {},
-                  .state = in_directory("STATE_DIRECTORY", "state.toml"),
-                  .forget = false,
-                  .metrics = in_directory("RUNTIME_DIRECTORY", "vgyrod.prom"),
-                  .instance = {}};
+void add_options(CLI::App& app, Options& options) {
   app.add_option("--config", options.config, "The gateway's configuration (vgyro.toml)")
       ->required()
       ->type_name("FILE");
@@ -143,6 +220,7 @@ int main(int argc, char** argv) {
         const auto good = vgyro::check_instance_name(name);
         return good ? std::string() : good.error().message();
       });
+  add_capture_options(app, options.capture);
   app.set_version_flag("--version", "vgyrod " VGYRO_VERSION);
   app.footer(
       "`vgyro check FILE` explains a configuration before it is trusted.\n"
@@ -150,12 +228,44 @@ int main(int argc, char** argv) {
       "SIGUSR1 begins debug messages, and ends them.\n"
       "Exit codes: 0 stopped by a signal, 1 configuration unusable, or another gateway has the "
       "state "
-      "file, 2 wrong usage, 3 the system failed.");
+      "file or the captures, 2 wrong usage, 3 the system failed.");
+}
+
+// What one option says of another.
+std::string capture_conflict(const CaptureOptions& capture) {
+  if (capture.disk_mib >= capture.memory_mib) return {};
+  return fmt::format(
+      "--capture-disk is {:g} MiB, less than the {:g} MiB of --capture-memory, which one capture "
+      "may take; raise the one or lower the other",
+      capture.disk_mib, capture.memory_mib);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app(
+      "vgyrod: a gateway that reads two gyros from CAN and sends one better gyro.\n"
+      "Runs in the foreground until SIGTERM; as a service: systemctl start vgyrod.",
+      "vgyrod");
+  Options options{.config = {},
+                  .method = {},
+                  .model = {},
+                  .state = in_directory("STATE_DIRECTORY", "state.toml"),
+                  .forget = false,
+                  .metrics = in_directory("RUNTIME_DIRECTORY", "vgyrod.prom"),
+                  .instance = {},
+                  .capture = {}};
+  add_options(app, options);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) return app.exit(error);
     std::fprintf(stderr, "error: %s\n", usage_text(app, error).c_str());
+    return kWrongUsage;
+  }
+
+  if (const std::string conflict = capture_conflict(options.capture); !conflict.empty()) {
+    std::fprintf(stderr, "error: vgyrod: %s\n", conflict.c_str());
     return kWrongUsage;
   }
 

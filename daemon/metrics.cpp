@@ -1,6 +1,5 @@
 #include "daemon/metrics.h"
 
-#include <cerrno>
 #include <cmath>
 #include <cstdio>
 #include <fcntl.h>
@@ -13,6 +12,7 @@
 
 #include <fmt/format.h>
 
+#include "daemon/whole_write.h"
 #include "gateway/config.h"
 
 namespace vgyro::daemon {
@@ -241,6 +241,31 @@ void add_gyros(Text& text, const Snapshot& now) {
   });
 }
 
+// Where the inputs are recorded.
+void add_captures(Text& text, const Snapshot& now) {
+  if (!now.capture) return;
+  const CaptureStatus& capture = *now.capture;
+  text.family("vgyro_captures_total", "counter",
+              "Recordings of the inputs that were written, by cause.");
+  for (std::size_t i = 0; i < kCaptureCauses; ++i)
+    text.sample({{"cause", to_string(static_cast<CaptureCause>(i))}}, capture.written[i]);
+  text.family("vgyro_captures_failed_total", "counter", "Recordings that could not be written.");
+  text.sample({}, capture.failed);
+  text.family("vgyro_captures_held_back_total", "counter",
+              "Causes of a recording that came too soon after one of their kind.");
+  text.sample({}, capture.held_back);
+  text.family("vgyro_capture_held_seconds", "gauge",
+              "Time from the first to the last frame in memory, ready to be written.");
+  text.sample({}, capture.ring.seconds);
+  text.family("vgyro_capture_held_frames", "gauge", "Frames in memory.");
+  text.sample({}, capture.ring.frames);
+  text.family("vgyro_capture_held_bytes", "gauge", "Memory that they take, packed.");
+  text.sample({}, capture.ring.bytes);
+  text.family("vgyro_capture_dropped_frames_total", "counter",
+              "Frames missing in the recording: no processor time, or no memory, to pack them.");
+  text.sample({}, capture.ring.dropped);
+}
+
 // Of a platform of several axes what is each one's.
 void add_axes(Text& text, const Snapshot& now) {
   if (now.axes.empty()) return;
@@ -347,18 +372,6 @@ void add_buses(Text& text, const Snapshot& now) {
   }
 }
 
-// All of it, or errno says why not: a write that was cut short by a full disk sets it only at the
-// next try.
-bool write_whole(int fd, std::string_view text) {
-  while (!text.empty()) {
-    const ssize_t written = ::write(fd, text.data(), text.size());
-    if (written < 0 && errno == EINTR) continue;
-    if (written < 0) return false;
-    text.remove_prefix(static_cast<std::size_t>(written));
-  }
-  return true;
-}
-
 }  // namespace
 
 std::string metrics_text(const Snapshot& now) {
@@ -372,6 +385,7 @@ std::string metrics_text(const Snapshot& now) {
   add_axes(text, now);
   add_misalignment(text, now);
   add_buses(text, now);
+  add_captures(text, now);
   return text.take();
 }
 
@@ -395,7 +409,7 @@ Expected<void> MetricsFile::replace(const std::string& text) const {
   const int fd =
       ::open(new_path_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC | O_NOFOLLOW, 0644);
   // For others to read, whatever the service's umask.
-  const bool whole = fd >= 0 && ::fchmod(fd, 0644) == 0 && write_whole(fd, text);
+  const bool whole = fd >= 0 && ::fchmod(fd, 0644) == 0 && write_all(fd, text);
   if (whole && ::close(fd) == 0 && ::rename(new_path_.c_str(), path_.c_str()) == 0) return {};
   auto failed = fail(path_, "metrics cannot be written: " + system_reason(),
                      "name a file in a folder that the gateway may write to (--metrics FILE)");

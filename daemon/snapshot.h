@@ -5,9 +5,11 @@
 #include <array>
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "daemon/capture_status.h"
 #include "daemon/reporter.h"
 #include "gateway/plan.h"
 #include "gateway/status.h"
@@ -29,6 +31,7 @@ struct Snapshot {
   std::uint64_t log_lines_lost = 0;                                   ///< not read
   std::uint64_t service_messages_lost = 0;  ///< the service manager did not take them at once
   bool config_refused = false;              ///< by the last reload
+  std::optional<CaptureStatus> capture;     ///< nothing: the inputs are not recorded
 };
 
 /// "ok", or what is wrong: gateway::Fault in words.

@@ -7,9 +7,10 @@
 #include <filesystem>
 #include <sys/stat.h>
 #include <unistd.h>
-#include <utility>
 
 #include <fmt/format.h>
+
+#include "daemon/whole_write.h"
 
 namespace vgyro::daemon {
 
@@ -23,32 +24,6 @@ std::string directory_of(const std::string& path) {
 constexpr const char* kRemedy =
     "give the gateway a directory that it may write to (--state FILE, or StateDirectory= of its "
     "unit)";
-
-class Descriptor {
- public:
-  explicit Descriptor(int fd) : fd_(fd) {}
-  Descriptor(const Descriptor&) = delete;
-  Descriptor& operator=(const Descriptor&) = delete;
-  ~Descriptor() {
-    if (fd_ >= 0) ::close(fd_);
-  }
-  [[nodiscard]] int get() const { return fd_; }
-  [[nodiscard]] bool is_open() const { return fd_ >= 0; }
-  [[nodiscard]] bool close() { return ::close(std::exchange(fd_, -1)) == 0; }
-
- private:
-  int fd_;
-};
-
-bool write_all(int fd, std::string_view text) {
-  while (!text.empty()) {
-    const ssize_t written = ::write(fd, text.data(), text.size());
-    if (written < 0 && errno == EINTR) continue;
-    if (written < 0) return false;
-    text.remove_prefix(static_cast<std::size_t>(written));
-  }
-  return true;
-}
 
 tl::unexpected<Error> cannot(const std::string& path, const char* verb) {
   return fail(path, fmt::format("cannot be {}: {}", verb, system_reason()), kRemedy);

@@ -20,6 +20,8 @@ using Json = nlohmann::ordered_json;
 constexpr const char* kInterface = "org.vgyro.Gateway1";
 constexpr const char* kPath = "/org/vgyro/Gateway1";
 constexpr std::uint64_t kPatienceUsec = 5'000'000;
+// A memory card may take so long to have a capture safe.
+constexpr std::uint64_t kCapturePatienceUsec = 120'000'000;
 constexpr int kDepthMost = 8;
 
 /// A message as JSON. Whoever answers under the name may be anybody: what cannot be read is null,
@@ -198,6 +200,17 @@ Expected<nlohmann::ordered_json> GatewayClient::status() {
   for (const auto& [name, value] : properties.items())
     status[snake_case(name)] = value;
   return status;
+}
+
+Expected<std::string> GatewayClient::capture() {
+  Reply reply;
+  sd_bus_set_method_call_timeout(bus_.get(), kCapturePatienceUsec);
+  const int result = sd_bus_call_method(bus_.get(), bus_name_of(instance_).c_str(), kPath,
+                                        kInterface, "Capture", &reply.error, &reply.message, "");
+  if (result < 0) return why(reply, result, unit_of(instance_));
+  const Json folder = Reader(reply.message).value();
+  if (!folder.is_string()) return fail(unit_of(instance_), "its answer cannot be read");
+  return folder.get<std::string>();
 }
 
 Expected<void> GatewayClient::call(const char* method) {

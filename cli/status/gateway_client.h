@@ -30,6 +30,8 @@ class GatewayClient {
 
   Expected<void> recalibrate() { return call("Recalibrate"); }
   Expected<void> save_state() { return call("SaveState"); }
+  /// Has the recorded inputs written; returns the folder when they are on the disk.
+  Expected<std::string> capture();
 
  private:
   struct Close {

@@ -1,4 +1,4 @@
-// vgyro status, vgyro recalibrate: what the running gateway says and does.
+// vgyro status, vgyro recalibrate, vgyro capture: what the running gateway says and does.
 
 #include <cerrno>
 #include <csignal>
@@ -184,6 +184,23 @@ int run_recalibrate(const WhichGateway& which) {
     }
     const std::string who = instance.empty() ? "the gateway" : "the gateway " + instance;
     say("{} has forgotten its biases and calibrates; `vgyro status` shows how far it is\n", who);
+  }
+  return code;
+}
+
+int run_capture(const WhichGateway& which) {
+  const Expected<std::vector<std::string>> instances = chosen(which);
+  if (!instances) return report(instances.error());
+  int code = kDone;
+  for (const std::string& instance : *instances) {
+    Expected<GatewayClient> client = GatewayClient::connect(instance);
+    if (!client) return report(client.error());
+    const Expected<std::string> folder = client->capture();
+    if (folder) {
+      say("{}\n", *folder);
+    } else {
+      code = report(folder.error());
+    }
   }
   return code;
 }

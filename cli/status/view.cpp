@@ -387,6 +387,36 @@ std::string layouts_line(const Json& counters) {
   return text + '\n';
 }
 
+/// The recording of the last minutes, and what was written of it; empty where there is none.
+std::string captures_line(const Json& status, const Paint& paint) {
+  const Json captures = at(status, "captures");
+  if (!captures.is_object() || captures.empty()) return {};
+  std::uint64_t written = 0;
+  for (const Json& count : at(captures, "written"))
+    written += count.is_number_unsigned() ? count.get<std::uint64_t>() : 0;
+  constexpr double kMegabyte = 1e6;
+  std::string text =
+      fmt::format("recorded: {} of the inputs, {} frames, {:.1f} MB; {} written",
+                  duration_text(number_of(captures, "held_s")), count_of(captures, "held_frames"),
+                  static_cast<double>(count_of(captures, "held_bytes")) / kMegabyte, written);
+  const std::string last = text_of(captures, "last");
+  if (!last.empty() && last != kNothing) text += ", the last one is " + last;
+  text += '\n';
+  if (const auto failed = count_of(captures, "failed"); failed > 0) {
+    text += paint(Mood::kBad, fmt::format("{} recordings could not be written; journalctl -u "
+                                          "vgyrod VGYRO_CAUSE=capture says why",
+                                          failed)) +
+            '\n';
+  }
+  if (const auto dropped = count_of(captures, "frames_dropped"); dropped > 0) {
+    text += paint(Mood::kDoubtful,
+                  fmt::format("{} frames are missing in the recording: too little processor time",
+                              dropped)) +
+            '\n';
+  }
+  return text;
+}
+
 std::string status_table(const Json& status, const ViewOptions& options) {
   const Paint paint(options.colour);
   const Json counters = at(status, "counters");
@@ -400,6 +430,7 @@ std::string status_table(const Json& status, const ViewOptions& options) {
       count_of(counters, "frames_overflowed"), count_of(counters, "frames_refused"));
   text += layouts_line(counters);
   text += unused_inputs(counters);
+  text += captures_line(status, paint);
   text += paint(Mood::kQuiet, fmt::format("vgyrod {}, method {}, configuration {}, up {}",
                                           text_of(status, "version"), text_of(status, "method"),
                                           text_of(status, "fingerprint"),

@@ -3,8 +3,10 @@
 
 #include <cmath>
 #include <cstdio>
+#include <functional>
 #include <string>
 #include <systemd/sd-event.h>
+#include <utility>
 
 #include <fmt/core.h>
 
@@ -24,6 +26,7 @@ struct SampleGateway {
   daemon::Control* control = nullptr;
   daemon::MetricsFile* metrics = nullptr;
   int seconds = 0;
+  std::function<void(const Expected<std::string>&)> asked;  ///< for a capture
 
   SampleGateway() {
     plan.gyros[0].name = "left \"one\" \\";
@@ -81,10 +84,32 @@ struct SampleGateway {
     bus.foreign = 17;
     bus.contested = true;
     now.traffic.buses = {bus, {.name = "can1"}};
+    now.capture = {.directory = "/captures",
+                   .ring = {.frames = 600'000, .bytes = 4'000'000, .dropped = 8, .seconds = 600.0},
+                   .written = {2, 0, 1, 0},
+                   .failed = 1,
+                   .held_back = 5,
+                   .is_writing = false,
+                   .last = "/captures/20261130T204835Z-contradicted"};
+  }
+
+  // As of a gateway without --capture in shadow mode; else answered a second later.
+  Expected<void> capture(std::function<void(const Expected<std::string>&)> answer) {
+    if (!now.capture) return fail({}, "the gateway keeps no recording", "start it with --capture");
+    if (asked) return fail({}, "a capture that was asked for is still being written");
+    asked = std::move(answer);
+    return {};
+  }
+  void answer_asked() {
+    const auto answer = std::exchange(asked, nullptr);
+    if (!answer) return;
+    ++now.capture->written[static_cast<std::size_t>(daemon::CaptureCause::kAsked)];
+    answer(std::string("/captures/20261130T205000Z-asked"));
   }
 
   void begin_shadow() {
     plan.output.transmit = false;
+    now.capture.reset();
     now.traffic.shadowed = 99;
   }
   Expected<void> save_state() {
@@ -100,6 +125,7 @@ struct SampleGateway {
     ++seconds;
     if (std::isfinite(now.status.rate_dps)) now.status.rate_dps += 0.5;
     now.uptime_s = seconds;
+    answer_asked();
     control->second_passed();
     if (metrics != nullptr && metrics->second_passed()) metrics->write(now);
     fmt::print("second {}\n", seconds);
@@ -120,11 +146,13 @@ int main(int argc, char** argv) {
   if (argc > 3) sample.now.instance = argv[3];
   sd_event* events = nullptr;
   if (sd_event_new(&events) < 0) return 1;
-  daemon::Control control(events,
-                          {.snapshot = [&]() -> const daemon::Snapshot& { return sample.now; },
-                           .recalibrate = [&] { sample.recalibrate(); },
-                           .save_state = [&] { return sample.save_state(); }},
-                          bus_name_of(sample.now.instance), sample.log);
+  daemon::Control control(
+      events,
+      {.snapshot = [&]() -> const daemon::Snapshot& { return sample.now; },
+       .recalibrate = [&] { sample.recalibrate(); },
+       .save_state = [&] { return sample.save_state(); },
+       .capture = [&](auto answer) { return sample.capture(std::move(answer)); }},
+      bus_name_of(sample.now.instance), sample.log);
   sample.control = &control;
   std::optional<daemon::MetricsFile> metrics;
   if (argc > 1) sample.metrics = &metrics.emplace(argv[1], sample.log);

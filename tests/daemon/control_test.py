@@ -129,7 +129,7 @@ class OnTheBus(Bench):
         self.assertEqual(listed.returncode, 0, listed.stderr)
         members = {line.split()[0]: line.split()[1:3] for line in listed.stdout.splitlines() if line.startswith(".")}
         expected = {".Recalibrate": ["method", "-"], ".SaveState": ["method", "-"], ".Counters": ["property", "a{st}"],
-                    ".Gyros": ["property", "aa{sv}"], ".Axes": ["property", "aa{sv}"], ".Buses": ["property", "aa{sv}"]}
+                    ".Gyros": ["property", "aa{sv}"], ".Axes": ["property", "aa{sv}"], ".Capture": ["method", "-"], ".Captures": ["property", "a{sv}"], ".Buses": ["property", "aa{sv}"]}
         expected |= {f".{name}": ["property", "s"] for name in ("Version", "Instance", "Method", "Fingerprint", "State", "Quality", "Restored", "Contradiction",
                                                                 "ContradictionText")}
         expected |= {f".{name}": ["property", "b"] for name in ("Valid", "Disagree", "Ambiguous", "RatesTooFarApart",
@@ -197,11 +197,11 @@ class OnTheBus(Bench):
         self.assertLessEqual(len(told), passed + 1)
         rates = [changed["RateDps"]["data"] for _, changed, _ in told]
         self.assertEqual([round(b - a, 9) for a, b in zip(rates, rates[1:])], [0.5] * (len(rates) - 1))
-        self.assertEqual(set(told[0][2]), {"Buses", "Counters"})
+        self.assertEqual(set(told[0][2]), {"Buses", "Captures", "Counters"})
 
     def test_methods_are_for_root_and_properties_for_all(self):
         stranger = NOBODY if IS_ROOT else None
-        for method in ("Recalibrate", "SaveState"):
+        for method in ("Recalibrate", "SaveState", "Capture"):
             refused = self.busctl("call", NAME, OBJECT, NAME, method, uid=stranger)
             self.assertNotEqual(refused.returncode, 0)
             self.assertIn("denied", refused.stderr.lower())
@@ -228,6 +228,39 @@ class OnTheBus(Bench):
         self.assertIs(self.get("Valid"), False)
         refused = self.busctl("call", NAME, OBJECT, NAME, "SaveState")
         self.assertIn("nothing was learned yet", refused.stderr)
+
+    @unittest.skipUnless(IS_ROOT, "the policy lets only root do this; the refusal is tested")
+    def test_capture_is_answered_when_it_is_written_and_the_loop_goes_on(self):
+        before = self.seconds_told()
+        done = self.vgyro("capture")
+        self.assertEqual((done.returncode, done.stdout), (0, "/captures/20261130T205000Z-asked\n"), done.stderr)
+        self.assertGreater(self.seconds_told(), before)
+        self.assertEqual(self.get("Captures")["written"]["data"]["asked"], 1)
+
+    @unittest.skipUnless(IS_ROOT, "the policy lets only root do this; the refusal is tested")
+    def test_a_gateway_that_records_nothing_says_how_to_begin(self):
+        self.end(self.sample)
+        self.start_sample(str(self.folder / "vgyro.prom"), "shadow")
+        self.assertTrue(until(self.is_there))
+        done = self.vgyro("capture")
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("keeps no recording; start it with --capture", done.stderr)
+        self.assertEqual(self.get("Captures"), {})
+        self.assertNotIn("recorded", self.vgyro("status").stdout)
+
+    def test_captures_are_told_wherever_one_looks(self):
+        captures = {key: value["data"] for key, value in self.get("Captures").items()}
+        self.assertEqual(captures, {
+            "directory": "/captures", "held_s": 600.0, "held_frames": 600000, "held_bytes": 4000000, "frames_dropped": 8,
+            "is_writing": False, "written": {"contradicted": 2, "disagree": 0, "stops_refused": 1, "asked": 0},
+            "failed": 1, "held_back": 5, "last": "/captures/20261130T204835Z-contradicted"})
+        shown = self.vgyro("status").stdout
+        self.assertIn("recorded: 10 min 0 s of the inputs, 600000 frames, 4.0 MB; 3 written, the last one is "
+                      "/captures/20261130T204835Z-contradicted\n", shown)
+        self.assertIn("1 recordings could not be written; journalctl", shown)
+        self.assertIn("8 frames are missing in the recording", shown)
+        seen = json.loads(self.vgyro("status", "--json").stdout)["captures"]
+        self.assertEqual((seen["held_s"], seen["written"]["contradicted"]), (600.0, 2))
 
     def test_status_as_json_says_the_same_as_the_bus(self):
         done = self.vgyro("status", "--json")
@@ -494,6 +527,11 @@ class Metrics(Bench):
         self.assertEqual(samples["vgyro_dropped_frames_total", (("cause", "stale"),)], 7)
         self.assertEqual(samples["vgyro_log_lines_lost_total", ()], 41)
         self.assertEqual(samples["vgyro_service_messages_lost_total", ()], 3)
+        self.assertEqual({labels[0][1]: value for (name, labels), value in samples.items() if name == "vgyro_captures_total"},
+                         {"contradicted": 2, "disagree": 0, "stops_refused": 1, "asked": 0})
+        self.assertEqual([samples[f"vgyro_capture{name}", ()] for name in ("s_failed_total", "s_held_back_total", "_held_seconds",
+                                                                          "_held_bytes", "_dropped_frames_total")],
+                         [1, 5, 600, 4e6, 8])
         self.assertEqual(samples["vgyro_bus_foreign_frames_total", (("bus", "can0"),)], 17)
         self.assertEqual(samples["vgyro_bus_restamped_frames_total", (("bus", "can0"),)], 23)
         self.assertEqual(samples["vgyro_bus_errors_total", (("bus", "can0"), ("cause", "bus_off"))], 3)

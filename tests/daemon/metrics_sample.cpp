@@ -29,6 +29,7 @@ int main() {
     now.axes.emplace_back();
   }
   now.plan = &plan;
+  now.capture.emplace();
   now.traffic.buses = {{.name = "can0"}, {.name = "can1"}};
   fmt::print("{}", daemon::metrics_text(now));
 }

@@ -1,6 +1,5 @@
 // A file that is whole at every moment. The system calls by which that is reached are watched, and
-// made to fail, from here: the program's own fsync, write and rename stand in front of the
-// library's.
+// made to fail (watched_calls.h).
 
 #include "daemon/state_file.h"
 
@@ -14,7 +13,6 @@
 #include <random>
 #include <string>
 #include <sys/stat.h>
-#include <sys/syscall.h>
 #include <sys/wait.h>
 #include <thread>
 #include <unistd.h>
@@ -24,49 +22,7 @@
 
 #include "gateway/saved_state.h"
 #include "scratch.h"
-
-namespace {
-
-struct Calls {
-  bool watching = false;
-  std::vector<std::string> names;
-  std::string failing;  ///< this call fails
-  int failure = EIO;
-  std::size_t write_most = SIZE_MAX;  ///< bytes that one write takes
-};
-Calls calls;
-
-bool fails(const std::string& name) {
-  if (!calls.watching) return false;
-  calls.names.push_back(name);
-  if (calls.failing != name) return false;
-  errno = calls.failure;
-  return true;
-}
-
-}  // namespace
-
-extern "C" {
-
-int fsync(int fd) {
-  struct stat about {};
-  ::fstat(fd, &about);
-  if (fails(S_ISDIR(about.st_mode) ? "fsync directory" : "fsync file")) return -1;
-  return static_cast<int>(::syscall(SYS_fsync, fd));
-}
-
-ssize_t write(int fd, const void* bytes, size_t count) {
-  if (fails("write")) return -1;
-  return ::syscall(SYS_write, fd, bytes,
-                   calls.watching ? std::min(count, calls.write_most) : count);
-}
-
-int rename(const char* from, const char* to) noexcept {
-  if (fails("rename")) return -1;
-  return static_cast<int>(::syscall(SYS_renameat2, AT_FDCWD, from, AT_FDCWD, to, 0));
-}
-
-}  // extern "C"
+#include "watched_calls.h"
 
 namespace vgyro::daemon {
 namespace {

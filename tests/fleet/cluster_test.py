@@ -3,6 +3,7 @@
 in the middle. Every drive counts once, and the bytes are the same."""
 
 import json
+import lzma
 import os
 import signal
 import subprocess
@@ -115,6 +116,22 @@ class VgyroFleet(unittest.TestCase):
         for path, stamp in before.items():
             if path != lost:
                 self.assertEqual(path.stat().st_mtime_ns, stamp)
+
+    def test_no_frame_of_captures_counts_twice(self):
+        log = (self.folder / "logs/drive0.log").read_bytes()
+        for vehicle, name, first, last in (("car1", "20261130T200000Z-asked", 0.0, 600.0), ("car1", "20261130T200500Z-disagree", 300.0, 900.0),
+                                           ("car1", "20261130T200900Z-asked", 601.0, 1200.0), ("car2", "20261130T200500Z-asked", 300.0, 900.0)):
+            capture = self.folder / "vehicles" / vehicle / "captures" / name
+            capture.mkdir(parents=True)
+            (capture / "recording.log.xz").write_bytes(lzma.compress(log))
+            (capture / "capture.json").write_text(json.dumps(
+                {"recording": "recording.log.xz", "first_stamp_s": first, "last_stamp_s": last}))
+        done = subprocess.run([*self.command("captures", "--time-limit", "0.001")[:-1], "vehicles"], cwd=self.folder,
+                              capture_output=True, text=True, check=False)
+        self.assertIn("1 captures are left out", done.stderr)
+        tried = sorted(json.loads(path.read_text())["recording"] for path in (self.folder / "captures/failed").glob("*.json"))
+        self.assertEqual([Path(path).relative_to(self.folder.resolve() / "vehicles").parts[0::2] for path in tried],
+                         [("car1", "20261130T200000Z-asked"), ("car1", "20261130T200900Z-asked"), ("car2", "20261130T200500Z-asked")])
 
     def test_a_drive_that_takes_too_long_is_listed(self):
         done = subprocess.run(self.command("hurried", "--time-limit", "0.001"), cwd=self.folder, capture_output=True, text=True,

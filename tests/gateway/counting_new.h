@@ -1,6 +1,6 @@
 #pragma once
 
-// Replaces the test program's operator new by one that counts allocations.
+// Replaces the test program's operator new by one that counts allocations, each thread for itself.
 
 #include <cstddef>
 

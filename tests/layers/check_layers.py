@@ -22,7 +22,7 @@ ARROWS = {
     "gap": {"base", "model", "analysis", "gap"},
     "fleet": {"base", "model", "fleet"},
     "gateway": {"base", "can", "dbc", "model", "fusion", "gateway"},
-    "daemon": {"base", "can", "dbc", "gateway", "daemon"},
+    "daemon": {"base", "can", "canlog", "dbc", "gateway", "daemon"},
     "cli": {"base", "can", "canlog", "dbc", "model", "simulation", "fusion", "analysis", "gap", "fleet", "gateway", "cli"},
 }
 
@@ -145,6 +145,7 @@ PLANTED = (  # file, text, is it a breach?
     ("fusion/b.cpp", '#include "gateway/plan.h"', True),
     ("model/a.cpp", '#include "fusion/compensation.h"', True),
     ("daemon/c.cpp", '#include "model/file.h"', True),
+    ("daemon/d.cpp", '#include "canlog/candump.h"', False),
     ("simulation/a.cpp", '#include "fusion/compensation.h"', True),
     ("gateway/a.cpp", '#include "daemon/loop.h"', True),
     ("gap/scan.cpp", '#include "gap/search.h"', True),

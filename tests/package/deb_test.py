@@ -14,6 +14,7 @@ SOURCE = Path(os.environ.get("VGYRO_SOURCE", Path(__file__).resolve().parents[2]
 FOLDER = SOURCE / "build/package"
 
 EXPECTED = """\
+/etc/default/vgyrod
 /etc/vgyro/vgyro.toml
 /lib/systemd/system/vgyrod.service
 /lib/systemd/system/vgyrod@.service
@@ -102,10 +103,10 @@ class Deb(unittest.TestCase):
                 if mode[0] != "l":
                     self.assertEqual((mode[5], mode[8]), ("-", "-"), mode)
 
-    def test_only_the_configuration_is_a_conffile(self):
+    def test_only_what_people_edit_is_a_conffile(self):
         with tempfile.TemporaryDirectory() as folder:
             output_of("dpkg-deb", "--control", self.deb, folder)
-            self.assertEqual((Path(folder) / "conffiles").read_text().split(), ["/etc/vgyro/vgyro.toml"])
+            self.assertEqual(sorted((Path(folder) / "conffiles").read_text().split()), ["/etc/default/vgyrod", "/etc/vgyro/vgyro.toml"])
 
     def test_depends_on_what_its_programs_load(self):
         depends = output_of("dpkg-deb", "--field", self.deb, "Depends")

@@ -32,7 +32,7 @@ class Unit(unittest.TestCase):
         one, many = (unit.read_text(encoding="utf-8") for unit in (UNIT, TEMPLATE))
         for own, common in (("/etc/vgyro/%i.", "/etc/vgyro/vgyro."), (", instance %i", ""), (" --instance %i", ""),
                             ("/run/vgyro-%i/", "/run/vgyro/"), ("Directory=vgyro-%i", "Directory=vgyro"),
-                            ("vgyrod@%i", "vgyrod")):
+                            ("vgyrod@%i", "vgyrod"), ("EnvironmentFile=-/etc/default/vgyrod-%i\n", "")):
             self.assertIn(own, many)
             many = many.replace(own, common)
         self.assertEqual(many, one)

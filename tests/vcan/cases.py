@@ -26,6 +26,8 @@ sys.path.insert(0, str(SOURCE / "tests/twin"))
 import make_twin  # noqa: E402
 
 RSS_MOST_KB = 12 * 1024
+# Blocks, the packer's own memory while it packs, and what a short case holds.
+CAPTURE_RSS_MOST_KB = 10 * 1024
 REST_S, RUN_S, RAMP_S = 2.0, 3.0, make_twin.RAMP_S
 # A player that stalls brings the motion nearer: none of it may reach into the calibration.
 STILL_S = REST_S + 1.0
@@ -1019,6 +1021,116 @@ source_address = {self.boat[3]}
         require([data[0] for data in frames] == [number % 253 for number in range(len(frames))], "sequence numbers")
 
 
+class CaptureCase:
+    """Two recordings of the inputs, one that is asked for on a bus of D-Bus that only this case has, one because the
+    gyros contradict each other, while others talk on the same bus."""
+
+    name = "capture"
+    says = "recordings of the inputs hold each of their frames as candump has it, and no other; their replay gives the rates"
+    foreign = ("100#1122334455667788", "103#00", "1F334455#DEADBEEF", "00000101#0102030405060708", "7FF#")
+    bus_config = """<!DOCTYPE busconfig PUBLIC "-//freedesktop//DTD D-Bus Bus Configuration 1.0//EN"
+ "http://www.freedesktop.org/standards/dbus/1.0/busconfig.dtd">
+<busconfig>
+  <type>system</type>
+  <listen>unix:path=@MEMORY@/dbus</listen>
+  <pidfile>@MEMORY@/dbus.pid</pidfile>
+  <auth>EXTERNAL</auth>
+  <policy context="default">
+    <allow user="*"/>
+    <deny own="*"/>
+    <deny send_type="method_call"/>
+    <allow send_destination="org.freedesktop.DBus"/>
+    <allow receive_type="method_call"/>
+    <allow receive_type="method_return"/>
+    <allow receive_type="error"/>
+    <allow receive_type="signal"/>
+    <allow send_type="signal"/>
+    <allow send_requested_reply="true" send_type="method_return"/>
+    <allow send_requested_reply="true" send_type="error"/>
+  </policy>
+  <include>{policy}</include>
+</busconfig>
+"""
+    sway_s, sway_hz, sway_dps = 10.0, 0.5, 40.0
+
+    def __init__(self):
+        self.twin = Twin(bus_b="can1", bus_out="can2", run_s=1.0)
+
+    def prepare(self, folder):
+        self.twin.prepare(folder)
+        played = (folder / "played.log").read_text(encoding="ascii").splitlines(keepends=True)
+        with open(folder / "played.log", "w", encoding="ascii") as log:
+            for number, line in enumerate(played):
+                log.write(line)
+                if number % 50 == 0:
+                    for bus in ("can0", "can1"):
+                        # The other bus's identifiers are foreign here.
+                        for frame in (*self.foreign, "102#00" if bus == "can0" else "101#00"):
+                            log.write(f"{line.split(' ')[0]} {bus} {frame}\n")
+        (folder / "sway.log").write_text("".join(self.swaying()), encoding="ascii")
+        (folder / "bus.in").write_text(self.bus_config.format(policy=SOURCE / "dbus/org.vgyro.Gateway1.conf"), encoding="ascii")
+        # The bus's configuration names a place that only the guest knows.
+        script = (f"sed 's|@MEMORY@|{{memory}}|' {folder}/bus.in > {{memory}}/bus.conf; "
+                  f"dbus-daemon --config-file={{memory}}/bus.conf --fork || exit 9; "
+                  f"exec {BIN / 'vgyrod'} --config {folder / 'vgyro.toml'} --capture captures")
+        address = "unix:path={memory}/dbus"
+        environment = ["env", f"DBUS_SYSTEM_BUS_ADDRESS={address}"]
+        ask = f"{BIN / 'vgyro'} status --json > {folder}/status.json && {BIN / 'vgyro'} capture > {folder}/asked.txt"
+        keep = f"cp -r {{memory}}/captures {folder}; kill $(cat {{memory}}/dbus.pid)"
+        steps = [["play", str(folder / "played.log")], ["wait", 1.0], ["run", [*environment, "sh", "-c", ask]],
+                 ["play", str(folder / "sway.log")], ["until_said", "-contradicted: "], ["run", ["sh", "-c", keep]]]
+        return {"links": self.twin.links(), "steps": steps,
+                "command": [*environment, "STATE_DIRECTORY={memory}", "sh", "-c", script]}
+
+    def swaying(self):
+        """To and fro, and gyro B the other way round."""
+        for i in range(int(self.sway_s * 200)):
+            us = 1_700_001_000_000_000 + 5000 * i
+            raw = round(1e6 * self.sway_dps * math.sin(2 * math.pi * self.sway_hz * i / 200))
+            for delay_us, bus, can_id, rate in ((0, "can0", "101", struct.pack("<i", raw)), (700, "can1", "102", struct.pack(">i", -raw))):
+                stamp = us + delay_us
+                yield (f"({stamp // 1_000_000}.{stamp % 1_000_000:06}) {bus} {can_id}#"
+                       f"{rate.hex().upper()}0000{i % 256:02X}00\n")
+
+    def read(self, folder):
+        text = lzma.decompress((folder / "recording.log.xz").read_bytes())
+        (folder / "recording.log").write_bytes(text)
+        return verdicts.read_log(folder / "recording.log"), json.loads((folder / "capture.json").read_text(encoding="utf-8"))
+
+    def judge(self, folder, result):
+        run = read_run(folder, result)
+        check_life(run)
+        inputs = [line for line in run.inputs if (line.bus, line.name) in (("can0", "101"), ("can1", "102"))]
+        require(len(run.inputs) > len(inputs) + 500, "no foreign frames")
+        asked, contradicted = sorted((folder / "captures").glob("2*"))
+        require(Path((folder / "asked.txt").read_text().strip()).name == asked.name, f"vgyro capture printed another name than {asked.name}")
+        require(asked.name.endswith("-asked") and contradicted.name.endswith("-contradicted"), f"{asked.name} {contradicted.name}")
+        require(not list((folder / "captures").glob(".*")), "something unfinished was left")
+        until = next(i for i, line in enumerate(inputs) if line.us > inputs[0].us + 0.5e6 and line.us - inputs[i - 1].us > 500_000)
+        for capture, expected in ((asked, inputs[:until]), (contradicted, inputs)):
+            lines, said = self.read(capture)
+            for bus in ("can0", "can1"):
+                seen, played = ([line.text for line in of if line.bus == bus] for of in (lines, expected))
+                require(seen == played, f"{capture.name}: {bus}: {len(seen)} frames, {len(played)} came, or not the same")
+            require(len(lines) == len(expected) == said["frames"] and said["frames_dropped"] == 0, f"{len(lines)} frames, {said}")
+            require(said["inputs"] == ["can0 101", "can1 102"], f"{said['inputs']}")
+        require(said["overlaps"] == asked.name, f"overlaps {said['overlaps']}")
+        require(said["text"].startswith("noisy moves -1.00 times quiet"), said["text"])
+        status = json.loads((folder / "status.json").read_text(encoding="utf-8"))["captures"]
+        require(status["directory"].endswith("/captures") and status["frames_dropped"] == 0, f"{status}")
+        resident = run.result["resources"]["rss_most_kb"]
+        require(resident <= RSS_MOST_KB + CAPTURE_RSS_MOST_KB, f"{resident} kB resident")
+        out = folder / "replayed_capture.log"
+        done = subprocess.run([str(BIN / "vgyro"), "replay", "--config", str(folder / "vgyro.toml"), "-o", str(out),
+                               str(asked / "recording.log.xz")], capture_output=True, text=True, check=False)
+        require(done.returncode == 0, f"replay of the capture failed: {done.stderr.strip()}")
+        replayed = [line for line in verdicts.read_log(out) if line.name == "610"]
+        live = [line for line in run.of(0x610) if line.us <= inputs[until - 1].us + 400_000]
+        require(len(replayed) > 1000, f"{len(replayed)} rates replayed")
+        verdicts.check_same_rates(live, replayed)
+        return f"{len(inputs)} frames, {len(run.inputs) - len(inputs)} foreign ones left out, {len(replayed)} rates as in the replay, {describe(run)}"
+
+
 class IdleCase:
     """No gyro is there: heartbeat, status, and a clean end."""
 
@@ -1332,6 +1444,7 @@ def all_cases(recordings):
         UnitsCase(),
         UnitsRestartCase(),
         UnitsReloadCase(),
+        CaptureCase(),
         IdleCase(),
         CommandCase("no_can_interface", "an interface that is none of CAN: exit 1 and what to do",
                     [vgyrod, "--config", "{folder}/vgyro.toml"], 1,
