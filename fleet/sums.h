@@ -15,12 +15,19 @@ inline constexpr double kStepsPerUnit = 1048576.0;
 /// A million million of these fit, and are far beyond what any drive says.
 inline constexpr double kValueMost = 1e18;
 
+/// Steps that 64 bits hold.
+inline constexpr double kShortMost = 9e18;
+
 /// Precondition: |value| ≤ kValueMost.
 inline Whole whole_of(double value) {
-  return static_cast<Whole>(std::nearbyint(value * kStepsPerUnit));
+  const double steps = value * kStepsPerUnit;
+  // The same number by one instruction; a conversion of 128 bits is a function.
+  if (std::abs(steps) < kShortMost) return std::llrint(steps);
+  return static_cast<Whole>(std::nearbyint(steps));
 }
 inline double value_of(Whole sum) {
-  return static_cast<double>(sum) / kStepsPerUnit;
+  const auto low = static_cast<std::int64_t>(sum);
+  return (low == sum ? static_cast<double>(low) : static_cast<double>(sum)) / kStepsPerUnit;
 }
 
 /// Of a quantity x that is told at times t: means, scatter, and the line through it.

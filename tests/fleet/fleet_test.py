@@ -155,8 +155,17 @@ class Merging(FleetBench):
         for bad, words in (("", "holds nothing"), ("{}", "no evidence"), (good[:500], "no evidence"), ("[1, 2]", "no evidence"),
                            (good.replace('"correlation": "', '"correlation": "AAAA'), "correlation"),
                            (good.replace('"format": 1', '"format": 7'), "format"),
+                           (good.replace('"places"', '"place"'), '"places" is missing'),
+                           (good.replace('"named": []', '"named": ["scale_facter"]', 1),
+                            'not a known kind of effect; did you mean "scale_factor"?'),
+                           (good.replace('"began_s": ', '"began_s": 1e999'), "not a line of JSON"),
+                           (good.replace('"score": [', '"score": [null, '), '"score" is not a number'),
+                           (good.replace('"score": [', '"score": [1, '), '"score" has 18 entries'),
+                           (good.replace('"alpha"', '"\\u0007"'), '"type" is no plain word'),
+                           (good.replace('"alpha"', '"\xff"'), "not a line of JSON"),
+                           ("[" * 100_000, "not a line of JSON"),
                            (good.replace('"white_dps_rthz": ', '"white_dps_rthz": -'), "white_dps_rthz")):
-            (self.folder / "bad.json").write_text(bad)
+            (self.folder / "bad.json").write_bytes(bad.encode("latin-1"))
             done = self.run_fleet("bad.json", out="bad", good=False)
             self.assertIn(words, done.stderr)
             self.assertIn("bad.json", done.stderr)

@@ -31,14 +31,18 @@ def information(rng):
     return correlation / np.outer(size, size)
 
 
-def place(rng, gyro, sizes):
-    matrix = information(rng)
-    score = matrix @ sizes + np.linalg.cholesky(matrix) @ rng.standard_normal(len(NAMES))
+def packed_correlation(matrix):
     own = np.diag(matrix)
     correlation = matrix / np.sqrt(np.outer(own, own))
     packed = np.round(32767.0 * correlation[np.tril_indices(len(NAMES), -1)]).astype("<i2")
+    return base64.b64encode(packed.tobytes()).decode()
+
+
+def place(rng, gyro, sizes):
+    matrix = information(rng)
+    score = matrix @ sizes + np.linalg.cholesky(matrix) @ rng.standard_normal(len(NAMES))
     return {"gyros": [gyro], "gyro": [gyro] * len(NAMES), "shapes": NAMES, "score": score.tolist(),
-            "information": own.tolist(), "correlation": base64.b64encode(packed.tobytes()).decode(), "beside": []}
+            "information": np.diag(matrix).tolist(), "correlation": packed_correlation(matrix), "beside": []}
 
 
 class Unit:
@@ -73,3 +77,35 @@ def drive(rng, number, pair):
 def lines(rng, pairs, drives):
     """Drives one after the other over the vehicles, each a line."""
     return [json.dumps(drive(rng, number, pairs[number % len(pairs)])) + "\n" for number in range(drives)]
+
+
+def numbers(values):
+    return "[" + ",".join(f"{value:.9g}" for value in values) + "]"
+
+
+class QuickDrives:
+    """Lines for fleets of a million drives, with numbers as short as `vgyro gap` writes them. A drive's information is one of
+    a few hundred that were drawn before."""
+
+    def __init__(self, rng, matrices=400):
+        self.rng = rng
+        self.matrices = [information(rng) for _ in range(matrices)]
+        self.roots = [np.linalg.cholesky(matrix) for matrix in self.matrices]
+        self.ends = [f'"information":{numbers(np.diag(matrix))},"correlation":"{packed_correlation(matrix)}","beside":[]}}'
+                     for matrix in self.matrices]
+        self.shapes = json.dumps(NAMES, separators=(",", ":"))
+
+    def place(self, gyro, sizes):
+        which = self.rng.integers(len(self.matrices))
+        score = self.matrices[which] @ sizes + self.roots[which] @ self.rng.standard_normal(len(NAMES))
+        return (f'{{"gyros":[{gyro}],"gyro":{json.dumps([gyro] * len(NAMES), separators=(",", ":"))},"shapes":{self.shapes},'
+                f'"score":{numbers(score)},{self.ends[which]}')
+
+    def line(self, number, pair):
+        began_s = 1.7e9 + YEAR_S * self.rng.random()
+        gyros = json.dumps([{key: float(f"{value:.9g}") if isinstance(value, float) else value
+                             for key, value in unit.gyro(self.rng, i + 1).items()} for i, unit in enumerate(pair)],
+                           separators=(",", ":"))
+        places = ",".join(self.place(i + 1, unit.sizes) for i, unit in enumerate(pair))
+        return (f'{{"format":1,"evidence":"drive","vgyro":"0","recording":"{number:016x}","began_s":{began_s:.6f},'
+                f'"seconds":300.0,"config":"c","model":"none","verdict":"no_gap","gyros":{gyros},"places":[{places}]}}\n')
