@@ -1,10 +1,12 @@
 #include "fleet/judge.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include <fmt/core.h>
 
+#include "fleet/leave_one_out.h"
 #include "fleet/selection.h"
 #include "fleet/statistics.h"
 #include "fleet/system.h"
@@ -38,6 +40,10 @@ class Judge {
     for (const auto& [identity, sums] : pool.units)
       types_.push_back(identity.type);
     types_.erase(std::unique(types_.begin(), types_.end()), types_.end());
+    // Identities are in the order of their types: units of a type stand side by side.
+    begin_of_.push_back(0);
+    for (const std::string& type : types_)
+      begin_of_.push_back(begin_of_.back() + units_of(type));
     of_types_ = System(types_.size() * kShapeCount);
     sizes_ = Eigen::VectorXd::Zero(of_types_.score.size());
     // Every shape of every type and of every unit, and what else is asked of each unit.
@@ -64,6 +70,15 @@ class Judge {
     Identity identity;
     System system;  ///< what is left beside the type's sizes
   };
+
+  [[nodiscard]] std::size_t units_of(const std::string& type) const {
+    return static_cast<std::size_t>(
+        std::count_if(pool_.units.begin(), pool_.units.end(),
+                      [&](const auto& unit) { return unit.first.type == type; }));
+  }
+
+  /// Places of a type's units in `units_`: from begin_of_[type] up to this.
+  [[nodiscard]] std::size_t end_of(std::size_t type) const { return begin_of_[type + 1]; }
 
   [[nodiscard]] std::size_t type_of(const Identity& identity) const {
     return static_cast<std::size_t>(std::lower_bound(types_.begin(), types_.end(), identity.type) -
@@ -147,10 +162,13 @@ class Judge {
     for (int round = 0; round < kSpreadsMax; ++round) {
       std::size_t best = 0;
       double best_p = threshold_of(1, tests_, settings_.false_names);
-      for (std::size_t column = 0; column < types_.size() * kShapeCount; ++column) {
-        if (std::find(fitted_.begin(), fitted_.end(), column) != fitted_.end()) continue;
-        const double p = spread_p(column);
-        if (p < best_p) std::tie(best, best_p) = std::pair(column, p);
+      for (std::size_t type = 0; type < types_.size(); ++type) {
+        const std::array<double, kShapeCount> p = spread_p_of(type);
+        for (std::size_t shape = 0; shape < kShapeCount; ++shape) {
+          const std::size_t column = type * kShapeCount + shape;
+          if (std::find(fitted_.begin(), fitted_.end(), column) != fitted_.end()) continue;
+          if (p[shape] < best_p) std::tie(best, best_p) = std::pair(column, p[shape]);
+        }
       }
       if (best_p == threshold_of(1, tests_, settings_.false_names)) return;
       fitted_.push_back(best);
@@ -160,21 +178,27 @@ class Judge {
     }
   }
 
-  [[nodiscard]] double spread_p(std::size_t column) const {
-    std::size_t off = 0;
-    std::size_t all = 0;
-    const std::vector<std::size_t> own = own_fitted(column / kShapeCount);
-    for (const Unit& unit : units_) {
-      if (type_of(unit.identity) != column / kShapeCount) continue;
-      const Left left = unit.system.beside(own)[column % kShapeCount];
-      if (left.information <= 0.0) continue;
-      const double doubt = unit.system.doubt(column % kShapeCount);
-      ++all;
-      if (left.gain() > kOff * kOff * doubt) ++off;
+  // Of every shape, whether more of the type's units are off than by chance.
+  [[nodiscard]] std::array<double, kShapeCount> spread_p_of(std::size_t type) const {
+    std::array<std::size_t, kShapeCount> off{};
+    std::array<std::size_t, kShapeCount> all{};
+    const std::vector<std::size_t> own = own_fitted(type);
+    for (std::size_t u = begin_of_[type]; u < end_of(type); ++u) {
+      const std::vector<Left> left = units_[u].system.beside(own);
+      for (std::size_t shape = 0; shape < kShapeCount; ++shape) {
+        if (left[shape].information <= 0.0) continue;
+        ++all[shape];
+        if (left[shape].gain() > kOff * kOff * units_[u].system.doubt(shape)) ++off[shape];
+      }
     }
-    if (all < kSpreadUnitsMin || static_cast<double>(off) < kSpreadShare * static_cast<double>(all))
-      return 1.0;
-    return binomial_tail(off, all, kOffByChance);
+    std::array<double, kShapeCount> p{};
+    for (std::size_t shape = 0; shape < kShapeCount; ++shape) {
+      const bool is_seen =
+          all[shape] >= kSpreadUnitsMin &&
+          static_cast<double>(off[shape]) >= kSpreadShare * static_cast<double>(all[shape]);
+      p[shape] = is_seen ? binomial_tail(off[shape], all[shape], kOffByChance) : 1.0;
+    }
+    return p;
   }
 
   [[nodiscard]] std::vector<std::size_t> own_fitted(std::size_t type) const {
@@ -195,8 +219,7 @@ class Judge {
     std::vector<std::size_t> others = own_fitted(type);
     others.erase(std::find(others.begin(), others.end(), shape));
     std::vector<UnitSize> sizes;
-    for (std::size_t u = 0; u < units_.size(); ++u) {
-      if (type_of(units_[u].identity) != type) continue;
+    for (std::size_t u = begin_of_[type]; u < end_of(type); ++u) {
       const Left left = units_[u].system.beside(others)[shape];
       if (left.information <= 0.0) continue;
       const double sigma = std::sqrt(units_[u].system.doubt(shape) / left.information);
@@ -260,20 +283,17 @@ class Judge {
     TypeJudgement own;
     own.type = types_[type];
     std::vector<UnitJudgement> units;
-    std::vector<std::size_t> places;
-    for (std::size_t u = 0; u < units_.size(); ++u) {
-      if (type_of(units_[u].identity) != type) continue;
+    for (std::size_t u = begin_of_[type]; u < end_of(type); ++u) {
       const UnitSums& sums = pool_.units.at(units_[u].identity);
       units.push_back(unit_judgement(units_[u].identity, sums));
-      places.push_back(u);
       own.drives += units.back().drives;
     }
     own.units = units.size();
     judge_measures(pool_, threshold_of(1, tests_, settings_.false_names), units, own);
     for (const std::size_t column : fitted_)
-      if (column / kShapeCount == type) judge_effect(column, places, units, own);
+      if (column / kShapeCount == type) judge_effect(column, units, own);
     for (std::size_t i = 0; i < units.size(); ++i)
-      judge_own(units_[places[i]], units[i]);
+      judge_own(type, units_[begin_of_[type] + i], units[i]);
     for (UnitJudgement& unit : units) {
       if (unit.status == Status::kAsItsType && unit.drives < kFewDrives)
         unit.status = Status::kFewDrives;
@@ -282,8 +302,8 @@ class Judge {
     judgement.types.push_back(std::move(own));
   }
 
-  void judge_effect(std::size_t column, const std::vector<std::size_t>& places,
-                    std::vector<UnitJudgement>& units, TypeJudgement& own) const {
+  void judge_effect(std::size_t column, std::vector<UnitJudgement>& units,
+                    TypeJudgement& own) const {
     const std::vector<UnitSize> sizes = unit_sizes(column);
     PooledEffect effect = pooled(column, sizes);
     const bool is_spread = std::find(spreads_.begin(), spreads_.end(), column) != spreads_.end();
@@ -299,7 +319,7 @@ class Judge {
       const auto at = std::find(spreads_.begin(), spreads_.end(), column) - spreads_.begin();
       effect.p_value = spread_p_[static_cast<std::size_t>(at)];
     }
-    judge_apart(column, sizes, places, units);
+    judge_apart(column, sizes, units);
     // A single unit that stands apart pulls the mean, and is told by itself.
     const bool is_one_units = effect.varies && !is_spread && effect.between_units <= 0.0;
     if (!is_one_units && !(effect.varies && !is_spread && count_apart(column, units) > 0))
@@ -318,23 +338,23 @@ class Judge {
 
   // Each against all others of its type, and the spread that they have without it.
   void judge_apart(std::size_t column, const std::vector<UnitSize>& sizes,
-                   const std::vector<std::size_t>& places,
                    std::vector<UnitJudgement>& units) const {
     if (sizes.size() < kApartUnitsMin) return;
-    for (const UnitSize& one : sizes) {
-      std::vector<Estimate> others;
-      for (const UnitSize& other : sizes)
-        if (other.unit != one.unit) others.push_back(other.estimate);
-      const RandomEffects type = random_effects(others);
-      const double off = one.estimate.value - type.mean;
-      const double sigma = std::sqrt(one.estimate.sigma * one.estimate.sigma +
-                                     type.between * type.between + type.sigma * type.sigma);
+    std::vector<Estimate> estimates;
+    for (const UnitSize& one : sizes)
+      estimates.push_back(one.estimate);
+    const std::vector<RandomEffects> others = random_effects_of_others(estimates);
+    for (std::size_t i = 0; i < sizes.size(); ++i) {
+      const Estimate& own = sizes[i].estimate;
+      const RandomEffects& type = others[i];
+      const double off = own.value - type.mean;
+      const double sigma =
+          std::sqrt(own.sigma * own.sigma + type.between * type.between + type.sigma * type.sigma);
       const double p =
           type.between > 0.0 ? student_tail(off / sigma, type.freedom) : normal_tail(off / sigma);
       if (p > threshold_of(1, tests_, settings_.false_names)) continue;
-      const auto at = std::find(places.begin(), places.end(), one.unit) - places.begin();
-      tell_apart(column % kShapeCount, one.estimate, off / sigma, p, type.mean,
-                 units[static_cast<std::size_t>(at)]);
+      tell_apart(column % kShapeCount, own, off / sigma, p, type.mean,
+                 units[sizes[i].unit - begin_of_[column / kShapeCount]]);
     }
   }
 
@@ -359,12 +379,9 @@ class Judge {
   }
 
   // What its type has nothing of. Beside what it has, of its own size.
-  void judge_own(const Unit& unit, UnitJudgement& told) const {
-    const std::size_t type = type_of(unit.identity);
+  void judge_own(std::size_t type, const Unit& unit, UnitJudgement& told) const {
     // Of the only unit it is the type's.
-    if (std::count_if(units_.begin(), units_.end(),
-                      [&](const Unit& other) { return type_of(other.identity) == type; }) < 2)
-      return;
+    if (end_of(type) - begin_of_[type] < 2) return;
     const Choice own = choose(unit.system, own_fitted(type), tests_, settings_.false_names);
     const Eigen::VectorXd sizes = unit.system.solve(joined(own_fitted(type), own.columns));
     const Eigen::Index first = sizes.size() - static_cast<Eigen::Index>(own.columns.size());
@@ -386,6 +403,7 @@ class Judge {
   const Pool& pool_;
   Settings settings_;
   std::vector<std::string> types_;
+  std::vector<std::size_t> begin_of_;  ///< of each type, its first place in `units_`; then the end
   System of_types_;
   Eigen::VectorXd sizes_;  ///< of the types' columns; 0 where not fitted
   Choice choice_;
