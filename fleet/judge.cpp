@@ -8,6 +8,7 @@
 
 #include "fleet/leave_one_out.h"
 #include "fleet/selection.h"
+#include "fleet/size_trends.h"
 #include "fleet/statistics.h"
 #include "fleet/system.h"
 #include "fleet/unit_measures.h"
@@ -27,6 +28,8 @@ constexpr double kOffByChance = 0.0455;
 constexpr int kSpreadsMax = 6;
 // Fewer units do not tell how far units differ.
 constexpr std::size_t kApartUnitsMin = 5;
+// Of the bias, and of every shape's size.
+constexpr std::size_t kTrends = kShapeCount + 1;
 // A unit with fewer drives is not called good.
 constexpr std::size_t kFewDrives = 3;
 
@@ -46,9 +49,10 @@ class Judge {
       begin_of_.push_back(begin_of_.back() + units_of(type));
     of_types_ = System(types_.size() * kShapeCount);
     sizes_ = Eigen::VectorXd::Zero(of_types_.score.size());
-    // Every shape of every type and of every unit, and what else is asked of each unit.
-    tests_ = static_cast<double>(types_.size() * kShapeCount +
-                                 pool.units.size() * (kShapeCount + kUnitQuestions));
+    // Every shape of every type and of every unit, their trends, and what else is asked of each
+    // unit.
+    tests_ = static_cast<double>(types_.size() * (kShapeCount + kTrends) +
+                                 pool.units.size() * (kShapeCount + kTrends + kUnitQuestions));
   }
 
   Judgement run() {
@@ -249,34 +253,7 @@ class Judge {
     effect.between_sigma = unit * random.between_sigma;
     effect.units = sizes.size();
     effect.drives = static_cast<std::size_t>(of_types_.drives[static_cast<Eigen::Index>(column)]);
-    set_trend(column, effect);
     return effect;
-  }
-
-  void set_trend(std::size_t column, PooledEffect& effect) const {
-    double score_time = 0.0;
-    double time = 0.0;
-    double square = 0.0;
-    double whole = 0.0;
-    double score = 0.0;
-    for (const auto& [who, sums] : pool_.groups) {
-      for (std::size_t slot = 0; slot < who.size(); ++slot) {
-        if (type_of(who[slot]) != column / kShapeCount) continue;
-        const std::size_t c = slot * kShapeCount + column % kShapeCount;
-        score_time += value_of(sums.score_time[c]);
-        time += value_of(sums.information_time[c]);
-        square += value_of(sums.time_square[c]);
-        whole += value_of(sums.information[triangle(c, c)]);
-        score += value_of(sums.score[c]);
-      }
-    }
-    if (whole <= 0.0) return;
-    const double about_mean = square - time * time / whole;
-    // A tenth of a year, on average, at the least.
-    constexpr double kSpanSquareMin = 0.01;
-    if (about_mean <= kSpanSquareMin * whole) return;
-    effect.per_year = unit_of(column) * (score_time - score * time / whole) / about_mean;
-    effect.per_year_sigma = unit_of(column) * std::sqrt(of_types_.doubt(column) / about_mean);
   }
 
   void judge_type(std::size_t type, Judgement& judgement) {
@@ -294,6 +271,8 @@ class Judge {
       if (column / kShapeCount == type) judge_effect(column, units, own);
     for (std::size_t i = 0; i < units.size(); ++i)
       judge_own(type, units_[begin_of_[type] + i], units[i]);
+    judge_size_trends(pool_, known_sizes(type), threshold_of(1, tests_, settings_.false_names),
+                      units, own);
     for (UnitJudgement& unit : units) {
       if (unit.status == Status::kAsItsType && unit.drives < kFewDrives)
         unit.status = Status::kFewDrives;
@@ -394,6 +373,19 @@ class Judge {
     }
   }
 
+  [[nodiscard]] KnownSizes known_sizes(std::size_t type) const {
+    KnownSizes known;
+    for (std::size_t t = 0; t < types_.size(); ++t) {
+      std::vector<double>& sizes = known.of_type[types_[t]];
+      for (std::size_t shape = 0; shape < kShapeCount; ++shape)
+        sizes.push_back(sizes_[static_cast<Eigen::Index>(t * kShapeCount + shape)]);
+    }
+    for (std::size_t u = begin_of_[type]; u < end_of(type); ++u)
+      known.dispersion.emplace_back(units_[u].system.dispersion.begin(),
+                                    units_[u].system.dispersion.end());
+    return known;
+  }
+
   static std::vector<std::size_t> joined(std::vector<std::size_t> first,
                                          const std::vector<std::size_t>& second) {
     first.insert(first.end(), second.begin(), second.end());
@@ -434,6 +426,11 @@ std::string_view status_name(Status status) {
       break;
   }
   return "apart";
+}
+
+void set_status(UnitJudgement& unit, Status status, std::string why) {
+  if (unit.status == Status::kAsItsType) unit.status = status;
+  unit.why.push_back(std::move(why));
 }
 
 Judgement judge(const Pool& pool, const Settings& settings) {

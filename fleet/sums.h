@@ -66,6 +66,12 @@ struct Moments {
   [[nodiscard]] double time_square() const {
     return value_of(tt) - value_of(t) * value_of(t) / n();
   }
+  /// Of single values about the line, and how many of them that is sure by; about the mean where
+  /// there is no line.
+  [[nodiscard]] double variance_about_line() const;
+  [[nodiscard]] double freedom_about_line() const { return n() - (has_line() ? 2.0 : 1.0); }
+  /// Drives enough, and not all at one time.
+  [[nodiscard]] bool has_line() const;
   /// Per year; 0 where all were told at one time.
   [[nodiscard]] double slope() const;
   /// 1σ of the slope by what scatters about the line.
