@@ -232,7 +232,25 @@ class Judge {
     return sizes;
   }
 
-  [[nodiscard]] PooledEffect pooled(std::size_t column, const std::vector<UnitSize>& sizes) const {
+  // What a type has is what its other units have: one that stands apart would pull the mean, and
+  // has a name and a model file of its own. All, where they are too few to say which is odd.
+  [[nodiscard]] std::vector<UnitSize> alike_of(std::size_t column,
+                                               const std::vector<UnitSize>& sizes,
+                                               const std::vector<UnitJudgement>& units) const {
+    std::vector<UnitSize> alike;
+    for (const UnitSize& one : sizes)
+      if (!stands_apart(units[one.unit - begin_of_[column / kShapeCount]], column % kShapeCount))
+        alike.push_back(one);
+    return alike.size() < kApartUnitsMin ? sizes : alike;
+  }
+
+  [[nodiscard]] static bool stands_apart(const UnitJudgement& unit, std::size_t shape) {
+    return std::any_of(unit.effects.begin(), unit.effects.end(),
+                       [&](const PooledEffect& effect) { return effect.shape == shape; });
+  }
+
+  [[nodiscard]] PooledEffect pooled(std::size_t column, const std::vector<UnitSize>& sizes,
+                                    bool are_some) const {
     std::vector<Estimate> estimates;
     for (const UnitSize& one : sizes)
       estimates.push_back(one.estimate);
@@ -243,7 +261,7 @@ class Judge {
     PooledEffect effect;
     effect.whose.type = types_[column / kShapeCount];
     effect.shape = column % kShapeCount;
-    const bool mixed = sizes.size() > 1 && random.between > 0.0;
+    const bool mixed = sizes.size() > 1 && (random.between > 0.0 || are_some);
     effect.size = unit * (mixed ? random.mean : sizes_[static_cast<Eigen::Index>(column)]);
     effect.sigma = unit * std::max(std::sqrt(variance), sizes.size() > 1 ? random.sigma : 0.0);
     RandomEffects width = random;
@@ -284,7 +302,9 @@ class Judge {
   void judge_effect(std::size_t column, std::vector<UnitJudgement>& units,
                     TypeJudgement& own) const {
     const std::vector<UnitSize> sizes = unit_sizes(column);
-    PooledEffect effect = pooled(column, sizes);
+    judge_apart(column, sizes, units);
+    PooledEffect effect =
+        pooled(column, alike_of(column, sizes, units), count_apart(column, units) > 0);
     const bool is_spread = std::find(spreads_.begin(), spreads_.end(), column) != spreads_.end();
     effect.varies = is_spread || (sizes.size() > 1 && std::abs(effect.size) < effect.half_width95);
     const auto chosen = std::find(choice_.columns.begin(), choice_.columns.end(), column);
@@ -298,8 +318,7 @@ class Judge {
       const auto at = std::find(spreads_.begin(), spreads_.end(), column) - spreads_.begin();
       effect.p_value = spread_p_[static_cast<std::size_t>(at)];
     }
-    judge_apart(column, sizes, units);
-    // A single unit that stands apart pulls the mean, and is told by itself.
+    // What is nothing but a unit that stands apart is told of that unit.
     const bool is_one_units = effect.varies && !is_spread && effect.between_units <= 0.0;
     if (!is_one_units && !(effect.varies && !is_spread && count_apart(column, units) > 0))
       own.effects.push_back(std::move(effect));
@@ -307,12 +326,9 @@ class Judge {
 
   [[nodiscard]] static std::size_t count_apart(std::size_t column,
                                                const std::vector<UnitJudgement>& units) {
-    return static_cast<std::size_t>(
-        std::count_if(units.begin(), units.end(), [&](const UnitJudgement& unit) {
-          return std::any_of(unit.effects.begin(), unit.effects.end(), [&](const PooledEffect& e) {
-            return e.shape == column % kShapeCount;
-          });
-        }));
+    return static_cast<std::size_t>(std::count_if(
+        units.begin(), units.end(),
+        [&](const UnitJudgement& unit) { return stands_apart(unit, column % kShapeCount); }));
   }
 
   // Each against all others of its type, and the spread that they have without it.
