@@ -1,11 +1,14 @@
 #include "fleet/judge.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include <fmt/core.h>
 
+#include "fleet/leave_one_out.h"
 #include "fleet/selection.h"
+#include "fleet/size_trends.h"
 #include "fleet/statistics.h"
 #include "fleet/system.h"
 #include "fleet/unit_measures.h"
@@ -25,6 +28,8 @@ constexpr double kOffByChance = 0.0455;
 constexpr int kSpreadsMax = 6;
 // Fewer units do not tell how far units differ.
 constexpr std::size_t kApartUnitsMin = 5;
+// Of the bias, and of every shape's size.
+constexpr std::size_t kTrends = kShapeCount + 1;
 // A unit with fewer drives is not called good.
 constexpr std::size_t kFewDrives = 3;
 
@@ -38,11 +43,16 @@ class Judge {
     for (const auto& [identity, sums] : pool.units)
       types_.push_back(identity.type);
     types_.erase(std::unique(types_.begin(), types_.end()), types_.end());
+    // Identities are in the order of their types: units of a type stand side by side.
+    begin_of_.push_back(0);
+    for (const std::string& type : types_)
+      begin_of_.push_back(begin_of_.back() + units_of(type));
     of_types_ = System(types_.size() * kShapeCount);
     sizes_ = Eigen::VectorXd::Zero(of_types_.score.size());
-    // Every shape of every type and of every unit, and what else is asked of each unit.
-    tests_ = static_cast<double>(types_.size() * kShapeCount +
-                                 pool.units.size() * (kShapeCount + kUnitQuestions));
+    // Every shape of every type and of every unit, their trends, and what else is asked of each
+    // unit.
+    tests_ = static_cast<double>(types_.size() * (kShapeCount + kTrends) +
+                                 pool.units.size() * (kShapeCount + kTrends + kUnitQuestions));
   }
 
   Judgement run() {
@@ -64,6 +74,15 @@ class Judge {
     Identity identity;
     System system;  ///< what is left beside the type's sizes
   };
+
+  [[nodiscard]] std::size_t units_of(const std::string& type) const {
+    return static_cast<std::size_t>(
+        std::count_if(pool_.units.begin(), pool_.units.end(),
+                      [&](const auto& unit) { return unit.first.type == type; }));
+  }
+
+  /// Places of a type's units in `units_`: from begin_of_[type] up to this.
+  [[nodiscard]] std::size_t end_of(std::size_t type) const { return begin_of_[type + 1]; }
 
   [[nodiscard]] std::size_t type_of(const Identity& identity) const {
     return static_cast<std::size_t>(std::lower_bound(types_.begin(), types_.end(), identity.type) -
@@ -147,10 +166,13 @@ class Judge {
     for (int round = 0; round < kSpreadsMax; ++round) {
       std::size_t best = 0;
       double best_p = threshold_of(1, tests_, settings_.false_names);
-      for (std::size_t column = 0; column < types_.size() * kShapeCount; ++column) {
-        if (std::find(fitted_.begin(), fitted_.end(), column) != fitted_.end()) continue;
-        const double p = spread_p(column);
-        if (p < best_p) std::tie(best, best_p) = std::pair(column, p);
+      for (std::size_t type = 0; type < types_.size(); ++type) {
+        const std::array<double, kShapeCount> p = spread_p_of(type);
+        for (std::size_t shape = 0; shape < kShapeCount; ++shape) {
+          const std::size_t column = type * kShapeCount + shape;
+          if (std::find(fitted_.begin(), fitted_.end(), column) != fitted_.end()) continue;
+          if (p[shape] < best_p) std::tie(best, best_p) = std::pair(column, p[shape]);
+        }
       }
       if (best_p == threshold_of(1, tests_, settings_.false_names)) return;
       fitted_.push_back(best);
@@ -160,21 +182,27 @@ class Judge {
     }
   }
 
-  [[nodiscard]] double spread_p(std::size_t column) const {
-    std::size_t off = 0;
-    std::size_t all = 0;
-    const std::vector<std::size_t> own = own_fitted(column / kShapeCount);
-    for (const Unit& unit : units_) {
-      if (type_of(unit.identity) != column / kShapeCount) continue;
-      const Left left = unit.system.beside(own)[column % kShapeCount];
-      if (left.information <= 0.0) continue;
-      const double doubt = unit.system.doubt(column % kShapeCount);
-      ++all;
-      if (left.gain() > kOff * kOff * doubt) ++off;
+  // Of every shape, whether more of the type's units are off than by chance.
+  [[nodiscard]] std::array<double, kShapeCount> spread_p_of(std::size_t type) const {
+    std::array<std::size_t, kShapeCount> off{};
+    std::array<std::size_t, kShapeCount> all{};
+    const std::vector<std::size_t> own = own_fitted(type);
+    for (std::size_t u = begin_of_[type]; u < end_of(type); ++u) {
+      const std::vector<Left> left = units_[u].system.beside(own);
+      for (std::size_t shape = 0; shape < kShapeCount; ++shape) {
+        if (left[shape].information <= 0.0) continue;
+        ++all[shape];
+        if (left[shape].gain() > kOff * kOff * units_[u].system.doubt(shape)) ++off[shape];
+      }
     }
-    if (all < kSpreadUnitsMin || static_cast<double>(off) < kSpreadShare * static_cast<double>(all))
-      return 1.0;
-    return binomial_tail(off, all, kOffByChance);
+    std::array<double, kShapeCount> p{};
+    for (std::size_t shape = 0; shape < kShapeCount; ++shape) {
+      const bool is_seen =
+          all[shape] >= kSpreadUnitsMin &&
+          static_cast<double>(off[shape]) >= kSpreadShare * static_cast<double>(all[shape]);
+      p[shape] = is_seen ? binomial_tail(off[shape], all[shape], kOffByChance) : 1.0;
+    }
+    return p;
   }
 
   [[nodiscard]] std::vector<std::size_t> own_fitted(std::size_t type) const {
@@ -195,8 +223,7 @@ class Judge {
     std::vector<std::size_t> others = own_fitted(type);
     others.erase(std::find(others.begin(), others.end(), shape));
     std::vector<UnitSize> sizes;
-    for (std::size_t u = 0; u < units_.size(); ++u) {
-      if (type_of(units_[u].identity) != type) continue;
+    for (std::size_t u = begin_of_[type]; u < end_of(type); ++u) {
       const Left left = units_[u].system.beside(others)[shape];
       if (left.information <= 0.0) continue;
       const double sigma = std::sqrt(units_[u].system.doubt(shape) / left.information);
@@ -205,7 +232,25 @@ class Judge {
     return sizes;
   }
 
-  [[nodiscard]] PooledEffect pooled(std::size_t column, const std::vector<UnitSize>& sizes) const {
+  // What a type has is what its other units have: one that stands apart would pull the mean, and
+  // has a name and a model file of its own. All, where they are too few to say which is odd.
+  [[nodiscard]] std::vector<UnitSize> alike_of(std::size_t column,
+                                               const std::vector<UnitSize>& sizes,
+                                               const std::vector<UnitJudgement>& units) const {
+    std::vector<UnitSize> alike;
+    for (const UnitSize& one : sizes)
+      if (!stands_apart(units[one.unit - begin_of_[column / kShapeCount]], column % kShapeCount))
+        alike.push_back(one);
+    return alike.size() < kApartUnitsMin ? sizes : alike;
+  }
+
+  [[nodiscard]] static bool stands_apart(const UnitJudgement& unit, std::size_t shape) {
+    return std::any_of(unit.effects.begin(), unit.effects.end(),
+                       [&](const PooledEffect& effect) { return effect.shape == shape; });
+  }
+
+  [[nodiscard]] PooledEffect pooled(std::size_t column, const std::vector<UnitSize>& sizes,
+                                    bool are_some) const {
     std::vector<Estimate> estimates;
     for (const UnitSize& one : sizes)
       estimates.push_back(one.estimate);
@@ -216,7 +261,7 @@ class Judge {
     PooledEffect effect;
     effect.whose.type = types_[column / kShapeCount];
     effect.shape = column % kShapeCount;
-    const bool mixed = sizes.size() > 1 && random.between > 0.0;
+    const bool mixed = sizes.size() > 1 && (random.between > 0.0 || are_some);
     effect.size = unit * (mixed ? random.mean : sizes_[static_cast<Eigen::Index>(column)]);
     effect.sigma = unit * std::max(std::sqrt(variance), sizes.size() > 1 ? random.sigma : 0.0);
     RandomEffects width = random;
@@ -226,54 +271,26 @@ class Judge {
     effect.between_sigma = unit * random.between_sigma;
     effect.units = sizes.size();
     effect.drives = static_cast<std::size_t>(of_types_.drives[static_cast<Eigen::Index>(column)]);
-    set_trend(column, effect);
     return effect;
-  }
-
-  void set_trend(std::size_t column, PooledEffect& effect) const {
-    double score_time = 0.0;
-    double time = 0.0;
-    double square = 0.0;
-    double whole = 0.0;
-    double score = 0.0;
-    for (const auto& [who, sums] : pool_.groups) {
-      for (std::size_t slot = 0; slot < who.size(); ++slot) {
-        if (type_of(who[slot]) != column / kShapeCount) continue;
-        const std::size_t c = slot * kShapeCount + column % kShapeCount;
-        score_time += value_of(sums.score_time[c]);
-        time += value_of(sums.information_time[c]);
-        square += value_of(sums.time_square[c]);
-        whole += value_of(sums.information[triangle(c, c)]);
-        score += value_of(sums.score[c]);
-      }
-    }
-    if (whole <= 0.0) return;
-    const double about_mean = square - time * time / whole;
-    // A tenth of a year, on average, at the least.
-    constexpr double kSpanSquareMin = 0.01;
-    if (about_mean <= kSpanSquareMin * whole) return;
-    effect.per_year = unit_of(column) * (score_time - score * time / whole) / about_mean;
-    effect.per_year_sigma = unit_of(column) * std::sqrt(of_types_.doubt(column) / about_mean);
   }
 
   void judge_type(std::size_t type, Judgement& judgement) {
     TypeJudgement own;
     own.type = types_[type];
     std::vector<UnitJudgement> units;
-    std::vector<std::size_t> places;
-    for (std::size_t u = 0; u < units_.size(); ++u) {
-      if (type_of(units_[u].identity) != type) continue;
+    for (std::size_t u = begin_of_[type]; u < end_of(type); ++u) {
       const UnitSums& sums = pool_.units.at(units_[u].identity);
       units.push_back(unit_judgement(units_[u].identity, sums));
-      places.push_back(u);
       own.drives += units.back().drives;
     }
     own.units = units.size();
     judge_measures(pool_, threshold_of(1, tests_, settings_.false_names), units, own);
     for (const std::size_t column : fitted_)
-      if (column / kShapeCount == type) judge_effect(column, places, units, own);
+      if (column / kShapeCount == type) judge_effect(column, units, own);
     for (std::size_t i = 0; i < units.size(); ++i)
-      judge_own(units_[places[i]], units[i]);
+      judge_own(type, units_[begin_of_[type] + i], units[i]);
+    judge_size_trends(pool_, known_sizes(type), threshold_of(1, tests_, settings_.false_names),
+                      units, own);
     for (UnitJudgement& unit : units) {
       if (unit.status == Status::kAsItsType && unit.drives < kFewDrives)
         unit.status = Status::kFewDrives;
@@ -282,10 +299,12 @@ class Judge {
     judgement.types.push_back(std::move(own));
   }
 
-  void judge_effect(std::size_t column, const std::vector<std::size_t>& places,
-                    std::vector<UnitJudgement>& units, TypeJudgement& own) const {
+  void judge_effect(std::size_t column, std::vector<UnitJudgement>& units,
+                    TypeJudgement& own) const {
     const std::vector<UnitSize> sizes = unit_sizes(column);
-    PooledEffect effect = pooled(column, sizes);
+    judge_apart(column, sizes, units);
+    PooledEffect effect =
+        pooled(column, alike_of(column, sizes, units), count_apart(column, units) > 0);
     const bool is_spread = std::find(spreads_.begin(), spreads_.end(), column) != spreads_.end();
     effect.varies = is_spread || (sizes.size() > 1 && std::abs(effect.size) < effect.half_width95);
     const auto chosen = std::find(choice_.columns.begin(), choice_.columns.end(), column);
@@ -299,8 +318,7 @@ class Judge {
       const auto at = std::find(spreads_.begin(), spreads_.end(), column) - spreads_.begin();
       effect.p_value = spread_p_[static_cast<std::size_t>(at)];
     }
-    judge_apart(column, sizes, places, units);
-    // A single unit that stands apart pulls the mean, and is told by itself.
+    // What is nothing but a unit that stands apart is told of that unit.
     const bool is_one_units = effect.varies && !is_spread && effect.between_units <= 0.0;
     if (!is_one_units && !(effect.varies && !is_spread && count_apart(column, units) > 0))
       own.effects.push_back(std::move(effect));
@@ -308,33 +326,30 @@ class Judge {
 
   [[nodiscard]] static std::size_t count_apart(std::size_t column,
                                                const std::vector<UnitJudgement>& units) {
-    return static_cast<std::size_t>(
-        std::count_if(units.begin(), units.end(), [&](const UnitJudgement& unit) {
-          return std::any_of(unit.effects.begin(), unit.effects.end(), [&](const PooledEffect& e) {
-            return e.shape == column % kShapeCount;
-          });
-        }));
+    return static_cast<std::size_t>(std::count_if(
+        units.begin(), units.end(),
+        [&](const UnitJudgement& unit) { return stands_apart(unit, column % kShapeCount); }));
   }
 
   // Each against all others of its type, and the spread that they have without it.
   void judge_apart(std::size_t column, const std::vector<UnitSize>& sizes,
-                   const std::vector<std::size_t>& places,
                    std::vector<UnitJudgement>& units) const {
     if (sizes.size() < kApartUnitsMin) return;
-    for (const UnitSize& one : sizes) {
-      std::vector<Estimate> others;
-      for (const UnitSize& other : sizes)
-        if (other.unit != one.unit) others.push_back(other.estimate);
-      const RandomEffects type = random_effects(others);
-      const double off = one.estimate.value - type.mean;
-      const double sigma = std::sqrt(one.estimate.sigma * one.estimate.sigma +
-                                     type.between * type.between + type.sigma * type.sigma);
+    std::vector<Estimate> estimates;
+    for (const UnitSize& one : sizes)
+      estimates.push_back(one.estimate);
+    const std::vector<RandomEffects> others = random_effects_of_others(estimates);
+    for (std::size_t i = 0; i < sizes.size(); ++i) {
+      const Estimate& own = sizes[i].estimate;
+      const RandomEffects& type = others[i];
+      const double off = own.value - type.mean;
+      const double sigma =
+          std::sqrt(own.sigma * own.sigma + type.between * type.between + type.sigma * type.sigma);
       const double p =
           type.between > 0.0 ? student_tail(off / sigma, type.freedom) : normal_tail(off / sigma);
       if (p > threshold_of(1, tests_, settings_.false_names)) continue;
-      const auto at = std::find(places.begin(), places.end(), one.unit) - places.begin();
-      tell_apart(column % kShapeCount, one.estimate, off / sigma, p, type.mean,
-                 units[static_cast<std::size_t>(at)]);
+      tell_apart(column % kShapeCount, own, off / sigma, p, type.mean,
+                 units[sizes[i].unit - begin_of_[column / kShapeCount]]);
     }
   }
 
@@ -359,12 +374,9 @@ class Judge {
   }
 
   // What its type has nothing of. Beside what it has, of its own size.
-  void judge_own(const Unit& unit, UnitJudgement& told) const {
-    const std::size_t type = type_of(unit.identity);
+  void judge_own(std::size_t type, const Unit& unit, UnitJudgement& told) const {
     // Of the only unit it is the type's.
-    if (std::count_if(units_.begin(), units_.end(),
-                      [&](const Unit& other) { return type_of(other.identity) == type; }) < 2)
-      return;
+    if (end_of(type) - begin_of_[type] < 2) return;
     const Choice own = choose(unit.system, own_fitted(type), tests_, settings_.false_names);
     const Eigen::VectorXd sizes = unit.system.solve(joined(own_fitted(type), own.columns));
     const Eigen::Index first = sizes.size() - static_cast<Eigen::Index>(own.columns.size());
@@ -377,6 +389,19 @@ class Judge {
     }
   }
 
+  [[nodiscard]] KnownSizes known_sizes(std::size_t type) const {
+    KnownSizes known;
+    for (std::size_t t = 0; t < types_.size(); ++t) {
+      std::vector<double>& sizes = known.of_type[types_[t]];
+      for (std::size_t shape = 0; shape < kShapeCount; ++shape)
+        sizes.push_back(sizes_[static_cast<Eigen::Index>(t * kShapeCount + shape)]);
+    }
+    for (std::size_t u = begin_of_[type]; u < end_of(type); ++u)
+      known.dispersion.emplace_back(units_[u].system.dispersion.begin(),
+                                    units_[u].system.dispersion.end());
+    return known;
+  }
+
   static std::vector<std::size_t> joined(std::vector<std::size_t> first,
                                          const std::vector<std::size_t>& second) {
     first.insert(first.end(), second.begin(), second.end());
@@ -386,6 +411,7 @@ class Judge {
   const Pool& pool_;
   Settings settings_;
   std::vector<std::string> types_;
+  std::vector<std::size_t> begin_of_;  ///< of each type, its first place in `units_`; then the end
   System of_types_;
   Eigen::VectorXd sizes_;  ///< of the types' columns; 0 where not fitted
   Choice choice_;
@@ -416,6 +442,11 @@ std::string_view status_name(Status status) {
       break;
   }
   return "apart";
+}
+
+void set_status(UnitJudgement& unit, Status status, std::string why) {
+  if (unit.status == Status::kAsItsType) unit.status = status;
+  unit.why.push_back(std::move(why));
 }
 
 Judgement judge(const Pool& pool, const Settings& settings) {

@@ -36,6 +36,16 @@ struct PooledEffect {
   std::vector<std::pair<std::string, std::size_t>> ambiguous_with;  ///< type, shape
 };
 
+/// How something of a type changes over the months.
+struct TypeTrend {
+  std::size_t shape = model::kShapeCount;  ///< whose size; kShapeCount: the bias, in deg/s
+  double per_year = 0.0;
+  double sigma = 0.0;
+  double between_units = 0.0;  ///< 1σ
+  std::size_t units = 0;       ///< with drives enough
+  bool varies = false;         ///< units change, each its own way, and the mean says nothing
+};
+
 struct TypeJudgement {
   std::string type;
   std::size_t units = 0;
@@ -43,6 +53,7 @@ struct TypeJudgement {
   double white_dps_rthz = 0.0;  ///< the middle unit's; 0: not known
   double walk_dps_rts = 0.0;
   std::vector<PooledEffect> effects;
+  std::vector<TypeTrend> trends;
 };
 
 enum class Status : std::uint8_t {
@@ -64,7 +75,7 @@ struct UnitJudgement {
   double white_dps_rthz = 0.0;
   double walk_dps_rts = 0.0;
   double bias_dps = 0.0;
-  double bias_scatter_dps = 0.0;      ///< from drive to drive
+  double bias_scatter_dps = 0.0;      ///< from drive to drive, beside its trend
   std::vector<PooledEffect> effects;  ///< where it stands apart: its own sizes
 };
 
@@ -74,6 +85,9 @@ struct Judgement {
   double tests = 0.0;
   double false_names = 0.0;
 };
+
+/// Adds a sentence, and a status to a unit that had none.
+void set_status(UnitJudgement& unit, Status status, std::string why);
 
 Judgement judge(const Pool& pool, const Settings& settings);
 

@@ -13,14 +13,22 @@ double cross(const Moments& m) {
 
 }  // namespace
 
+bool Moments::has_line() const {
+  return count >= 3 && time_square() >= kTimeSquareMin;
+}
+
+double Moments::variance_about_line() const {
+  if (!has_line()) return variance();
+  const double about_line = variance() * (n() - 1.0) - slope() * cross(*this);
+  return about_line > 0.0 ? about_line / (n() - 2.0) : 0.0;
+}
+
 double Moments::slope() const {
-  return count < 3 || time_square() < kTimeSquareMin ? 0.0 : cross(*this) / time_square();
+  return has_line() ? cross(*this) / time_square() : 0.0;
 }
 
 double Moments::slope_sigma() const {
-  if (count < 3 || time_square() < kTimeSquareMin) return 0.0;
-  const double about_line = variance() * (n() - 1.0) - slope() * cross(*this);
-  return about_line > 0.0 ? std::sqrt(about_line / (n() - 2.0) / time_square()) : 0.0;
+  return has_line() ? std::sqrt(variance_about_line() / time_square()) : 0.0;
 }
 
 }  // namespace vgyro::fleet

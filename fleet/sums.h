@@ -15,12 +15,19 @@ inline constexpr double kStepsPerUnit = 1048576.0;
 /// A million million of these fit, and are far beyond what any drive says.
 inline constexpr double kValueMost = 1e18;
 
+/// Steps that 64 bits hold.
+inline constexpr double kShortMost = 9e18;
+
 /// Precondition: |value| ≤ kValueMost.
 inline Whole whole_of(double value) {
-  return static_cast<Whole>(std::nearbyint(value * kStepsPerUnit));
+  const double steps = value * kStepsPerUnit;
+  // The same number by one instruction; a conversion of 128 bits is a function.
+  if (std::abs(steps) < kShortMost) return std::llrint(steps);
+  return static_cast<Whole>(std::nearbyint(steps));
 }
 inline double value_of(Whole sum) {
-  return static_cast<double>(sum) / kStepsPerUnit;
+  const auto low = static_cast<std::int64_t>(sum);
+  return (low == sum ? static_cast<double>(low) : static_cast<double>(sum)) / kStepsPerUnit;
 }
 
 /// Of a quantity x that is told at times t: means, scatter, and the line through it.
@@ -59,6 +66,12 @@ struct Moments {
   [[nodiscard]] double time_square() const {
     return value_of(tt) - value_of(t) * value_of(t) / n();
   }
+  /// Of single values about the line, and how many of them that is sure by; about the mean where
+  /// there is no line.
+  [[nodiscard]] double variance_about_line() const;
+  [[nodiscard]] double freedom_about_line() const { return n() - (has_line() ? 2.0 : 1.0); }
+  /// Drives enough, and not all at one time.
+  [[nodiscard]] bool has_line() const;
   /// Per year; 0 where all were told at one time.
   [[nodiscard]] double slope() const;
   /// 1σ of the slope by what scatters about the line.

@@ -6,6 +6,7 @@
 #include <fmt/core.h>
 
 #include "fleet/statistics.h"
+#include "fleet/trends.h"
 
 namespace vgyro::fleet {
 
@@ -22,9 +23,8 @@ constexpr double kLostMore = 0.01;
 // Units are never more alike than this, of a logarithm and of a share of frames.
 constexpr double kAlikeLog = 0.03;
 constexpr double kAlikeShare = 1e-3;
-// Of the scatter of the bias, and of its trend.
+// Of the scatter of the bias.
 constexpr double kScatterDrivesMin = 4.0;
-constexpr double kTrendDrivesMin = 6.0;
 
 const Moments& measure(const UnitSums& sums, Measure which) {
   return sums.measures[static_cast<std::size_t>(which)];
@@ -53,14 +53,18 @@ Question means_of(const Pool& pool, Measure which, const std::vector<UnitJudgeme
   return question;
 }
 
-Question scatters_of(const Pool& pool, const std::vector<UnitJudgement>& units) {
+// Of a unit that has a trend, or whose type has one, about the line: a trend is no scatter.
+Question scatters_of(const Pool& pool, const std::vector<UnitJudgement>& units,
+                     const TypeJudgement& type) {
   Question question;
   for (std::size_t i = 0; i < units.size(); ++i) {
     const Moments& moments = measure(pool.units.at(units[i].identity), Measure::kBias);
-    if (moments.n() < kScatterDrivesMin || moments.variance() <= 0.0) continue;
+    const bool moves = !type.trends.empty() || units[i].status == Status::kTrend;
+    const double variance = moves ? moments.variance_about_line() : moments.variance();
+    const double freedom = moves ? moments.freedom_about_line() : moments.n() - 1.0;
+    if (moments.n() < kScatterDrivesMin || variance <= 0.0) continue;
     question.unit.push_back(i);
-    question.estimate.push_back(
-        {0.5 * std::log(moments.variance()), 1.0 / std::sqrt(2.0 * (moments.n() - 1.0))});
+    question.estimate.push_back({0.5 * std::log(variance), 1.0 / std::sqrt(2.0 * freedom)});
   }
   return question;
 }
@@ -89,18 +93,24 @@ void ask(const Question& question, double alike, double least, double threshold,
   }
 }
 
-void set_status(UnitJudgement& unit, Status status, std::string why) {
-  if (unit.status == Status::kAsItsType) unit.status = status;
-  unit.why.push_back(std::move(why));
-}
-
-void judge_trend(const Moments& bias, double threshold, UnitJudgement& unit) {
-  if (bias.n() < kTrendDrivesMin || bias.slope_sigma() <= 0.0) return;
-  const double t = bias.slope() / bias.slope_sigma();
-  if (student_tail(t, bias.n() - 2.0) >= threshold) return;
-  set_status(unit, Status::kTrend,
-             fmt::format("its bias moves by {:.3g} ± {:.1g} deg/s a year",
-                         bias.slope() * kBiasUnit_dps, bias.slope_sigma() * kBiasUnit_dps));
+void judge_bias_trends(const Pool& pool, double threshold, std::vector<UnitJudgement>& units,
+                       TypeJudgement& type) {
+  std::vector<UnitSlope> slopes;
+  for (std::size_t i = 0; i < units.size(); ++i) {
+    const Moments& bias = measure(pool.units.at(units[i].identity), Measure::kBias);
+    if (bias.n() < kTrendDrivesMin || bias.slope_sigma() <= 0.0) continue;
+    slopes.push_back({i, {bias.slope(), bias.slope_sigma()}, bias.n() - 2.0});
+  }
+  const SlopesJudgement judged = judge_slopes(slopes, threshold);
+  for (const auto& [slope, type_per_year] : judged.apart)
+    set_status(units[slope.unit], Status::kTrend,
+               fmt::format("its bias moves by {:.3g} ± {:.1g} deg/s a year, its type's by {:.2g}",
+                           slope.per_year.value * kBiasUnit_dps,
+                           slope.per_year.sigma * kBiasUnit_dps, type_per_year * kBiasUnit_dps));
+  if (judged.is_named || judged.varies)
+    type.trends.push_back({model::kShapeCount, judged.type.mean * kBiasUnit_dps,
+                           judged.type.sigma * kBiasUnit_dps, judged.type.between * kBiasUnit_dps,
+                           slopes.size(), !judged.is_named});
 }
 
 double middle_of(const std::vector<UnitJudgement>& units, double UnitJudgement::*value) {
@@ -124,7 +134,7 @@ UnitJudgement unit_judgement(const Identity& identity, const UnitSums& sums) {
   unit.walk_dps_rts = middle(Measure::kLogWalk);
   const Moments& bias = measure(sums, Measure::kBias);
   if (bias.count > 0) unit.bias_dps = bias.mean() * kBiasUnit_dps;
-  unit.bias_scatter_dps = std::sqrt(bias.variance()) * kBiasUnit_dps;
+  unit.bias_scatter_dps = std::sqrt(bias.variance_about_line()) * kBiasUnit_dps;
   return unit;
 }
 
@@ -132,6 +142,7 @@ void judge_measures(const Pool& pool, double threshold, std::vector<UnitJudgemen
                     TypeJudgement& type) {
   type.white_dps_rthz = middle_of(units, &UnitJudgement::white_dps_rthz);
   type.walk_dps_rts = middle_of(units, &UnitJudgement::walk_dps_rts);
+  judge_bias_trends(pool, threshold, units, type);
   ask(means_of(pool, Measure::kLogWhite, units), kAlikeLog, std::log(kNoiseFactor), threshold,
       [&](std::size_t i, double off) {
         set_status(units[i], Status::kNoisy,
@@ -143,7 +154,7 @@ void judge_measures(const Pool& pool, double threshold, std::vector<UnitJudgemen
                    fmt::format("within a drive its bias wanders {:.2g} times as far as its type's",
                                std::exp(off)));
       });
-  ask(scatters_of(pool, units), kAlikeLog, std::log(kWanderFactor), threshold,
+  ask(scatters_of(pool, units, type), kAlikeLog, std::log(kWanderFactor), threshold,
       [&](std::size_t i, double off) {
         set_status(units[i], Status::kWandering,
                    fmt::format("from drive to drive its bias scatters {:.2g} times as far as its "
@@ -156,8 +167,6 @@ void judge_measures(const Pool& pool, double threshold, std::vector<UnitJudgemen
             units[i], Status::kLossy,
             fmt::format("{:.2g} % more of its frames are lost than of its type's", 100.0 * off));
       });
-  for (UnitJudgement& unit : units)
-    judge_trend(measure(pool.units.at(unit.identity), Measure::kBias), threshold, unit);
 }
 
 }  // namespace vgyro::fleet

@@ -10,12 +10,13 @@
 
 namespace vgyro::fleet {
 
-/// Noise, walk, scatter of the bias, its trend, lost frames.
-inline constexpr std::size_t kUnitQuestions = 5;
+/// Noise, walk, scatter of the bias, lost frames; trends count by themselves.
+inline constexpr std::size_t kUnitQuestions = 4;
 
 UnitJudgement unit_judgement(const Identity& identity, const UnitSums& sums);
 
-/// Judges all units of a type; `threshold`: of a p-value. Sets the type's noise.
+/// Judges all units of a type; `threshold`: of a p-value. Sets the type's noise, and the
+/// trend of its bias.
 void judge_measures(const Pool& pool, double threshold, std::vector<UnitJudgement>& units,
                     TypeJudgement& type);
 

@@ -2,7 +2,7 @@
 
 BUILD_PACKAGES=(g++ cmake ninja-build pkg-config libeigen3-dev libfmt-dev libcli11-dev
   libtomlplusplus-dev libexpected-dev nlohmann-json3-dev liblzma-dev libsystemd-dev libnlopt-cxx-dev
-  zlib1g-dev libzstd-dev libbz2-dev nettle-dev libjs-dygraphs)
+  zlib1g-dev libzstd-dev libbz2-dev libsimdjson-dev nettle-dev libjs-dygraphs)
 PACKAGE_PACKAGES=(debhelper scdoc)
 RUN_PACKAGES=(gnuplot-nox fonts-dejavu-core can-utils iproute2 util-linux xz-utils)
 TEST_PACKAGES=(libgtest-dev libbenchmark-dev clang-format git python3 python3-numpy python3-can

@@ -16,6 +16,8 @@
 
 namespace vgyro::cli {
 
+inline constexpr int kEvidenceFormat = 1;
+
 struct DriveOfPair {
   const GapSubject& subject;
   const std::vector<gap::Recording>& recordings;

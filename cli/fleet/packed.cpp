@@ -1,59 +1,33 @@
 #include "cli/fleet/packed.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
+#include <nettle/base64.h>
 
 namespace vgyro::cli {
 
 namespace {
 
-constexpr std::string_view kDigits =
-    "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
 constexpr double kCorrelationSteps = 32767.0;
-
-constexpr std::array<std::int8_t, 256> values() {
-  std::array<std::int8_t, 256> table{};
-  for (std::int8_t& value : table)
-    value = -1;
-  for (std::size_t i = 0; i < kDigits.size(); ++i)
-    table[static_cast<unsigned char>(kDigits[i])] = static_cast<std::int8_t>(i);
-  return table;
-}
-constexpr auto kValues = values();
 
 }  // namespace
 
 std::string base64(std::string_view bytes) {
-  std::string text;
-  text.reserve((bytes.size() + 2) / 3 * 4);
-  for (std::size_t i = 0; i < bytes.size(); i += 3) {
-    std::uint32_t word = 0;
-    for (std::size_t k = 0; k < 3; ++k)
-      word = word << 8U | (i + k < bytes.size() ? static_cast<unsigned char>(bytes[i + k]) : 0U);
-    for (std::size_t k = 0; k < 4; ++k)
-      text += i + k > bytes.size() ? '=' : kDigits[word >> (18U - 6U * k) & 63U];
-  }
+  std::string text(BASE64_ENCODE_RAW_LENGTH(bytes.size()), '\0');
+  base64_encode_raw(text.data(), bytes.size(), reinterpret_cast<const std::uint8_t*>(bytes.data()));
   return text;
 }
 
 std::optional<std::string> from_base64(std::string_view text) {
-  if (text.size() % 4 != 0) return std::nullopt;
-  std::string bytes;
-  bytes.reserve(text.size() / 4 * 3);
-  const std::size_t pads = text.ends_with("==") ? 2 : text.ends_with("=") ? 1 : 0;
-  std::uint32_t word = 0;
-  for (std::size_t i = 0; i < text.size(); ++i) {
-    const bool is_pad = i + pads >= text.size();
-    const int value = is_pad ? 0 : kValues[static_cast<unsigned char>(text[i])];
-    if (value < 0) return std::nullopt;
-    word = word << 6U | static_cast<std::uint32_t>(value);
-    if (i % 4 != 3) continue;
-    for (const unsigned shift : {16U, 8U, 0U})
-      bytes += static_cast<char>(word >> shift & 255U);
-    word = 0;
-  }
-  bytes.erase(bytes.size() - std::min(pads, bytes.size()));
+  std::string bytes(BASE64_DECODE_LENGTH(text.size()), '\0');
+  std::size_t size = 0;
+  base64_decode_ctx context{};
+  base64_decode_init(&context);
+  if (base64_decode_update(&context, &size, reinterpret_cast<std::uint8_t*>(bytes.data()),
+                           text.size(), text.data()) != 1 ||
+      base64_decode_final(&context) != 1)
+    return std::nullopt;
+  bytes.resize(size);
   return bytes;
 }
 

@@ -78,6 +78,24 @@ Json effect_json(const PooledEffect& effect) {
   return json;
 }
 
+std::string trend_text(const fleet::TypeTrend& trend) {
+  const bool is_bias = trend.shape == model::kShapeCount;
+  return fmt::format("{} {} by {:.3g} ± {:.1g}{} a year, ± {:.2g} between units{}",
+                     is_bias ? "the bias" : model::shapes()[trend.shape].name,
+                     is_bias ? "moves" : "changes", trend.per_year, trend.sigma,
+                     is_bias ? " deg/s" : "", trend.between_units,
+                     trend.varies ? ": each unit its own way" : "");
+}
+
+Json trend_json(const fleet::TypeTrend& trend) {
+  const bool is_bias = trend.shape == model::kShapeCount;
+  return {{"of", is_bias ? "bias_dps" : model::shapes()[trend.shape].name},
+          {"per_year", {digits(trend.per_year), digits(trend.sigma)}},
+          {"between_units", digits(trend.between_units)},
+          {"units", trend.units},
+          {"varies", trend.varies}};
+}
+
 Json unit_json(const fleet::UnitJudgement& unit) {
   Json json{{"unit", unit.identity.unit},
             {"type", unit.identity.type},
@@ -322,6 +340,13 @@ std::string todo_html(const fleet::Judgement& judgement) {
                     escaped(unit.identity.type), escaped(unit.why.front()), advice(unit.status));
   }
   for (const fleet::TypeJudgement& type : judgement.types) {
+    for (const fleet::TypeTrend& trend : type.trends) {
+      any = true;
+      html += fmt::format(
+          "<li>type <b>{}</b>: {}; calibrate again within the time in which that matters, and ask "
+          "again in a month</li>",
+          escaped(type.type), escaped(trend_text(trend)));
+    }
     if (type.effects.empty()) continue;
     any = true;
     html += fmt::format(
@@ -365,7 +390,10 @@ std::string fleet_json(const fleet::Pool& pool, const fleet::Judgement& judgemen
                              {"units", type.units},
                              {"drives", type.drives},
                              {"white_dps_rthz", digits(type.white_dps_rthz)},
-                             {"walk_dps_rts", digits(type.walk_dps_rts)}});
+                             {"walk_dps_rts", digits(type.walk_dps_rts)},
+                             {"trends", Json::array()}});
+    for (const fleet::TypeTrend& trend : type.trends)
+      json["types"].back()["trends"].push_back(trend_json(trend));
     for (const PooledEffect& effect : type.effects)
       json["effects"].push_back(effect_json(effect));
   }
@@ -390,6 +418,8 @@ std::string fleet_page(const fleet::Pool& pool, const fleet::Judgement& judgemen
         "deg/s/√Hz, random walk {:.2g} deg/s/√s</p>",
         escaped(type.type), type.units, type.drives, type.white_dps_rthz, type.walk_dps_rts);
     html += effects_table(type.effects);
+    for (const fleet::TypeTrend& trend : type.trends)
+      html += fmt::format("<p>Over the months {}.</p>", escaped(trend_text(trend)));
   }
   html += "<h2>Units</h2>";
   for (const bool bad : {true, false}) {
@@ -408,6 +438,8 @@ std::string fleet_text(const fleet::Pool& pool, const fleet::Judgement& judgemen
       text += fmt::format("  type {}: {} {}{}, {} drives\n", type.type, shape_of(effect).name,
                           size_text(effect), effect.varies ? ", differs from unit to unit" : "",
                           effect.drives);
+    for (const fleet::TypeTrend& trend : type.trends)
+      text += fmt::format("  type {}: {}\n", type.type, trend_text(trend));
   }
   for (const fleet::UnitJudgement& unit : judgement.units) {
     for (const std::string& why : unit.why)

@@ -42,7 +42,8 @@ class Benchmarks(unittest.TestCase):
         options = {"whiteness.py": ("--stretch", "--lags", "--cell", "--quiet-dps", "--gap"), "throughput.py": ("--rounds", "--core"),
                    "faults": ("--sequences", "--seed", "--kills", "--hours", "--seconds"), "paper_table.py": ("--seeds",),
                    "accuracy": ("--seeds", "--first-seed", "--jobs"), "blind": ("--first-seed", "--limit", "--jobs"),
-                   "blind_units": ("--first-seed", "--limit", "--jobs"), "accuracy_axes": ("--seeds", "--first-seed", "--jobs")}
+                   "blind_units": ("--first-seed", "--limit", "--jobs"), "accuracy_axes": ("--seeds", "--first-seed", "--jobs"),
+                   "fleet.py": ("--rounds", "--drives")}
         for script, names in options.items():
             positional = ("a.toml", "a.log") if script == "whiteness.py" else ()
             for name in names:

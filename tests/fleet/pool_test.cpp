@@ -91,6 +91,17 @@ TEST(Moments, SayMeanScatterAndTrend) {
   EXPECT_NEAR(moments.slope(), 2.0, 1e-5);
   // Residuals 0.4, -0.6, 0.4, -0.6, 0.4: sum of squares 1.2, over 3 and Σ(t - 2)² = 10.
   EXPECT_NEAR(moments.slope_sigma(), std::sqrt(1.2 / 3.0 / 10.0), 1e-5);
+  EXPECT_NEAR(moments.variance_about_line(), 1.2 / 3.0, 1e-5);
+  EXPECT_EQ(moments.freedom_about_line(), 3.0);
+}
+
+TEST(Moments, HaveNoLineWhereAllWasToldAtOnce) {
+  Moments moments;
+  for (const double value : {1.0, 2.0, 3.0})
+    moments.add(value, 4.0);
+  EXPECT_FALSE(moments.has_line());
+  EXPECT_EQ(moments.slope_sigma(), 0.0);
+  EXPECT_NEAR(moments.variance_about_line(), 1.0, 1e-5);
 }
 
 }  // namespace

@@ -110,7 +110,7 @@ class Deb(unittest.TestCase):
 
     def test_depends_on_what_its_programs_load(self):
         depends = output_of("dpkg-deb", "--field", self.deb, "Depends")
-        for library in ("libc6", "libfmt9", "liblzma5", "libnettle8", "libnlopt-cxx0", "libstdc++6", "libsystemd0"):
+        for library in ("libc6", "libfmt9", "liblzma5", "libnettle8", "libnlopt-cxx0", "libsimdjson14", "libstdc++6", "libsystemd0"):
             self.assertRegex(depends, rf"\b{re.escape(library)}\b")
 
     def test_the_packed_programs_are_those_of_the_release_and_run(self):

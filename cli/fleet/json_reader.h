@@ -1,0 +1,46 @@
+#pragma once
+
+// JSON of an evidence file, read without trust: what is missing or of another form is a Fault that
+// names the key. simdjson checks a whole document before anything of it is used, and reads numbers
+// to the nearest double.
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include <simdjson.h>
+
+namespace vgyro::cli {
+
+/// What a file says wrongly; thrown here, and reported with the file's name and line.
+struct Fault {
+  std::string what;
+  std::string remedy = "a file that vgyro gap --evidence or vgyro fleet wrote";
+};
+
+using JsonValue = simdjson::dom::element;
+
+class JsonReader {
+ public:
+  /// The result is good until the next call.
+  JsonValue parse(std::string_view text);
+
+ private:
+  simdjson::dom::parser parser_;
+};
+
+std::optional<JsonValue> find_member(JsonValue object, std::string_view key);
+JsonValue member(JsonValue object, std::string_view key);
+simdjson::dom::array list_of(JsonValue object, std::string_view key);
+/// The list's entry; `key` is the list's.
+JsonValue entry(simdjson::dom::array list, std::size_t at, std::string_view key);
+
+/// `key` names the value in the message.
+std::string_view text_of(JsonValue value, std::string_view key);
+/// Finite.
+double number_of(JsonValue value, std::string_view key);
+std::uint64_t count_of(JsonValue value, std::string_view key);
+
+}  // namespace vgyro::cli
