@@ -34,7 +34,7 @@ constexpr std::array<char, 200> make_decimal_pairs() {
 }
 constexpr auto kDecimalPairs = make_decimal_pairs();
 
-// The lowest `digits` decimal digits of `value`, which has no more.
+// Writes `value`, which has at most `digits` decimal digits.
 template <unsigned digits>
 char* put_decimal(char* out, std::uint32_t value) {
   for (unsigned i = digits; i >= 2; i -= 2) {
@@ -184,7 +184,7 @@ std::size_t LineFormatter::format(char* out, TimePoint stamp, const can::Frame& 
     second_ns_ = ns - ns % kSecond_ns;
     put_seconds(prefix_.data(), second_ns_);
   }
-  // Copies of a fixed size, beyond the text where that is shorter: what follows writes over them.
+  // Copies a fixed size, which may exceed the text: the next fields overwrite the rest.
   std::memcpy(out, prefix_.data(), prefix_.size());
   const auto fraction_ns = static_cast<std::uint32_t>(ns - second_ns_);
   char* at = out + kSecondsTextBytes;

@@ -53,6 +53,7 @@ struct ReplayOptions {
   std::string json;                  ///< "-": standard output; empty: none
   std::string csv;                   ///< "-": standard output; empty: none
   std::string plot;                  ///< empty: none
+  std::string html;                  ///< "-": standard output; empty: none
   std::vector<std::string> bus_map;  ///< "LOGNAME=CONFIGNAME"
   std::vector<std::string> logs;
   unsigned digits = 0;  ///< digits of the output's stamps, 6 or 9; 0: as in the log

@@ -166,6 +166,8 @@ CLI::App* add_replay(CLI::App& app, ReplayOptions& options, std::string& method)
   command->add_option("--csv", options.csv,
                       "rates, sigmas, biases and heading as CSV; - is standard output");
   command->add_option("--plot", options.plot, "picture of rates and drifts: .svg, .png or .pdf");
+  command->add_option("--html", options.html,
+                      "the same as one web page that zooms; - is standard output");
   command
       ->add_option("--map", options.bus_map,
                    "LOGNAME=CONFIGNAME: use the log's interface for one of the\n"
@@ -487,7 +489,8 @@ int run(int argc, char** argv) {
   if (capture->parsed()) return run_capture(options.capture);
   // Frames are the main result: they go to standard output unless a summary or a table does.
   const bool output_given = replay->count("--output") > 0;
-  const bool stdout_taken = options.replay.json == "-" || options.replay.csv == "-";
+  const bool stdout_taken =
+      options.replay.json == "-" || options.replay.csv == "-" || options.replay.html == "-";
   if (!output_given && !stdout_taken) options.replay.output = "-";
   return run_replay(options.replay);
 }

@@ -1,13 +1,9 @@
 #include "cli/gap/report_page.h"
 
-#include <cmath>
-#include <map>
-#include <string_view>
-
-#include <fmt/format.h>
 #include <nlohmann/json.hpp>
-#include <vgyro_report_text.h>
+#include <vgyro_pages_text.h>
 
+#include "cli/page/page.h"
 #include "model/catalogue.h"
 
 namespace vgyro::cli {
@@ -20,26 +16,14 @@ using Json = nlohmann::ordered_json;
 constexpr int kDigits = 6;
 constexpr int kDigitsOfX = 8;
 
-Json number(double value, int digits) {
-  if (!std::isfinite(value)) return nullptr;
-  return std::stod(fmt::format("{:.{}g}", value, digits));
-}
-
-Json numbers(const std::vector<double>& values, int digits) {
-  Json json = Json::array();
-  for (const double value : values)
-    json.push_back(number(value, digits));
-  return json;
-}
-
 Json figure_json(const gap::Figure& figure) {
   Json curves = Json::array();
   for (const gap::Curve& curve : figure.curves) {
     Json json{{"label", curve.label},
               {"points", curve.points},
-              {"x", numbers(curve.x, kDigitsOfX)},
-              {"y", numbers(curve.y, kDigits)}};
-    if (!curve.y_sigma.empty()) json["y_sigma"] = numbers(curve.y_sigma, kDigits);
+              {"x", page_numbers(curve.x, kDigitsOfX)},
+              {"y", page_numbers(curve.y, kDigits)}};
+    if (!curve.y_sigma.empty()) json["y_sigma"] = page_numbers(curve.y_sigma, kDigits);
     curves.push_back(std::move(json));
   }
   return {{"title", figure.title}, {"x_label", figure.x_label}, {"y_label", figure.y_label},
@@ -82,56 +66,21 @@ Json page_data(const GapSubject& subject, const gap::Result& result,
   return json;
 }
 
-// JSON that no HTML parser takes for the end of its script.
-std::string harmless(const Json& json) {
-  const std::string text = json.dump(-1, ' ', false, Json::error_handler_t::replace);
-  std::string safe;
-  safe.reserve(text.size());
-  for (const char c : text) {
-    if (c == '<') {
-      safe += "\\u003c";
-    } else {
-      safe += c;
-    }
-  }
-  return safe;
-}
-
-// The last line, "//# …" or "/*# …", points at a file beside the library that is not there.
-std::string_view without_source_map(std::string_view text) {
-  const std::size_t at = text.rfind("# sourceMappingURL=");
-  return at == std::string_view::npos ? text : text.substr(0, at - 2);
-}
-
-// Each "{{name}}" of the template for its text; what is put in is not looked at again.
-std::string filled(std::string_view page, const std::map<std::string_view, std::string_view>& by) {
-  std::string text;
-  while (true) {
-    const std::size_t open = page.find("{{");
-    if (open == std::string_view::npos) break;
-    const std::size_t close = page.find("}}", open);
-    text += page.substr(0, open);
-    text += by.at(page.substr(open + 2, close - open - 2));
-    page.remove_prefix(close + 2);
-  }
-  text += page;
-  return text;
-}
-
-std::string page_of(const Json& json) {
-  const std::string data = harmless(json);
-  return filled(report::page, {{"style", report::style},
-                               {"script", report::script},
-                               {"library", without_source_map(report::library)},
-                               {"library_style", without_source_map(report::library_style)},
-                               {"data", data}});
+std::string gap_page_of(const Json& json) {
+  return page_of({.title = "vgyro gap report",
+                  .noscript = "This page draws its tables and plots with a script that it holds "
+                              "itself; please allow it. gap.json beside it has the same figures.",
+                  .made_by = "Made by vgyro gap.",
+                  .style = pages::gap_style,
+                  .script = pages::gap_script},
+                 json);
 }
 
 }  // namespace
 
 std::string report_page(const GapSubject& subject, const gap::Result& result,
                         std::span<const AxisResult> axes) {
-  return page_of(page_data(subject, result, axes));
+  return gap_page_of(page_data(subject, result, axes));
 }
 
 std::string overview_page(std::span<const AxisResult> axes) {
@@ -143,7 +92,7 @@ std::string overview_page(std::span<const AxisResult> axes) {
     for (std::size_t k = 0; k < axes[i].judged.effects.size(); ++k)
       axis["effects"][k]["value"] = value_text(axes[i].judged.effects[k]);
   }
-  return page_of(json);
+  return gap_page_of(json);
 }
 
 }  // namespace vgyro::cli

@@ -25,6 +25,7 @@
 #include "cli/output/overwrite.h"
 #include "cli/output/terminal.h"
 #include "cli/output/unfinished.h"
+#include "cli/replay/page.h"
 #include "cli/replay/plot.h"
 #include "cli/replay/rate_table.h"
 #include "cli/replay/summary.h"
@@ -71,7 +72,7 @@ class LineSink final : public gateway::FrameSink {
 
 class Totals final : public gateway::RateObserver {
  public:
-  explicit Totals(ReplaySummary& summary, ReplayPlot* plot) : summary_(summary), plot_(plot) {}
+  explicit Totals(ReplaySummary& summary, Course* course) : summary_(summary), course_(course) {}
   void on_rate(TimePoint t, const std::array<double, 2>& raw_dps, double virtual_dps) override {
     if (!begun_) first_ = t;
     if (begun_ && t - last_ > kGap) {
@@ -79,7 +80,7 @@ class Totals final : public gateway::RateObserver {
     }
     begun_ = true;
     last_ = t;
-    if (plot_ != nullptr) plot_->add_rate(t, raw_dps, virtual_dps);
+    if (course_ != nullptr) course_->add_rate(t, raw_dps, virtual_dps);
     if (std::isnan(virtual_dps)) return;
     summary_.rate_sum_dps += virtual_dps;
     ++summary_.rates;
@@ -91,14 +92,14 @@ class Totals final : public gateway::RateObserver {
   }
 
   void on_condition(TimePoint t, const fusion::Condition& condition) override {
-    if (plot_ != nullptr) plot_->add_condition(t, condition);
+    if (course_ != nullptr) course_->add_condition(t, condition);
   }
 
  private:
   static constexpr Duration kGap = std::chrono::milliseconds(500);
   static_assert(ReplaySummary::kGap_s == 0.5);
   ReplaySummary& summary_;
-  ReplayPlot* plot_;
+  Course* course_;
   bool begun_ = false;
   TimePoint first_;
   TimePoint last_;
@@ -107,20 +108,20 @@ class Totals final : public gateway::RateObserver {
 /// Of one axis of several.
 class AxisTotals final : public gateway::RateObserver {
  public:
-  AxisTotals(AxisSummary& summary, ReplayPlot* plot) : summary_(&summary), plot_(plot) {}
+  AxisTotals(AxisSummary& summary, Course* course) : summary_(&summary), course_(course) {}
   void on_rate(TimePoint t, const std::array<double, 2>& raw_dps, double virtual_dps) override {
-    if (plot_ != nullptr) plot_->add_rate(t, raw_dps, virtual_dps);
+    if (course_ != nullptr) course_->add_rate(t, raw_dps, virtual_dps);
     if (std::isnan(virtual_dps)) return;
     summary_->rate_sum_dps += virtual_dps;
     ++summary_->rates;
   }
   void on_condition(TimePoint t, const fusion::Condition& condition) override {
-    if (plot_ != nullptr) plot_->add_condition(t, condition);
+    if (course_ != nullptr) course_->add_condition(t, condition);
   }
 
  private:
   AxisSummary* summary_;
-  ReplayPlot* plot_;
+  Course* course_;
 };
 
 // Interface names of the log → indices of the plan, through the user's --map.
@@ -178,13 +179,14 @@ class Replay {
  public:
   Replay(const ReplayOptions& options, const gateway::Plan& plan, OutputFile& output, BusMap buses)
       : options_(options),
-        is_drawn_(!options.plot.empty()),
+        is_drawn_(!options.plot.empty() || !options.html.empty()),
         output_(output),
         buses_(std::move(buses)),
         pipeline_(plan),
         sink_(output, plan),
-        plots_(std::max<std::size_t>(pipeline_.axis_count(), 1)),
-        totals_(summary_, options.plot.empty() ? nullptr : &plots_.front()) {
+        courses_(std::max<std::size_t>(pipeline_.axis_count(), 1),
+                 Course(options.html.empty() ? kPlotBuckets : kPageBuckets)),
+        totals_(summary_, is_drawn_ ? &courses_.front() : nullptr) {
     if (pipeline_.axis_count() == 0) pipeline_.observe(&totals_);
     observe_axes(plan);
   }
@@ -234,7 +236,7 @@ class Replay {
   }
 
   /// One, or one for each axis.
-  const std::vector<ReplayPlot>& plots() const { return plots_; }
+  const std::vector<Course>& courses() const { return courses_; }
 
  private:
   void observe_axes(const gateway::Plan& plan) {
@@ -242,7 +244,7 @@ class Replay {
     summary_.axes.resize(count);
     for (std::size_t place = 0; place < count; ++place) {
       summary_.axes[place].name = gateway::kAxisNames[plan.axes[place].axis];
-      axis_totals_.emplace_back(summary_.axes[place], is_drawn_ ? &plots_[place] : nullptr);
+      axis_totals_.emplace_back(summary_.axes[place], is_drawn_ ? &courses_[place] : nullptr);
     }
     for (std::size_t place = 0; place < count; ++place)
       pipeline_.observe(&axis_totals_[place], place);
@@ -291,8 +293,9 @@ class Replay {
     const gateway::Status& status = pipeline_.status();
     if (status.biases_out == biases_seen_) return;
     biases_seen_ = status.biases_out;
-    for (std::size_t i = 0; i < plots_.size(); ++i)
-      plots_[i].add_status(stamp, pipeline_.axis_count() == 0 ? status : pipeline_.axis_status(i));
+    for (std::size_t i = 0; i < courses_.size(); ++i)
+      courses_[i].add_status(stamp,
+                             pipeline_.axis_count() == 0 ? status : pipeline_.axis_status(i));
     follow_sigma(stamp);
   }
 
@@ -302,14 +305,14 @@ class Replay {
     sigma_seen_ = stamp;
     const std::optional<gateway::SavedState> known = pipeline_.memory();
     if (!known) return;
-    const auto show = [&](ReplayPlot& plot, const fusion::DriftMemory& drift) {
-      plot.add_bias_sigma(
+    const auto show = [&](Course& course, const fusion::DriftMemory& drift) {
+      course.add_bias_sigma(
           stamp, {std::sqrt(drift.bias_covariance[0]), std::sqrt(drift.bias_covariance[2])});
     };
-    if (pipeline_.axis_count() == 0) return show(plots_.front(), known->drift);
+    if (pipeline_.axis_count() == 0) return show(courses_.front(), known->drift);
     for (const gateway::SavedState& axis : known->axes) {
-      for (std::size_t i = 0; i < plots_.size(); ++i) {
-        if (summary_.axes[i].name == gateway::kAxisNames[axis.axis]) show(plots_[i], axis.drift);
+      for (std::size_t i = 0; i < courses_.size(); ++i) {
+        if (summary_.axes[i].name == gateway::kAxisNames[axis.axis]) show(courses_[i], axis.drift);
       }
     }
   }
@@ -322,7 +325,7 @@ class Replay {
   gateway::Pipeline pipeline_;
   LineSink sink_;
   ReplaySummary summary_;
-  std::vector<ReplayPlot> plots_;  ///< one, or one for each axis
+  std::vector<Course> courses_;  ///< one, or one for each axis
   Totals totals_;
   std::vector<AxisTotals> axis_totals_;
   bool first_ = true;
@@ -416,7 +419,7 @@ Expected<void> check_files(const ReplayOptions& options, const gateway::Plan& pl
   inputs.insert(inputs.end(), options.logs.begin(), options.logs.end());
   inputs.push_back(options.state);
   std::vector<std::string> outputs = pictures_of(options, plan);
-  outputs.insert(outputs.end(), {options.output, options.json, options.csv});
+  outputs.insert(outputs.end(), {options.output, options.json, options.csv, options.html});
   return check_outputs(inputs, outputs);
 }
 
@@ -552,8 +555,19 @@ std::string picture_name_of(std::vector<std::string> logs) {
   return name_of(logs);
 }
 
+Expected<void> write_page(const ReplayOptions& options, const gateway::Plan& plan,
+                          const ReplaySummary& summary, const std::vector<Course>& courses,
+                          OutputFile& file) {
+  if (options.html.empty()) return {};
+  const auto page =
+      replay_page({picture_name_of(options.logs), options.config}, plan, summary, courses);
+  if (!page) return fail(options.html, page.error().what);
+  file.write(*page);
+  return file.close();
+}
+
 int write_results(const ReplayOptions& options, const gateway::Plan& plan,
-                  const ReplaySummary& summary, const std::vector<ReplayPlot>& plots) {
+                  const ReplaySummary& summary, const std::vector<Course>& courses) {
   if (!options.json.empty()) {
     // A log's interface names may be any bytes.
     const auto done = write_json(options.json, to_json(summary, plan));
@@ -561,12 +575,13 @@ int write_results(const ReplayOptions& options, const gateway::Plan& plan,
   }
   if (!options.quiet) put_text(stderr, to_text(summary, plan));
   const std::vector<std::string> pictures = pictures_of(options, plan);
-  for (std::size_t i = 0; !options.plot.empty() && i < plots.size(); ++i) {
+  for (std::size_t i = 0; !options.plot.empty() && i < courses.size(); ++i) {
     const gateway::Plan& drawn = plan.axes.empty() ? plan : plan.axes[i];
     const PlotTexts texts{fmt::format("{}{}, method {}", picture_name_of(options.logs),
                                       about_axis(drawn), gateway::to_string(plan.corrector.method)),
                           {plan.gyros[0].name, plan.gyros[1].name}};
-    if (const auto done = plots[i].draw(pictures[i], texts); !done) return report(done.error());
+    const auto done = draw_plot(courses[i].coarser(kPlotBuckets), pictures[i], texts);
+    if (!done) return report(done.error());
   }
   return kDone;
 }
@@ -619,6 +634,9 @@ int run_replay(const ReplayOptions& options) {
   if (!output) return report(output.error());
   auto table = open_table(options.csv, plan);
   if (!table) return report(table.error());
+  // Before an hour of work: can the page be written?
+  auto page = OutputFile::open(options.html);
+  if (!page) return report(page.error());
 
   // What is read from a pipe ends with its writer.
   const FinishOnInterrupt finish(std::count(options.logs.begin(), options.logs.end(), "-") > 0);
@@ -635,7 +653,9 @@ int run_replay(const ReplayOptions& options) {
     if (const auto closed = (*table)->close(); !closed) return report(closed.error());
   }
   if (!trouble) trouble = explain_silence(summary, plan, name_of(options.logs));
-  const int written = write_results(options, plan, summary, replay.plots());
+  int written = write_results(options, plan, summary, replay.courses());
+  const auto shown = write_page(options, plan, summary, replay.courses(), *page);
+  if (!shown) written = report(shown.error());
   warn_of_doubts(summary, plan);
   warn_of_data(summary, plan);
   warn_of_weakness(summary, plan);

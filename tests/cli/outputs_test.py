@@ -46,6 +46,7 @@ class Outputs(bench.Bench):
         return (
             (*replay, "-o", output, "in.log"), (*replay, "--json", output, "-o", "x.log", "in.log"),
             (*replay, "--plot", output, "-o", "x.log", "in.log"), (*replay, "--csv", output, "-o", "x.log", "in.log"),
+            (*replay, "--html", output, "-o", "x.log", "in.log"),
             ("allan", *config, "--json", output, "in.log"), ("allan", *config, "--plot", output, "in.log"),
             ("compare", "-q", *config, "--model", "model.toml", "--measured", "in.log", "--json", output),
             ("simulate", "-q", *config, "--model", "model.toml", "--profile", "profile.csv", "-o", output),
@@ -91,6 +92,7 @@ class Outputs(bench.Bench):
         # Whether the file exists already or not.
         for first, second in (("a.svg", "a.svg"), ("a.svg", "./a.svg"), ("b.svg", "b.svg")):
             for call in (("replay", "-q", "-o", first, "--plot", second, "in.log"), ("replay", "-o", first, "--json", second, "in.log"),
+                         ("replay", "-q", "-o", first, "--html", second, "in.log"),
                          ("allan", "--json", first, "--plot", second, "in.log")):
                 with self.subTest(call):
                     self.assertIn("is also another output", self.bad(call[0], "--config", "vgyro.toml", *call[1:]))

@@ -2,76 +2,24 @@
 """The report page of a made-up result, in headless Chromium: it draws every plot, logs no error, fetches nothing,
 and treats no name as markup. Without Chromium only its text is checked, and the test counts as skipped."""
 
-import html
-import json
 import math
 import os
 import re
-import shutil
 import subprocess
 import sys
-import tempfile
 import unittest
 from pathlib import Path
 
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+import browser  # noqa: E402
+
 SOURCE = Path(os.environ.get("VGYRO_SOURCE", Path(__file__).resolve().parents[2]))
 BIN = Path(os.environ.get("VGYRO_BIN", SOURCE / "build/release/bin"))
-CHROMIUM = shutil.which("chromium")
 SKIPPED = 77
 
 HOSTILE = "</script><img src=x onerror=\"console.error('in')\">&amp; {{data}}"
 
-# Runs before everything else on the page: records errors.
-LISTENER = """<script>
-window.problems = [];
-for (const kind of ["error", "warn"]) console[kind] = (...what) => problems.push(kind + ": " + what.join(" "));
-addEventListener("error", (event) => problems.push("uncaught: " + event.message), true);
-addEventListener("unhandledrejection", (event) => problems.push("rejected: " + event.reason));
-addEventListener("securitypolicyviolation", (event) => problems.push("policy: " + event.violatedDirective));
-</script>"""
-
-# Runs after the page: records what is visible. Pixels are counted by the colour that the curve's role has in the style.
-PROBE = """<script>
-addEventListener("load", () => setTimeout(() => {
-  const rgb = (name) => {
-    const probe = document.body.appendChild(document.createElement("i"));
-    probe.style.color = `var(--${name})`;
-    const parts = getComputedStyle(probe).color.match(/\\d+/g).map(Number);
-    probe.remove();
-    return parts;
-  };
-  const painted = (canvases, [r, g, b]) => {
-    let count = 0;
-    for (const canvas of canvases) {
-      const pixels = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height).data;
-      for (let i = 0; i < pixels.length; i += 4) {
-        const off = Math.abs(pixels[i] - r) + Math.abs(pixels[i + 1] - g) + Math.abs(pixels[i + 2] - b);
-        if (off < 24 && pixels[i + 3] > 160) ++count;
-      }
-    }
-    return count;
-  };
-  const roles = ["before", "after", "simulated"];
-  const charts = [...document.querySelectorAll(".chart")];
-  const seen = {
-    problems: window.problems,
-    painted: charts.map((chart) => roles.map((role) => painted(chart.querySelectorAll("canvas"), rgb(role)))),
-    text: document.body.innerText, title: document.title, images: document.images.length,
-    background: getComputedStyle(document.body).backgroundColor,
-    overflow: document.documentElement.scrollWidth - innerWidth,
-    cut: [...document.querySelectorAll(".scroll, figure")].filter((box) => box.scrollWidth > box.clientWidth + 1).map((box) => box.innerText.slice(0, 60)),
-  };
-  seen.links = [...document.querySelectorAll("main a")].map((link) => link.getAttribute("href"));
-  const press = (key) => charts[0].dispatchEvent(new KeyboardEvent("keydown", { key, bubbles: true }));
-  const range = () => plots[0].chart.xAxisRange();
-  seen.ranges = charts.length > 0 ? [range()] : [];
-  for (const key of charts.length > 0 ? ["+", "ArrowRight", "Escape"] : []) { press(key); seen.ranges.push(range()); }
-  const out = document.createElement("pre");
-  out.id = "seen";
-  out.textContent = JSON.stringify(seen);
-  document.body.append(out);
-}, 300));
-</script>"""
+ROLES = ["before", "after", "simulated"]
 
 
 class Page(unittest.TestCase):
@@ -82,38 +30,21 @@ class Page(unittest.TestCase):
         cls.page = subprocess.run([BIN / "report_page_sample"], stdout=subprocess.PIPE, check=True, timeout=60).stdout.decode()
 
     def look(self, width=1200, *options):
-        """The result of the probe in a window of this width."""
-        if not CHROMIUM:
+        """What the probe saw in a window of this width."""
+        if not browser.CHROMIUM:
             self.skipTest("chromium is not installed")
         if (width, options) not in self.seen:
             self.seen[width, options] = self.visit(width, *options)
         return self.seen[width, options]
 
     def visit(self, width, *options, page=None):
-        with tempfile.TemporaryDirectory(prefix="vgyro-page-") as folder:
-            path = Path(folder) / "report.html"
-            page = (page or self.page).replace('<meta charset="utf-8">', '<meta charset="utf-8">' + LISTENER, 1)
-            path.write_text(page.replace("</body>", PROBE + "</body>"))
-            done = subprocess.run(
-                [CHROMIUM, "--headless=new", "--no-sandbox", "--disable-gpu", f"--user-data-dir={folder}/profile", "--no-first-run",
-                 "--enable-logging=stderr", f"--window-size={width},2000", "--virtual-time-budget=5000", *options, "--dump-dom", path.as_uri()],
-                capture_output=True, check=True, timeout=100)
-        said = [line for line in done.stderr.decode(errors="replace").splitlines() if "CONSOLE" in line]
-        self.assertEqual([line for line in said if "willReadFrequently" not in line], [])  # this warning comes from the probe, which reads canvases
-        found = re.search(r'<pre id="seen">(.*?)</pre>', done.stdout.decode(), re.DOTALL)
-        self.assertTrue(found, "the page did not come to its end")
-        return json.loads(html.unescape(found.group(1)))
+        return browser.visit(page or self.page, ROLES, width, *options)
 
     def test_holds_everything_itself(self):
-        # The page is mailed and archived, so it must be complete by itself.
-        without_data = re.sub(r'<script type="application/json".*?</script>', "", self.page, flags=re.DOTALL)
-        self.assertEqual(re.findall(r'<(?:script|img|iframe|link)[^>]*\s(?:src|href)="(?!data:)', without_data), [])
-        self.assertEqual(re.findall(r"url\(\s*['\"]?(?!data:)[a-z]+:", without_data), [])
-        self.assertIn("default-src 'none'", self.page)
-        self.assertNotIn("sourceMappingURL", self.page)
+        browser.needs_nothing_else(self, self.page)
 
     def test_data_is_the_json_of_the_result(self):
-        data = json.loads(re.search(r'<script type="application/json" id="data">(.*?)</script>', self.page, re.DOTALL).group(1))
+        data = browser.data_of(self.page)
         self.assertEqual(data["gyros"], [HOSTILE, "b"])
         self.assertEqual(data["effects"][0]["kind"], "scale_factor")
         self.assertEqual(len(data["figures"]), 2)
@@ -123,7 +54,7 @@ class Page(unittest.TestCase):
         self.assertEqual(seen["problems"], [])
         self.assertEqual(len(seen["painted"]), 2 + 2 * 3)
         for number, plot in enumerate(seen["painted"]):
-            for role, pixels in zip(("before", "after", "simulated"), plot):
+            for role, pixels in zip(ROLES, plot):
                 self.assertGreater(pixels, 40, f"plot {number} does not show {role}")
 
     def test_tells_the_whole_story(self):
@@ -135,8 +66,8 @@ class Page(unittest.TestCase):
 
     def test_the_first_page_of_several_axes_leads_to_each(self):
         page = subprocess.run([BIN / "report_page_sample", "axes"], stdout=subprocess.PIPE, check=True, timeout=60).stdout.decode()
-        self.assertEqual(len(json.loads(re.search(r'<script type="application/json" id="data">(.*?)</script>', page, re.DOTALL).group(1))["axes"]), 2)
-        if not CHROMIUM:
+        self.assertEqual(len(browser.data_of(page)["axes"]), 2)
+        if not browser.CHROMIUM:
             self.skipTest("chromium is not installed")
         seen = self.visit(1200, page=page)
         self.assertEqual(seen["problems"], [])
@@ -192,14 +123,9 @@ class Page(unittest.TestCase):
             self.assertIn(part, text)
 
     def test_prints_on_four_pages(self):
-        if not CHROMIUM:
+        if not browser.CHROMIUM:
             self.skipTest("chromium is not installed")
-        with tempfile.TemporaryDirectory(prefix="vgyro-page-") as folder:
-            path = Path(folder) / "report.html"
-            path.write_text(self.page)
-            subprocess.run([CHROMIUM, "--headless=new", "--no-sandbox", "--disable-gpu", f"--user-data-dir={folder}/profile", "--no-first-run",
-                            "--virtual-time-budget=5000", f"--print-to-pdf={folder}/report.pdf", path.as_uri()], capture_output=True, check=True, timeout=100)
-            pages = len(re.findall(rb"/Type\s*/Page\b", (Path(folder) / "report.pdf").read_bytes()))
+        pages = browser.pages_printed(self.page)
         self.assertTrue(1 <= pages <= 4, pages)
 
 

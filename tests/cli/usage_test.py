@@ -11,7 +11,7 @@ COMMANDS = {
     "check": {"CONFIG", "--method", "--model"},
     "decode": {"--dbc", "--text", "LOG"},
     "allan": {"--config", "--axis", "--evidence", "--json", "--plot", "LOG"},
-    "replay": {"--config", "--method", "--model", "--state", "-o", "--output", "--json", "--csv", "--plot", "--map", "--digits", "-q", "--quiet",
+    "replay": {"--config", "--method", "--model", "--state", "-o", "--output", "--json", "--csv", "--plot", "--html", "--map", "--digits", "-q", "--quiet",
                "LOG"},
     "compare": {"--config", "--model", "--measured", "--axis", "--json", "--seed", "-q", "--quiet"},
     "gap": {"--config", "--model", "--measured", "--axis", "--out", "--accept", "--evidence", "--time-limit", "--seed", "-q", "--quiet"},

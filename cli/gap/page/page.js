@@ -1,60 +1,7 @@
 "use strict";
-// Draws the report from the data in the page. User's text goes through textContent only.
+// Draws the gap report from the data in the page.
 
-const data = JSON.parse(document.getElementById("data").textContent);
 const SIGMAS = 2; // what bars and bands show
-
-// --- small helpers ------------------------------------------------------------------------------
-
-function make(tag, attributes, ...children) {
-  const node = document.createElement(tag);
-  for (const [name, value] of Object.entries(attributes || {})) node.setAttribute(name, value);
-  for (const child of children.flat()) node.append(child);
-  return node;
-}
-
-function drawing(tag, attributes, text) {
-  const node = document.createElementNS("http://www.w3.org/2000/svg", tag);
-  for (const [name, value] of Object.entries(attributes || {})) node.setAttribute(name, value);
-  if (text !== undefined) node.textContent = text;
-  return node;
-}
-
-function number(value, digits) {
-  if (!Number.isFinite(value)) return "–";
-  if (value === 0) return "0";
-  const size = Math.abs(value);
-  const rounded = Number(value.toPrecision(digits));
-  const text = size < 1e-3 || size >= 1e5 ? rounded.toExponential() : String(rounded);
-  return text.replace(/^-/, "−").replace("e-", "e−").replace("e+", "e");
-}
-
-function escaped(text) {
-  const holder = document.createElement("span");
-  holder.textContent = text;
-  return holder.innerHTML;
-}
-
-function colour(name) {
-  return getComputedStyle(document.documentElement).getPropertyValue("--" + name).trim();
-}
-
-// A name of the catalogue breaks after its "_", never inside a word.
-const breakable = (name) => name.split(/(?<=_)/).flatMap((part, i) => (i > 0 ? [make("wbr"), part] : [part]));
-const kindCell = (kind) => ({ kind: breakable(kind) });
-
-// A cell is a text, a node, { number } or { kind }.
-function tableCell(part, label) {
-  const named = { "data-label": label };
-  if (typeof part !== "object" || part instanceof Node) return make("td", label ? named : {}, part);
-  return "kind" in part ? make("td", { class: "kind", ...named }, part.kind) : make("td", { class: "number", ...named }, part.number);
-}
-
-function table(head, rows) {
-  return make("div", { class: "scroll" }, make("table", {},
-    make("thead", {}, make("tr", {}, head.map((text) => make("th", {}, text)))),
-    make("tbody", {}, rows.map((row) => make("tr", {}, row.map((part, i) => tableCell(part, head[i])))))));
-}
 
 const sentence = (text) => text.replace(/^what /, "What ").replace(/\.?$/, "."); // it may begin with a sensor's name
 const gyroName = (gyro) => (gyro ? data.gyros[gyro - 1] : "the reference");
@@ -146,7 +93,7 @@ function gapFigure() {
   const at = gapScale(rows, left, right);
   const [low, high] = data.gap.band95.map(at);
   svg.append(drawing("rect", { x: low, y: top - 14, width: Math.max(high - low, 1), height: bottom - top + 14, style: "fill: var(--band)" }));
-  svg.append(drawing("text", { x: (low + high) / 2, y: top - 18, "text-anchor": "middle", class: "soft" }, "as good as it gets"));
+  svg.append(drawing("text", { x: (low + high) / 2, y: top - (narrow ? 32 : 18), "text-anchor": "middle", class: "soft" }, "as good as it gets"));
   for (const tick of gapTicks(at, left, right)) {
     svg.append(drawing("line", { x1: tick.x, x2: tick.x, y1: top - 14, y2: bottom, style: "stroke: var(--line)" }));
     svg.append(drawing("text", { x: tick.x, y: bottom + 16, "text-anchor": "middle", class: "soft" }, number(tick.value, 2)));
@@ -258,6 +205,25 @@ function roleOf(label) {
   return "other";
 }
 
+function pointPlotter(event) {
+  const ctx = event.drawingContext;
+  ctx.save();
+  ctx.strokeStyle = ctx.fillStyle = event.color;
+  for (const point of event.points) {
+    if (!Number.isFinite(point.canvasy)) continue;
+    ctx.globalAlpha = 0.45;
+    ctx.beginPath();
+    ctx.moveTo(point.canvasx, event.dygraph.toDomYCoord(point.yval_minus));
+    ctx.lineTo(point.canvasx, event.dygraph.toDomYCoord(point.yval_plus));
+    ctx.stroke();
+    ctx.globalAlpha = 0.9;
+    ctx.beginPath();
+    ctx.arc(point.canvasx, point.canvasy, 2.2, 0, 2 * Math.PI);
+    ctx.fill();
+  }
+  ctx.restore();
+}
+
 // Curves of their own x → rows for dygraphs: one x, then one [low, mid, high] for each curve.
 function rowsOf(curves, logY) {
   const marks = [];
@@ -279,25 +245,6 @@ function rowsOf(curves, logY) {
     row[mark.column + 1] = mark.bar;
   }
   return rows;
-}
-
-function pointPlotter(event) {
-  const ctx = event.drawingContext;
-  ctx.save();
-  ctx.strokeStyle = ctx.fillStyle = event.color;
-  for (const point of event.points) {
-    if (!Number.isFinite(point.canvasy)) continue;
-    ctx.globalAlpha = 0.45;
-    ctx.beginPath();
-    ctx.moveTo(point.canvasx, event.dygraph.toDomYCoord(point.yval_minus));
-    ctx.lineTo(point.canvasx, event.dygraph.toDomYCoord(point.yval_plus));
-    ctx.stroke();
-    ctx.globalAlpha = 0.9;
-    ctx.beginPath();
-    ctx.arc(point.canvasx, point.canvasy, 2.2, 0, 2 * Math.PI);
-    ctx.fill();
-  }
-  ctx.restore();
 }
 
 function logTicks(from, to) {
@@ -328,32 +275,10 @@ function paint(curves) {
   return { colors: curves.map((curve) => colour(roleOf(curve.label))), gridLineColor: colour("line"), axisLineColor: colour("soft") };
 }
 
-const plots = [];
-
-function zoom(chart, factor, shift, log) {
-  const scale = log ? Math.log : (v) => v, back = log ? Math.exp : (v) => v;
-  const [from, to] = chart.xAxisRange().map(scale);
-  const middle = (from + to) / 2 + shift * (to - from), half = ((to - from) / 2) * factor;
-  chart.updateOptions({ dateWindow: [back(middle - half), back(middle + half)] });
-}
-
-function listenToKeys(host, chart, log) {
-  const act = {
-    "+": () => zoom(chart, 0.5, 0, log), "-": () => zoom(chart, 2, 0, log),
-    ArrowLeft: () => zoom(chart, 1, -0.2, log), ArrowRight: () => zoom(chart, 1, 0.2, log),
-    Escape: () => chart.resetZoom(), 0: () => chart.resetZoom(),
-  };
-  host.addEventListener("keydown", (event) => {
-    if (!act[event.key] || event.ctrlKey || event.metaKey || event.altKey) return;
-    event.preventDefault();
-    act[event.key]();
-  });
-}
-
 function plot(figure) {
   const legend = make("div", { class: "legend" });
   const host = make("div", { class: "chart", tabindex: "0", role: "img", "aria-label": figure.title });
-  const node = make("figure", { class: "plot" }, make("figcaption", {}, figure.title), legend, host);
+  const node = make("figure", { class: "plot" }, make("figcaption", {}, figure.title), legend, framed(host));
   const curves = figure.curves.filter((curve) => curve.x.length > 0)
     .map((curve, i) => ({ ...curve, i }))
     .sort((a, b) => ROLES.indexOf(roleOf(a.label)) - ROLES.indexOf(roleOf(b.label)) || a.i - b.i);
@@ -388,20 +313,6 @@ function draw(entry) {
 
 function repaint() {
   for (const { chart, curves } of plots) chart.updateOptions(paint(curves));
-}
-
-// A canvas that is drawn anew while the page is being printed stays white, so it is only scaled.
-function fitPaper() {
-  const PAPER_PX = 400, GROW_MOST = 1.0;
-  for (const { host } of plots) {
-    const wide = host.offsetWidth, high = host.offsetHeight;
-    const scale = Math.min(GROW_MOST, PAPER_PX / wide);
-    host.style.cssText = `width: ${wide}px; transform: scale(${scale}); transform-origin: 0 0; margin-bottom: ${(scale - 1) * high}px`;
-  }
-}
-
-function leavePaper() {
-  for (const { host } of plots) host.style.cssText = "";
 }
 
 // --- the page -----------------------------------------------------------------------------------
@@ -515,6 +426,5 @@ window.addEventListener("resize", () => {
   wasNarrow = isNarrow;
   document.getElementById("gap").replaceWith(gapFigure());
 });
-window.addEventListener("beforeprint", fitPaper);
-window.addEventListener("afterprint", leavePaper);
-window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", repaint);
+watchPaper(480); // px of a plot's width, so that a report of two gyros takes four pages
+darkness.addEventListener("change", repaint);
