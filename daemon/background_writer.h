@@ -1,7 +1,7 @@
 #pragma once
 
-// Writes texts in a thread of its own, for a disk may take its time and a rate that waits for it is
-// worth nothing. Of several texts the newest is written.
+// Writes texts in a separate thread, because a disk may be slow and no rate may wait for it. If
+// texts come faster than they are written, only the newest is.
 
 #include <condition_variable>
 #include <functional>
@@ -18,7 +18,7 @@ class BackgroundWriter {
  public:
   using Write = std::function<Expected<void>(const std::string&)>;
 
-  /// The thread begins with the first text; `write` runs there.
+  /// `write` runs in the thread, which starts with the first text.
   explicit BackgroundWriter(Write write) : write_(std::move(write)) {}
   BackgroundWriter(const BackgroundWriter&) = delete;
   BackgroundWriter& operator=(const BackgroundWriter&) = delete;

@@ -21,7 +21,7 @@ Expected<void> Bus::open() {
         tell(Severity::kError, "interface_unusable", "{}", socket.error().message());
       return tl::unexpected(socket.error());
     }
-    // After a removal there was a line already.
+    // close_dead() has already logged a removal.
     if (!std::exchange(told_of_absence_, true) && !was_open_) {
       tell(Severity::kWarning, "interface_absent", "{}; waiting for it", socket.error().message());
     }
@@ -64,7 +64,7 @@ Arrival Bus::peek() {
   return {&received.frame, next_stamp_};
 }
 
-// The kernel's stamp, or the time of reading where that is no time of arrival.
+// The kernel's stamp, or the time of reading if that stamp is not the time of arrival.
 TimePoint Bus::software_stamp(TimePoint kernels) {
   if (kernels != TimePoint{} && arrivals_.is_near(kernels)) return kernels;
   if (!std::exchange(clocks_are_fresh_, true)) turn_clock_->begin_turn();
@@ -86,7 +86,8 @@ bool Bus::refill() {
   switch (batch_.status) {
     case can::ReceiveStatus::kMore:
     case can::ReceiveStatus::kDrained:
-      // What comes through a link that was down may be another bus's.
+      // While its link was down, the interface may have been renamed: these frames may be of
+      // another bus.
       if (down_ && !batch_.frames.empty() && !look_after_link()) lose_interface();
       break;
     case can::ReceiveStatus::kLinkDown:
@@ -104,11 +105,11 @@ bool Bus::refill() {
 
 can::SendResult Bus::send(const can::Frame& frame) {
   if (!socket_) return can::SendResult::kLinkDown;
-  // Not closed here: the frame that caused this one may lie in the socket's batch.
+  // The socket is not closed here: its batch may hold the frame that `frame` answers.
   if (down_) look_after_link();
   if (down_) return can::SendResult::kLinkDown;
   const can::SendResult result = socket_->send(frame);
-  // Whoever asks the socket first after the link went down is told of it, and nobody after that.
+  // The socket reports that the link went down only once, to the first send() or receive().
   if (result == can::SendResult::kLinkDown) link_went_down();
   return result;
 }
@@ -127,14 +128,14 @@ void Bus::link_came_up() {
        carries_fd_ ? ", CAN FD" : "");
 }
 
-// Each time counts, also where it was up in between for less than a look.
+// Counts every report, even if the link was up again only between two looks.
 void Bus::link_went_down() {
   ++downs_;
   if (std::exchange(down_, true)) return;
   tell(Severity::kWarning, "link_down", "{}: link went down", name_);
 }
 
-// It was removed, went to another network namespace, or has another name now.
+// The interface was removed, moved to another network namespace, or renamed.
 void Bus::lose_interface() {
   if (!std::exchange(down_, true)) ++downs_;
   const std::string name_now = socket_->name_now();
@@ -146,7 +147,7 @@ void Bus::lose_interface() {
 void Bus::close_dead(const std::string& what_now) {
   tell(Severity::kWarning, "interface_lost", "{}: {}", name_, what_now);
   lost_before_ += socket_->drops();
-  // The batch lives in the socket, and nothing more can come from it.
+  // The batch refers to memory of the socket.
   batch_ = {};
   more_ = false;
   socket_.reset();

@@ -1,8 +1,8 @@
 #pragma once
 
-// One interface as the loop sees it: its socket while there is one, the frames read from it and not
-// yet handed on, and what is known of the link. A link that is down or gone is never fatal. An
-// interface that is renamed is gone: what has its name now is another bus.
+// One CAN interface of the gateway: its socket while there is one, the frames read but not yet
+// taken, and the state of the link. A link that is down or gone is never fatal. A renamed interface
+// counts as removed: an interface that later takes its name is another bus.
 
 #include <cstdint>
 #include <optional>
@@ -31,8 +31,8 @@ struct Arrival {
 
 class Bus final : public can::Transmitter {
  public:
-  /// Without filters the bus is only written to. `own` are the identifiers that the gateway sends
-  /// here; they belong into the filters too. The clock stands in where the kernel gives no stamp.
+  /// Without filters the bus is only written to. `own` holds the identifiers that the gateway sends
+  /// here; the filters must include them too. `clock` gives the time where the kernel has no stamp.
   Bus(std::string name, std::vector<can::Filter> filters, IdentifierWatch own,
       can::SocketOptions options, TurnClock& clock, Log& log);
 
@@ -40,55 +40,56 @@ class Bus final : public can::Transmitter {
   /// reported once, and is_open() stays false. An unusable device of that name is an error.
   Expected<void> open();
 
-  /// Poll reported something: read again when peek() runs dry, but not without end.
+  /// Call when poll reports data: peek() then reads further batches, at most kReadsPerCycle.
   void begin_reading() { reads_left_ = kReadsPerCycle; }
 
-  /// The oldest frame not yet taken; its frame is null when there is none for now. Error frames,
-  /// and foreign frames with our identifiers, are kept here.
+  /// The oldest frame not yet taken; `frame` is null if there is none for now. Skips error frames
+  /// and frames with our identifiers, which are only counted.
   Arrival peek();
   void take() {
     ++next_;
     ++received_;
   }
 
-  /// Many came at once: the socket was not read for a while.
+  /// Many frames came in one batch: the socket was not read for a while.
   [[nodiscard]] bool is_behind() const { return batch_.frames.size() > kFewFrames; }
 
-  /// Nothing is left in the kernel as far as is known.
+  /// The last read left no frame in the kernel.
   [[nodiscard]] bool drained() const { return !more_; }
 
-  /// While the link is down nothing is tried before the kernel has said that it is up again, and is
-  /// still the one that the name means.
+  /// While the link is down, sends nothing until the kernel reports that the link is up and that
+  /// the name still refers to this interface.
   can::SendResult send(const can::Frame& frame) override;
 
-  /// Throws away what the kernel holds.
+  /// Drops the frames that wait in the kernel.
   void discard() {
     for (begin_reading(); peek().frame != nullptr;)
       take();
   }
 
-  /// To be called about once a second, with nothing left to take: looks after the link.
+  /// To be called about once a second, when no frame is left to take: checks the link.
   void second_passed();
 
   [[nodiscard]] const std::string& name() const { return name_; }
   [[nodiscard]] bool is_open() const { return socket_.has_value(); }
   /// Only while open.
   [[nodiscard]] const can::Socket& socket() const { return *socket_; }
-  /// As far as is known; a link that is down may be given another MTU.
+  /// As of the last look at the link; one that is down may still be given another MTU.
   [[nodiscard]] bool is_up() const { return is_open() && !down_; }
   [[nodiscard]] bool carries_fd() const { return is_open() && carries_fd_; }
   [[nodiscard]] BusStatus status() const;
 
  private:
-  // 1024 frames, a quarter of a second of a full bus at 500 kbit/s: after a delay that is caught up
-  // with, and the other buses do not starve.
+  // 1024 frames, a quarter of a second of a full bus at 500 kbit/s: enough to catch up after a
+  // delay, and few enough that the other buses do not starve.
   static constexpr int kReadsPerCycle = 16;
   static constexpr std::size_t kFewFrames = 4;
 
   bool refill();
   [[nodiscard]] TimePoint software_stamp(TimePoint kernels);
   can::ArrivalWatch::Clocks clocks() { return {turn_clock_->wall(), turn_clock_->steady()}; }
-  /// Whether the socket is still bound to the interface that is meant; notes that it is up.
+  /// Whether the socket is still bound to the interface of that name; notes if the link is up
+  /// again.
   bool look_after_link();
   void link_went_down();
   void link_came_up();
@@ -110,13 +111,13 @@ class Bus final : public can::Transmitter {
   std::optional<can::Socket> socket_;
   can::StampClock clock_;
   can::ArrivalWatch arrivals_;
-  bool clocks_are_fresh_ = false;  ///< read since the batch was
+  bool clocks_are_fresh_ = false;  ///< restarted since the batch was read
   can::ControllerWatch controller_;
   IdentifierWatch own_;
   can::Batch batch_;
   std::size_t next_ = 0;
   TimePoint next_stamp_;
-  std::size_t stamped_ = 0;  ///< frames of the batch whose stamp has been worked out
+  std::size_t stamped_ = 0;  ///< frames of the batch whose stamp is computed
   int reads_left_ = 0;
   bool more_ = false;
   bool down_ = false;
@@ -124,7 +125,7 @@ class Bus final : public can::Transmitter {
   bool was_open_ = false;
   bool told_of_absence_ = false;
   std::uint64_t received_ = 0;
-  std::uint64_t lost_before_ = 0;  ///< by sockets that are gone
+  std::uint64_t lost_before_ = 0;  ///< frames lost by closed sockets
   std::uint64_t downs_ = 0;
   std::uint64_t reopened_ = 0;
   std::uint64_t restamped_ = 0;

@@ -1,6 +1,6 @@
 #pragma once
 
-// What is known of one interface: for the log, the status and those who watch.
+// State and counters of one interface, for the log, D-Bus and the metrics.
 
 #include <array>
 #include <cstdint>
@@ -18,11 +18,11 @@ struct BusStatus {
   std::array<std::uint64_t, can::kErrorCauseCount> errors{};  ///< by can::ErrorCause
   std::uint64_t received = 0;                                 ///< frames that passed the filters
   std::uint64_t lost = 0;       ///< of these, dropped because the receive buffer was full
-  std::uint64_t downs = 0;      ///< times that the link went down, or the interface away while up
+  std::uint64_t downs = 0;      ///< times that the link went down or the interface was removed
   std::uint64_t reopened = 0;   ///< times that the interface was bound again
   std::uint64_t restamped = 0;  ///< frames whose stamp was no time of arrival
   std::uint64_t foreign = 0;    ///< frames with our identifiers from another sender
-  bool contested = false;       ///< there was one lately
+  bool contested = false;       ///< a foreign frame came within kContestedSeconds
 };
 
 }  // namespace vgyro::daemon

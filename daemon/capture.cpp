@@ -12,13 +12,13 @@
 namespace vgyro::daemon {
 namespace {
 
-// A ring whose thread gets no processor for so long gives what it has.
+// If the ring's thread has not packed the last block by then, the capture is written without it.
 constexpr int kPackingSecondsMost = 20;
-// At the end of the process. systemd waits longer, and a disk that takes longer would not be done
-// then either.
+// Waits at the end of the process. systemd would allow longer, but a disk that is slower than this
+// would hardly finish then either.
 constexpr std::chrono::milliseconds kPackingPatience{1000};
 constexpr std::chrono::milliseconds kDiskPatience{5000};
-// Causes named in one capture: further ones are in its frames.
+// Further causes listed in one capture; its frames show the others.
 constexpr std::size_t kAlsoMost = 8;
 
 std::string input_text(const std::string& bus, const gateway::FrameMatch& match) {
@@ -30,7 +30,7 @@ std::string input_text(const std::string& bus, const gateway::FrameMatch& match)
 
 }  // namespace
 
-/// Where the thread that writes leaves its result.
+/// Where the writing thread leaves its result.
 struct Capture::Desk {
   std::mutex mutex;  ///< guards what follows
   std::optional<Expected<std::string>> result;
@@ -54,7 +54,8 @@ Expected<void> Capture::open(TimePoint now) {
     log_.tell(Severity::kWarning, {.cause = "capture"}, "{}; trying again with each capture",
               opened.error().message());
   }
-  // A gateway that is restarted again and again must not wear the disk out either.
+  // The interval also holds across restarts: a gateway that restarts in a loop must not wear out
+  // the disk.
   for (std::size_t i = 0; i < kCaptureCauses; ++i) {
     const std::optional<TimePoint> newest = store_->newest(static_cast<CaptureCause>(i));
     if (!newest || now < *newest) continue;
@@ -104,7 +105,8 @@ void Capture::look_for_causes(const gateway::Status& status, TimePoint now) {
   }
 }
 
-// A cause that comes while another one's capture still gathers frames is told of in that one.
+// A cause that begins while the capture of an earlier one still gathers frames is listed in that
+// capture.
 void Capture::begin(CaptureCause cause, std::string text, TimePoint now) {
   int& quiet_s = quiet_s_[static_cast<std::size_t>(cause)];
   if (quiet_s > 0) {
@@ -171,7 +173,7 @@ void Capture::second_passed(std::optional<Pending>& pending) {
   if (is_packed || ++pending->packing_s > kPackingSecondsMost) start_writing(pending);
 }
 
-// One at a time: the frames of each may be as much as the ring may hold.
+// Only one capture is written at a time: each may hold as many frames as the ring.
 void Capture::start_writing(std::optional<Pending>& pending) {
   if (writing_) return;
   CaptureRing::Blocks blocks = ring_.blocks();

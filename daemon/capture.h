@@ -1,10 +1,10 @@
 #pragma once
 
-// Recordings of the inputs, from the minutes before something went wrong. Frames of the configured
-// inputs, and no others, wait in memory (capture_ring.h). A cause (capture_cause.h), or somebody
-// who asks, has them written (capture_store.h) in a thread of its own, with some seconds of what
-// came after it. Nothing here delays a rate or is fatal; what cannot be written is reported and
-// counted. Clock-free: second_passed() is its clock.
+// Recordings of the inputs from the minutes before something went wrong. The last frames of the
+// configured inputs, and of no others, are kept in memory (capture_ring.h). After a cause
+// (capture_cause.h), or on request, a separate thread writes them to disk (capture_store.h); after
+// a cause the frames of kAftermathSeconds are added. Nothing here delays a rate or is fatal; a
+// failure to write is logged and counted. Clock-free: second_passed() is its clock.
 
 #include <array>
 #include <cstdint>
@@ -30,7 +30,7 @@ namespace vgyro::daemon {
 
 class Capture {
  public:
-  /// What comes after a cause belongs to its story; nothing does of a capture that is asked for.
+  /// A capture includes this much after its cause. A requested capture ends with the request.
   static constexpr int kAftermathSeconds = 10;
 
   struct Options {
@@ -38,39 +38,39 @@ class Capture {
     std::string instance;
     CaptureRing::Limits ring;
     CaptureLimits disk;
-    int interval_s = 0;  ///< at least so long from one capture to the next of the same cause
+    int interval_s = 0;  ///< least time between two captures of the same cause
   };
-  /// Gets the folder, or why there is none.
+  /// Receives the folder of the capture, or the error.
   using Answer = std::function<void(const Expected<std::string>&)>;
 
-  /// Throws std::system_error where there is no thread to be had.
+  /// Throws std::system_error if no thread can be started.
   Capture(Options options, Log& log);
   Capture(const Capture&) = delete;
   Capture& operator=(const Capture&) = delete;
   ~Capture();
 
-  /// Call first. Error when another gateway has the directory; one that cannot be written is only
-  /// reported. `now` on the host's clock.
+  /// Call first. Error if another gateway uses the directory; a directory that cannot be written is
+  /// only logged. `now` is on the host's clock.
   Expected<void> open(TimePoint now);
 
-  /// The configuration in use. What is held is forgotten where it may hold frames that this one
-  /// does not name.
+  /// Sets the configuration in use. Forgets the frames in memory if it lacks an input of the
+  /// earlier one.
   void use(const gateway::Plan& plan, const std::string& fingerprint);
 
-  /// A frame that came. Cheap; it neither waits nor allocates. Frames that are no input are left
-  /// out.
+  /// Keeps a received frame if it is an input. Cheap: neither waits nor allocates.
   void put(can::BusIndex bus, const can::Frame& frame, TimePoint stamp) {
     if (frame.is_data() && router_->roles(bus, frame) != 0) ring_.put(bus, frame, stamp);
   }
 
-  /// To be called about once a second; `now` on the host's clock.
+  /// To be called about once a second; `now` is on the host's clock.
   void second_passed(const gateway::Status& status, TimePoint now);
 
-  /// Has what is held now written; `answer` comes from second_passed(), unless the process ends
-  /// before. Refused while an earlier request is under way.
+  /// Has the frames now in memory written. second_passed() calls `answer`, unless the process ends
+  /// before. Error while an earlier request is being written.
   Expected<void> ask(Answer answer, TimePoint now);
 
-  /// The last word: what a cause has begun is written, as far as the disk takes it in time.
+  /// Call at the end of the process: writes the capture that a cause began, if the disk takes it in
+  /// time.
   void finish();
 
   [[nodiscard]] CaptureStatus status() const;
@@ -79,15 +79,15 @@ class Capture {
   struct Desk;
   struct Input {
     std::string bus;
-    gateway::FrameMatch match;  ///< its number of the bus is 0
+    gateway::FrameMatch match;  ///< with bus 0; `bus` above names it
     friend bool operator==(const Input&, const Input&) = default;
   };
-  /// A capture that is to be written.
+  /// A capture that is not being written yet.
   struct Pending {
     CaptureNote note;
-    int seconds_left = 0;                 ///< of its aftermath
-    std::optional<std::uint32_t> sealed;  ///< all that belongs to it is with the ring's thread
-    int packing_s = 0;                    ///< since then
+    int seconds_left = 0;                 ///< until its aftermath ends
+    std::optional<std::uint32_t> sealed;  ///< from ring_.seal(), after its last frame
+    int packing_s = 0;                    ///< time since `sealed` was set
   };
 
   void look_for_causes(const gateway::Status& status, TimePoint now);
@@ -111,21 +111,21 @@ class Capture {
   std::array<std::string, 2> gyro_names_;
   std::string fingerprint_;
   CaptureTriggers triggers_;
-  std::array<int, kCaptureCauses> quiet_s_{};  ///< left until the cause counts again
+  std::array<int, kCaptureCauses> quiet_s_{};  ///< time left until the cause may start a capture
   std::optional<Pending> caused_;
   std::optional<Pending> asked_;
-  Answer answer_;  ///< of the one who asked, until it is given
+  Answer answer_;  ///< of the request under way; null: none
   std::shared_ptr<Desk> desk_;
   std::optional<CaptureNote> writing_;
   std::uint64_t writing_frames_ = 0;
-  TimePoint writing_last_;  ///< the greatest stamp in it
+  TimePoint writing_last_;  ///< the greatest stamp in `writing_`
   LooseThread thread_;
   std::array<std::uint64_t, kCaptureCauses> written_{};
   std::uint64_t failed_ = 0;
   std::uint64_t held_back_ = 0;
   bool told_of_failure_ = false;
   std::string last_;      ///< folder of the newest capture since the start
-  TimePoint last_stamp_;  ///< the greatest one in it
+  TimePoint last_stamp_;  ///< the greatest stamp in `last_`
 };
 
 }  // namespace vgyro::daemon

@@ -27,8 +27,9 @@ std::optional<CaptureCause> capture_cause_from(std::string_view name) {
   return static_cast<CaptureCause>(found - kNames.begin());
 }
 
-// A single refused stop is no cause: it may have been a turn. Where most stretches taught little,
-// each further one is: the ring holds that stretch, and no longer those before it.
+// A single refused stop is no cause: it may have been a turn. Once most steady stretches have
+// taught little, each further one is a cause: the ring holds its frames, and no longer those of the
+// earlier stretches.
 CaptureTriggers::Causes CaptureTriggers::look(const gateway::Status& status) {
   const gateway::SteadyStretches stretches = gateway::steady_stretches(status);
   const auto place = [](CaptureCause cause) { return static_cast<std::size_t>(cause); };

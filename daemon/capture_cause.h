@@ -1,7 +1,7 @@
 #pragma once
 
-// Why the gateway writes a recording of its inputs, and when that is. From one status to the next:
-// holds only the counts that it has seen.
+// The causes of a capture, and their detection: CaptureTriggers compares each status with the
+// counters of the one before, and keeps nothing else.
 
 #include <array>
 #include <cstdint>
@@ -23,7 +23,8 @@ class CaptureTriggers {
  public:
   using Causes = std::array<bool, kCaptureCauses>;
 
-  /// What began since the last call. Counters that begin anew, as after a reload, are no cause.
+  /// The causes that began since the last call. A counter that restarts at 0, as after a reload, is
+  /// no cause.
   Causes look(const gateway::Status& status);
 
  private:

@@ -1,8 +1,7 @@
 #pragma once
 
-// Frames → a block of a recording: candump text, packed as one xz stream. Streams one behind the
-// other are one .xz file, so a recording is put together from blocks without packing anything
-// again.
+// Frames → a block of a recording: candump text, packed as one xz stream. Concatenated streams are
+// one .xz file, so a recording is joined from blocks without packing them again.
 
 #include <cstdint>
 #include <memory>
@@ -40,8 +39,8 @@ struct PackedBlock {
   std::shared_ptr<const CaptureSource> source;
 };
 
-/// Only `xz`, `frames`, `first`, `last` and `source` are filled in. Nothing where memory is short.
-/// `frames` is not empty.
+/// Fills in only `xz`, `frames`, `first`, `last` and `source`. Returns nothing if memory is short.
+/// Precondition: `frames` is not empty.
 std::optional<PackedBlock> pack(std::span<const CapturedFrame> frames,
                                 std::shared_ptr<const CaptureSource> source);
 

@@ -12,19 +12,20 @@
 namespace vgyro::daemon {
 namespace {
 
-// At the end of the process: packing a block takes milliseconds.
+// Wait at the end of the process; packing a block takes milliseconds.
 constexpr std::chrono::milliseconds kLastPatience{1000};
 constexpr std::chrono::milliseconds kLookEvery{2};
 
 }  // namespace
 
-/// What the loop and the thread have in common; the thread may outlive the ring. Block number n is
-/// blocks[n % kBlocks]: the loop's from `packed` + kBlocks > n on until `sealed` > n, then the
-/// thread's until `packed` > n. Both numbers wrap around.
+/// State shared by the loop and the thread, which may outlive the ring. Block n is blocks[n %
+/// kBlocks]. It belongs to the loop from `packed` + kBlocks > n until `sealed` > n, then to the
+/// thread until `packed` > n. Both counters wrap around.
 struct CaptureRing::Shared {
   explicit Shared(Limits the_limits) : limits(the_limits) {}
 
-  // In one order with the thread's look whether it must sleep, or it would miss this one.
+  // Sequentially consistent with the thread's check whether to sleep; otherwise it could miss this
+  // block.
   void announce(std::uint32_t blocks_sealed) {
     sealed.store(blocks_sealed, std::memory_order_seq_cst);
     sealed.notify_one();
@@ -45,8 +46,8 @@ struct CaptureRing::Shared {
   std::deque<std::shared_ptr<const PackedBlock>> held;
   std::size_t bytes = 0;
   std::uint64_t frames = 0;
-  std::uint64_t unpacked = 0;         ///< frames for which there was no memory, so far
-  std::uint64_t unpacked_before = 0;  ///< of these, since the newest block of `held`
+  std::uint64_t unpacked = 0;         ///< frames dropped for lack of memory, so far
+  std::uint64_t unpacked_before = 0;  ///< frames missing since the newest block of `held`
 };
 
 void CaptureRing::Shared::pack_what_comes() {
@@ -98,7 +99,7 @@ CaptureRing::CaptureRing(Limits limits) : shared_(std::make_shared<Shared>(limit
   thread_.start([shared = shared_] { shared->pack_what_comes(); });
 }
 
-// The thread ends at the next block, so it is given an empty one.
+// The thread ends at the next block, so an empty one is announced.
 CaptureRing::~CaptureRing() {
   shared_->stopping.store(true, std::memory_order_release);
   shared_->announce(sealed_ + 1);
@@ -144,7 +145,7 @@ void CaptureRing::second_passed() {
   if (open_ != nullptr && second_ - open_->began_s >= kBlockSeconds) seal();
 }
 
-// Numbers that wrap around are compared by their distance.
+// The counters wrap around, so they are compared by their distance.
 bool CaptureRing::is_packed(std::uint32_t sealed) const {
   const std::uint32_t ahead = shared_->packed.load(std::memory_order_acquire) - sealed;
   return ahead < (1U << 31U);

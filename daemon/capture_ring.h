@@ -1,11 +1,10 @@
 #pragma once
 
-// The last minutes of frames, in memory. The loop puts frames into blocks of fixed size, which are
-// made at the start; a thread packs each full block (capture_packing.h) and keeps it, within limits
-// of time and of bytes. put() neither waits nor allocates: where the thread has fallen behind and
-// no block is free, frames are dropped and counted. Knows nothing of files, causes or
-// configurations. Clock-free: second_passed() is its clock. All calls come from one thread, the
-// loop's.
+// Keeps the frames of the last minutes in memory. The loop fills blocks of fixed size, allocated at
+// the start; a thread packs each full block (capture_packing.h) and keeps it, within limits of time
+// and bytes. put() neither waits nor allocates: if the thread has fallen behind and no block is
+// free, frames are dropped and counted. Independent of files, causes and configurations.
+// Clock-free: second_passed() is its clock. All calls come from the loop's thread.
 
 #include <chrono>
 #include <cstddef>
@@ -24,35 +23,36 @@ class CaptureRing {
  public:
   /// Four seconds of two gyros at 500 Hz: enough text for xz to find what repeats.
   static constexpr std::size_t kBlockFrames = 4096;
-  /// One is being filled, one packed; the others are the time that the thread may be late by.
+  /// One is being filled and one packed; the others let the thread fall behind without loss.
   static constexpr std::size_t kBlocks = 4;
-  /// A block that is not full by then is packed all the same.
+  /// After this time a block is packed even if it is not full.
   static constexpr std::int64_t kBlockSeconds = 10;
 
   struct Limits {
-    std::int64_t seconds = 0;  ///< between the first frame of the oldest block and the newest one
+    std::int64_t seconds = 0;  ///< from the start of the oldest block to the end of the newest
     std::size_t bytes = 0;     ///< of all packed blocks
   };
 
   struct Counts {
     std::uint64_t frames = 0;   ///< held in packed blocks
-    std::uint64_t bytes = 0;    ///< of these blocks
-    std::uint64_t dropped = 0;  ///< frames since the start: no block was free, or no memory
+    std::uint64_t bytes = 0;    ///< size of these blocks
+    std::uint64_t dropped = 0;  ///< frames since the start for lack of a free block or memory
     double seconds = 0.0;       ///< from the first frame of the packed blocks to the last one
   };
 
   using Blocks = std::vector<std::shared_ptr<const PackedBlock>>;
 
-  /// Starts the thread; throws std::system_error where there is none to be had.
+  /// Starts the thread; throws std::system_error if that fails.
   explicit CaptureRing(Limits limits);
   CaptureRing(const CaptureRing&) = delete;
   CaptureRing& operator=(const CaptureRing&) = delete;
   ~CaptureRing();
 
-  /// What the bus numbers of the frames mean from now on. Call before the first put().
+  /// Sets the configuration that the bus numbers of further frames refer to. Call before the first
+  /// put().
   void use(std::shared_ptr<const CaptureSource> source);
 
-  /// Everything that was put so far is gone, packed or not.
+  /// Drops all frames put so far, packed or not.
   void forget();
 
   void put(can::BusIndex bus, const can::Frame& frame, TimePoint stamp) {
@@ -70,11 +70,11 @@ class CaptureRing {
   /// To be called about once a second.
   void second_passed();
 
-  /// Hands what was put so far to the thread. The number is for is_packed().
+  /// Hands the frames put so far to the thread. Returns a number for is_packed().
   std::uint32_t seal();
-  /// Is what was put before that seal() among blocks()?
+  /// Whether the thread has packed the frames that were put before that seal().
   [[nodiscard]] bool is_packed(std::uint32_t sealed) const;
-  /// Waits for it, but no longer than that. For the end of the process only.
+  /// Waits for is_packed(), at most `patience`. For the end of the process only.
   bool wait_until_packed(std::uint32_t sealed, std::chrono::milliseconds patience) const;
 
   /// The packed blocks, oldest first.
@@ -97,11 +97,11 @@ class CaptureRing {
 
   std::shared_ptr<Shared> shared_;
   std::shared_ptr<const CaptureSource> source_;
-  Block* open_ = nullptr;             ///< that is being filled
-  std::uint64_t dropped_ = 0;         ///< since the last block that was opened
-  std::uint64_t dropped_before_ = 0;  ///< that
+  Block* open_ = nullptr;             ///< being filled; null: none
+  std::uint64_t dropped_ = 0;         ///< frames since a block was last opened
+  std::uint64_t dropped_before_ = 0;  ///< frames until then
   std::uint32_t generation_ = 0;      ///< changed by forget()
-  std::uint32_t sealed_ = 0;          ///< blocks so far
+  std::uint32_t sealed_ = 0;          ///< blocks sealed so far
   std::int64_t second_ = 0;
   LooseThread thread_;
 };

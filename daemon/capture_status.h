@@ -1,6 +1,6 @@
 #pragma once
 
-// What is known of the captures at a moment, for those who ask or watch.
+// State and counters of the captures at one moment, for D-Bus and the metrics.
 
 #include <array>
 #include <cstdint>
@@ -15,7 +15,7 @@ struct CaptureStatus {
   std::string directory;
   CaptureRing::Counts ring;
   std::array<std::uint64_t, kCaptureCauses> written{};  ///< by cause, since the start
-  std::uint64_t failed = 0;                             ///< could not be written
+  std::uint64_t failed = 0;                             ///< captures that could not be written
   std::uint64_t held_back = 0;  ///< causes that came too soon after one of their kind
   bool is_writing = false;
   std::string last;  ///< folder of the newest capture since the start; empty: none

@@ -23,12 +23,12 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
-// Where a capture grows, and where one goes that is removed: neither has a capture's name.
+// Folders for a capture while it is written and while it is removed; neither is a capture's name.
 constexpr std::string_view kNew = ".new";
 constexpr std::string_view kOld = ".old";
 constexpr std::size_t kStampCharacters = 16;  // "20261130T204835Z"
 constexpr int kSameSecondMost = 99;           // captures of one cause within a second
-constexpr mode_t kFolderMode = 0750;          // with the service's umask only for its own user
+constexpr mode_t kFolderMode = 0750;          // the service's umask leaves its own user only
 constexpr mode_t kFileMode = 0640;
 constexpr int kDescriptionFormat = 1;
 constexpr const char* kRemedy =
@@ -39,7 +39,7 @@ struct CaptureName {
   CaptureCause cause = CaptureCause::kAsked;
 };
 
-// "20261130T204835Z-contradicted", or with "-2" behind it.
+// "20261130T204835Z-contradicted", possibly followed by "-2".
 std::optional<CaptureName> parse_name(const std::string& name) {
   if (name.size() <= kStampCharacters || name[kStampCharacters] != '-') return std::nullopt;
   std::tm parts{};
@@ -76,7 +76,7 @@ bool sync_directory(const std::string& path) {
   return directory.is_open() && ::fsync(directory.get()) == 0;
 }
 
-/// `put` writes the bytes. On the disk before the folder gets its name.
+/// `put` writes the bytes. The file is synced: it must be on the disk before the folder is renamed.
 template <class Put>
 bool write_file(const std::string& path, const Put& put) {
   Descriptor file(
@@ -103,7 +103,7 @@ Json description_of(const CaptureNote& note, const CaptureRing::Blocks& blocks) 
   Json earlier = Json::array();
   for (const auto& block : blocks) {
     frames += block->frames;
-    // What is missing before the first block is not missing in this recording.
+    // Frames dropped before the first block are not part of this recording's time.
     if (block != blocks.front()) dropped += block->dropped_before;
     first = std::min(first, block->first);
     last = std::max(last, block->last);
@@ -186,7 +186,7 @@ Expected<std::string> CaptureStore::write(const CaptureNote& note,
   return placed;
 }
 
-// Before it is written, so that the limit holds meanwhile too.
+// Called before the capture is written, so that the limits hold while it is.
 Expected<void> CaptureStore::make_room(std::uint64_t bytes) const {
   if (bytes > limits_.bytes) {
     return fail(directory_, fmt::format("a capture of {} bytes is more than may lie there", bytes),
@@ -237,7 +237,7 @@ Expected<std::string> CaptureStore::put_in_place(const CaptureNote& note) const 
   return fail(directory_, "the capture cannot be written: " + system_reason(), kRemedy);
 }
 
-// Under another name first: half a capture must not look like a whole one.
+// Renames the folder first: half a capture must not look like a whole one.
 bool CaptureStore::remove(const std::string& name) const {
   if (::rename(path(name).c_str(), path(kOld).c_str()) != 0) return false;
   std::error_code error;

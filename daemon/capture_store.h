@@ -1,10 +1,11 @@
 #pragma once
 
-// Captures on the disk: a folder each, DIRECTORY/20261130T204835Z-contradicted, with the recording
-// and a description. It is written under another name, brought to the disk and renamed, so a folder
-// with a capture's name is whole, whatever killed the process. Their number and bytes are limited;
-// the oldest go first, by name. Removes nothing that is not its own. One gateway has a directory.
-// write() may take long, so it belongs in a thread of its own; the other calls come from the loop.
+// Captures on disk: one folder each, DIRECTORY/20261130T204835Z-contradicted, with the recording
+// and a description. The folder is written under another name, synced and renamed, so a folder with
+// a capture's name is whole, whatever killed the process. The number of captures and their bytes
+// are limited; the oldest by name are removed first, and nothing but captures. Each gateway has a
+// directory of its own. write() may take long, so it belongs in a separate thread; the other calls
+// come from the loop.
 
 #include <cstdint>
 #include <optional>
@@ -20,16 +21,16 @@
 
 namespace vgyro::daemon {
 
-/// What there is to say of a capture beside its frames.
+/// The description of a capture: all but its frames.
 struct CaptureNote {
   CaptureCause cause = CaptureCause::kAsked;
   std::string text;                 ///< the cause, for people
-  std::vector<std::string> also;    ///< what happened besides before it was written
-  TimePoint at;                     ///< of the cause, on the host's clock
-  std::string instance;             ///< of several gateways; empty: the only one
+  std::vector<std::string> also;    ///< further causes until it was written, for people
+  TimePoint at;                     ///< time of the cause, on the host's clock
+  std::string instance;             ///< name of one of several gateways, or empty
   std::string fingerprint;          ///< of the configuration in use
   std::vector<std::string> inputs;  ///< what is recorded: "can0 101"
-  std::string overlaps;             ///< an earlier capture that holds some of the frames too
+  std::string overlaps;             ///< earlier capture with some of the same frames, or empty
 };
 
 struct CaptureLimits {
@@ -42,14 +43,14 @@ class CaptureStore {
   static constexpr std::string_view kRecording = "recording.log.xz";
   static constexpr std::string_view kDescription = "capture.json";
 
-  /// Touches nothing yet.
+  /// Does not touch the disk yet.
   CaptureStore(std::string directory, CaptureLimits limits);
 
-  /// Once, at the start: makes the directory and removes what a killed writer left. `other` tells
-  /// whether another gateway has the directory; that is the one error that does not go away.
+  /// Call once, at the start: makes the directory and removes what a killed writer left. Sets
+  /// `other` if another gateway uses the directory, the only error that is permanent.
   Expected<void> open(bool& other);
 
-  /// Writes a capture; returns its folder. After a failure nothing of it is left.
+  /// Writes a capture and returns its folder. A failure leaves nothing behind.
   [[nodiscard]] Expected<std::string> write(const CaptureNote& note,
                                             const CaptureRing::Blocks& blocks) const;
 

@@ -19,7 +19,7 @@ constexpr const char* kPath = "/org/vgyro/Gateway1";
 constexpr const char* kNothingToSave = "org.vgyro.Error.NothingToSave";
 constexpr const char* kNoCapture = "org.vgyro.Error.NoCapture";
 
-/// Writes one dictionary {string: variant} or {string: number}; the first error stays.
+/// Writes one dictionary {string: variant} or {string: number}; keeps the first error.
 class Dictionary {
  public:
   Dictionary(sd_bus_message* message, const char* entry) : message_(message), entry_(entry) {
@@ -128,7 +128,7 @@ int append_gyros(sd_bus_message* reply, const Snapshot& now) {
   return result < 0 ? result : sd_bus_message_close_container(reply);
 }
 
-// Of one axis of a platform of several.
+// One axis of a platform with several.
 int append_axis(sd_bus_message* reply, const Snapshot& now, std::size_t place) {
   const gateway::Status& status = now.axes[place];
   const std::size_t axis = now.plan->axes[place].axis;
@@ -220,7 +220,7 @@ int append_hypotheses(sd_bus_message* reply, const Snapshot& now) {
   return fields.close();
 }
 
-// Empty where the inputs are not recorded.
+// Empty if the inputs are not recorded.
 int append_captures(sd_bus_message* reply, const Snapshot& now) {
   Dictionary fields(reply, "{sv}");
   if (now.capture) {
@@ -337,8 +337,8 @@ constexpr Property kProperties[] = {
 
 }  // namespace
 
-// A method without "unprivileged" makes sd-bus ask the bus who calls, and wait for the answer; who
-// may call is the policy file's business.
+// Without SD_BUS_VTABLE_UNPRIVILEGED, sd-bus asks the bus for the caller of a method and waits for
+// the answer. The policy file decides who may call.
 const sd_bus_vtable Control::kInterface[] = {
     SD_BUS_VTABLE_START(0),
     SD_BUS_PROPERTY("Version", "s", on_get, 0, SD_BUS_VTABLE_PROPERTY_CONST),
@@ -383,7 +383,8 @@ Control::~Control() {
   if (bus_ != nullptr) sd_bus_close_unref(bus_);  // flushing would wait
 }
 
-// No step of it waits: the handshake goes on within the event loop, the name comes with on_name().
+// No step waits: the handshake runs in the event loop, and on_name() receives the reply for the
+// name.
 void Control::connect() {
   wait_ = kRetrySeconds;
   has_name_ = false;
@@ -435,7 +436,7 @@ void Control::second_passed() {
   if (bus_ != nullptr && sd_bus_is_open(bus_) <= 0) disconnect(ECONNRESET);
   if (wait_ > 0) --wait_;
   if (bus_ == nullptr && wait_ == 0) connect();
-  // The name may be another daemon's that is about to end, or the policy may be changed.
+  // The daemon that owns the name may end, or the policy file may change.
   if (bus_ != nullptr && !has_name_ && wait_ == 0) {
     wait_ = kRetrySeconds;
     sd_bus_request_name_async(bus_, nullptr, bus_name_.c_str(), 0, &on_name, this);
@@ -469,7 +470,8 @@ int Control::on_recalibrate(sd_bus_message* call, void* self, sd_bus_error*) {
   return sd_bus_reply_method_return(call, "");
 }
 
-// Answered when it is on the disk, which may take seconds; sd-bus goes on meanwhile.
+// Replies once the capture is on the disk, which may take seconds; sd-bus serves other calls
+// meanwhile.
 int Control::on_capture(sd_bus_message* call, void* self, sd_bus_error* error) {
   return or_no_memory([&] {
     const std::shared_ptr<sd_bus_message> asked(sd_bus_message_ref(call), &sd_bus_message_unref);

@@ -1,9 +1,9 @@
 #pragma once
 
-// The gateway on D-Bus: org.vgyro.Gateway1, or org.vgyro.Gateway1.NAME of one of several, with the
-// interface org.vgyro.Gateway1 at /org/vgyro/Gateway1 of the system bus: properties to read and
-// watch, and methods that the policy file gives to root alone. The gateway runs without a bus too:
-// it is tried again every few seconds, and nothing here waits for an answer.
+// The gateway on the system bus: the name org.vgyro.Gateway1 (org.vgyro.Gateway1.NAME for one of
+// several gateways) with the interface org.vgyro.Gateway1 at /org/vgyro/Gateway1. It has properties
+// to read and watch, and methods that the policy file allows to root alone. The gateway runs
+// without D-Bus too: Control tries to connect every few seconds, and never waits for an answer.
 
 #include <cstdint>
 #include <functional>
@@ -23,23 +23,23 @@ class Control {
     std::function<const Snapshot&()> snapshot;
     std::function<void()> recalibrate;
     std::function<Expected<void>()> save_state;
-    /// Has the recorded inputs written; the answer is the folder, or why there is none.
+    /// Has the recorded inputs written; `answer` receives the folder, or the error.
     std::function<Expected<void>(std::function<void(const Expected<std::string>&)> answer)> capture;
   };
 
-  /// Serves its bus within `events`, which must outlive it, under the name `bus_name`.
+  /// Serves the bus under the name `bus_name`, in the event loop `events`, which must outlive this.
   Control(sd_event* events, Gateway gateway, std::string bus_name, Log& log);
   Control(const Control&) = delete;
   Control& operator=(const Control&) = delete;
   ~Control();
 
-  /// To be called about once a second: looks for a bus where there is none, and reports changes,
-  /// at most this often.
+  /// To be called about once a second: connects if there is no bus, and emits changes, which are
+  /// sent no more often than that.
   void second_passed();
 
  private:
   static constexpr int kRetrySeconds = 5;
-  // A bus that takes nothing must not make the daemon grow.
+  // Limits the daemon's memory while the bus takes no messages.
   static constexpr std::uint64_t kQueuedMost = 64;
 
   void connect();

@@ -1,7 +1,7 @@
 #pragma once
 
-// A timer that is set as seldom as possible: nearly every frame moves the next deadline, and mostly
-// to a later time. It may go off too early, never too late.
+// A timer that is set as rarely as possible, because nearly every frame moves the next deadline,
+// mostly to a later time. It may go off early, but never late.
 
 #include <algorithm>
 #include <optional>
@@ -11,23 +11,23 @@
 
 namespace vgyro::daemon {
 
-/// When the timer goes off, from the deadlines of both clocks. Pure.
+/// Computes when the timer must go off, from the deadlines on both clocks. Pure.
 class Alarm {
  public:
-  // Not at once: a deadline that somehow stays in the past must not turn into a busy loop.
+  // Above 0: a deadline that stays in the past must not cause a busy loop.
   static constexpr Duration kLeast = std::chrono::milliseconds(1);
-  /// A clock that is set may bring a deadline nearer without anybody noticing.
+  /// Setting the clock may bring a deadline nearer, and no event reports that.
   static constexpr Duration kMost = std::chrono::seconds(1);
 
-  /// While it has not gone off, the present is before this, on the clock of the frames' stamps.
+  /// Until the alarm goes off, the present is before this, on the clock of the frames' stamps.
   [[nodiscard]] TimePoint latest_now() const { return stamped_; }
 
-  /// It would go off too late for one of these deadlines.
+  /// Whether the alarm would go off too late for one of these deadlines.
   [[nodiscard]] bool is_late_for(TimePoint stamped, TimePoint steady) const {
     return stamped < stamped_ || steady < steady_;
   }
 
-  /// Sets it for the earlier of two deadlines; returns how long that is from now.
+  /// Sets the alarm for the earlier of two deadlines; returns the time until then.
   Duration set(TimePoint stamped_due, TimePoint stamped_now, TimePoint steady_due,
                TimePoint steady_now) {
     const Duration wait = std::min(until(stamped_due, stamped_now), until(steady_due, steady_now));
@@ -56,7 +56,7 @@ class DeadlineTimer {
 
   Expected<void> open();
   [[nodiscard]] int fd() const { return fd_; }
-  /// Once, after this time.
+  /// Goes off once, after `wait`.
   void set(Duration wait) const;
 
  private:

@@ -10,8 +10,8 @@
 namespace vgyro::daemon {
 namespace {
 
-// An owner that ends takes its lock file away under who has just opened it; that happens once in a
-// while, and never so often.
+// An owner that ends may unlink the lock file just after this process opened it, so taking the lock
+// is tried again. That cannot plausibly happen this often in a row.
 constexpr int kAttemptsMost = 10;
 
 bool is_still_there(int fd, const std::string& path) {
@@ -25,7 +25,7 @@ bool is_still_there(int fd, const std::string& path) {
 
 FileLock::~FileLock() {
   if (fd_ < 0) return;
-  ::unlink(lock_path_.c_str());  // while it is held: nobody else's is taken away
+  ::unlink(lock_path_.c_str());  // while locked, so that it is not another's file
   ::close(fd_);
 }
 
@@ -41,7 +41,7 @@ FileLock::Outcome FileLock::try_once(bool& again) {
   again = false;
   constexpr int kFlags = O_NOFOLLOW | O_CLOEXEC | O_NONBLOCK;
   int fd = ::open(lock_path_.c_str(), O_RDWR | O_CREAT | kFlags, 0644);
-  // Another user's, who was killed or is there: reading is enough to ask.
+  // The file belongs to another user's process, killed or running: flock() needs only read access.
   if (fd < 0 && errno == EACCES) fd = ::open(lock_path_.c_str(), O_RDONLY | kFlags);
   if (fd < 0) return Outcome::kImpossible;
   const bool locked = ::flock(fd, LOCK_EX | LOCK_NB) == 0;

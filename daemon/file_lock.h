@@ -1,8 +1,8 @@
 #pragma once
 
-// One owner for something that is kept in a file: a lock on a file beside it, for the file itself
-// is replaced with every write. It is advisory, ends with the process however that ends, and leaves
-// nothing behind but after a kill. Knows nothing of what is protected.
+// Gives a file or directory one owner by a lock on a file beside it, because the file itself is
+// replaced with every write. The lock is advisory and ends with the process, however that ends; the
+// lock file stays behind only after a kill. Independent of what is protected.
 
 #include <string>
 
@@ -12,18 +12,18 @@ namespace vgyro::daemon {
 
 class FileLock {
  public:
-  /// Takes nothing yet. The lock is on `path` + ".lock".
+  /// Does not lock yet. The lock file is `path` + ".lock".
   explicit FileLock(const std::string& path) : lock_path_(path + ".lock") {}
   FileLock(const FileLock&) = delete;
   FileLock& operator=(const FileLock&) = delete;
   ~FileLock();
 
   enum class Outcome { kTaken, kHeld, kImpossible };
-  /// Never waits. kHeld: by another process, holder() says which; kImpossible: no lock can be made
-  /// there.
+  /// Never waits. kHeld: another process has the lock, see holder(); kImpossible: the lock file
+  /// cannot be made.
   Outcome take();
 
-  /// "process 1234"; as far as that is known.
+  /// "process 1234", or "an unknown process".
   [[nodiscard]] std::string holder() const;
 
  private:

@@ -23,11 +23,11 @@ constexpr std::uint32_t kTimerTag = 0xFFFFFFFE;
 constexpr std::uint32_t kLoaderTag = 0xFFFFFFFD;
 constexpr std::uint64_t kSecondUsec = 1'000'000;
 
-// A process that was stopped must not send its backlog.
+// Older frames are dropped: a process that was stopped must not send its backlog.
 constexpr Duration kAgeMost = std::chrono::milliseconds(250);
 
-// The kernel's least, some six frames. What a bus does not take waits in the queue here, where it
-// is dropped when it is stale; from the kernel it would come out in a burst.
+// The kernel raises this to its minimum, some six frames. Frames that the bus does not take wait in
+// the transmit queue, which drops stale ones; the kernel would send them in a burst.
 constexpr int kSendBufferBytes = 1;
 
 template <clockid_t Clock>
@@ -37,7 +37,7 @@ TimePoint read_clock() {
   return time_from_ns(static_cast<std::int64_t>(now.tv_sec) * 1'000'000'000 + now.tv_nsec);
 }
 
-// What comes in, and our own identifiers, which nobody else should send.
+// The inputs, and our own identifiers, which no other node should send.
 std::vector<can::Filter> filters_of(const gateway::Plan& plan, std::size_t bus) {
   std::vector<can::Filter> filters;
   const auto index = static_cast<can::BusIndex>(bus);
@@ -221,7 +221,8 @@ Expected<void> GatewayLoop::run() {
   return {};
 }
 
-// sd-event inside another loop: armed once, and again only after it had something to do.
+// Runs sd-event inside the epoll loop: it is armed once, and again only after it had something to
+// do.
 Expected<void> GatewayLoop::serve_events(bool armed) {
   int result = armed ? sd_event_wait(events_.get(), 0) : 0;
   for (;;) {
@@ -272,11 +273,11 @@ TimePoint GatewayLoop::pipeline_now() {
   return forward_.update(clock_.wall(), clock_.steady());
 }
 
-// Frames tell the time by themselves; this is for when none comes.
+// The stamps of frames advance the pipeline's time; this advances it when no frame comes.
 void GatewayLoop::look_at_time() {
   const TimePoint now = pipeline_now();
   if (now < setup_->pipeline.next_deadline()) return;
-  // Frames that came before now but after poll had looked count before the time-out does.
+  // Frames that came after epoll_wait() but before `now` must count before the time-out does.
   for (Bus& bus : setup_->buses)
     bus.begin_reading();
   hand_on_arrivals();
@@ -299,7 +300,7 @@ void GatewayLoop::look_at_status() {
   }
   const std::uint64_t samples = status.gyros[0].samples + status.gyros[1].samples;
   if (std::exchange(samples_, samples) != samples) {
-    // No stamp from nowhere may pass for the present.
+    // Bounded, because a wrong stamp must not pass for the present.
     forward_.sample_came(std::min(newest_stamp_, alarm_.latest_now()));
   }
 }
@@ -335,7 +336,7 @@ void GatewayLoop::put(const can::Frame& frame, TimePoint stamp) {
 
 void GatewayLoop::put_on(can::BusIndex bus, const can::Frame& frame, TimePoint stamp) {
   const gateway::OutputPlan& output = setup_->plan.output;
-  // Whatever else goes out goes out with a rate.
+  // Every frame but VG_Bias and VG_Model goes out with a rate.
   const bool is_own = output.vgyro_frames && bus == output.bus && !frame.has(can::kExtended);
   const bool is_bias = is_own && (frame.id == output.bias_id || frame.id == output.model_id);
   if (!is_bias) patience_.rate_at(stamp);
@@ -347,9 +348,9 @@ void GatewayLoop::put_on(can::BusIndex bus, const can::Frame& frame, TimePoint s
   has_spoken_ = true;
 }
 
-// A process that was stopped finds its timer gone off, or many frames at once where it was about to
-// look. So the first answer of a turn without either is young enough where it is when the timer is
-// due, and nobody has to ask for the time.
+// A process that was stopped finds its timer gone off, or many frames in one batch. If neither is
+// so, the first frame of a turn can be judged by the time at which the timer is due, which saves
+// reading the clock.
 bool GatewayLoop::is_timely(TimePoint stamp) {
   const bool nothing_odd = !rang_ && !has_spoken_ &&
                            std::none_of(setup_->buses.begin(), setup_->buses.end(),
@@ -393,7 +394,7 @@ Traffic GatewayLoop::traffic() const {
   return traffic;
 }
 
-// --- what is slow --------------------------------------------------------------------------------
+// --- slow work -----------------------------------------------------------------------------------
 
 void GatewayLoop::second_passed() {
   for (Bus& bus : setup_->buses)
@@ -442,7 +443,7 @@ void GatewayLoop::look_whether_output_fits() {
             fits.error().message());
 }
 
-// Not from within the dispatching: the buses are replaced.
+// Not called while sd-event dispatches, because it replaces the buses.
 Expected<void> GatewayLoop::do_what_was_asked() {
   if (std::exchange(reload_wanted_, false)) begin_reload();
   if (std::exchange(recalibration_wanted_, false)) recalibrate();
@@ -460,8 +461,7 @@ void GatewayLoop::recalibrate() {
   if (keeper_ != nullptr) keeper_->forget();
 }
 
-// What is worth keeping: what the pipeline knows, or what was known before a reload, as long as
-// that is better.
+// The state to save: the pipeline's, or the one from before a reload as long as that is better.
 std::optional<gateway::SavedState> GatewayLoop::memory() {
   const bool was_contradicted = inheritance_.is_contradicted();
   std::optional<gateway::SavedState> known =
@@ -497,7 +497,7 @@ Expected<void> GatewayLoop::ask_for_capture(Capture::Answer answer) {
   return capture_->ask(std::move(answer), clock_.wall());
 }
 
-// Once in a turn: a request for all properties asks for each of them.
+// Made once per turn, because a request for all properties calls this for each of them.
 const Snapshot& GatewayLoop::snapshot() {
   if (std::exchange(snapshot_at_, clock_.steady()) == clock_.steady() && snapshot_.plan != nullptr)
     return snapshot_;
@@ -571,11 +571,11 @@ Expected<void> GatewayLoop::try_to_replace_setup(gateway::Plan plan, bool keep) 
   }
 }
 
-// Nothing of the present setup is given up before all memory is there.
+// Allocates everything before it gives up any part of the present setup.
 Expected<void> GatewayLoop::replace_setup(gateway::Plan plan, bool keep) {
   auto next = std::make_unique<Setup>(std::move(plan), clock_, log_);
   if (Expected<void> opened = open_buses(*next); !opened) return opened;
-  // The old pipeline takes what has come so far, also through the sockets of the new one.
+  // The old pipeline takes the frames received so far; the new sockets drop their copies of them.
   clock_.begin_turn();
   for (Bus& bus : setup_->buses)
     bus.begin_reading();
@@ -592,7 +592,7 @@ Expected<void> GatewayLoop::replace_setup(gateway::Plan plan, bool keep) {
   return poll_buses();
 }
 
-// Not before such a configuration is in use; then each time, so that nobody forgets it.
+// Called when a configuration takes effect, and each time, so that shadow mode is not forgotten.
 void GatewayLoop::tell_of_shadow(const gateway::OutputPlan& output) {
   if (output.transmit) return;
   log_.tell(Severity::kWarning, {.cause = "shadow"},
@@ -600,7 +600,8 @@ void GatewayLoop::tell_of_shadow(const gateway::OutputPlan& output) {
             "transmit = true`, or no such line, and a reload end it");
 }
 
-// What the present pipeline has learned, as much of it as the next one can use; tells how much.
+// Gives the next pipeline what the present one has learned, as far as it can use it. Returns the
+// text for the log.
 std::string GatewayLoop::hand_over(Setup& next) {
   if (gateway::same_but_output(setup_->plan, next.plan)) {
     std::string how =
@@ -644,7 +645,7 @@ int GatewayLoop::on_debug(sd_event_source*, const signalfd_siginfo*, void* self)
 }
 
 int GatewayLoop::on_second(sd_event_source* source, std::uint64_t, void* self) {
-  // Rates need no memory and no further thread; what should be told this second waits for the next.
+  // Rates need neither memory nor a further thread, so the reports of this second just wait.
   auto& loop = *static_cast<GatewayLoop*>(self);
   try {
     loop.second_passed();

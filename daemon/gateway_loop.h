@@ -1,9 +1,9 @@
 #pragma once
 
-// The live driver of the pipeline: frames of all buses in the order of their stamps, time when no
-// frame comes, output frames to the transmit queue. sd-event serves what is slow (signals, the
-// status of each second); frames go past it, straight from epoll. Nothing on the frame path
-// allocates.
+// Drives the pipeline live: gives it the frames of all buses in the order of their stamps, and the
+// time when no frame comes, and puts its output frames into the transmit queues. sd-event serves
+// the slow work (signals, the status of each second); frames bypass it, straight from epoll.
+// Nothing on the frame path allocates.
 
 #include <memory>
 #include <optional>
@@ -36,16 +36,16 @@
 
 namespace vgyro::daemon {
 
-/// What the loop serves beside the rates. Each may be null: it is not wanted.
+/// What the loop serves besides the rates; null: not wanted.
 struct Companions {
-  StateKeeper* keeper = nullptr;  ///< across a restart
+  StateKeeper* keeper = nullptr;  ///< keeps the biases across a restart
   MetricsFile* metrics = nullptr;
   Capture* capture = nullptr;
 };
 
 class GatewayLoop final : private gateway::FrameSink {
  public:
-  /// `load` reads the configuration again, beside the loop. `instance` is the name of one of
+  /// `load` reads the configuration again, in a thread of its own. `instance` is the name of one of
   /// several gateways, or empty.
   GatewayLoop(LoadedConfig config, LoadPlan load, std::string instance, Companions companions,
               Log& log);
@@ -53,17 +53,18 @@ class GatewayLoop final : private gateway::FrameSink {
   GatewayLoop& operator=(const GatewayLoop&) = delete;
   ~GatewayLoop() override;
 
-  /// Takes up what was kept, binds the sockets and catches signals; an error says what the user can
-  /// do. Interfaces that are not there yet are waited for.
+  /// Binds the sockets, takes up the saved state and catches signals; an error says what the user
+  /// can do. A missing interface is no error: the loop waits for it.
   Expected<void> start();
 
-  /// Until SIGTERM or SIGINT; SIGHUP reads the configuration again, SIGUSR1 toggles debug messages.
+  /// Runs until SIGTERM or SIGINT. SIGHUP reads the configuration again, SIGUSR1 toggles debug
+  /// messages.
   Expected<void> run();
 
  private:
   using EventPointer = std::unique_ptr<sd_event, decltype(&sd_event_unref)>;
 
-  /// What one configuration makes; replaced as a whole.
+  /// Everything made from one configuration; replaced as a whole.
   struct Setup {
     Setup(gateway::Plan the_plan, TurnClock& clock, Log& log);
     gateway::Plan plan;
@@ -106,7 +107,7 @@ class GatewayLoop final : private gateway::FrameSink {
   std::optional<gateway::SavedState> memory();
   Expected<void> save_state();
   Expected<void> ask_for_capture(Capture::Answer answer);
-  /// `keep`: goes on with what was learned, where the gyros are the same.
+  /// `keep`: the new pipeline continues with what was learned, if the gyros are the same.
   Expected<void> replace_setup(gateway::Plan plan, bool keep);
   Expected<void> try_to_replace_setup(gateway::Plan plan, bool keep);
   std::string hand_over(Setup& next);
@@ -125,7 +126,7 @@ class GatewayLoop final : private gateway::FrameSink {
 
   PlanLoader loader_;
   StateKeeper* keeper_;
-  gateway::Inheritance inheritance_;  ///< from a setup that was given up
+  gateway::Inheritance inheritance_;  ///< what an earlier setup had learned
   MetricsFile* metrics_;
   Capture* capture_;
   Log& log_;
@@ -139,19 +140,19 @@ class GatewayLoop final : private gateway::FrameSink {
   int epoll_fd_ = -1;
   DeadlineTimer timer_;
   Alarm alarm_;
-  bool rang_ = true;          ///< the timer, in this turn
+  bool rang_ = true;          ///< the timer went off in this turn
   TimePoint newest_stamp_;    ///< of the frame handed on last
   bool has_spoken_ = false;   ///< a frame went out in this turn
-  std::uint64_t spoken_ = 0;  ///< what the pipeline counted at the end of the last turn
+  std::uint64_t spoken_ = 0;  ///< Pipeline::spoken() at the end of the last turn
   bool stopping_ = false;
   bool reload_wanted_ = false;
   bool recalibration_wanted_ = false;
   bool reload_refused_ = false;
   bool told_of_shortage_ = false;
-  bool output_fits_ = true;  ///< when last looked at
+  bool output_fits_ = true;  ///< result of the last check_output()
   std::uint64_t watchdog_half_usec_ = 0;
   LifeSign life_;
-  std::uint64_t samples_ = 0;  ///< of both gyros, when last looked at
+  std::uint64_t samples_ = 0;  ///< of both gyros, at the last look_at_status()
   Patience patience_;
   ForwardTime forward_;
   TimePoint started_;  ///< on the steady clock

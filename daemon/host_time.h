@@ -1,8 +1,8 @@
 #pragma once
 
-// The host's clocks as the loop uses them, and what is derived of them. What is due on the bus goes
-// by the clock of the frames' stamps, which may be set; what waits for the bus goes by one that may
-// not.
+// The host's clocks as the loop uses them, and what is derived from them. The pipeline's deadlines
+// are on the clock of the frames' stamps, which may be set; those of frames waiting for the bus are
+// on a clock that cannot be set.
 
 #include <algorithm>
 #include <optional>
@@ -11,10 +11,10 @@
 
 namespace vgyro::daemon {
 
-/// The host's clocks as one turn of the loop sees them: each is read when it is first asked for,
-/// and then stands still. Most turns ask for none: under User Mode Linux, and wherever the kernel
-/// has no quick way, reading one costs as much as reading a frame. Restarted within a turn by a
-/// bus that checks whether a stamp is in the future.
+/// The host's clocks in one turn of the loop: each is read at its first use and then stands still.
+/// Most turns read none, because where the kernel has no quick way, as under User Mode Linux, that
+/// costs as much as reading a frame. A bus restarts the clocks within a turn to check whether a
+/// stamp is in the future.
 class TurnClock {
  public:
   using Read = TimePoint (*)();
@@ -42,14 +42,14 @@ class TurnClock {
   std::optional<TimePoint> steady_;
 };
 
-/// The stamps' clock, without its backward steps: otherwise a silence would go unnoticed until the
-/// clock had caught up. Where samples come, the pipeline takes a step out of their stamps; then it
-/// is forgotten here.
+/// The clock of the stamps, without its backward steps: after one, a silence would go unnoticed
+/// until the clock had caught up. While samples come, the pipeline takes a step out of their
+/// stamps, so each sample makes this forget the step.
 class ForwardTime {
  public:
   TimePoint update(TimePoint wall, TimePoint steady) {
     if (begun_) {
-      // A sample came since the last update, when on the steady clock nobody asked.
+      // After a sample, the steady time that belongs to `wall_` is not known.
       const TimePoint expected = sampled_ ? wall_ : wall_ + (steady - steady_);
       if (wall < expected - kStepLeast) set_back_ += expected - wall;
     }
@@ -70,14 +70,14 @@ class ForwardTime {
   static constexpr Duration kStepLeast = std::chrono::milliseconds(100);
 
   bool begun_ = false;
-  bool sampled_ = false;  ///< wall_ is of the newest sample, and steady_ older
+  bool sampled_ = false;  ///< wall_ is the newest sample's, steady_ is older
   TimePoint wall_;
   TimePoint steady_;
   Duration set_back_{};
 };
 
-/// How long a frame may wait for the bus: two periods of VG_Rate, within limits. What it has not
-/// taken by then is worth less than its successor.
+/// How long a frame may wait for the bus: two periods of VG_Rate, within limits. After that it is
+/// worth less than its successor.
 class Patience {
  public:
   void rate_at(TimePoint stamp) {

@@ -17,20 +17,21 @@ namespace vgyro::daemon {
 
 class IdentifierWatch {
  public:
-  /// So long after the last such frame the bus counts as contested: longer than the slowest gyros,
-  /// at whose rates another gateway sends, leave between two samples.
+  /// The bus counts as contested this long after the last foreign frame. That is longer than the
+  /// sample interval of the slowest gyros, at which another gateway would send.
   static constexpr int kContestedSeconds = 10;
-  /// A frame that was handed to a controller is sent, or given up, and looped back within this.
+  /// Within this time, a frame handed to a controller is sent and looped back, or given up.
   static constexpr int kEchoSeconds = 2;
 
-  /// Nothing is sent to this bus.
+  /// For a bus that the gateway does not send to.
   IdentifierWatch() = default;
   explicit IdentifierWatch(std::vector<gateway::FrameId> ids) : ids_(std::move(ids)) {}
 
-  /// A socket was opened: echoes of an earlier one may come.
+  /// Call when a socket was opened: echoes of an earlier one may still come.
   void opened() { echoes_left_ = kEchoSeconds; }
 
-  /// Has it one of our identifiers? Then it is no input. `local`: sent by this host.
+  /// Whether the frame has one of our identifiers, and thus is no input. `local`: sent by this
+  /// host.
   bool takes(const can::Frame& frame, bool local) {
     if (frame.has(can::kRemote) || frame.has(can::kError)) return false;
     const gateway::FrameId id{frame.id, frame.has(can::kExtended)};

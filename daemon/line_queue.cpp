@@ -7,7 +7,7 @@
 namespace vgyro::daemon {
 namespace {
 
-// At the end of the process: a journal that works takes milliseconds.
+// Wait at the end of the process; a journal that works takes milliseconds.
 constexpr std::chrono::milliseconds kLastPatience{1000};
 
 Line remark_of(std::uint64_t lost) {
@@ -24,7 +24,7 @@ Line remark_of(std::uint64_t lost) {
 struct LineQueue::Shared {
   struct Entry {
     Line line;
-    std::uint64_t lost_before = 0;  ///< right before it
+    std::uint64_t lost_before = 0;  ///< lines lost right before this one
   };
 
   explicit Shared(Write the_write) : write(std::move(the_write)) {}
@@ -41,8 +41,8 @@ struct LineQueue::Shared {
   std::condition_variable idle;
   std::deque<Entry> entries;
   std::uint64_t lost = 0;
-  std::uint64_t did_not_fit = 0;  ///< of these, behind the last entry
-  std::uint64_t failed = 0;       ///< of these, not written and not said
+  std::uint64_t did_not_fit = 0;  ///< of `lost`: after the last entry
+  std::uint64_t failed = 0;       ///< of `lost`: could not be written, not reported yet
   bool writing = false;
   bool closed = false;
 };
@@ -60,7 +60,7 @@ void LineQueue::Shared::write_what_comes() {
   }
 }
 
-// A line; or, where none is left, that some did not fit behind the last.
+// Writes the next line or, if none is left, how many did not fit after the last one.
 void LineQueue::Shared::write_next(std::unique_lock<std::mutex>& lock) {
   const bool has_line = !entries.empty();
   Entry entry;

@@ -1,8 +1,8 @@
 #pragma once
 
-// Lines for a receiver that may not read: put() never waits. A thread of its own
-// writes them in their order. Lines that do not fit, or cannot be written, are counted, and the
-// count is written in their place as soon as lines are read again. Independent of the receiver.
+// A queue of lines for a receiver that may not read: put() never waits, and a separate thread
+// writes the lines in their order. Lines that do not fit, or cannot be written, are counted, and
+// the count is written in their place as soon as lines are read again. Independent of the receiver.
 
 #include <chrono>
 #include <condition_variable>
@@ -31,25 +31,25 @@ struct Line {
 
 class LineQueue {
  public:
-  /// May wait as long as it likes; false when the line cannot be written.
+  /// May block; false if the line cannot be written.
   using Write = std::function<bool(const Line&)>;
 
-  /// What a reader who looks away for a minute misses of a daemon in trouble, and more; with it the
-  /// queue takes some 100 kB.
+  /// More than a daemon in trouble logs in a minute without a reader. A full queue takes some 100
+  /// kB.
   static constexpr std::size_t kLinesMost = 256;
 
-  /// Throws std::system_error where there are no more threads.
+  /// Throws std::system_error if no thread can be started.
   explicit LineQueue(Write write);
   LineQueue(const LineQueue&) = delete;
   LineQueue& operator=(const LineQueue&) = delete;
-  /// Waits a second at most for what is not written yet.
+  /// Waits at most a second for the remaining lines.
   ~LineQueue();
 
   void put(Line line);
-  /// One that never became a line.
+  /// Counts a line that could not even be formatted.
   void count_lost();
 
-  /// Waits until all is written, or `patience` has passed; true when it is.
+  /// Waits until all lines are written; false if that takes longer than `patience`.
   bool flush(std::chrono::milliseconds patience);
 
   /// Lines that did not fit or could not be written, since the start.

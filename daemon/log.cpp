@@ -15,7 +15,7 @@
 namespace vgyro::daemon {
 namespace {
 
-/// systemd names the stream it made; a redirected stderr is another one.
+/// systemd names the stream that it made for stderr; a redirected stderr is another one.
 bool stderr_is_journal() {
   const char* stream = std::getenv("JOURNAL_STREAM");  // NOLINT(concurrency-mt-unsafe): at start
   struct stat status {};
@@ -32,13 +32,13 @@ bool write_journal(Log::Journal journal, const Line& line) {
   std::array<iovec, fields.size()> parts{};
   int count = 0;
   for (const std::string& field : fields) {
-    if (field.back() == '=') continue;  // nothing to say
+    if (field.back() == '=') continue;  // empty
     parts[static_cast<std::size_t>(count++)] = {const_cast<char*>(field.data()), field.size()};
   }
   return journal(parts.data(), count) >= 0;
 }
 
-// Somebody who shares stderr may have made it one that does not wait.
+// Another process that shares stderr may have made it non-blocking.
 bool write_stderr(std::string_view text) {
   while (!text.empty()) {
     const ssize_t written = ::write(STDERR_FILENO, text.data(), text.size());
@@ -57,7 +57,8 @@ bool write_stderr(std::string_view text) {
 bool write_line(Log::Journal journal, const Line& line) {
   if (journal == nullptr) return write_stderr(fmt::format("vgyrod: {}\n", line.message));
   if (write_journal(journal, line)) return true;
-  // Where journald does not answer its stream may; it takes the priority from the line's beginning.
+  // If journald's socket fails, its stream may still work; it reads the priority from the line's
+  // prefix.
   return write_stderr(fmt::format("<{}>{}\n", static_cast<int>(line.severity), line.message));
 }
 
@@ -83,7 +84,7 @@ void Log::write(Severity severity, const Subject& subject, fmt::string_view text
                 .gyro = std::string(subject.gyro),
                 .cause = std::string(subject.cause),
                 .bus = std::string(subject.bus)});
-  } catch (const std::bad_alloc&) {  // whoever speaks goes on
+  } catch (const std::bad_alloc&) {  // the caller goes on
     lines_.count_lost();
   }
 }

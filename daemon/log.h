@@ -1,9 +1,9 @@
 #pragma once
 
-// One line per event for people: to the journal, with fields to filter by, when systemd connected
-// stderr to it, else to stderr as it is. Rare lines only; nothing here belongs on the frame path.
-// One thread speaks: the loop. Nobody waits for the journal or for stderr: lines that are not taken
-// are counted (line_queue.h).
+// The daemon's log, one line per event for people: to the journal, with fields to filter by, if
+// systemd connected stderr to it; otherwise to stderr. For rare lines only, not for the frame path.
+// Called by the loop's thread alone, which never waits for the journal or stderr: lines that are
+// not taken are counted (line_queue.h).
 
 #include <chrono>
 #include <cstdint>
@@ -16,7 +16,8 @@
 
 namespace vgyro::daemon {
 
-/// What a line is about: VGYRO_GYRO=, VGYRO_CAUSE= and VGYRO_BUS= of the journal. Empty: nothing.
+/// What a line is about: the journal's fields VGYRO_GYRO=, VGYRO_CAUSE= and VGYRO_BUS=, unless
+/// empty.
 struct Subject {
   std::string_view gyro = {};
   std::string_view cause = {};
@@ -25,12 +26,12 @@ struct Subject {
 
 class Log {
  public:
-  /// sd_journal_sendv(), or what a test has instead.
+  /// sd_journal_sendv(), or a test's replacement.
   using Journal = int (*)(const iovec* fields, int count);
 
-  /// To the journal when stderr is connected to it.
+  /// Writes to the journal if stderr is connected to it, otherwise to stderr.
   Log();
-  /// To this journal; where it fails, or is null, to stderr.
+  /// Writes to this journal; to stderr if it fails or is null.
   explicit Log(Journal journal);
 
   template <class... Args>
@@ -61,12 +62,12 @@ class Log {
     write(severity, subject, text, fmt::make_format_args(args...));
   }
 
-  /// Less severe lines are not written. The queue's own, of lines that were lost, always are.
+  /// Less severe lines are not written. The queue's own reports of lost lines always are.
   void set_level(Severity least) { least_ = least; }
   /// Everything is written, whatever the level, until this is called again.
   void toggle_debug();
 
-  /// Waits until all lines are written; false when that takes too long.
+  /// Waits until all lines are written; false if that takes longer than `patience`.
   bool flush(std::chrono::milliseconds patience) { return lines_.flush(patience); }
 
   /// Lines lost since the start.

@@ -32,7 +32,7 @@ void LooseThread::start(std::function<void()> work) {
   auto end = std::make_shared<End>();
   start_thread([end, work = std::move(work)]() mutable {
     work();
-    work = nullptr;  // what it shares is given back before anybody is told
+    work = nullptr;  // frees what it shares before finish() returns
     const std::scoped_lock lock(end->mutex);
     end->is_reached = true;
     end->reached.notify_all();

@@ -1,8 +1,8 @@
 #pragma once
 
-// Threads of the daemon. Signals stay the event loop's. A LooseThread may be left behind: what
-// hangs in a disk, a pipe or the journal must not keep the process from ending. So whatever such a
-// thread works on it owns, or shares by a pointer that counts.
+// Threads of the daemon. They block all signals, which the event loop handles. A LooseThread may be
+// left behind: one that hangs on a disk, a pipe or the journal must not keep the process from
+// ending. So it must own its data, or share them by std::shared_ptr.
 
 #include <chrono>
 #include <functional>
@@ -11,7 +11,7 @@
 
 namespace vgyro::daemon {
 
-/// A thread that no signal comes to. Throws std::system_error where there are no more threads.
+/// Starts a thread that receives no signals. Throws std::system_error if there are no more threads.
 std::thread start_thread(std::function<void()> work);
 
 class LooseThread {
@@ -20,10 +20,11 @@ class LooseThread {
   LooseThread(const LooseThread&) = delete;
   LooseThread& operator=(const LooseThread&) = delete;
 
-  /// As start_thread(). One that was started before is left to itself.
+  /// Like start_thread(). A thread that was started before is left running.
   void start(std::function<void()> work);
 
-  /// True when it has ended, or was never started; else, after `patience`, it is left to itself.
+  /// Waits at most `patience`. True if the thread has ended or was never started; otherwise it is
+  /// left running.
   bool finish(std::chrono::milliseconds patience);
 
  private:

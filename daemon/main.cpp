@@ -31,15 +31,15 @@ constexpr int kBadInput = 1;
 constexpr int kWrongUsage = 2;
 constexpr int kSystemTrouble = 3;
 
-// Two gyros at 500 Hz fill 5 MB in ten minutes. A vehicle computer's memory card is written to only
-// for a capture, and keeps some weeks of them.
+// Two gyros at 500 Hz fill 5 MB in ten minutes. Only a capture writes to a vehicle computer's
+// memory card, which keeps some weeks of captures.
 constexpr double kCaptureMinutes = 10.0;
 constexpr double kCaptureMemory_mib = 16.0;
 constexpr double kCaptureDisk_mib = 256.0;
 constexpr int kCaptureKeep = 20;
-// A fault that comes and goes gives a day of it 24 captures, not thousands.
+// An intermittent fault makes 24 captures a day, not thousands.
 constexpr double kCaptureInterval_min = 60.0;
-// Beyond these limits a number is a slip of the pen.
+// A number beyond these limits is taken for a typing error.
 constexpr double kMinutesMost = 1440.0;
 constexpr double kMemoryMost_mib = 4096.0;
 constexpr double kDiskMost_mib = 1'048'576.0;
@@ -68,7 +68,7 @@ struct Options {
   CaptureOptions capture;
 };
 
-// An unknown option comes first: it is often the reason why another one is missing.
+// An unknown option is reported first: it is often the reason why another one is missing.
 std::string usage_text(const CLI::App& app, const CLI::ParseError& error) {
   const std::string help = "; see `vgyrod --help`";
   std::vector<std::string> known;
@@ -83,7 +83,7 @@ std::string usage_text(const CLI::App& app, const CLI::ParseError& error) {
   return "vgyrod: " + vgyro::printable(error.what()) + help;
 }
 
-// systemd names the directory that it made for the service; of several the first.
+// systemd names the directories that it made for the service; the first one is used.
 std::string in_directory(const char* variable, const char* file) {
   const char* directories = std::getenv(variable);  // NOLINT(concurrency-mt-unsafe): at start
   if (directories == nullptr || *directories == '\0') return {};
@@ -91,7 +91,7 @@ std::string in_directory(const char* variable, const char* file) {
   return std::string(all.substr(0, all.find(':'))) + '/' + file;
 }
 
-// A relative one stands in the service's state directory, so that one line is right for every
+// A relative path is in the service's state directory, so that one line is right for every
 // instance.
 std::string capture_directory(const std::string& given) {
   if (given.empty() || given.front() == '/') return given;
@@ -231,7 +231,7 @@ void add_options(CLI::App& app, Options& options) {
       "file or the captures, 2 wrong usage, 3 the system failed.");
 }
 
-// What one option says of another.
+// Checks the options against each other; empty: no conflict.
 std::string capture_conflict(const CaptureOptions& capture) {
   if (capture.disk_mib >= capture.memory_mib) return {};
   return fmt::format(
@@ -269,7 +269,7 @@ int main(int argc, char** argv) {
     return kWrongUsage;
   }
 
-  std::signal(SIGPIPE, SIG_IGN);  // a reader of stderr that went away must not stop the gateway
+  std::signal(SIGPIPE, SIG_IGN);  // a closed stderr must not stop the gateway
   try {
     return run_with_log(options);
   } catch (const std::exception& error) {  // no thread for the log

@@ -35,7 +35,7 @@ std::string escaped(std::string_view value) {
 
 class Text {
  public:
-  /// node_exporter puts the files of all gateways of a host together, so each needs a label.
+  /// node_exporter merges the files of all gateways of a host, so each gateway needs a label.
   explicit Text(std::string_view instance)
       : common_(instance.empty() ? "" : fmt::format("gateway=\"{}\"", escaped(instance))) {}
 
@@ -131,7 +131,7 @@ void add_counters(Text& text, const Snapshot& now) {
   text.family("vgyro_rates_total", "counter", "VG_Rate frames made, by whether they were valid.");
   text.sample({{"valid", "yes"}}, status.rates_out_valid);
   text.sample({{"valid", "no"}}, status.rates_out - status.rates_out_valid);
-  // No counters: a stretch that turns out to be the other thing goes from one to the other.
+  // Gauges, not counters: a stretch whose verdict changes moves from one to another.
   text.family("vgyro_stops", "gauge",
               "Steady stretches so far, by whether they were taken for stops and learned from, for "
               "turns of both gyros together, or ended open.");
@@ -241,7 +241,7 @@ void add_gyros(Text& text, const Snapshot& now) {
   });
 }
 
-// Where the inputs are recorded.
+// Only if the inputs are recorded.
 void add_captures(Text& text, const Snapshot& now) {
   if (!now.capture) return;
   const CaptureStatus& capture = *now.capture;
@@ -266,7 +266,7 @@ void add_captures(Text& text, const Snapshot& now) {
   text.sample({}, capture.ring.dropped);
 }
 
-// Of a platform of several axes what is each one's.
+// The metrics of each axis, on a platform with several.
 void add_axes(Text& text, const Snapshot& now) {
   if (now.axes.empty()) return;
   const auto each = [&](const auto& add) {
@@ -325,7 +325,7 @@ void add_misalignment(Text& text, const Snapshot& now) {
                 now.status.misalignment_sigma_deg[i]);
 }
 
-// Few gyros tell it: of the others there is no family of NaN.
+// Few gyros send their supply voltage; if neither does, there is no family full of NaN.
 void add_supply(Text& text, const Snapshot& now) {
   const auto& gyros = now.plan->gyros;
   if (!gyros[0].supply_voltage && !gyros[1].supply_voltage) return;
@@ -404,11 +404,11 @@ bool MetricsFile::second_passed() {
   return second_++ % kPeriod_s == 0;
 }
 
-// No fsync: what is lost with the power is old anyway.
+// No fsync: after a loss of power the metrics are outdated anyway.
 Expected<void> MetricsFile::replace(const std::string& text) const {
   const int fd =
       ::open(new_path_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC | O_NOFOLLOW, 0644);
-  // For others to read, whatever the service's umask.
+  // Readable by all users, whatever the service's umask.
   const bool whole = fd >= 0 && ::fchmod(fd, 0644) == 0 && write_all(fd, text);
   if (whole && ::close(fd) == 0 && ::rename(new_path_.c_str(), path_.c_str()) == 0) return {};
   auto failed = fail(path_, "metrics cannot be written: " + system_reason(),

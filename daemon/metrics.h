@@ -1,7 +1,7 @@
 #pragma once
 
-// The gateway in numbers for Prometheus: a text file that node_exporter's textfile collector reads.
-// Written whole or not at all, in a thread of its own; a file that cannot be written is reported
+// The gateway's metrics for Prometheus: a text file that node_exporter's textfile collector reads.
+// A separate thread writes the file, whole or not at all; a file that cannot be written is reported
 // once.
 
 #include <string>
@@ -12,7 +12,7 @@
 
 namespace vgyro::daemon {
 
-/// In Prometheus' text form; units in the names.
+/// Prometheus' text format, with the units in the names.
 std::string metrics_text(const Snapshot& now);
 
 class MetricsFile {
@@ -32,7 +32,7 @@ class MetricsFile {
   std::string new_path_;
   Log& log_;
   int second_ = 0;
-  bool failed_ = false;  ///< and reported
+  bool failed_ = false;  ///< the last write failed, and that was reported
   BackgroundWriter writer_;
 };
 

@@ -1,9 +1,9 @@
 #pragma once
 
 // The frames that wait to be sent, for each bus of a configuration: its queue, and whether poll
-// watches for room in its socket. A reload hands them on by the names of the buses, so that a frame
-// meant for one bus is never sent to another. In shadow mode ([output] transmit = false) frames are
-// counted instead of queued, and no transmitter is called. Allocates only when constructed.
+// watches for room in its socket. A reload matches buses by name, so that a frame meant for one bus
+// is never sent to another. In shadow mode ([output] transmit = false) frames are counted instead
+// of queued, and no transmitter is called. Allocates only when constructed.
 
 #include <cstddef>
 #include <cstdint>
@@ -45,7 +45,7 @@ class Outlets {
   /// and the counts of all buses. In shadow mode the waiting frames are dropped.
   void take_over(Outlets&& before);
 
-  /// Of all buses, since the program started.
+  /// Counts of all buses, since the program started.
   [[nodiscard]] can::TransmitCounts counts() const;
   /// Frames that shadow mode kept from the buses, since the program started.
   [[nodiscard]] std::uint64_t shadowed() const { return shadowed_; }
@@ -55,7 +55,7 @@ class Outlets {
  private:
   std::vector<std::string> names_;
   std::vector<Outlet> outlets_;
-  can::TransmitCounts gone_;  ///< of buses that no configuration has any longer
+  can::TransmitCounts gone_;  ///< counts of buses that are no longer configured
   bool transmit_;
   std::uint64_t shadowed_ = 0;
 };

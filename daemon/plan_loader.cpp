@@ -16,7 +16,7 @@
 namespace vgyro::daemon {
 namespace {
 
-// At the end of the process: one that goes on takes milliseconds more.
+// Wait at the end of the process; a load that does not hang takes milliseconds.
 constexpr std::chrono::milliseconds kLastPatience{1000};
 
 std::vector<Error> refusal(std::string what, std::string remedy) {
@@ -35,7 +35,7 @@ LoadResult load_with_fingerprint(const std::string& path,
 }
 
 LoadResult load_or_refuse(const LoadPlan& load) {
-  // Made before it is needed: then there may be no memory for it.
+  // Made in advance, because later there may be no memory for it.
   std::vector<Error> no_memory =
       refusal("there is not memory enough to read the configuration",
               "name a DBC file that holds only the messages that are needed");
@@ -108,7 +108,7 @@ void PlanLoader::begin() {
   try {
     thread_.start([desk = desk_, load = load_] {
       desk->hand_over(load_or_refuse(load));
-      // A large file's heap is this thread's own, and nobody else would ever give it back.
+      // A large file grows this thread's own heap, which would otherwise never be given back.
       ::malloc_trim(0);
     });
   } catch (const std::system_error& error) {

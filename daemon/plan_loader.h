@@ -1,9 +1,8 @@
 #pragma once
 
-// Reads the configuration beside the loop: a file may be large, its disk slow or away, and the
-// rates wait for nothing. A descriptor that the loop polls signals a result. Any
-// error, lack of memory included, is a result too: a refusal. A thread that hangs is left
-// behind.
+// Reads the configuration in a separate thread: a file may be large and its disk slow or gone, and
+// no rate may wait for it. A descriptor that the loop polls signals a result. Any error, lack of
+// memory included, is a result too: a refusal. A thread that hangs is left behind.
 
 #include <functional>
 #include <memory>
@@ -21,7 +20,7 @@ namespace vgyro::daemon {
 /// What the gateway needs of a configuration.
 struct LoadedConfig {
   gateway::Plan plan;
-  std::string fingerprint;  ///< gateway::fingerprint_of(), reckoned beside the loop
+  std::string fingerprint;  ///< gateway::fingerprint_of(), computed outside the loop
   gateway::LogLevel log_level = gateway::LogLevel::kInfo;
   std::vector<Error> warnings;  ///< usable, but the user should know
 };
@@ -35,13 +34,13 @@ LoadResult load_with_fingerprint(const std::string& path,
 /// Runs in a thread of its own, so it owns what it uses.
 using LoadPlan = std::function<LoadResult()>;
 
-/// What `load` says; its exceptions as errors.
+/// The result of `load`, with exceptions as errors.
 LoadResult load_or_refuse(const LoadPlan& load);
 
-/// The level that it asks for.
+/// Sets the configured log level.
 void set_log_level(const LoadedConfig& config, Log& log);
 
-/// The errors of a configuration that cannot be used; the warnings of one that can.
+/// Logs the errors of a configuration that cannot be used, or the warnings of one that can.
 void tell_config(const LoadResult& loaded, Log& log);
 
 class PlanLoader {
@@ -55,10 +54,10 @@ class PlanLoader {
   /// Readable when take() has a result.
   [[nodiscard]] int fd() const;
 
-  /// Begins to load; while that goes on, any number of further wishes make one further load.
+  /// Starts a load. Any number of calls during a load cause one further load.
   void ask();
 
-  /// The result of one load, once. A load that was asked for meanwhile begins.
+  /// The result of a load, once. Then starts the load that was asked for meanwhile, if any.
   std::optional<LoadResult> take();
 
   [[nodiscard]] bool is_busy() const { return busy_; }
@@ -68,7 +67,7 @@ class PlanLoader {
   void begin();
 
   LoadPlan load_;
-  std::shared_ptr<Desk> desk_;  ///< what a thread and the loop share
+  std::shared_ptr<Desk> desk_;  ///< shared by the thread and the loop
   LooseThread thread_;
   bool busy_ = false;
   bool asked_again_ = false;

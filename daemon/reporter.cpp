@@ -17,7 +17,7 @@ std::string bias_text(double bias_dps) {
   return std::isfinite(bias_dps) ? fmt::format("{:.2f}", bias_dps * kDegPerHour) : "unknown";
 }
 
-// "3 h"; in the largest unit of which there are two.
+// "3 h": in the largest unit that gives at least 2.
 std::string age_text(double age_s) {
   if (!std::isfinite(age_s)) return "an unknown time";
   if (age_s < 120.0) return fmt::format("{:.0f} s", age_s);
@@ -26,7 +26,7 @@ std::string age_text(double age_s) {
   return fmt::format("{:.0f} days", age_s / 86'400.0);
 }
 
-// What is wrong, as the rest of the sentence "gyro left ...".
+// The rest of the sentence "gyro left ...": what is wrong.
 std::string sentence(gateway::Fault fault) {
   switch (fault) {
     case gateway::Fault::kSilent:
@@ -51,7 +51,7 @@ std::string sentence(gateway::Fault fault) {
   return "";
 }
 
-// The beginning of a sentence that ends with how often it was so.
+// The beginning of a sentence that ends with "once" or "N times".
 const char* sentence(can::ErrorCause cause) {
   switch (cause) {
     case can::ErrorCause::kBusOff:
@@ -171,7 +171,7 @@ void Reporter::axis_fault_changed(char axis, std::size_t gyro, const gateway::St
 
 void Reporter::contradiction_changed(const gateway::Status& status) {
   contradiction_ = status.pair.contradiction;
-  disagree_ = status.disagree;  // it is of one piece with this
+  disagree_ = status.disagree;  // part of the contradiction, not reported separately
   if (!health_lines_.take()) return;
   if (contradiction_ == fusion::Contradiction::kNone) {
     log_.notice("the gyros move together again, as on one platform");
@@ -279,7 +279,7 @@ void Reporter::tell_gyro(const std::string& name, const gateway::GyroStatus& gyr
   }
 }
 
-// Once, when the first frames had time to come.
+// Reported once, after the first frames had time to come.
 void Reporter::tell_waiting(const std::string& name, const gateway::GyroStatus& gyro,
                             GyroTold& told) {
   if (!gyro.heard || gyro.waits_for == 0 || second_ < kRepeatSeconds) return;

@@ -1,8 +1,8 @@
 #pragma once
 
-// Tells people what the gateway does: changes of state, the first of each kind of trouble, a status
-// line, a summary at the end. Every kind of message has a limit on how often it comes. Clock-free:
-// second_passed() is its clock.
+// Logs what the gateway does, for people: changes of state, the first of each kind of trouble, a
+// status line, a summary at the end. Each kind of message has a limit on how often it comes.
+// Clock-free: second_passed() is its clock.
 
 #include <array>
 #include <cstdint>
@@ -34,9 +34,9 @@ class Reporter {
  public:
   Reporter(std::array<std::string, 2> gyro_names, double rest_s, Log& log);
 
-  /// What was sent before is known already.
+  /// Takes these counts as reported already.
   void start_from(const can::TransmitCounts& transmitted);
-  /// Their counters begin at 0 again.
+  /// Call when the buses were replaced: their counters begin at 0 again.
   void buses_are_new() {
     buses_.clear();
     last_received_ = 0;
@@ -63,7 +63,7 @@ class Reporter {
     }
   }
 
-  /// To be called about once a second: logs troubles that are new, returns the status line.
+  /// To be called about once a second: logs new troubles and returns the status line.
   std::string second_passed(const gateway::Status& status, const Traffic& traffic);
 
   void summarize(const gateway::Status& status, const Traffic& traffic);

@@ -37,7 +37,7 @@ void Notifier::ready(const std::string& status) {
   tell_surely(fmt::format("READY=1\nSTATUS={}", status));
 }
 
-// With the time, systemd knows a reload that it has asked for from one that came of itself.
+// The time lets systemd distinguish a reload that it requested from any other.
 void Notifier::reloading() {
   timespec now{};
   ::clock_gettime(CLOCK_MONOTONIC, &now);
@@ -57,7 +57,7 @@ void Notifier::alive() {
   tell("WATCHDOG=1");
 }
 
-// Of a status the next second has a newer one.
+// Not repeated: the next second has a newer status.
 void Notifier::tell(const std::string& text) {
   if (fd_ >= 0 && (!pay_debts() || !send(text))) ++failures_;
 }

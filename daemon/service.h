@@ -1,8 +1,8 @@
 #pragma once
 
-// The messages to systemd, and whether the watchdog may be fed. Without a service
-// manager all of this does nothing. Unlike sd_notify() it never waits: a manager that does not read
-// must not stop the rates. Messages not accepted are counted; required ones are repeated.
+// Messages to systemd, and the decision whether to feed the watchdog. Without a service manager all
+// of this does nothing. Unlike sd_notify(), Notifier never waits: a manager that does not read must
+// not stop the rates. Messages not accepted are counted; required ones are repeated.
 
 #include <cstdint>
 #include <deque>
@@ -14,9 +14,9 @@ namespace vgyro::daemon {
 
 class Notifier {
  public:
-  /// Speaks to the socket that $NOTIFY_SOCKET names.
+  /// Sends to the socket that $NOTIFY_SOCKET names.
   Notifier();
-  /// To this one: a path, or a name that begins with '@'. Empty: no receiver.
+  /// Sends to this socket: a path, or a name that begins with '@'. Empty: no receiver.
   explicit Notifier(const std::string& address);
   Notifier(const Notifier&) = delete;
   Notifier& operator=(const Notifier&) = delete;
@@ -32,7 +32,7 @@ class Notifier {
   [[nodiscard]] std::uint64_t failures() const { return failures_; }
 
  private:
-  // READY, RELOADING and READY again; older ones say nothing new.
+  // Room for READY, RELOADING and READY again; older messages are obsolete.
   static constexpr std::size_t kOwedMost = 4;
 
   void tell(const std::string& text);
@@ -50,13 +50,14 @@ class Notifier {
 std::uint64_t watchdog_usec();
 
 /// Decides whether the watchdog is fed. A loop that turns is not enough: whatever its state, the
-/// gateway sends VG_Bias ten times a second, or at every rate of slower gyros. One that is asked
-/// again after a second or more, and has sent nothing since, hangs. Clock-free.
+/// gateway sends VG_Bias ten times a second, or with every rate of slower gyros. If has_moved() is
+/// called a second or more after the last progress, and nothing was sent since, the gateway hangs.
+/// Clock-free.
 class LifeSign {
  public:
   static constexpr Duration kSilenceMost = std::chrono::seconds(1);
 
-  /// `put_out`: how often the pipeline had something to say so far. True when it has moved.
+  /// `put_out`: Pipeline::spoken(). True if it has changed within the last second.
   bool has_moved(TimePoint now, std::uint64_t put_out) {
     if (put_out != put_out_) last_moved_ = now;
     put_out_ = put_out;

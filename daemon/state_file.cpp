@@ -54,13 +54,13 @@ Expected<std::optional<std::string>> StateFile::read() const {
     if (count == 0) return text;
     text.append(block.data(), static_cast<std::size_t>(count));
     if (text.size() > bytes_max_) text.resize(bytes_max_ + 1);
-    if (text.size() > bytes_max_) return text;  // whoever reads it will say that it is too long
+    if (text.size() > bytes_max_) return text;  // the caller will refuse it as too long
   }
 }
 
 Expected<void> StateFile::check_writable() const {
   struct stat about {};
-  // Renaming over a device or a directory would take it from the system.
+  // Renaming over a device would remove it from the system.
   if (::stat(path_.c_str(), &about) == 0 && !S_ISREG(about.st_mode)) {
     return fail(path_, "is no file", "name a file of its own");
   }
@@ -80,7 +80,7 @@ Expected<void> StateFile::write_new(std::string_view text) const {
   clean_up();
   Descriptor file(
       ::open(new_path_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0600));
-  // On the disk before it gets its name: else a loss of power leaves the name without its bytes.
+  // Synced before the rename: otherwise a loss of power could leave the name without its bytes.
   const bool whole = file.is_open() && write_all(file.get(), text) && ::fsync(file.get()) == 0;
   if (!whole || !file.close()) return cannot(path_, "written");
   return {};

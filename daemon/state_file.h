@@ -1,8 +1,8 @@
 #pragma once
 
-// One small file that is whole at every moment, whatever kills the process or the machine: written
-// beside itself, brought to the disk, and renamed over the old one. One writer at a time. Knows
-// nothing of what is in it.
+// A small file that is whole at every moment, whatever kills the process or the machine: a new file
+// is written beside it, synced, and renamed over the old one. One writer at a time. Independent of
+// the contents.
 
 #include <optional>
 #include <string>
@@ -14,21 +14,23 @@ namespace vgyro::daemon {
 
 class StateFile {
  public:
-  /// Files above `bytes_max` are refused. Touches nothing yet.
+  /// Of a file longer than `bytes_max`, read() returns only one byte more. Does not touch the disk
+  /// yet.
   StateFile(std::string path, std::size_t bytes_max);
 
-  /// Nothing when there is no file; never waits for a pipe or a device.
+  /// Nothing if there is no file. Never waits for a pipe or a device.
   [[nodiscard]] Expected<std::optional<std::string>> read() const;
 
-  /// After success the new text is there, also after a loss of power; after a failure the old one.
+  /// After success the file holds the new text, even after a loss of power; after a failure the old
+  /// one.
   Expected<void> write(std::string_view text) const;
 
-  /// Could write() succeed? Says what is in the way.
+  /// Whether write() could succeed; the error says what is in the way.
   [[nodiscard]] Expected<void> check_writable() const;
 
   /// Renames the file to aside_path(), over an earlier one.
   Expected<void> set_aside() const;
-  /// Removes it; that there is none is fine.
+  /// Removes the file; no error if there is none.
   Expected<void> remove() const;
   /// Removes what a killed writer left behind.
   void clean_up() const;

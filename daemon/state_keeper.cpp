@@ -10,7 +10,7 @@ StateKeeper::StateKeeper(std::string path, Log& log)
       log_(log),
       writer_([this](const std::string& text) { return file_.write(text); }) {}
 
-// Where no lock can be made nothing can be written either, and load() tells of that.
+// If the lock file cannot be made, the state cannot be written either, and load() reports that.
 Expected<void> StateKeeper::lock() {
   if (lock_.take() != FileLock::Outcome::kHeld) return {};
   return fail(file_.path(), "another gateway keeps its biases there (" + lock_.holder() + ")",
@@ -42,7 +42,7 @@ std::optional<gateway::SavedState> StateKeeper::load(const gateway::Plan& plan) 
   return std::move(*state);
 }
 
-// Kept, for it may be the file of another pair, or tell what damages files here.
+// The file is kept: it may belong to another pair, or show what damages files here.
 void StateKeeper::refuse(Error error) {
   if (error.where.empty()) error.where = file_.path();
   const bool kept = file_.set_aside().has_value();

@@ -1,8 +1,8 @@
 #pragma once
 
-// Keeps the pipeline's learned state in a file: restored at the start, written when
-// something new was learned, at most once a minute, and at the end. A disk may be slow, so a
-// thread of its own writes; only finish() waits. File errors are reported, and never fatal.
+// Keeps the pipeline's learned state in a file: restored at the start, written when something new
+// was learned, at most once a minute, and at the end. A disk may be slow, so a separate thread
+// writes; only finish() waits. File errors are reported, and never fatal.
 
 #include <optional>
 #include <string>
@@ -23,20 +23,20 @@ class StateKeeper {
 
   StateKeeper(std::string path, Log& log);
 
-  /// Call first: no other process writes this file from now on. Error when one does.
+  /// Call first: reserves the file for this process. Error if another process has it.
   Expected<void> lock();
 
-  /// What an earlier run left, when it is whole and of these gyros. What is not is set aside.
+  /// The state of an earlier run, if it is whole and of these gyros. Otherwise its file is renamed.
   std::optional<gateway::SavedState> load(const gateway::Plan& plan);
 
-  /// To start afresh: what an earlier run left is removed.
+  /// Removes the state of an earlier run, to start afresh.
   void forget();
 
   /// To be called about once a second; true when it is time for keep().
   bool second_passed();
   void keep(const std::optional<gateway::SavedState>& state);
 
-  /// The last word; returns when it is on the disk.
+  /// Writes the last state; returns when it is on the disk.
   void finish(const std::optional<gateway::SavedState>& state);
 
  private:
@@ -48,7 +48,7 @@ class StateKeeper {
   Log& log_;
   int seconds_left_ = 0;
   std::string latest_;   ///< given to the thread, or written
-  bool failed_ = false;  ///< and reported
+  bool failed_ = false;  ///< the last write failed, and that was reported
   BackgroundWriter writer_;
 };
 

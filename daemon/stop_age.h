@@ -1,7 +1,7 @@
 #pragma once
 
-// How long ago the corrector learned from a stop. The pipeline counts stops and keeps no time of
-// them, so the age is as exact as it is asked for: to the second. Clock-free.
+// How long ago the corrector learned from a stop. The pipeline counts stops without their times, so
+// the age is as exact as count_is() is called often: to the second. Clock-free.
 
 #include <cstdint>
 #include <limits>
@@ -12,8 +12,8 @@ namespace vgyro::daemon {
 
 class StopAge {
  public:
-  /// `stops`: learned from so far. A stop that turns out to be a turn takes itself off the count,
-  /// and a new pipeline begins at 0 again: neither is a stop.
+  /// `stops`: the number learned from so far. It falls when a stop turns out to be a turn, and
+  /// begins at 0 again with a new pipeline: neither is a stop.
   void count_is(std::uint64_t stops, TimePoint now) {
     if (stops > stops_) {
       last_ = now;

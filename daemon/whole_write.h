@@ -1,6 +1,6 @@
 #pragma once
 
-// A file descriptor that closes itself, and bytes that are written to one until all of them are.
+// A file descriptor that closes itself, and a write that goes on until all bytes are written.
 
 #include <cerrno>
 #include <string_view>
@@ -25,8 +25,8 @@ class Descriptor {
   int fd_;
 };
 
-/// All of it, or errno says why not: a write that was cut short by a full disk sets it only at the
-/// next try.
+/// Writes all of `text`; on false, errno says why. A full disk first cuts a write short, and only
+/// the next one sets errno.
 inline bool write_all(int fd, std::string_view text) {
   while (!text.empty()) {
     const ssize_t written = ::write(fd, text.data(), text.size());
