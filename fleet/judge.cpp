@@ -19,16 +19,16 @@ namespace {
 
 using model::kShapeCount;
 
-// A spread between units is named from so many units on, and where this share of them is off by
-// more than two standard errors; by chance it is 4.6 %.
+// A spread between units is named if there are at least this many units and at least this share of
+// them is off by more than two standard errors; by chance that is 4.6 %.
 constexpr std::size_t kSpreadUnitsMin = 6;
 constexpr double kSpreadShare = 0.25;
 constexpr double kOff = 2.0;
 constexpr double kOffByChance = 0.0455;
 constexpr int kSpreadsMax = 6;
-// Fewer units do not tell how far units differ.
+// With fewer units their spread is not known well enough.
 constexpr std::size_t kApartUnitsMin = 5;
-// Of the bias, and of every shape's size.
+// One for the bias, and one for the size of each shape.
 constexpr std::size_t kTrends = kShapeCount + 1;
 // A unit with fewer drives is not called good.
 constexpr std::size_t kFewDrives = 3;
@@ -43,14 +43,13 @@ class Judge {
     for (const auto& [identity, sums] : pool.units)
       types_.push_back(identity.type);
     types_.erase(std::unique(types_.begin(), types_.end()), types_.end());
-    // Identities are in the order of their types: units of a type stand side by side.
+    // Identities are sorted by type, so the units of a type are contiguous.
     begin_of_.push_back(0);
     for (const std::string& type : types_)
       begin_of_.push_back(begin_of_.back() + units_of(type));
     of_types_ = System(types_.size() * kShapeCount);
     sizes_ = Eigen::VectorXd::Zero(of_types_.score.size());
-    // Every shape of every type and of every unit, their trends, and what else is asked of each
-    // unit.
+    // Every shape of every type and unit, their trends, and the other questions about each unit.
     tests_ = static_cast<double>(types_.size() * (kShapeCount + kTrends) +
                                  pool.units.size() * (kShapeCount + kTrends + kUnitQuestions));
   }
@@ -72,7 +71,7 @@ class Judge {
  private:
   struct Unit {
     Identity identity;
-    System system;  ///< what is left beside the type's sizes
+    System system;  ///< what the type's sizes leave over
   };
 
   [[nodiscard]] std::size_t units_of(const std::string& type) const {
@@ -81,7 +80,7 @@ class Judge {
                       [&](const auto& unit) { return unit.first.type == type; }));
   }
 
-  /// Places of a type's units in `units_`: from begin_of_[type] up to this.
+  /// A type's units are units_[begin_of_[type]] up to, but without, units_[end_of(type)].
   [[nodiscard]] std::size_t end_of(std::size_t type) const { return begin_of_[type + 1]; }
 
   [[nodiscard]] std::size_t type_of(const Identity& identity) const {
@@ -89,7 +88,7 @@ class Judge {
                                     types_.begin());
   }
 
-  // Two of one type in a group share their type's columns.
+  // Two gyros of one type in a group share their type's columns.
   void gather_types() {
     Eigen::VectorXd squares = Eigen::VectorXd::Zero(of_types_.score.size());
     Eigen::VectorXd freedom = squares;
@@ -124,7 +123,7 @@ class Judge {
     gather_units();
   }
 
-  // Of each unit, with its partners as their types are.
+  // Collects the system of each unit, on the assumption that its partners have their types' sizes.
   void gather_units() {
     units_.clear();
     for (const auto& [identity, sums] : pool_.units)
@@ -161,7 +160,7 @@ class Judge {
     }
   }
 
-  // What many units have, and each otherwise: a mean of nothing does not hide it.
+  // Finds shapes that many units have with different sizes, which a mean near 0 must not hide.
   void add_spreads() {
     for (int round = 0; round < kSpreadsMax; ++round) {
       std::size_t best = 0;
@@ -182,7 +181,8 @@ class Judge {
     }
   }
 
-  // Of every shape, whether more of the type's units are off than by chance.
+  // For each shape the probability that so many of the type's units are off by chance; 1 if they
+  // are too few.
   [[nodiscard]] std::array<double, kShapeCount> spread_p_of(std::size_t type) const {
     std::array<std::size_t, kShapeCount> off{};
     std::array<std::size_t, kShapeCount> all{};
@@ -232,8 +232,8 @@ class Judge {
     return sizes;
   }
 
-  // What a type has is what its other units have: one that stands apart would pull the mean, and
-  // has a name and a model file of its own. All, where they are too few to say which is odd.
+  // Units without those that stand apart: these would pull the type's mean, and have names and
+  // model files of their own. All units if the rest would be too few.
   [[nodiscard]] std::vector<UnitSize> alike_of(std::size_t column,
                                                const std::vector<UnitSize>& sizes,
                                                const std::vector<UnitJudgement>& units) const {
@@ -318,7 +318,7 @@ class Judge {
       const auto at = std::find(spreads_.begin(), spreads_.end(), column) - spreads_.begin();
       effect.p_value = spread_p_[static_cast<std::size_t>(at)];
     }
-    // What is nothing but a unit that stands apart is told of that unit.
+    // An effect that is nothing but a unit standing apart is reported for that unit only.
     const bool is_one_units = effect.varies && !is_spread && effect.between_units <= 0.0;
     if (!is_one_units && !(effect.varies && !is_spread && count_apart(column, units) > 0))
       own.effects.push_back(std::move(effect));
@@ -331,7 +331,7 @@ class Judge {
         [&](const UnitJudgement& unit) { return stands_apart(unit, column % kShapeCount); }));
   }
 
-  // Each against all others of its type, and the spread that they have without it.
+  // Compares each unit with the mean and the spread of all other units of its type.
   void judge_apart(std::size_t column, const std::vector<UnitSize>& sizes,
                    std::vector<UnitJudgement>& units) const {
     if (sizes.size() < kApartUnitsMin) return;
@@ -373,9 +373,10 @@ class Judge {
     unit.effects.push_back(std::move(effect));
   }
 
-  // What its type has nothing of. Beside what it has, of its own size.
+  // Names the shapes that the unit has and its type does not. The type's shapes are fitted to the
+  // unit beside them.
   void judge_own(std::size_t type, const Unit& unit, UnitJudgement& told) const {
-    // Of the only unit it is the type's.
+    // What the only unit of a type has is the type's.
     if (end_of(type) - begin_of_[type] < 2) return;
     const Choice own = choose(unit.system, own_fitted(type), tests_, settings_.false_names);
     const Eigen::VectorXd sizes = unit.system.solve(joined(own_fitted(type), own.columns));
@@ -411,9 +412,10 @@ class Judge {
   const Pool& pool_;
   Settings settings_;
   std::vector<std::string> types_;
-  std::vector<std::size_t> begin_of_;  ///< of each type, its first place in `units_`; then the end
+  std::vector<std::size_t>
+      begin_of_;  ///< index of each type's first unit in `units_`; then the end
   System of_types_;
-  Eigen::VectorXd sizes_;  ///< of the types' columns; 0 where not fitted
+  Eigen::VectorXd sizes_;  ///< of the types' columns; 0 if not fitted
   Choice choice_;
   std::vector<std::size_t> fitted_;
   std::vector<std::size_t> spreads_;

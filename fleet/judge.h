@@ -1,7 +1,7 @@
 #pragma once
 
-// A pool → what all units of a type have in common, how far they differ, and which unit is not as
-// its type. docs/fleet.md derives what is computed here and says what a name means.
+// Judges a pool: what all units of a type have in common, how far they differ, and which unit is
+// not as its type. docs/fleet.md derives the computation and explains what a name means.
 
 #include <cstddef>
 #include <string>
@@ -12,45 +12,45 @@
 namespace vgyro::fleet {
 
 struct Settings {
-  /// Of all names, those that are false on average, at most (Benjamini–Yekutieli). Where there is
-  /// nothing to name it is the chance of any name.
+  /// Greatest share of all names that is false on average (Benjamini–Yekutieli). If there is
+  /// nothing to name, the greatest probability of any name.
   double false_names = 0.005;
 };
 
-/// One shape, of a type or of a unit; sizes in the parameter's own unit.
+/// The effect of one shape, of a type or a unit; sizes in the parameter's own unit.
 struct PooledEffect {
-  Identity whose;  ///< of a type the unit is empty
+  Identity whose;  ///< `unit` is empty if the effect is a type's
   std::size_t shape = 0;
   double size = 0.0;
   double sigma = 0.0;
   double half_width95 = 0.0;
-  double between_units = 0.0;  ///< 1σ; 0 of one unit
+  double between_units = 0.0;  ///< 1σ; 0 if there is one unit
   double between_sigma = 0.0;
-  double statistic = 0.0;  ///< standard errors from 0, or of a unit from its type
+  double statistic = 0.0;  ///< standard errors from 0; of a unit, from its type
   double p_value = 1.0;
   double per_year = 0.0;  ///< trend of the size
   double per_year_sigma = 0.0;
   std::size_t drives = 0;
   std::size_t units = 0;
-  bool varies = false;  ///< what the units have is there, and its mean is not
+  bool varies = false;  ///< units have it beyond chance, their mean has not
   std::vector<std::pair<std::string, std::size_t>> ambiguous_with;  ///< type, shape
 };
 
-/// How something of a type changes over the months.
+/// How the bias or a size of a type changes over the months.
 struct TypeTrend {
-  std::size_t shape = model::kShapeCount;  ///< whose size; kShapeCount: the bias, in deg/s
+  std::size_t shape = model::kShapeCount;  ///< kShapeCount: the bias, in deg/s
   double per_year = 0.0;
   double sigma = 0.0;
   double between_units = 0.0;  ///< 1σ
-  std::size_t units = 0;       ///< with drives enough
-  bool varies = false;         ///< units change, each its own way, and the mean says nothing
+  std::size_t units = 0;       ///< with enough drives
+  bool varies = false;         ///< each unit changes its own way; the mean has no meaning
 };
 
 struct TypeJudgement {
   std::string type;
   std::size_t units = 0;
-  std::size_t drives = 0;       ///< of its gyros: two of one type in a drive are two
-  double white_dps_rthz = 0.0;  ///< the middle unit's; 0: not known
+  std::size_t drives = 0;       ///< of its gyros: a drive with two of this type counts twice
+  double white_dps_rthz = 0.0;  ///< the median unit's; 0: unknown
   double walk_dps_rts = 0.0;
   std::vector<PooledEffect> effects;
   std::vector<TypeTrend> trends;
@@ -75,8 +75,8 @@ struct UnitJudgement {
   double white_dps_rthz = 0.0;
   double walk_dps_rts = 0.0;
   double bias_dps = 0.0;
-  double bias_scatter_dps = 0.0;      ///< from drive to drive, beside its trend
-  std::vector<PooledEffect> effects;  ///< where it stands apart: its own sizes
+  double bias_scatter_dps = 0.0;      ///< from drive to drive, without its trend
+  std::vector<PooledEffect> effects;  ///< its own sizes of shapes in which it stands apart
 };
 
 struct Judgement {
@@ -86,7 +86,7 @@ struct Judgement {
   double false_names = 0.0;
 };
 
-/// Adds a sentence, and a status to a unit that had none.
+/// Adds `why`; sets the status unless another one was set before.
 void set_status(UnitJudgement& unit, Status status, std::string why);
 
 Judgement judge(const Pool& pool, const Settings& settings);

@@ -10,11 +10,11 @@ namespace vgyro::fleet {
 
 namespace {
 
-// A unit with a larger share of a sum is left out by summing the others anew: the difference of two
-// sums would lose digits. Of each sum no more than 1/share units have so much.
+// If a unit has a larger share of a sum than this, the others are summed anew, because subtracting
+// it from the sum would lose digits. For each sum, at most 1/share units have so much.
 constexpr double kShareMost = 0.01;
 
-/// Sums over units of weights and values, by weight 1/(σ² + between²).
+/// Sums over units of weights and weighted values, with the weight 1/(σ² + between²).
 struct Sums {
   double w = 0.0;
   double ww = 0.0;
@@ -27,7 +27,7 @@ struct Sums {
     wy += weight * value;
     wyy += weight * value * value;
   }
-  /// Nothing where the unit's share is too large.
+  /// Nothing if the unit's share is too large.
   [[nodiscard]] std::optional<Sums> without(double weight, double value) const {
     const double square = weight * value * value;
     if (weight > kShareMost * w || weight * weight > kShareMost * ww || square > kShareMost * wyy)
@@ -37,9 +37,9 @@ struct Sums {
   [[nodiscard]] double scatter() const { return wyy - wy * wy / w; }
 };
 
-/// Sums as a function of between², by their values at Chebyshev's points of log(between² + least
-/// σ²). As functions of that logarithm they have no pole nearer to the real axis than π, so that
-/// the number of points for all digits follows from the range alone.
+/// Interpolates the sums as functions of between², from their values at the Chebyshev points of
+/// log(between² + least σ²). As functions of that logarithm, their poles are at least π away from
+/// the real axis, so the number of points for full precision follows from the range alone.
 class SumsCurve {
  public:
   SumsCurve(const std::vector<Estimate>& centred, double low, double high)
@@ -83,9 +83,9 @@ class SumsCurve {
     return least;
   }
   [[nodiscard]] double log_of(double between) const { return std::log(between + least_); }
-  // The error falls with the sum of the half axes of the largest ellipse without a pole.
+  // The error falls as a power of the sum of the half axes of the largest ellipse without a pole.
   static std::size_t points_for(double half) {
-    constexpr double kOfPole = 0.75;  // short of the pole, where the sums are not large
+    constexpr double kOfPole = 0.75;  // stays away from the pole, where the sums are large
     constexpr double kError = 1e-16;
     constexpr double kMore = 2.0;
     const double axis = kOfPole * std::numbers::pi / std::max(half, 1e-9);
@@ -109,8 +109,8 @@ RandomEffects summed_anew(const std::vector<Estimate>& units, std::size_t withou
   return random_effects(others);
 }
 
-/// About the mean by σ alone: then sums of values are small, and differences of squares lose
-/// nothing.
+/// Values relative to `centre`, the mean weighted by 1/σ²: their sums are small, so differences of
+/// squares lose no digits.
 std::vector<Estimate> centred(const std::vector<Estimate>& units, double centre) {
   std::vector<Estimate> moved = units;
   for (Estimate& unit : moved)
@@ -125,14 +125,14 @@ double mean_of(const std::vector<Estimate>& units) {
   return sums.wy / sums.w;
 }
 
-/// One unit of many, while its others are summed.
+/// Spread of all units but one.
 struct Others {
   double between2 = 0.0;
   double q = 0.0;
   bool anew = false;
 };
 
-// DerSimonian and Laird's spread of the others, of each unit.
+// DerSimonian and Laird's spread of all units but one, for each unit in turn.
 std::vector<Others> spreads_of_others(const std::vector<Estimate>& units, double freedom) {
   Sums all;
   for (const Estimate& unit : units)

@@ -1,7 +1,7 @@
 #pragma once
 
-// What random_effects() says of all units but one, for each unit in turn, in a time that grows with
-// the number of units and not with its square.
+// random_effects() of all units but one, for each unit in turn, in time that grows with the number
+// of units, not its square.
 
 #include <vector>
 
@@ -9,11 +9,11 @@
 
 namespace vgyro::fleet {
 
-/// Entry i: random_effects() of all units but i. Up to kDirectMost units to the bit, beyond that up
-/// to rounding. Precondition: every sigma is above 0.
+/// Entry i: random_effects() of all units but i; bit for bit up to kDirectMost units, beyond that
+/// up to rounding. Precondition: every sigma is above 0.
 std::vector<RandomEffects> random_effects_of_others(const std::vector<Estimate>& units);
 
-/// So few units are summed anew for each: that is as fast.
+/// Up to this many units, the others are summed anew for each unit, which is as fast.
 inline constexpr std::size_t kDirectMost = 64;
 
 }  // namespace vgyro::fleet

@@ -9,13 +9,14 @@ namespace vgyro::fleet {
 
 namespace {
 
-// Years count from 2020: sums of their squares stay small.
+// Years count from 2020, so that sums of their squares stay small.
 constexpr double kTimeZero_s = 1'577'836'800.0;
 constexpr double kYear_s = 31'557'600.0;
-// Below what any gyro has; a walk that is not seen counts as so much less than the white noise of a
-// second.
+// Floor of the walk, as a share of the white noise of one second: less than any gyro has, and what
+// an unseen walk counts as.
 constexpr double kWalkFloor = 1e-4;
-// Scores and information that no drive has: a file that says so is wrong, and is refused before.
+// Bound on scores and information. No drive reaches it: a file that does is wrong, and is refused
+// before.
 constexpr double kMost = 1e12;
 
 void add_each(std::vector<Whole>& sums, const std::vector<Whole>& more) {
@@ -49,7 +50,7 @@ UnitSums sums_of(const DriveGyro& gyro, const Drive& drive, double t_years) {
   return sums;
 }
 
-// The same recording must not be in the pool already, whatever was said of it.
+// Error if the recording is in the pool already, with whatever evidence.
 Expected<void> check_free(const Pool& pool, const std::string& id) {
   const std::string recording = id.substr(0, id.find('-'));
   const auto at = pool.drives.lower_bound(recording);

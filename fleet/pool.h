@@ -1,8 +1,8 @@
 #pragma once
 
-// Evidence of many drives as sums of fixed size for each unit: a pool. Pools add up; however drives
-// are grouped and ordered, the same pool comes out to the bit (fleet/sums.h). Which drives are in
-// it is kept, so that none counts twice.
+// A pool: the evidence of many drives as sums of fixed size for each unit. Pools can be added; the
+// result is the same to the bit however drives are grouped and ordered (fleet/sums.h). A pool lists
+// its drives, so that none counts twice.
 
 #include <array>
 #include <cstddef>
@@ -19,12 +19,12 @@
 
 namespace vgyro::fleet {
 
-/// Of one gyro, or of a pair of which only the difference is known: sums over its drives.
+/// Sums over the drives of one gyro, or of a pair of which only the difference is known.
 struct GroupSums {
   explicit GroupSums(std::size_t slots = 1);
 
   std::size_t slots;                    ///< 1 or 2
-  std::vector<Whole> count;             ///< of each column: drives that could show it
+  std::vector<Whole> count;             ///< for each column: drives that could show it
   std::vector<Whole> score;             ///< Σ u
   std::vector<Whole> heterogeneity;     ///< Σ u²/I, each shape alone
   std::vector<Whole> score_time;        ///< Σ u·t
@@ -37,10 +37,10 @@ struct GroupSums {
   void add(const GroupSums& more);
 };
 
-/// What is told of each drive of a unit beside the shapes.
+/// What each drive measures of a unit besides the shapes.
 enum class Measure : std::uint8_t { kLogWhite, kLogWalk, kBias, kLost, kMasked };
 inline constexpr std::size_t kMeasures = 5;
-/// Biases count in this.
+/// Unit in which biases are summed.
 inline constexpr double kBiasUnit_dps = 1e-4;
 
 struct UnitSums {
@@ -51,26 +51,27 @@ struct UnitSums {
   double began_most_s = 0.0;
   bool has_temperature = false;
   std::array<double, 2> temperature_c{};
-  std::map<std::string, std::uint64_t> named;  ///< kind → drives that alone named it
+  std::map<std::string, std::uint64_t> named;  ///< kind → number of drives that alone named it
 
   void add(const UnitSums& more);
 };
 
 struct Pool {
   std::set<std::string> drives;
-  std::set<std::string> models;  ///< fingerprints of model files that drives were judged with
-  std::set<std::pair<std::string, std::string>> pairs;  ///< types of gyros 1 and 2 of the vehicles
+  std::set<std::string> models;  ///< fingerprints of the model files used to judge them
+  std::set<std::pair<std::string, std::string>>
+      pairs;  ///< types of gyro 1 and gyro 2 of the vehicles
   std::map<Identity, UnitSums> units;
   std::map<std::vector<Identity>, GroupSums> groups;
 
-  /// False: it is in already, and nothing changed.
-  /// Error: the same recording is in it with other evidence.
+  /// False if the drive is in the pool already: nothing changes. Error if the same recording is in
+  /// it with other evidence.
   Expected<bool> add(const Drive& drive);
-  /// Error when a drive is in both: what was added cannot be told apart again.
+  /// Error if a drive is in both pools: its share of the sums cannot be taken out again.
   Expected<void> add(const Pool& more);
 };
 
-/// Lower triangle: row ≥ column.
+/// Index into a lower triangle stored row by row; row ≥ column.
 constexpr std::size_t triangle(std::size_t row, std::size_t column) {
   return row * (row + 1) / 2 + column;
 }

@@ -10,12 +10,13 @@ namespace vgyro::fleet {
 
 namespace {
 
-// Names of one type or unit: beyond that a pool is described, not explained.
+// Most names of one system: more would describe a pool, not explain it.
 constexpr std::size_t kNamesMax = 24;
 constexpr int kRounds = 6;
-// Of 2·log-likelihood: replacing one by another that is as good would go on for ever.
+// Least gain in 2·log-likelihood for a replacement: replacing by an equal would never end.
 constexpr double kBetter = 0.5;
-// Readings that are closer than this, or than this share of the whole gain, cannot be told apart.
+// Explanations whose gains differ by less than this plus this share of the gain cannot be
+// distinguished.
 constexpr double kLead = 9.0;
 constexpr double kLeadShare = 3e-3;
 
@@ -27,7 +28,7 @@ bool holds(const std::vector<std::size_t>& list, std::size_t column) {
   return std::find(list.begin(), list.end(), column) != list.end();
 }
 
-// There is no less of a low-pass than none.
+// A low-pass has no negative size.
 bool can_be(const Left& left, std::size_t column) {
   return left.information > 0.0 && (!shape_at(column).is_low_pass || left.score > 0.0);
 }
@@ -76,7 +77,7 @@ class Chooser {
     return true;
   }
 
-  // Each in turn by what explains more in its place.
+  // Replaces each chosen column in turn by one that explains more in its place.
   void improve() {
     for (int round = 0; round < kRounds; ++round) {
       bool changed = false;

@@ -1,7 +1,7 @@
 #pragma once
 
-// Which shapes a system needs: the likeliest first, each against all others in its place, and none
-// that falls below what a name needs once the others are there.
+// Chooses the shapes that a system needs: adds the likeliest first, tries all others in the place
+// of each, and drops those that fall below the threshold of a name once the others are fitted.
 
 #include <cstddef>
 #include <vector>
@@ -12,12 +12,12 @@ namespace vgyro::fleet {
 
 struct Choice {
   std::vector<std::size_t> columns;
-  std::vector<double> z;  ///< of each, beside the others
+  std::vector<double> z;  ///< of each, with the others fitted
   std::vector<std::vector<std::size_t>> ambiguous_with;
 };
 
-/// `tests`: names that are looked for in all, of which at most `false_names` are to be false.
-/// `begun`: columns that are there already, and are no names.
+/// `tests`: number of names that could be found in all; `false_names`: greatest share of false ones
+/// among those found. `begun`: columns that are fitted already and are no names.
 Choice choose(const System& system, const std::vector<std::size_t>& begun, double tests,
               double false_names);
 

@@ -14,10 +14,11 @@ namespace {
 
 using model::kShapeCount;
 
-// Years squared, on average about the middle of a unit's drives: a tenth of a year at the least.
+// Least mean square distance of a unit's drives from their middle, in years²: a tenth of a year,
+// squared.
 constexpr double kSpanSquareMin = 0.01;
 
-/// Of one shape of a unit, over its drives.
+/// Sums for one shape of a unit over its drives.
 struct Course {
   double drives = 0.0;
   double score = 0.0;
@@ -25,7 +26,7 @@ struct Course {
   double score_time = 0.0;
   double information_time = 0.0;
   double time_square = 0.0;
-  double foreign = 0.0;  ///< Σ size²·I of all other shapes in its drives
+  double foreign = 0.0;  ///< Σ size²·I over all other shapes
 };
 using Courses = std::array<Course, kShapeCount>;
 
@@ -39,10 +40,11 @@ class UnitCourses {
           add(who, sums, slot, courses_[static_cast<std::size_t>(unit - units_.data())]);
   }
 
-  /// Of the units whose drives reach far enough.
+  /// Slopes of the units whose drives cover enough time.
   [[nodiscard]] std::vector<UnitSlope> slopes(std::size_t shape) const {
     std::vector<UnitSlope> slopes;
-    // Information and the scatter that all drives of the type show make σ, not the unit's few.
+    // σ follows from the information and from the scatter of all drives of the type, not of the
+    // unit's few, so the degrees of freedom are those of all.
     double freedom = 0.0;
     for (const Courses& unit : courses_)
       freedom += std::max(0.0, unit[shape].drives - 1.0);
@@ -52,7 +54,8 @@ class UnitCourses {
       const double middle = one.information_time / one.information;
       const double about_middle = one.time_square - middle * one.information_time;
       if (about_middle <= kSpanSquareMin * one.information) continue;
-      // How the other shapes resemble this one differs from drive to drive, by as much as they can.
+      // The likeness of the other shapes to this one varies from drive to drive; this is its
+      // greatest effect.
       const double doubt = std::max(known_.dispersion[u][shape], 1.0 + one.foreign / one.drives);
       slopes.push_back(
           {u,
@@ -70,7 +73,7 @@ class UnitCourses {
     return at == units_.end() || at->identity != identity ? nullptr : &*at;
   }
 
-  // Its type's, its own instead where it stands apart.
+  // The unit's type's sizes, or its own where it stands apart.
   [[nodiscard]] std::vector<double> sizes_of(const Identity& identity) const {
     std::vector<double> sizes = known_.of_type.at(identity.type);
     if (const UnitJudgement* unit = find(identity)) {
@@ -109,7 +112,7 @@ class UnitCourses {
   std::vector<Courses> courses_;
 };
 
-// Of the type's effect of this shape, where it has one.
+// Sets the trend of the type's effect of this shape, if it has one.
 void set_trend_of_effect(std::size_t shape, const std::vector<UnitSlope>& slopes,
                          TypeJudgement& type) {
   if (slopes.empty()) return;

@@ -1,6 +1,6 @@
 #pragma once
 
-// How the sizes of shapes change over the months, of a type and of each unit of it.
+// How the sizes of shapes change over the months, for a type and each of its units.
 
 #include <map>
 #include <string>
@@ -10,14 +10,15 @@
 
 namespace vgyro::fleet {
 
-/// In 1/Shape::unit, as a pool's sums are.
+/// Sizes in Shape::unit, as in a pool's sums.
 struct KnownSizes {
-  std::map<std::string, std::vector<double>> of_type;  ///< of each shape; 0 where it has no name
-  /// Of each unit and shape: variance of a score over its information.
+  std::map<std::string, std::vector<double>> of_type;  ///< of each shape; 0 if not named
+  /// For each unit and shape, the variance of a score over its information.
   std::vector<std::vector<double>> dispersion;
 };
 
-/// `units`: all of a type, with their own effects. Sets the trends of `type` and of its effects.
+/// `units`: all units of the type, with their own effects. Sets the trends of `type` and its
+/// effects.
 void judge_size_trends(const Pool& pool, const KnownSizes& known, double threshold,
                        std::vector<UnitJudgement>& units, TypeJudgement& type);
 

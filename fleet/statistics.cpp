@@ -12,7 +12,7 @@ namespace vgyro::fleet {
 namespace {
 
 double harmonic_number(double n) {
-  // Exact to a millionth from 10 on, and never less.
+  // Never too small; from 10 on, too large by less than 1e-3.
   constexpr double kEuler = std::numbers::egamma;
   return std::log(n) + kEuler + 1.0 / (2.0 * n);
 }

@@ -4,7 +4,7 @@ namespace vgyro::fleet {
 
 namespace {
 
-// Years squared: drives of one day tell no trend.
+// In years²: drives of one day show no trend.
 constexpr double kTimeSquareMin = 1e-5;
 
 double cross(const Moments& m) {

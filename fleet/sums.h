@@ -1,7 +1,7 @@
 #pragma once
 
-// Sums that come out the same to the last bit in any order and any grouping: each value becomes a
-// whole number of fixed steps once, and whole numbers add exactly.
+// Sums that are the same to the last bit in any order and grouping: each value is rounded once to a
+// whole number of fixed steps, and whole numbers add exactly.
 
 #include <cmath>
 #include <cstdint>
@@ -10,18 +10,18 @@ namespace vgyro::fleet {
 
 __extension__ typedef __int128 Whole;  // NOLINT(modernize-use-using): the extension needs it
 
-/// 2^-20: of values in units in which 1 matters.
+/// Steps of 2^-20, for values in units of which 1 matters.
 inline constexpr double kStepsPerUnit = 1048576.0;
-/// A million million of these fit, and are far beyond what any drive says.
+/// A million million of these fit into a Whole; no drive has a value near this.
 inline constexpr double kValueMost = 1e18;
 
-/// Steps that 64 bits hold.
+/// Greatest number of steps that is converted in 64 bits.
 inline constexpr double kShortMost = 9e18;
 
 /// Precondition: |value| ≤ kValueMost.
 inline Whole whole_of(double value) {
   const double steps = value * kStepsPerUnit;
-  // The same number by one instruction; a conversion of 128 bits is a function.
+  // The same number by one instruction; a conversion to 128 bits calls a function.
   if (std::abs(steps) < kShortMost) return std::llrint(steps);
   return static_cast<Whole>(std::nearbyint(steps));
 }
@@ -30,7 +30,7 @@ inline double value_of(Whole sum) {
   return (low == sum ? static_cast<double>(low) : static_cast<double>(sum)) / kStepsPerUnit;
 }
 
-/// Of a quantity x that is told at times t: means, scatter, and the line through it.
+/// Sums of a quantity x measured at times t, for its mean, its scatter and the line through it.
 struct Moments {
   Whole count = 0;
   Whole x = 0;
@@ -57,7 +57,7 @@ struct Moments {
   }
   [[nodiscard]] double n() const { return static_cast<double>(count); }
   [[nodiscard]] double mean() const { return value_of(x) / n(); }
-  /// Of single values; 0 of fewer than two.
+  /// Variance of single values; 0 if there are fewer than two.
   [[nodiscard]] double variance() const {
     if (count < 2) return 0.0;
     const double square = value_of(xx) - mean() * value_of(x);
@@ -66,15 +66,15 @@ struct Moments {
   [[nodiscard]] double time_square() const {
     return value_of(tt) - value_of(t) * value_of(t) / n();
   }
-  /// Of single values about the line, and how many of them that is sure by; about the mean where
-  /// there is no line.
+  /// Variance of single values about the line, and its degrees of freedom; about the mean if there
+  /// is no line.
   [[nodiscard]] double variance_about_line() const;
   [[nodiscard]] double freedom_about_line() const { return n() - (has_line() ? 2.0 : 1.0); }
-  /// Drives enough, and not all at one time.
+  /// Whether there are enough drives, and not all at one time.
   [[nodiscard]] bool has_line() const;
-  /// Per year; 0 where all were told at one time.
+  /// Per year; 0 if there is no line.
   [[nodiscard]] double slope() const;
-  /// 1σ of the slope by what scatters about the line.
+  /// 1σ of the slope, from the scatter about the line.
   [[nodiscard]] double slope_sigma() const;
 };
 

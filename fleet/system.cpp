@@ -6,12 +6,14 @@ namespace vgyro::fleet {
 
 namespace {
 
-// What the others build but for this share of its square has nothing of its own.
+// If the others build all but this share of a shape's information, it has nothing of its own.
 constexpr double kOwnShareMin = 0.01;
-// So that shapes which were never seen together can be solved: a share of each one's own square.
+// Added to the diagonal, as a share of it, so that shapes that were never seen together can be
+// solved.
 constexpr double kRidge = 1e-9;
 // Error that all drives share, in standard errors of one drive: interpolation, filters, linearised
-// timing. 400 drives are then as good as a single one can ever be twenty times over.
+// timing. So no pool is more than twenty times as precise as one drive; at 400 drives it equals the
+// random error.
 constexpr double kCommonError = 0.05;
 
 Eigen::MatrixXd ridged(const Eigen::MatrixXd& information, const std::vector<std::size_t>& fitted) {

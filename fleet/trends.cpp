@@ -9,19 +9,20 @@ namespace vgyro::fleet {
 
 namespace {
 
-// By how many units with |t| above this it is told whether units move each its own way.
+// Whether each unit moves its own way is judged by the number of units with |t| above this.
 constexpr double kOff = 2.0;
 
 double t_of(double value, double sigma) {
   return value / sigma;
 }
 
-// Student's tail is never below the normal one, and costs a hundred times as much.
+// The normal tail is checked first: Student's is never below it and costs a hundred times as much.
 bool is_beyond_chance(double t, double freedom, double threshold) {
   return normal_tail(t) < threshold && student_tail(t, freedom) < threshold;
 }
 
-// Units are their own measure of how far they differ, where they do.
+// If units differ, their spread is estimated from the units, so their number limits the degrees of
+// freedom.
 double freedom_of(const UnitSlope& unit, const RandomEffects& others) {
   return others.between > 0.0 ? std::min(unit.freedom, others.freedom) : unit.freedom;
 }
@@ -35,7 +36,7 @@ bool mean_is_named(const RandomEffects& type, const std::vector<UnitSlope>& slop
                           threshold);
 }
 
-// About the middle unit: one that runs away pulls the mean, and is told by itself.
+// About the median unit: one that runs away would pull the mean, and is reported by itself.
 bool spread_is_named(const std::vector<UnitSlope>& slopes, double threshold) {
   constexpr double kShare = 0.25;     // of the units, as for a spread of sizes
   constexpr double kByChance = 0.11;  // |t| > 2 with the 5 degrees of freedom of few drives

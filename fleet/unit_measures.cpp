@@ -12,31 +12,32 @@ namespace vgyro::fleet {
 
 namespace {
 
-// Fewer units of a type do not tell what is usual.
+// With fewer units of a type it is not known what is usual.
 constexpr std::size_t kUnitsMin = 5;
-// The median's distance from the middle → σ of a normal distribution.
+// Median distance from the median → σ of a normal distribution.
 constexpr double kMadToSigma = 1.4826;
-// What is nearer to its type than this factor is no fault, however sure.
+// A unit within this factor (or share of lost frames) of its type has no fault, however
+// significant.
 constexpr double kNoiseFactor = 1.5;
 constexpr double kWanderFactor = 2.0;
 constexpr double kLostMore = 0.01;
-// Units are never more alike than this, of a logarithm and of a share of frames.
+// Units are never taken for more alike than this: in a logarithm, and in a share of frames.
 constexpr double kAlikeLog = 0.03;
 constexpr double kAlikeShare = 1e-3;
-// Of the scatter of the bias.
+// Fewer drives give no scatter of the bias.
 constexpr double kScatterDrivesMin = 4.0;
 
 const Moments& measure(const UnitSums& sums, Measure which) {
   return sums.measures[static_cast<std::size_t>(which)];
 }
 
-/// One question, asked of all units.
+/// One quantity to compare, with its estimate for each unit that has one.
 struct Question {
   std::vector<std::size_t> unit;
   std::vector<Estimate> estimate;
 };
 
-// Means of a measure, with the scatter that drives of the middle unit have.
+// Means of a measure, with the median unit's scatter between drives.
 Question means_of(const Pool& pool, Measure which, const std::vector<UnitJudgement>& units) {
   Question question;
   std::vector<double> variances;
@@ -53,7 +54,8 @@ Question means_of(const Pool& pool, Measure which, const std::vector<UnitJudgeme
   return question;
 }
 
-// Of a unit that has a trend, or whose type has one, about the line: a trend is no scatter.
+// Scatter of the bias; about the line if the unit or its type has a trend, because a trend is no
+// scatter.
 Question scatters_of(const Pool& pool, const std::vector<UnitJudgement>& units,
                      const TypeJudgement& type) {
   Question question;
@@ -69,7 +71,7 @@ Question scatters_of(const Pool& pool, const std::vector<UnitJudgement>& units,
   return question;
 }
 
-// Calls `tell` for each unit that is above its type by `least` and beyond chance.
+// Calls `tell` for each unit that is above its type by more than `least` and beyond chance.
 template <class Tell>
 void ask(const Question& question, double alike, double least, double threshold, const Tell& tell) {
   if (question.unit.size() < kUnitsMin) return;
