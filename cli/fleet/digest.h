@@ -1,7 +1,8 @@
 #pragma once
 
-// Names of recordings, files and evidence: sixteen hexadecimal digits, two FNV-1a of 32 bits with
-// different beginnings. The same on every machine and in every version; finds no forger.
+// Digests of recordings, files and evidence: sixteen hexadecimal digits, from two 32-bit FNV-1a
+// hashes with different initial values. The same on every machine and in every version; not secure
+// against forgery.
 
 #include <cstdint>
 #include <string>
@@ -16,7 +17,7 @@ namespace vgyro::cli {
 
 class Digest {
  public:
-  // Both in one pass: neither waits for the other's product.
+  // Both hashes in one pass, so that the processor overlaps their multiplications.
   void add(std::string_view text) {
     std::uint32_t first = first_;
     std::uint32_t second = second_ ^ static_cast<std::uint32_t>(text.size());

@@ -17,7 +17,7 @@ namespace vgyro::cli {
 
 namespace {
 
-// Longer words are no names that a configuration lets through.
+// A configuration accepts no longer names.
 constexpr std::size_t kWordMax = 200;
 
 std::string word_of(JsonValue json, std::string_view key) {
@@ -27,7 +27,7 @@ std::string word_of(JsonValue json, std::string_view key) {
   return word;
 }
 
-// 0 where it is missing.
+// 0 if it is missing.
 double optional_number(JsonValue json, std::string_view key) {
   const auto found = find_member(json, key);
   return found ? number_of(*found, key) : 0.0;
@@ -37,7 +37,7 @@ double share_of(JsonValue json, std::string_view key) {
   return std::clamp(optional_number(json, key), 0.0, 1.0);
 }
 
-// Densities that no gyro has are a mistake of whoever wrote the file.
+// No gyro has a density beyond kMost: the file is wrong.
 double density_of(JsonValue json, std::string_view key) {
   constexpr double kMost = 1e6;
   const double value = optional_number(json, key);
@@ -96,15 +96,15 @@ void read_gyros(JsonValue json, fleet::DrivePlace& place) {
     throw Fault{"a place is of one gyro or of both"};
 }
 
-// Most files list shapes in the order of the catalogue: the one behind the last is tried first.
+// Most files list shapes in the order of the catalogue, so the one after `last` is tried first.
 std::size_t shape_after(std::size_t last, std::string_view name) {
   const auto shapes = model::shapes();
   if (last + 1 < shapes.size() && shapes[last + 1].name == name) return last + 1;
   return model::shape_index(name);
 }
 
-// Shapes that a later version knows are passed over: `keep` says which entries stay. Returns how
-// many there are.
+// Skips shapes that only a later version knows; `keep` gets the indices of the others. Returns the
+// number of all shapes.
 std::size_t read_columns(JsonValue json, fleet::DrivePlace& place, std::vector<std::size_t>& keep) {
   const simdjson::dom::array shapes = list_of(json, "shapes");
   const simdjson::dom::array gyros = list_of(json, "gyro");

@@ -9,7 +9,8 @@
 
 namespace vgyro::cli {
 
-/// `line`: the text of `json`; its digest tells judgements of one recording apart. Throws Fault.
+/// `line`: the text of `json`; its digest distinguishes two evidences of one recording. Throws
+/// Fault.
 fleet::Drive drive_of(JsonValue json, std::string_view line);
 
 }  // namespace vgyro::cli

@@ -42,7 +42,7 @@ std::string digest_of_files(const std::vector<std::string>& files) {
   return digest.text();
 }
 
-// The sensor's own sign of a size in the readings' sign.
+// Factor from a size in the sign of the readings to the sensor's own sign.
 double sign_of(const model::Shape& shape, bool flipped) {
   if (!flipped || shape.is_low_pass) return 1.0;
   const model::Effect effect = model::effect_of(shape, 1.0);

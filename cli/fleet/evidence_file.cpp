@@ -17,12 +17,11 @@ namespace vgyro::cli {
 
 namespace {
 
-// Lines that are understood side by side: enough to keep threads busy, few enough to be little
-// memory.
+// Lines parsed in parallel: enough to keep all threads busy, few enough to need little memory.
 constexpr std::size_t kBatch = 1024;
 constexpr std::size_t kWorkersMost = 16;
 
-/// A line as it was understood.
+/// A parsed line; std::monostate: an empty one.
 using Understood = std::variant<std::monostate, fleet::Drive, fleet::Pool, Fault>;
 
 Understood understood(const std::string& line, JsonReader& reader) {
@@ -42,19 +41,19 @@ Understood understood(const std::string& line, JsonReader& reader) {
   }
 }
 
-/// Reads ahead: while a batch is added to the pool, threads understand the next one.
+/// Reads ahead: while a batch is added to the pool, threads parse the next one.
 class Lines {
  public:
   explicit Lines(const std::string& path) : file_(path, std::ios::binary) { ask(); }
 
   [[nodiscard]] bool is_open() const { return file_.is_open(); }
-  /// In their order; none: the file ended, or could not be read further.
+  /// The next lines in order; none if the file ended or could not be read further.
   std::vector<Understood> next() {
     std::vector<Understood> batch = next_.get();
     if (!batch.empty()) ask();
     return batch;
   }
-  /// Precondition: next() gave none.
+  /// Precondition: next() returned none.
   [[nodiscard]] bool failed() const { return file_.bad(); }
 
  private:
@@ -85,7 +84,8 @@ class Lines {
 
   std::ifstream file_;
   std::vector<JsonReader> readers_;  // one for each worker
-  // Last: it waits for what is on its way before the others go.
+  // Last, so that its destructor waits for the running batch before the other members are
+  // destroyed.
   std::future<std::vector<Understood>> next_;
 };
 

@@ -1,7 +1,7 @@
 #pragma once
 
-// Evidence files: of a drive, as `vgyro gap --evidence` and `vgyro allan --evidence` leave it, and
-// of a pool, as `vgyro fleet` does. docs/fleet.md describes both. A file is read without trust.
+// Evidence files: of a drive, as `vgyro gap --evidence` and `vgyro allan --evidence` write it, and
+// of a pool, as `vgyro fleet` writes it. docs/fleet.md describes both. Files are not trusted.
 
 #include <string>
 #include <string_view>
@@ -22,16 +22,17 @@ struct DriveOfPair {
   const GapSubject& subject;
   const std::vector<gap::Recording>& recordings;
   gap::DriveEvidence evidence;
-  std::array<bool, 2> flipped{};  ///< the readings are against the sensor's sign
-  std::string verdict;            ///< of vgyro gap; empty: of vgyro allan
+  std::array<bool, 2> flipped{};  ///< the readings have the opposite sign of the sensor's
+  std::string verdict;            ///< of vgyro gap; empty: evidence of vgyro allan
 };
 
-/// One line, with a newline at its end. `files`: those that made up configuration and model.
+/// One line, with a newline at its end. The digests of `config_files` and `model_file` are part of
+/// it.
 std::string drive_text(const DriveOfPair& drive, const std::vector<std::string>& config_files,
                        const std::string& model_file);
 
-/// Adds every line of an evidence file: drives, or pools. Returns how many drives were there
-/// already. Error: where, what is wrong, and what would be right.
+/// Adds every line of an evidence file, drives or pools. Returns the number of drives that were in
+/// the pool already. Error: where, what is wrong, and what would be right.
 Expected<std::size_t> add_evidence(const std::string& path, fleet::Pool& pool);
 
 /// The pool as one line.

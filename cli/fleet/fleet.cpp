@@ -20,7 +20,7 @@ namespace fs = std::filesystem;
 
 const std::vector<std::string> kResult{"report.html", "fleet.json", "evidence.json", "models"};
 
-// Folders stand for the *.json in them, in the order of their names.
+// Replaces folders by their *.json files, sorted by name.
 Expected<std::vector<std::string>> files_of(const std::vector<std::string>& named) {
   std::vector<std::string> files;
   for (const std::string& name : named) {

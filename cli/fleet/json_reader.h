@@ -1,8 +1,8 @@
 #pragma once
 
-// JSON of an evidence file, read without trust: what is missing or of another form is a Fault that
-// names the key. simdjson checks a whole document before anything of it is used, and reads numbers
-// to the nearest double.
+// Reads the JSON of an evidence file, which is not trusted: a missing value, or one of another
+// form, is a Fault that names the key. simdjson checks a whole document before any of it is used,
+// and reads numbers to the nearest double.
 
 #include <cstddef>
 #include <cstdint>
@@ -14,7 +14,7 @@
 
 namespace vgyro::cli {
 
-/// What a file says wrongly; thrown here, and reported with the file's name and line.
+/// An error in a file; thrown here, and reported with the file's name and line.
 struct Fault {
   std::string what;
   std::string remedy = "a file that vgyro gap --evidence or vgyro fleet wrote";
@@ -24,7 +24,7 @@ using JsonValue = simdjson::dom::element;
 
 class JsonReader {
  public:
-  /// The result is good until the next call.
+  /// The result is valid until the next call.
   JsonValue parse(std::string_view text);
 
  private:
@@ -34,12 +34,12 @@ class JsonReader {
 std::optional<JsonValue> find_member(JsonValue object, std::string_view key);
 JsonValue member(JsonValue object, std::string_view key);
 simdjson::dom::array list_of(JsonValue object, std::string_view key);
-/// The list's entry; `key` is the list's.
+/// Entry `at` of a list; `key` is the list's.
 JsonValue entry(simdjson::dom::array list, std::size_t at, std::string_view key);
 
 /// `key` names the value in the message.
 std::string_view text_of(JsonValue value, std::string_view key);
-/// Finite.
+/// A finite number.
 double number_of(JsonValue value, std::string_view key);
 std::uint64_t count_of(JsonValue value, std::string_view key);
 

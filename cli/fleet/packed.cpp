@@ -57,7 +57,7 @@ std::optional<std::vector<double>> correlations_of(std::string_view text, std::s
 
 void WholeWriter::put(fleet::Whole value) {
   __extension__ using Bits = unsigned __int128;
-  // The sign in the lowest bit.
+  // Zigzag encoding: the sign goes into the lowest bit.
   auto bits = static_cast<Bits>(value) << 1U ^ static_cast<Bits>(value >> 127);
   while (bits > 127U) {
     bytes_ += static_cast<char>(static_cast<unsigned>(bits & 127U) | 128U);

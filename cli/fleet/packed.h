@@ -1,7 +1,7 @@
 #pragma once
 
-// Numbers packed into a JSON string: little bytes in base64. Large sums are whole numbers in as
-// many groups of seven bits as they need.
+// Numbers packed into a JSON string as base64. Correlations are little-endian integers of two
+// bytes; sums are whole numbers in as many groups of seven bits as they need.
 
 #include <cstdint>
 #include <optional>
@@ -14,12 +14,12 @@
 namespace vgyro::cli {
 
 std::string base64(std::string_view bytes);
-/// Nothing where the text is no base64.
+/// Nothing if the text is no base64.
 std::optional<std::string> from_base64(std::string_view text);
 
-/// ±1 in steps of 1/32767, two bytes each.
+/// Values from −1 to 1 in steps of 1/32767, two bytes each.
 std::string packed_correlations(const std::vector<double>& values);
-/// Nothing where the text does not hold `count` of them.
+/// Nothing if the text does not hold `count` correlations.
 std::optional<std::vector<double>> correlations_of(std::string_view text, std::size_t count);
 
 class WholeWriter {
@@ -34,9 +34,9 @@ class WholeWriter {
 class WholeReader {
  public:
   explicit WholeReader(std::string_view text);
-  /// 0 from the first fault on.
+  /// The next number; 0 from the first error on.
   fleet::Whole get();
-  /// All was there, and nothing is left.
+  /// Whether every get() succeeded and nothing is left.
   [[nodiscard]] bool good() const { return good_ && at_ == bytes_.size(); }
 
  private:

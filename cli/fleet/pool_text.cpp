@@ -11,7 +11,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-// The order in which a pool's sums stand in its text; once for both directions.
+// The order of a pool's sums in its text, for reading and writing alike.
 template <class Sums, class Visit>
 void visit_group(Sums& sums, const Visit& visit) {
   for (auto* list : {&sums.count, &sums.score, &sums.heterogeneity, &sums.score_time,

@@ -1,7 +1,7 @@
 #pragma once
 
-// A pool as one line of an evidence file: read here, without trust; written by pool_text() of
-// cli/fleet/evidence_file.h.
+// Reads a pool from one line of an evidence file, which is not trusted. pool_text() of
+// cli/fleet/evidence_file.h writes it.
 
 #include "cli/fleet/json_reader.h"
 #include "fleet/pool.h"

@@ -30,7 +30,7 @@ const model::Shape& shape_of(const PooledEffect& effect) {
   return model::shapes()[effect.shape];
 }
 
-// A low-pass is told by its cut-off.
+// The size as it is reported: a low-pass has its cut-off instead.
 double told(const PooledEffect& effect) {
   const model::Shape& shape = shape_of(effect);
   return model::effect_of(shape, effect.size).parameters[shape.size];
@@ -118,7 +118,7 @@ std::string size_text(const PooledEffect& effect) {
 
 // --- models --------------------------------------------------------------------------------------
 
-// A colon in the name of an axis is none in a file's.
+// Replaces characters that do not belong into a file's name, such as the colon before an axis.
 std::string file_word(std::string_view text) {
   std::string word(text);
   for (char& c : word) {
@@ -129,7 +129,7 @@ std::string file_word(std::string_view text) {
   return word;
 }
 
-// What is known of one gyro: its type's effects, or its own where it differs.
+// The known effects of one gyro: its type's, or its own where it differs.
 std::vector<PooledEffect> effects_of(const fleet::TypeJudgement& type,
                                      const fleet::UnitJudgement* unit) {
   std::vector<PooledEffect> effects;
@@ -152,7 +152,7 @@ Expected<std::string> with_gyro(Expected<std::string> text, const fleet::TypeJud
     const model::Shape& shape = shape_of(pooled);
     model::Effect effect = model::effect_of(shape, pooled.size);
     effect.gyro = gyro;
-    // What units differ by is a unit's doubt.
+    // The spread between units is part of one unit's σ.
     effect.sigma =
         model::sigma_of(shape, pooled.size, std::hypot(pooled.sigma, pooled.between_units));
     add(effect, fmt::format("of {} {}: {} drives, {} units", pooled.whose.type, pooled.whose.unit,
@@ -193,7 +193,7 @@ class Models {
                          [&](const fleet::TypeJudgement& type) { return type.type == name; });
   }
 
-  // In each place that its vehicles have it in.
+  // As gyro 1, gyro 2 or both, as its vehicles have it.
   void add_type(const std::string& name, const fleet::TypeJudgement& type,
                 const fleet::UnitJudgement* unit) {
     const auto sits = [&](const auto& is_it) {
@@ -310,7 +310,7 @@ std::string unit_html(const fleet::UnitJudgement& unit, const fleet::UnitSums& s
   return html + "</details>";
 }
 
-// What to do with a unit of this status.
+// Advice for a unit of this status.
 std::string_view advice(fleet::Status status) {
   switch (status) {
     case fleet::Status::kNoisy:

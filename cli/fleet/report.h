@@ -1,7 +1,7 @@
 #pragma once
 
-// What a fleet showed: fleet.json for programs, report.html and a summary for people, model files
-// that vgyrod takes.
+// The result of `vgyro fleet`: fleet.json for programs, report.html and a summary for people, and
+// model files for vgyrod.
 
 #include <string>
 #include <vector>
@@ -13,12 +13,12 @@
 namespace vgyro::cli {
 
 std::string fleet_json(const fleet::Pool& pool, const fleet::Judgement& judgement);
-/// One page that holds all it needs and runs no script; names reach it as text.
+/// A self-contained page without scripts; all names are escaped.
 std::string fleet_page(const fleet::Pool& pool, const fleet::Judgement& judgement);
 std::string fleet_text(const fleet::Pool& pool, const fleet::Judgement& judgement);
 
-/// models/TYPE.toml, models/UNIT.toml of each unit that differs, and models/A+B.toml of each two
-/// types that share a vehicle. In a file a gyro has the number that it has in its vehicles.
+/// models/TYPE.toml, models/TYPE-UNIT.toml of each unit that differs, and models/A+B.toml of each
+/// pair of types in a vehicle. A gyro has the number in a file that it has in its vehicles.
 Expected<std::vector<ResultFile>> fleet_models(const fleet::Pool& pool,
                                                const fleet::Judgement& judgement);
 
