@@ -20,12 +20,12 @@ using Json = nlohmann::ordered_json;
 constexpr const char* kInterface = "org.vgyro.Gateway1";
 constexpr const char* kPath = "/org/vgyro/Gateway1";
 constexpr std::uint64_t kPatienceUsec = 5'000'000;
-// A memory card may take so long to have a capture safe.
+// A memory card may take this long to sync a capture.
 constexpr std::uint64_t kCapturePatienceUsec = 120'000'000;
 constexpr int kDepthMost = 8;
 
-/// A message as JSON. Whoever answers under the name may be anybody: what cannot be read is null,
-/// and ends the reading.
+/// Reads a message as JSON. The sender is not trusted: a value that cannot be read is null and ends
+/// the reading.
 class Reader {
  public:
   explicit Reader(sd_bus_message* message) : message_(message) {}

@@ -1,7 +1,6 @@
 #pragma once
 
-// Talks to the running vgyrod over D-Bus; with gateway_client.cpp the only place here that knows
-// libsystemd.
+// Client of the running vgyrod on D-Bus. In cli/, only gateway_client.cpp uses libsystemd.
 
 #include <memory>
 #include <string>
@@ -18,19 +17,20 @@ namespace vgyro::cli {
 
 class GatewayClient {
  public:
-  /// To the system bus; an error when there is none. `instance`: of several gateways on the host.
+  /// Connects to the system bus; error if there is none. `instance`: name of one of several
+  /// gateways on the host.
   static Expected<GatewayClient> connect(std::string_view instance = {});
 
-  /// The gateways that are on the bus, by the names of their instances, in their order; "" is the
-  /// one without a name, and the first.
+  /// Instance names of the gateways on the bus, sorted; "" is the one without a name, and comes
+  /// first.
   Expected<std::vector<std::string>> instances();
 
-  /// All that the gateway reports. Names as on D-Bus, but as in "rate_dps"; NaN is null.
+  /// All properties of the gateway, with names in snake_case ("RateDps" → "rate_dps"); NaN is null.
   Expected<nlohmann::ordered_json> status();
 
   Expected<void> recalibrate() { return call("Recalibrate"); }
   Expected<void> save_state() { return call("SaveState"); }
-  /// Has the recorded inputs written; returns the folder when they are on the disk.
+  /// Has the recorded inputs written; returns their folder once they are on the disk.
   Expected<std::string> capture();
 
  private:

@@ -1,4 +1,4 @@
-// vgyro status, vgyro recalibrate, vgyro capture: what the running gateway says and does.
+// vgyro status, vgyro recalibrate and vgyro capture: commands to the running gateway.
 
 #include <cerrno>
 #include <csignal>
@@ -61,7 +61,7 @@ Expected<Json> ask(const std::string& instance) {
   return client->status();
 }
 
-/// A live view: the screen is drawn anew, or, into a pipe, a line is added.
+/// A live view: redraws the screen or, into a pipe, adds a line.
 class Watch {
  public:
   Watch() : screen_(::isatty(STDOUT_FILENO) == 1) {
@@ -92,7 +92,7 @@ class Watch {
     if (rates_.size() > kRatesShown) rates_.pop_front();
   }
 
-  // Line by line over the old picture, so that nothing flickers.
+  // Draws line by line over the old picture, so that nothing flickers.
   static void draw(const std::string& text) {
     std::string picture = "\x1b[H";
     for (const char c : text) {
@@ -115,13 +115,13 @@ int watch(const StatusOptions& options) {
   Watch view;
   while (interrupted == 0) {
     view.show(ask(options.which.instance));
-    if (!flush_output()) return kDone;  // told at the end
+    if (!flush_output()) return kDone;  // reported at the end
     sleep_s(options.interval_s);
   }
   return kDone;
 }
 
-/// The instances that are meant; an error where all are and there is none.
+/// The chosen instances; error if all are wanted and there is none.
 Expected<std::vector<std::string>> chosen(const WhichGateway& which) {
   if (!which.all) return std::vector{which.instance};
   Expected<GatewayClient> client = GatewayClient::connect();
@@ -134,7 +134,7 @@ Expected<std::vector<std::string>> chosen(const WhichGateway& which) {
   return found;
 }
 
-// One that does not answer keeps none of the others from being shown.
+// A gateway that does not answer does not keep the others from being shown.
 int show_all(const std::vector<std::string>& instances, bool json) {
   int code = kDone;
   Json gateways = Json::array();

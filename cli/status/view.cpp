@@ -74,7 +74,7 @@ std::string counts_text(const Json& counts) {
 }
 
 std::size_t columns_of(std::string_view text) {
-  // Bytes that go on a character of UTF-8 take no column.
+  // Continuation bytes of UTF-8 take no column.
   return static_cast<std::size_t>(std::count_if(text.begin(), text.end(), [](char c) {
     return (static_cast<unsigned char>(c) & 0xC0U) != 0x80U;
   }));
@@ -162,7 +162,7 @@ std::string gyros_table(const Json& status, const Paint& paint) {
   return table(rows, paint);
 }
 
-/// Of a platform of several axes; empty of two single gyros.
+/// The axes of a platform with several; empty for two single gyros.
 std::string axes_table(const Json& status, const Paint& paint) {
   const Json axes = at(status, "axes");
   if (!axes.is_array() || axes.empty()) return {};
@@ -214,7 +214,7 @@ std::string buses_table(const Json& status, const Paint& paint) {
   return table(rows, paint);
 }
 
-// --- what the corrector thinks ---
+// --- findings of the corrector ---
 
 gateway::GyroNames names_of(const Json& status) {
   gateway::GyroNames names{kNothing, kNothing};
@@ -235,7 +235,7 @@ std::array<double, 2> of_gyros(const Json& status, const char* key) {
   return values;
 }
 
-/// What is not there is not likely.
+/// A hypothesis that is missing has the probability 0.
 gateway::Probabilities probabilities_of(const Json& status) {
   const Json told = at(status, "hypotheses");
   gateway::Probabilities probability{};
@@ -278,7 +278,7 @@ std::string opinion(const Json& status, const Paint& paint) {
   return text;
 }
 
-/// What is wrong with the gyros or with us, and what to do about it.
+/// Troubles of the gyros or of vgyro itself, with what to do about them.
 std::string troubles(const Json& status, const Paint& paint) {
   std::string text;
   for (const Json& gyro : at(status, "gyros")) {
@@ -365,7 +365,7 @@ std::string sparkline(const std::vector<double>& values) {
   return text;
 }
 
-/// Frames of the inputs beside the gyros that were not used; empty where all were.
+/// Unused frames of the inputs other than gyros; empty if all were used.
 std::string unused_inputs(const Json& counters) {
   Json counts = Json::object();
   for (const std::string name : {"reference", "accelerometer", "speed"})
@@ -374,7 +374,7 @@ std::string unused_inputs(const Json& counters) {
   return text == kNothing ? std::string() : "frames not used: " + text + '\n';
 }
 
-/// What went out in foreign layouts; empty without any.
+/// Frames sent in foreign layouts; empty without any.
 std::string layouts_line(const Json& counters) {
   const std::uint64_t frames = count_of(counters, "layout_frames");
   const std::uint64_t withheld = count_of(counters, "layout_withheld");
@@ -387,7 +387,7 @@ std::string layouts_line(const Json& counters) {
   return text + '\n';
 }
 
-/// The recording of the last minutes, and what was written of it; empty where there is none.
+/// The recording of the last minutes, and the captures written of it; empty if there is none.
 std::string captures_line(const Json& status, const Paint& paint) {
   const Json captures = at(status, "captures");
   if (!captures.is_object() || captures.empty()) return {};

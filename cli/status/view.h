@@ -1,7 +1,7 @@
 #pragma once
 
-// The gateway's status for people: a table, and one line for logs. Text in, text out. Whatever is
-// missing in the status is shown as "–".
+// The gateway's status for people: a table, and one line for logs. Computes text from JSON only. A
+// value missing in the status is shown as "–".
 
 #include <string>
 #include <vector>
@@ -12,8 +12,7 @@ namespace vgyro::cli {
 
 struct ViewOptions {
   bool colour = false;
-  std::vector<double>
-      rates_dps;  ///< the last ones, oldest first; drawn where there are two; NaN: gap
+  std::vector<double> rates_dps;  ///< the last ones, oldest first; drawn from two on; NaN: gap
 };
 
 std::string status_table(const nlohmann::ordered_json& status, const ViewOptions& options);
@@ -21,7 +20,7 @@ std::string status_table(const nlohmann::ordered_json& status, const ViewOptions
 /// For a pipe: state, rate and biases, no line end.
 std::string status_line(const nlohmann::ordered_json& status);
 
-/// A row of blocks, one a value, between the smallest and the largest; NaN is a blank.
+/// A row of blocks, one for each value, scaled from the smallest to the largest; NaN is a blank.
 std::string sparkline(const std::vector<double>& values);
 
 }  // namespace vgyro::cli
