@@ -13,7 +13,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-// JSON that no HTML parser takes for the end of its script.
+// JSON without "<", so that no HTML parser finds the end of the script in it.
 std::string harmless(const Json& json) {
   const std::string text = json.dump(-1, ' ', false, Json::error_handler_t::replace);
   std::string safe;
@@ -28,13 +28,13 @@ std::string harmless(const Json& json) {
   return safe;
 }
 
-// The last line, "//# …" or "/*# …", points at a file beside the library that is not there.
+// Drops the last line, "//# …" or "/*# …", which refers to a file that is not shipped.
 std::string_view without_source_map(std::string_view text) {
   const std::size_t at = text.rfind("# sourceMappingURL=");
   return at == std::string_view::npos ? text : text.substr(0, at - 2);
 }
 
-// Each "{{name}}" of the template for its text; what is put in is not looked at again.
+// Replaces each "{{name}}" of the template by its text, in which nothing is replaced again.
 std::string filled(std::string_view page, const std::map<std::string_view, std::string_view>& by) {
   std::string text;
   while (true) {

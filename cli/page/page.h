@@ -12,9 +12,9 @@
 
 namespace vgyro::cli {
 
-/// All of it is markup: nothing of a user's may be in it.
+/// All of it is markup: no text of a user may be in it.
 struct PageParts {
-  std::string_view title;     ///< until the script has set another
+  std::string_view title;     ///< until the script sets another
   std::string_view noscript;  ///< for a reader whose browser runs no script
   std::string_view made_by;   ///< a sentence at the foot
   std::string_view style;
@@ -24,7 +24,7 @@ struct PageParts {
 /// The whole file.
 std::string page_of(const PageParts& parts, const nlohmann::ordered_json& data);
 
-/// With so many significant digits; null where it is no number.
+/// With this many significant digits; null if not finite.
 nlohmann::ordered_json page_number(double value, int digits);
 nlohmann::ordered_json page_numbers(const std::vector<double>& values, int digits);
 

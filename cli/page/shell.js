@@ -1,5 +1,6 @@
 "use strict";
-// What all pages share: making nodes, tables, a plot's keys, paper. User's text goes through textContent only.
+// Shared by all pages: nodes, tables, keys of a plot, printing. A user's text goes through
+// textContent only.
 
 const data = JSON.parse(document.getElementById("data").textContent);
 
@@ -38,7 +39,7 @@ function colour(name) {
   return getComputedStyle(document.documentElement).getPropertyValue("--" + name).trim();
 }
 
-// A name of the catalogue breaks after its "_", never inside a word.
+// Lets a name of the catalogue break after "_", but not inside a word.
 const breakable = (name) => name.split(/(?<=_)/).flatMap((part, i) => (i > 0 ? [make("wbr"), part] : [part]));
 const kindCell = (kind) => ({ kind: breakable(kind) });
 
@@ -57,7 +58,7 @@ function table(head, rows) {
 
 // --- plots --------------------------------------------------------------------------------------
 
-const plots = []; // of each: host, and the chart once it is drawn
+const plots = []; // each with its host, and its chart once it is drawn
 
 function zoom(chart, factor, shift, log) {
   const scale = log ? Math.log : (v) => v, back = log ? Math.exp : (v) => v;
