@@ -7,11 +7,11 @@ namespace vgyro::cli {
 
 namespace {
 
-// A hole is as long as the one the summary tells, and longer than a slow gyro's usual pace.
+// A hole is at least as long as a gap of the summary, and longer than a slow gyro's usual interval.
 constexpr double kHole_s = 0.5;
 constexpr double kHoleIntervals = 5.0;
 
-// In the order of Shade; of a fault the gyro's name stands there.
+// In the order of Shade; shade_name() makes the names of faults.
 constexpr std::array<const char*, Course::kShades> kShadeNames{
     "calibrating", "stop learned", "stop refused: turning", "ambiguous", "one gyro alone", "", "",
     "contradicted"};
@@ -38,7 +38,7 @@ void Course::Stretches::join_nearest() {
   stretches_.erase(stretches_.begin() + static_cast<std::ptrdiff_t>(nearest));
 }
 
-// A stretch that is held for a turn has `turning` without `stopped`.
+// A stretch taken for a turn has a likely kTurning without `stopped`.
 void Course::add_condition(TimePoint t, const fusion::Condition& condition) {
   const auto likely = [&](fusion::Hypothesis which) {
     return condition.probability[static_cast<std::size_t>(which)] > 0.5;
@@ -85,7 +85,7 @@ void Course::Heading::add(TimePoint t, double rate_dps) {
   last_dps = rate_dps;
 }
 
-// From the first valid rate on all of them count anew: before it there is nothing to compare.
+// All headings start at 0 at the first valid rate: before it there is nothing to compare.
 void Course::add_heading(TimePoint t, const std::array<double, 2>& raw_dps, double virtual_dps) {
   const bool valid = std::isfinite(virtual_dps);
   if (valid && !valid_begun_) {
@@ -199,8 +199,8 @@ void Course::add_rate(TimePoint t, const std::array<double, 2>& raw_dps, double 
   add_heading(t, raw_dps, virtual_dps);
 }
 
-// A curve's points are often sparser than the buckets: the line goes on to the next one. Where it
-// must not, across a hole, the curve gets a point that is none.
+// A curve's points are often sparser than the buckets, and the line connects them. Across a hole it
+// must not, so the curve gets a break there.
 std::vector<bool> Course::breaks(Column column) const {
   std::vector<std::size_t> filled;
   for (std::size_t i = 0; i < buckets_.size(); ++i) {
@@ -231,7 +231,7 @@ double Course::span_s() const {
   return to_seconds(width_) * static_cast<double>(buckets_.size());
 }
 
-// The curve, its band, and all but the wildest of what was measured, with a margin.
+// Range of the curve, its band and all measured points but outliers, with a margin.
 std::array<double, 2> Course::drift_range_dps(std::size_t gyro) const {
   constexpr double kWild = 0.02;  // of the points, at each end
   constexpr double kMargin = 0.15;
@@ -251,7 +251,7 @@ std::array<double, 2> Course::drift_range_dps(std::size_t gyro) const {
     low = std::min(low, points[aside]);
     high = std::max(high, points[points.size() - 1 - aside]);
   }
-  // A simulation without noise has no height.
+  // Without noise, as in a simulation, the curve has no height.
   constexpr double kLeast = 1e-4;
   if (!(high - low > kLeast * std::abs(high))) return {0.0, 0.0};
   const double margin = kMargin * (high - low);

@@ -18,12 +18,13 @@ using Bucket = Course::Bucket;
 using Mean = Course::Mean;
 using Envelope = Course::Envelope;
 
-// Rates and drifts: a screen shows no more. Times: a millisecond of a week.
+// Enough digits of rates and drifts for any screen, and of times for a millisecond in a week.
 constexpr int kDigits = 6;
 constexpr int kDigitsOfTime = 9;
-// Headings are compared with each other: an absolute step, however far the platform turned.
+// Headings have an absolute step, because they are compared with each other however far the
+// platform turned.
 constexpr double kHeadingSteps_per_deg = 1e4;
-// What a curve has where it must not go on; null is "no point here, the line goes on".
+// A point that interrupts its curve; null means "no point here, the line goes on".
 constexpr const char* kBreak = "break";
 
 // In the order of Course::Shade: the names of their colours in the style.
@@ -72,7 +73,7 @@ Json heading_number(double heading_deg) {
   return std::round(heading_deg * kHeadingSteps_per_deg) / kHeadingSteps_per_deg;
 }
 
-// A point for each row; null or "break" where there is none.
+// A point for each row; null or "break" if there is none.
 template <typename Value>
 Json points(const Course& course, const std::vector<std::size_t>& rows,
             const std::vector<bool>& breaks, Course::Column mean, Value value) {
@@ -90,7 +91,7 @@ Json points(const Course& course, const std::vector<std::size_t>& rows,
   return json;
 }
 
-// The buckets that say something of anything.
+// The buckets in which any curve has a point or a break.
 std::vector<std::size_t> rows_of(const Course& course) {
   std::vector<bool> is_row(course.buckets().size(), false);
   const auto look = [&](Course::Column column) {
@@ -110,7 +111,7 @@ std::vector<std::size_t> rows_of(const Course& course) {
   return rows;
 }
 
-// Columns that nothing is known of are left out. Of a bucket with one sample the mean says it all.
+// Leaves out empty columns, and least and greatest values if every bucket has one sample.
 Json columns_json(const Course& course, const std::vector<std::size_t>& rows) {
   Json columns = Json::object();
   for (const MeanColumn& column : kMeans) {
@@ -212,7 +213,7 @@ Expected<std::string> replay_page(const PageSubject& subject, const gateway::Pla
             {"config", subject.config},
             {"gyros", names}};
   json["summary"] = to_json(summary, plan);
-  json["summary"].erase("frames_by_id");  // as many as identifiers are on the bus
+  json["summary"].erase("frames_by_id");  // long: one entry for each identifier on the bus
   json["courses"] = Json::array();
   for (std::size_t i = 0; i < courses.size(); ++i) {
     if (courses[i].empty()) continue;

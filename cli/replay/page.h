@@ -1,7 +1,7 @@
 #pragma once
 
-// The page of a replay (--html): what --plot draws, as one self-contained file that zooms and tells
-// its values, with the summary's figures. The same input gives the same bytes.
+// The page of a replay (--html): the plots of --plot as one self-contained file, with zoom and
+// readout, and the summary's figures. The same input gives the same bytes.
 
 #include <span>
 #include <string>
@@ -12,8 +12,8 @@
 
 namespace vgyro::cli {
 
-/// Of a course that a page will show: what is left of an hour at 500 Hz is finer than a second, and
-/// a megabyte and a half of text for each axis.
+/// Buckets of a course for a page: of an hour at 500 Hz they are shorter than a second, and take
+/// one and a half megabytes of text for each axis.
 constexpr std::size_t kPageBuckets = 6000;
 
 struct PageSubject {
@@ -21,7 +21,7 @@ struct PageSubject {
   std::string config;
 };
 
-/// `courses`: one, or one for each axis of the plan. Error when none of them has a sample.
+/// `courses`: one, or one for each axis of the plan. Error if none has a sample.
 Expected<std::string> replay_page(const PageSubject& subject, const gateway::Plan& plan,
                                   const ReplaySummary& summary, std::span<const Course> courses);
 

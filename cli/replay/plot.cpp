@@ -15,12 +15,12 @@ namespace {
 
 constexpr double kSecondsPerHour = 3600.0;
 constexpr double kSecondsPerMinute = 60.0;
-// A drift beyond this, in deg/s, has more digits than one reads in deg/h.
+// A drift beyond this is shown in deg/s, because in deg/h it would have too many digits to read.
 constexpr double kReadableInDegPerHour_dps = 0.3;
-// Of the table: gnuplot draws past a value that is missing, and interrupts the line at one that is
-// no number.
+// In gnuplot's table: the line goes on past a missing value, and is interrupted at one that is no
+// number.
 constexpr const char* kMissing = "-";
-// Okabe and Ito's colours, which the colour-blind tell apart: none stands for two things.
+// Okabe and Ito's colours, which the colour-blind can distinguish. None has two meanings.
 constexpr std::array<const char*, 2> kColours{"#e69f00", "#cc79a7"};
 constexpr const char* kMeanColour = "#808080";
 constexpr const char* kVirtualColour = "#0072b2";
@@ -31,16 +31,16 @@ constexpr const char* kDriftBand = "#c8c8c8";
 // In the order of Course::Shade.
 constexpr std::array<unsigned, Course::kShades> kShadeColours{
     0xf0e442, 0x009e73, 0xd55e00, 0x882255, 0x56b4e9, 0x000000, 0x000000, 0x332288};
-constexpr double kTint = 0.2;         // of a shade's colour, the rest is paper
-constexpr double kBlackTint = 0.09;   // black weighs more
-constexpr double kShortest = 0.0015;  // of the picture: what is shorter could not be seen
+constexpr double kTint = 0.2;         // share of a shade's colour; the rest is paper
+constexpr double kBlackTint = 0.09;   // less, because black looks heavier
+constexpr double kShortest = 0.0015;  // share of the picture; shorter stretches could not be seen
 
 // Sizes in pixels.
 constexpr int kWidth = 1200;
 constexpr int kTitle = 46;
-constexpr int kLegend = 78;    // above each panel: what it shows, and below that the legend
-constexpr int kNoLegend = 36;  // where there is no legend
-constexpr int kHeading = 56;   // of these, from the panel to what it shows
+constexpr int kLegend = 78;    // above each panel: its caption and, below that, the legend
+constexpr int kNoLegend = 36;  // without a legend
+constexpr int kHeading = 56;   // of these, from the panel to its caption
 constexpr int kFoot = 62;      // the axis of time
 constexpr int kLane = 22;
 constexpr int kLeft = 190;
@@ -61,7 +61,7 @@ bool is_inside_character(const std::string& text, std::size_t at) {
   return (static_cast<unsigned char>(text[at]) & 0xC0U) == 0x80U;
 }
 
-// Both ends of a long name stay: names of one platform often begin alike.
+// Keeps both ends of a long name, because names on one platform often begin alike.
 std::string shortened(const std::string& name, std::size_t most) {
   if (name.size() <= most) return name;
   std::size_t head = most / 2 - 1;
@@ -79,7 +79,7 @@ std::string legend_name(const std::string& name) {
   return "gyro " + shortened(name, kMost);
 }
 
-// Left of a lane there is room for so much; what is cut off a gyro's faults, the summary holds.
+// Cuts a name to the room left of a lane. The summary has all faults of a gyro.
 std::string lane_name(const std::string& shade_name) {
   constexpr std::size_t kMost = 26;
   if (shade_name.size() <= kMost) return shade_name;
@@ -89,7 +89,7 @@ std::string lane_name(const std::string& shade_name) {
   return shade_name.substr(0, end) + "…";
 }
 
-// Two significant digits of the smaller one.
+// Fewer decimals for larger values.
 std::string degrees(double value_deg) {
   const double size = std::abs(value_deg);
   const int digits = size >= 100.0 ? 0 : size >= 10.0 ? 1 : size >= 1.0 ? 2 : 3;
@@ -103,7 +103,7 @@ std::string text_of(const Course::Mean& mean, double scale) {
 class Plot {
  public:
   Plot(const Course& course, const PlotTexts& texts) : course_(course), texts_(texts) {}
-  /// For gnuplot: the data, then what draws them.
+  /// Script for gnuplot: the data, then the commands that draw them.
   [[nodiscard]] std::string whole_script(const std::string& path) const;
 
  private:
@@ -111,9 +111,9 @@ class Plot {
   using Mean = Course::Mean;
   struct Unit {
     const char* name;
-    double in_base;  ///< of the base unit: s, or deg/s
+    double in_base;  ///< this unit in the base unit, s or deg/s
   };
-  /// What stands beneath what, with its height and the script that draws it.
+  /// One plot of the picture, from top to bottom, with its height and the script that draws it.
   struct Panel {
     int height_px;
     std::string caption;
@@ -186,7 +186,7 @@ void Plot::write_data(std::string& to) const {
   put(to, "EOD\n");
 }
 
-// In the unit of the time axis.
+// Time of a bucket's middle, in the unit of the time axis.
 double Plot::middle_of(std::size_t bucket) const {
   return to_seconds(course_.width()) * (static_cast<double>(bucket) + 0.5) / time_unit().in_base;
 }
@@ -220,7 +220,7 @@ Plot::Panel Plot::heading_panel() const {
   return {310, "Heading, deg", text + '\n'};
 }
 
-// The ends stand in the legend: they are what one takes away.
+// The legend shows the values at the end, which are the result.
 Plot::Panel Plot::off_panel() const {
   const std::array<std::string, 3> names{legend_name(texts_.gyro_names[0]),
                                          legend_name(texts_.gyro_names[1]), "mean"};
@@ -261,7 +261,7 @@ std::string Plot::drift_range(std::size_t gyro) const {
 
 Plot::Panel Plot::drift_panel(std::size_t gyro) const {
   std::string text = drift_range(gyro);
-  // The points are small, for there are many; the legend's is large enough to be seen.
+  // The points are small because there are many; the legend's point is large enough to be seen.
   put(text,
       "plot $rates u 1:{} w p pt 7 ps 0.25 lc rgb '{}' notitle, "
       "NaN w p pt 7 ps 0.8 lc rgb '{}' t 'gyro less the virtual gyro', ",
@@ -281,7 +281,7 @@ Plot::Panel Plot::drift_panel(std::size_t gyro) const {
           text};
 }
 
-// A temperature that never changes leaves gnuplot no height, of which it would complain.
+// A constant temperature would leave the plot no height, and gnuplot would complain.
 std::string Plot::temperature_range() const {
   constexpr double kAround_k = 1.0;
   double low_c = std::numeric_limits<double>::infinity();
@@ -311,7 +311,7 @@ Plot::Panel Plot::temperature_panel() const {
   return {130, "Temperature, °C", temperature_range() + text + "\nset autoscale y\n"};
 }
 
-// From and to, in the unit of the time axis, wide enough to be seen.
+// Begin and end in the unit of the time axis, wide enough to be seen.
 std::array<double, 2> Plot::ends(const Course::Stretch& stretch) const {
   const double from = std::max(to_seconds(stretch.from - course_.begin()), 0.0);
   const double to =
@@ -319,8 +319,7 @@ std::array<double, 2> Plot::ends(const Course::Stretch& stretch) const {
   return {from / time_unit().in_base, to / time_unit().in_base};
 }
 
-// A lane, with its name, for each thing that went on at some time; the same colours shade the
-// panels.
+// A lane, with its name, for each shade that occurred; the panels are shaded in the same colours.
 Plot::Panel Plot::events_panel() const {
   std::string boxes;
   std::string names;
@@ -413,7 +412,7 @@ std::string Plot::script(const std::string& path) const {
   return text + "unset multiplot\n";
 }
 
-// What is known of the drifts, row by row: σ comes less often than the drift.
+// Table of the known drifts. It is separate because σ comes less often than the drift.
 void Plot::write_known(std::string& to) const {
   const double scale = 1.0 / drift_unit().in_base;
   put(to, "$known << EOD\n");

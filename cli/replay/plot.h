@@ -1,9 +1,9 @@
 #pragma once
 
-// The picture of a replay. First what matters: the heading that the raw gyros, their mean and the
-// virtual gyro add up to, with the virtual gyro's σ. Then how far the others are off, what went on
-// when (calibration, stops, faults, one gyro alone), the rates, each gyro's drift with its σ over
-// what was measured of it, and the temperature where there is one.
+// The picture of a replay. First the headings of the raw gyros, their mean and the virtual gyro,
+// with the virtual gyro's σ. Then how far the others are off, the times of events (calibration,
+// stops, faults, one gyro alone), the rates, each gyro's drift with its σ over the measured values,
+// and the temperature if there is one.
 
 #include <array>
 #include <string>
@@ -13,7 +13,7 @@
 
 namespace vgyro::cli {
 
-/// As many points as a picture shows.
+/// Most points that a picture shows.
 constexpr std::size_t kPlotBuckets = 2000;
 
 struct PlotTexts {
@@ -21,8 +21,8 @@ struct PlotTexts {
   std::array<std::string, 2> gyro_names;
 };
 
-/// Error when there is nothing to draw, or as run_gnuplot(). The course is drawn as it is, in its
-/// own number of buckets.
+/// Draws the course with its own number of buckets. Error if there is nothing to draw, or as of
+/// run_gnuplot().
 Expected<void> draw_plot(const Course& course, const std::string& path, const PlotTexts& texts);
 
 }  // namespace vgyro::cli

@@ -14,7 +14,7 @@ namespace {
 
 constexpr std::string_view kHeader =
     "t_s,rate_dps,sigma_dps,valid,state,bias1_dps,bias2_dps,heading_deg\n";
-// Finer than any gyro's noise of one sample, and than VG_Rate's own steps.
+// Finer than any gyro's noise in one sample, and than the steps of VG_Rate.
 constexpr int kRateDigits = 7;
 constexpr int kHeadingDigits = 6;
 
@@ -22,7 +22,7 @@ struct Line {
   char* at;
 
   void put(std::string_view text) { at = std::copy(text.begin(), text.end(), at); }
-  /// Nothing for what is not known.
+  /// Writes nothing if the value is not finite.
   void number(double value, int digits) {
     *at++ = ',';
     if (std::isfinite(value)) at = fmt::format_to(at, "{:.{}f}", value, digits);
@@ -61,7 +61,7 @@ Expected<void> RateTable::close() {
   return file_.close();
 }
 
-// Where an axis goes on with one unit its instants are others than those of the pairs.
+// Instants may differ: an axis that goes on with one unit has rates between those of the pairs.
 void RateTable::gather(std::size_t place, const gateway::RateOutput& output,
                        const std::array<double, 2>& bias_dps) {
   const bool other_instant =
@@ -74,7 +74,7 @@ void RateTable::gather(std::size_t place, const gateway::RateOutput& output,
 }
 
 void RateTable::write_line() {
-  // Of each axis four numbers, a state and a flag, and two more numbers in all.
+  // Four numbers, a state and a flag for each axis, and two more numbers.
   constexpr std::size_t kLineBytesMax = 640;
   constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
   char* const begin = file_.room(kLineBytesMax);

@@ -1,7 +1,7 @@
 #pragma once
 
 // The virtual gyro as a table for other programs: a CSV line for every VG_Rate, with the biases and
-// the heading that it adds up to.
+// the heading, which is the integral of the rate.
 
 #include <array>
 #include <optional>
@@ -21,7 +21,7 @@ class RateTable final : public gateway::OutputObserver {
   static Expected<RateTable> open(const std::string& path, const gateway::Plan& plan);
 
   void on_output(const gateway::RateOutput& output, const std::array<double, 2>& bias_dps) override;
-  /// Of a platform of several axes: who takes the rates of the one in this place. A line holds all
+  /// On a platform with several axes: the observer for the rates of axis `place`. A line holds all
   /// axes of an instant, and the heading about z.
   [[nodiscard]] gateway::OutputObserver* column(std::size_t place) {
     columns_[place].table = this;
@@ -51,7 +51,7 @@ class RateTable final : public gateway::OutputObserver {
               const std::array<double, 2>& bias_dps);
   void write_line();
   /// Adds the turn since the last valid rate. Between two instants, and across a hole, the rate is
-  /// taken to change evenly.
+  /// taken to change linearly.
   void turn(TimePoint instant, double rate_dps);
 
   OutputFile file_;
@@ -62,7 +62,7 @@ class RateTable final : public gateway::OutputObserver {
   std::optional<Rate> last_;  ///< the last valid one
   double heading_deg_ = 0.0;
 
-  std::vector<std::size_t> axes_;  ///< of the platform; empty: a single one
+  std::vector<std::size_t> axes_;  ///< of the platform; empty: a single axis
   std::array<Column, gateway::kAxes> columns_;
   std::array<std::optional<Entry>, gateway::kAxes> entries_;
   bool any_ = false;

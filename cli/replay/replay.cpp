@@ -38,11 +38,11 @@ namespace vgyro::cli {
 
 namespace {
 
-// As many as stay in the first cache between the parser and the pipeline.
+// As many as stay in the L1 cache between the parser and the pipeline.
 constexpr std::size_t kRecordsAtOnce = 64;
 constexpr can::BusIndex kForeignBus = 0xFF;
 
-// Frames of the pipeline → candump lines.
+// Writes frames of the pipeline as candump lines.
 class LineSink final : public gateway::FrameSink {
  public:
   LineSink(OutputFile& file, const gateway::Plan& plan)
@@ -67,7 +67,7 @@ class LineSink final : public gateway::FrameSink {
 
   OutputFile& file_;
   std::vector<canlog::LineFormatter> buses_;
-  canlog::LineFormatter* lines_;  ///< of the output's own bus
+  canlog::LineFormatter* lines_;  ///< for the bus of the output
 };
 
 class Totals final : public gateway::RateObserver {
@@ -105,7 +105,7 @@ class Totals final : public gateway::RateObserver {
   TimePoint last_;
 };
 
-/// Of one axis of several.
+/// Totals of one axis of several.
 class AxisTotals final : public gateway::RateObserver {
  public:
   AxisTotals(AxisSummary& summary, Course* course) : summary_(&summary), course_(course) {}
@@ -124,7 +124,7 @@ class AxisTotals final : public gateway::RateObserver {
   Course* course_;
 };
 
-// Interface names of the log → indices of the plan, through the user's --map.
+// Maps interface names of the log to indices of the plan, by the user's --map.
 class BusMap {
  public:
   static Expected<BusMap> make(const std::vector<std::string>& entries, const gateway::Plan& plan) {
@@ -225,7 +225,7 @@ class Replay {
     const std::optional<gateway::SavedState> known = pipeline_.memory();
     if (known) keep_axes_sigma(*known);
     for (std::size_t i = 0; known && i < 2; ++i) {
-      // Of several axes the first one's stands there; a summary of all has no drift.
+      // With several axes this is the first axis's, and the summary of all has no drift.
       if (pipeline_.axis_count() == 0)
         summary_.bias_sigma_dps[i] = std::sqrt(known->drift.bias_covariance[2 * i]);
       if (!(known->drift.slope_sigma_dps_s[i] > 0.0)) continue;  // 0 stands for "not known"
@@ -235,7 +235,7 @@ class Replay {
     return summary_;
   }
 
-  /// One, or one for each axis.
+  /// One course, or one for each axis.
   const std::vector<Course>& courses() const { return courses_; }
 
  private:
@@ -250,7 +250,7 @@ class Replay {
       pipeline_.observe(&axis_totals_[place], place);
   }
 
-  // An axis that is not calibrated has none.
+  // An axis that is not calibrated has no saved state.
   void keep_axes_sigma(const gateway::SavedState& known) {
     for (const gateway::SavedState& saved : known.axes) {
       for (AxisSummary& axis : summary_.axes) {
@@ -286,7 +286,7 @@ class Replay {
     if (is_drawn_) follow_drift(record.stamp);
   }
 
-  // Looks at the drift whenever the pipeline has published it.
+  // Records the drift whenever the pipeline has sent it.
   void follow_drift(TimePoint stamp) {
     if (sink_.frames == frames_seen_) return;
     frames_seen_ = sink_.frames;
@@ -299,7 +299,8 @@ class Replay {
     follow_sigma(stamp);
   }
 
-  // The σ of each drift, as it would be kept across a restart; no more often than a picture shows.
+  // Records the σ of each drift, from the state that would be saved; no more often than a picture
+  // shows.
   void follow_sigma(TimePoint stamp) {
     if (sigma_seen_ && stamp - *sigma_seen_ < kSigmaEvery) return;
     sigma_seen_ = stamp;
@@ -345,7 +346,7 @@ std::string causes_of_rejection(const gateway::GyroStatus& gyro) {
   return causes;
 }
 
-// Frames of both gyros and yet no pair.
+// Explains why frames of both gyros gave no pair.
 std::optional<Error> explain_no_pair(const gateway::Status& status, const gateway::Plan& plan,
                                      const std::string& logs) {
   if (status.pairs > 0) return std::nullopt;
@@ -371,7 +372,7 @@ std::optional<Error> explain_no_pair(const gateway::Status& status, const gatewa
                "use a recording that contains both gyros"};
 }
 
-// Why nothing came out, in words that lead to the remedy.
+// Explains why there is no output, with a remedy.
 std::optional<Error> explain_silence(const ReplaySummary& summary, const gateway::Plan& plan,
                                      const std::string& logs) {
   std::uint64_t frames = 0;
@@ -395,7 +396,7 @@ std::optional<Error> explain_silence(const ReplaySummary& summary, const gateway
   return explain_no_pair(summary.status, plan, logs);
 }
 
-// Of several axes each has a picture of its own.
+// With several axes, each has a picture of its own.
 std::vector<std::string> pictures_of(const ReplayOptions& options, const gateway::Plan& plan) {
   if (plan.axes.empty()) return {options.plot};
   std::vector<std::string> paths;
@@ -405,8 +406,7 @@ std::vector<std::string> pictures_of(const ReplayOptions& options, const gateway
   return paths;
 }
 
-// Before an output of an earlier run is written over: are the logs there, and is no input an
-// output?
+// Checks, before any output is overwritten, that the logs exist and that no input is an output.
 Expected<void> check_files(const ReplayOptions& options, const gateway::Plan& plan,
                            std::vector<std::string> inputs) {
   for (const std::string& log : options.logs) {
@@ -449,7 +449,7 @@ void warn_of_doubts(const ReplaySummary& summary, const gateway::Plan& plan) {
   }
 }
 
-// A virtual gyro that was one gyro for the most part, or that says nothing of its σ.
+// Warns if the virtual gyro was mostly one gyro, or if its σ does not fit into VG_Sigma.
 void warn_of_weakness(const ReplaySummary& summary, const gateway::Plan& plan) {
   for (std::size_t i = 0; i < 2; ++i) {
     if (summary.rates == 0 || 2 * summary.raws[i] >= summary.rates) continue;
@@ -460,7 +460,7 @@ void warn_of_weakness(const ReplaySummary& summary, const gateway::Plan& plan) {
                      summary.raws[i], summary.rates),
          "the summary's \"faults\" and \"not used\" say why; --plot shows when"});
   }
-  // What VG_Sigma can say at most: 0xFFE steps of 2e-5 deg/s.
+  // The largest σ that VG_Sigma can hold: 0xFFE steps of 2e-5 deg/s.
   constexpr double kSigmaMost_dps = 0xFFE * 2e-5;
   if (plan.output.fd || !(summary.status.sigma_dps > kSigmaMost_dps)) return;
   warn({"sigma",
@@ -470,7 +470,7 @@ void warn_of_weakness(const ReplaySummary& summary, const gateway::Plan& plan) {
         "fd = true in [output] carries any; --csv holds it too"});
 }
 
-// What the corrector could not make sense of, with what to look at.
+// Warns of data that the corrector could not use, with advice.
 void warn_of_data(const ReplaySummary& summary, const gateway::Plan& plan) {
   const gateway::Status& status = summary.status;
   const gateway::SteadyStretches stretches = gateway::steady_stretches(status);
@@ -491,7 +491,7 @@ void warn_of_data(const ReplaySummary& summary, const gateway::Plan& plan) {
     warn({"estimate", gateway::restarts_text(status.estimate_restarts), ""});
 }
 
-// A pair that cannot be one is a mistake of the configuration: an error while it stands.
+// A contradicted pair is a mistake of the configuration, and thus an error if it is one at the end.
 std::optional<Error> explain_contradiction(const ReplaySummary& summary,
                                            const gateway::Plan& plan) {
   const gateway::Status& status = summary.status;
@@ -509,7 +509,7 @@ std::optional<Error> explain_contradiction(const ReplaySummary& summary,
   return std::nullopt;
 }
 
-// An input of which nothing came, while its J1939 parameter group came from other senders.
+// Warns of an input without frames whose J1939 parameter group came from other senders.
 void warn_of_senders_missed(const ReplaySummary& summary, const gateway::Plan& plan) {
   const auto look = [&](const std::string& title, const std::string& message,
                         const gateway::FrameMatch& match) {
@@ -530,7 +530,7 @@ void warn_of_senders_missed(const ReplaySummary& summary, const gateway::Plan& p
   if (plan.speed) look("speed", plan.speed->message, plan.speed->match);
 }
 
-// Two senders of one identifier: whoever reads VG_Rate would get both.
+// Warns of other senders of our identifiers: a receiver of VG_Rate would get both.
 void warn_of_other_senders(const ReplaySummary& summary, const gateway::Plan& plan) {
   for (std::size_t i = 0; i < plan.buses.size(); ++i) {
     const auto bus = static_cast<can::BusIndex>(i);
@@ -548,7 +548,7 @@ void warn_of_other_senders(const ReplaySummary& summary, const gateway::Plan& pl
   }
 }
 
-// Without folders: a title is short.
+// Without folders, to keep a title short.
 std::string picture_name_of(std::vector<std::string> logs) {
   for (std::string& log : logs)
     log = log.substr(log.rfind('/') + 1);
@@ -634,11 +634,11 @@ int run_replay(const ReplayOptions& options) {
   if (!output) return report(output.error());
   auto table = open_table(options.csv, plan);
   if (!table) return report(table.error());
-  // Before an hour of work: can the page be written?
+  // Opened before an hour of work, in case the page cannot be written.
   auto page = OutputFile::open(options.html);
   if (!page) return report(page.error());
 
-  // What is read from a pipe ends with its writer.
+  // An interrupt must not end the replay of a pipe, whose input ends with its writer.
   const FinishOnInterrupt finish(std::count(options.logs.begin(), options.logs.end(), "-") > 0);
   Replay replay(options, plan, *output, std::move(*buses));
   if (*state) {

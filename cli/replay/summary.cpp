@@ -55,7 +55,7 @@ std::uint64_t times(const gateway::GyroStatus& gyro, gateway::Fault fault) {
   return gyro.faults[static_cast<std::size_t>(fault)].times;
 }
 
-// Only what happened: most gyros are well.
+// Only faults that occurred, because most gyros have none.
 Json faults_json(const gateway::GyroStatus& gyro) {
   Json faults = Json::object();
   for (std::size_t i = 0; i < gateway::kFaultCount; ++i) {
@@ -95,7 +95,8 @@ Json gyro_json(const ReplaySummary& summary, const gateway::Plan& plan, std::siz
   return json;
 }
 
-// Null without a model; `waits_for` names what was never heard, so that its effects stayed in.
+// Null without a model. `waits_for` names inputs that were never received, so that their effects
+// were not corrected.
 Json model_json(const ReplaySummary& summary, const gateway::Plan& plan) {
   if (!plan.model) return nullptr;
   Json effects = Json::array();
@@ -112,7 +113,7 @@ Json model_json(const ReplaySummary& summary, const gateway::Plan& plan) {
   return {{"file", plan.model->file}, {"effects", effects}, {"waits_for", waits_for}};
 }
 
-// As the recording ended; what is less likely than a twentieth is left out.
+// Hypotheses at the end of the recording; leaves out those up to kWorthTelling.
 Json hypotheses_json(const gateway::Status& status) {
   Json hypotheses = Json::object();
   for (std::size_t i = 0; i < status.probability.size(); ++i) {
@@ -131,7 +132,8 @@ Json gaps_json(const ReplaySummary& summary) {
   return {{"longer_than_s", ReplaySummary::kGap_s}, {"count", summary.gaps}, {"longest", gaps}};
 }
 
-// As the recording ended; `contradiction` is "none" where the two can be of one platform.
+// State at the end of the recording; `contradiction` is "none" if both gyros can be on one
+// platform.
 Json pair_json(const gateway::Status& status) {
   const fusion::PairVerdict& pair = status.pair;
   const bool any = pair.contradiction != fusion::Contradiction::kNone;
@@ -177,7 +179,7 @@ Json axis_gyro_json(const gateway::GyroStatus& gyro) {
           {"bias_dps", number(gyro.bias_dps)}};
 }
 
-// Of a platform of several axes what is each one's.
+// The figures of each axis, on a platform with several.
 Json axes_json(const ReplaySummary& summary) {
   Json axes = Json::array();
   for (const AxisSummary& axis : summary.axes) {
@@ -321,16 +323,16 @@ Json to_json(const ReplaySummary& summary, const gateway::Plan& plan) {
 
 namespace {
 
-// A drift beyond this, in deg/s, has more digits than one reads in deg/h.
+// A drift beyond this is shown in deg/s, because in deg/h it would have too many digits to read.
 constexpr double kReadableInDegPerHour_dps = 0.3;
 
-// As many digits as leave σ two that count.
+// Decimals that leave σ two significant digits.
 int digits_for(double sigma) {
   constexpr int kDigitsMost = 9;
   return std::clamp(1 - static_cast<int>(std::floor(std::log10(sigma))), 0, kDigitsMost);
 }
 
-// "+0.033032 ± 0.000042 deg/s = +118.92 ± 0.15 deg/h"; without σ where it is not known.
+// "+0.033032 ± 0.000042 deg/s = +118.92 ± 0.15 deg/h"; without σ if it is unknown.
 std::string drift_text(double bias_dps, double sigma_dps) {
   const bool known = sigma_dps > 0.0 && std::isfinite(sigma_dps);
   const auto text = [&](double scale, const char* unit, int digits) {
@@ -375,7 +377,7 @@ void put_faults(fmt::memory_buffer& text, const gateway::GyroStatus& gyro, doubl
   }
 }
 
-// What the plain mean of the two would have done over the same instants.
+// The result of the plain mean of both gyros over the same instants.
 void put_plain_mean(fmt::memory_buffer& text, const ReplaySummary& summary) {
   if (summary.rates == 0 || summary.raws[0] != summary.rates || summary.raws[1] != summary.rates) {
     return;
@@ -392,7 +394,7 @@ void put_plain_mean(fmt::memory_buffer& text, const ReplaySummary& summary) {
       mean_dps, excess_dps * kSecondsPerHour, excess_dps * valid_s, valid_s);
 }
 
-// What the corrector made of it, as the recording ended.
+// The corrector's findings at the end of the recording.
 void put_opinion(fmt::memory_buffer& text, const ReplaySummary& summary,
                  const gateway::Plan& plan) {
   const gateway::Status& status = summary.status;
@@ -441,7 +443,7 @@ void put_gyro(fmt::memory_buffer& text, const ReplaySummary& summary, const gate
   fmt::format_to(to, "\n");
 }
 
-// The reference, and what of the model file was taken back.
+// The reference, and which effects of the model file were corrected.
 void put_other_inputs(fmt::memory_buffer& text, const gateway::Status& status,
                       const gateway::Plan& plan) {
   auto to = std::back_inserter(text);
@@ -477,7 +479,7 @@ void put_virtual_gyro(fmt::memory_buffer& text, const ReplaySummary& summary) {
   put_plain_mean(text, summary);
 }
 
-// One line for each axis, and what is between the units.
+// One line for each axis, and the misalignment of the units.
 void put_axes(fmt::memory_buffer& text, const ReplaySummary& summary, const gateway::Plan& plan) {
   auto to = std::back_inserter(text);
   for (const AxisSummary& axis : summary.axes) {

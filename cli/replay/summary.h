@@ -1,6 +1,6 @@
 #pragma once
 
-// What a replay saw and did, as JSON for programs and as a few lines for people. Holds nothing that
+// The summary of a replay, as JSON for programs and as a few lines for people. Nothing in it
 // differs from run to run: no wall-clock time, no paths of temporary files.
 
 #include <array>
@@ -16,8 +16,8 @@
 
 namespace vgyro::cli {
 
-/// Frames by interface and identifier. Bounded: of extended identifiers the first kExtendedMax; how
-/// many frames there were in all stands in the counts of the logs.
+/// Counts frames by interface and identifier. Bounded: only the first kExtendedMax extended
+/// identifiers are counted; the counts of the logs include all frames.
 class IdCounts {
  public:
   void add(can::BusIndex bus, const can::Frame& frame) {
@@ -35,13 +35,13 @@ class IdCounts {
     bool extended = false;
     std::uint64_t frames = 0;
   };
-  /// By interface, then identifier.
+  /// Sorted by interface, then identifier.
   [[nodiscard]] std::vector<Row> rows() const;
   [[nodiscard]] std::uint64_t error_frames() const { return error_frames_; }
 
  private:
   static constexpr std::size_t kExtendedMax = 4096;
-  /// Twice as many places, so that what is looked for is found in the next ones.
+  /// Twice as many places as identifiers, so that probing ends after a few places.
   static constexpr std::size_t kPlaces = 2 * kExtendedMax;
   struct Place {
     std::uint64_t key = 0;     ///< interface and identifier
@@ -49,7 +49,7 @@ class IdCounts {
   };
   void add_extended(can::BusIndex bus, const can::Frame& frame);
   std::vector<std::array<std::uint64_t, can::kStandardIdMax + 1>> standard_;
-  std::vector<Place> extended_;  ///< kPlaces, from the first such identifier on
+  std::vector<Place> extended_;  ///< kPlaces once the first such identifier came
   std::size_t extended_count_ = 0;
   std::uint64_t error_frames_ = 0;
 };
@@ -64,13 +64,13 @@ struct Gap {
   double length_s = 0.0;
 };
 
-/// One axis of a platform of several.
+/// One axis of a platform with several.
 struct AxisSummary {
   char name = 'x';
   gateway::Status status;
   double rate_sum_dps = 0.0;  ///< over the valid virtual rates
   std::uint64_t rates = 0;
-  std::array<double, 2> bias_sigma_dps{};  ///< of the biases, at the end; 0 where it is not known
+  std::array<double, 2> bias_sigma_dps{};  ///< of the biases, at the end; 0 if unknown
 };
 
 struct ReplaySummary {
@@ -79,14 +79,14 @@ struct ReplaySummary {
   IdCounts ids;
   gateway::Status status;
   std::array<double, 2> slope_dps_s{};        ///< of the biases, at the end
-  std::array<double, 2> slope_sigma_dps_s{};  ///< of these; NaN where they are not known
-  std::array<double, 2> bias_sigma_dps{};     ///< of the biases; NaN where it is not known
+  std::array<double, 2> slope_sigma_dps_s{};  ///< of these; NaN if unknown
+  std::array<double, 2> bias_sigma_dps{};     ///< of the biases; NaN if unknown
   std::uint64_t frames_out = 0;
   double first_s = 0.0;  ///< stamps of the first and the last frame
   double last_s = 0.0;
   double rate_sum_dps = 0.0;  ///< over the valid virtual rates
   std::uint64_t rates = 0;
-  std::array<double, 2> raw_sum_dps{};  ///< over the same instants, where the gyro took part
+  std::array<double, 2> raw_sum_dps{};  ///< over the same instants, if the gyro took part
   std::array<std::uint64_t, 2> raws{};
   std::uint64_t gaps = 0;         ///< between successive virtual rates, longer than kGap_s
   std::vector<AxisSummary> axes;  ///< empty: two single gyros

@@ -1,9 +1,9 @@
 "use strict";
-// Draws the course of a replay from the data in the page. All plots show the same stretch of time.
+// Draws the course of a replay from the data in the page. All plots show the same time range.
 
 const GYROS = [1, 2];
 const PER_HOUR = 3600;
-const READABLE_DPS = 0.3; // a drift beyond this has more digits than one reads in deg/h
+const READABLE_DPS = 0.3; // a drift beyond this has too many digits in deg/h to read
 const gyroName = (gyro) => data.gyros[gyro - 1];
 const beginUs = Math.min(...data.courses.map((course) => course.begin_us));
 
@@ -11,7 +11,7 @@ const beginUs = Math.min(...data.courses.map((course) => course.begin_us));
 
 const minus = (text) => text.replace(/^-/, "−");
 
-// As many decimals as leave σ two digits that count.
+// Decimals that leave σ two significant digits.
 function decimalsFor(sigma, most) {
   if (!(sigma > 0)) return 2;
   return Math.min(Math.max(1 - Math.floor(Math.log10(sigma)), 0), most);
@@ -28,7 +28,7 @@ function duration(seconds) {
 
 const spanS = Math.max(...data.courses.map((course) => course.t_s[course.t_s.length - 1] || 0));
 
-// "1:02:03.5": hours only where the recording has any, seconds alone in a short one.
+// "1:02:03.5": hours only if the recording has any, seconds alone in a short one.
 function clock(seconds, decimals) {
   const digits = decimals === undefined ? 2 : decimals;
   if (spanS < 120) return `${minus(seconds.toFixed(digits))} s`;
@@ -39,7 +39,7 @@ function clock(seconds, decimals) {
   return (seconds < 0 ? "−" : "") + text;
 }
 
-// Steps that clocks have.
+// Round steps of time.
 const STEPS_S = [0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800, 3600, 7200, 14400, 21600, 43200, 86400];
 
 function timeTicks(from, to, pixels) {
@@ -52,7 +52,7 @@ function timeTicks(from, to, pixels) {
   return ticks;
 }
 
-// --- what the replay came to --------------------------------------------------------------------
+// --- result of the replay -----------------------------------------------------------------------
 
 const offOf = (end, which) => end[`heading_${which}_deg`] - end.heading_virtual_deg;
 
@@ -144,7 +144,7 @@ function curve(key, label, columns, names, scale = 1) {
   return { key, label, bars };
 }
 
-// How far a heading is off the virtual one; the virtual one's own row is its σ around 0.
+// Difference of a heading from the virtual one; for the virtual one itself, 0 ± σ.
 function offCurve(key, label, columns, name) {
   const own = columns.heading_virtual, other = columns[name], sigma = columns.heading_sigma;
   if (own === undefined || other === undefined) return null;
@@ -211,7 +211,7 @@ function dotPlotter(event) {
   ctx.restore();
 }
 
-// What a stretch of time was, behind the curves.
+// Shades the stretches of time, behind the curves.
 function shade(ctx, area, chart, course) {
   const TINT = 0.2, FAULT_TINT = 0.12, LEAST_PX = 1;
   ctx.save();
@@ -234,7 +234,7 @@ const Y_LABELS_PX = 66; // as in the style of the lanes
 let window_ = [0, Math.max(spanS, 1e-3)];
 let moving = false;
 
-// The others follow the plot that was moved.
+// All other plots follow the one that was moved.
 function follow(range) {
   if (moving) return;
   moving = true;
@@ -279,7 +279,7 @@ function unpoint(course) {
 
 function drawLanes(entry) {
   const { course } = entry.panel;
-  const LEAST_OF_WINDOW = 0.0015; // what is shorter could not be seen
+  const LEAST_OF_WINDOW = 0.0015; // a shorter stretch could not be seen
   const [from, to] = window_, least = LEAST_OF_WINDOW * (to - from);
   entry.host.replaceChildren(...course.stretches.map(({ shade: key, name, spans_s: spans }) => {
     const svg = drawing("svg", { viewBox: `0 0 1000 10`, preserveAspectRatio: "none", role: "img", "aria-label": `${name}: ${spans.length} times` });
@@ -340,7 +340,7 @@ const dps = (value, sigma) => {
   return Math.abs(value) > READABLE_DPS ? text(1, "deg/s") : `${text(PER_HOUR, "deg/h")} = ${text(1, "deg/s")}`;
 };
 
-// Of several axes the summary has no σ; the course has.
+// With several axes the summary has no σ, but the course has.
 function lastSigma(axis, gyro) {
   const course = data.courses.find((one) => one.axis === axis);
   const known = ((course && course.columns[`drift_sigma_${gyro}`]) || []).filter(Number.isFinite);
