@@ -24,7 +24,7 @@ TEST(CaptureTriggers, EachNewContradictionAndDisagreementIsACauseOnce) {
   EXPECT_FALSE(has(causes, CaptureCause::kContradicted));
 }
 
-// A restart or a reload takes up the verdict, and counts none.
+// A restart or a reload takes up the verdict without counting it.
 TEST(CaptureTriggers, AVerdictThatIsTakenUpAndCountersThatBeginAnewAreNoCause) {
   CaptureTriggers triggers;
   gateway::Status status;

@@ -1,4 +1,4 @@
-// The last minutes in memory: in order, whole but for what is counted, and within limits.
+// The last minutes in memory: in order, complete except for counted losses, and within limits.
 
 #include "daemon/capture_ring.h"
 
@@ -26,7 +26,7 @@ class CaptureRingTest : public testing::Test {
     for (std::uint32_t i = from; i < to; ++i)
       ring->put(bus, numbered_frame(i), numbered_stamp(i));
   }
-  // As much as fits a block, and time for the thread to pack it.
+  // Puts at most a block at a time, and gives the thread time to pack it.
   void put_in_peace(std::uint32_t from, std::uint32_t to, can::BusIndex bus = 0) {
     for (std::uint32_t i = from; i < to; i += CaptureRing::kBlockFrames) {
       put(i, std::min(to, i + static_cast<std::uint32_t>(CaptureRing::kBlockFrames)), bus);
@@ -84,7 +84,8 @@ TEST_F(CaptureRingTest, PuttingAFrameAllocatesNothing) {
   EXPECT_EQ(allocations_so_far(), before) << "not even where a block is full";
 }
 
-// Faster than any thread packs: what is not there is counted, at its place.
+// Puts frames faster than the thread packs: missing ones are counted in the block that follows
+// them.
 TEST_F(CaptureRingTest, WhatTheThreadIsTooSlowForIsDroppedAndCounted) {
   begin(kWide);
   constexpr std::uint32_t kFrames = 100 * CaptureRing::kBlockFrames;
@@ -186,7 +187,7 @@ TEST_F(CaptureRingTest, FramesKeepTheNamesOfTheBusesThatTheyCameFrom) {
   EXPECT_EQ(blocks[1]->source->fingerprint, "another");
 }
 
-// What a writer holds does not change under it.
+// Blocks that a writer holds do not change.
 TEST_F(CaptureRingTest, BlocksThatAreHeldOutsideOutliveTheRing) {
   begin(kWide);
   put(0, 5);

@@ -1,4 +1,4 @@
-// Captures on the disk: whole or not there, however the writing ends, and within limits.
+// Captures on the disk: whole or absent, however the writing ends, and within limits.
 
 #include "daemon/capture_store.h"
 
@@ -143,7 +143,8 @@ TEST_F(CaptureStoreTest, OddTextMakesNoOddDescription) {
   EXPECT_EQ(said["text"], "\"\x1b[2J\xEF\xBF\xBD\n");
 }
 
-// Against a loss of power: the bytes before the name, and the name before success is told.
+// Against a loss of power: bytes are synced before the name, and the name before success is
+// reported.
 TEST_F(CaptureStoreTest, BytesAreOnTheDiskBeforeTheName) {
   CaptureStore store(scratch.path("captures"), kWide);
   open(store);
@@ -173,7 +174,7 @@ TEST_F(CaptureStoreTest, AnyFailureLeavesNothingAndSaysWhatToDo) {
   }
 }
 
-// A file system that takes only so much, without a word from a test's own calls.
+// A file size limit stands for a full disk; the watched calls do not interfere.
 TEST_F(CaptureStoreTest, AFullDiskLeavesNothing) {
   CaptureStore store(scratch.path("captures"), kWide);
   open(store);
@@ -309,8 +310,8 @@ int kills() {
   }
 }
 
-// The child writes as fast as it can, removing the oldest, and dies between any two instructions.
-// Every folder with a capture's name is whole afterwards.
+// The child writes as fast as it can, removing the oldest, and is killed at a random moment. Every
+// folder with a capture's name must be whole afterwards.
 TEST_F(CaptureStoreTest, KilledAtAnyMomentEachCaptureIsWhole) {
   constexpr std::uint32_t kSeed = 11;
   SCOPED_TRACE(kSeed);

@@ -1,5 +1,5 @@
-// Recordings of the inputs: which frames are in them, when they are written, and what happens where
-// they cannot be.
+// Recordings of the inputs: which frames they hold, when they are written, and what happens if that
+// fails.
 
 #include "daemon/capture.h"
 
@@ -36,7 +36,7 @@ class CaptureTest : public testing::Test {
     ASSERT_TRUE(capture->open(now));
     capture->use(plan, "0123456789abcdef");
   }
-  // Both gyros send once; the time of day is the frames'.
+  // Both gyros send once, at the present time of day.
   void second() {
     capture->put(0, gateway::rig::rate_frame(kIdA, 1.0), now);
     capture->put(1, gateway::rig::rate_frame(kIdB, 1.0), now + std::chrono::milliseconds(3));
@@ -47,7 +47,7 @@ class CaptureTest : public testing::Test {
     for (int i = 0; i < count; ++i)
       second();
   }
-  // The threads get time, the seconds pass quickly.
+  // Seconds pass quickly, with time for the threads.
   template <class Condition>
   bool until(const Condition& condition) {
     const auto end = std::chrono::steady_clock::now() + std::chrono::minutes(1);
@@ -87,7 +87,7 @@ class CaptureTest : public testing::Test {
     EXPECT_TRUE(log.flush(std::chrono::minutes(1)));
     return testing::internal::GetCapturedStderr();
   }
-  /// What stands between the stamp and the payload: "can0 101".
+  /// Bus and identifier of each line: "can0 101".
   static std::set<std::string> senders(const std::vector<std::string>& lines) {
     std::set<std::string> found;
     for (const std::string& line : lines)
@@ -121,7 +121,7 @@ TEST_F(CaptureTest, NoFrameButThoseOfTheInputsIsEverWritten) {
   EXPECT_EQ(lines.size(), 2U);
 }
 
-// The kernel's filter lets the whole group through; the message is one of two in it.
+// The kernel's filter passes the whole parameter group; the input is one of two messages in it.
 TEST_F(CaptureTest, OfAGroupOnlyTheMessageThatIsAnInputIsWritten) {
   constexpr std::uint32_t kOfAnySource = 0x03FFFF00;
   plan.gyros[0].match = {
@@ -239,7 +239,7 @@ TEST_F(CaptureTest, NorDoesAGatewayThatIsRestartedAgainAndAgain) {
   begin();
   seconds(Capture::kAftermathSeconds + 1);
   ASSERT_TRUE(until_written(1));
-  now -= std::chrono::hours(1000);  // a clock that was wrong keeps nothing back
+  now -= std::chrono::hours(1000);  // captures in the future do not count
   begin();
   seconds(Capture::kAftermathSeconds + 1);
   ASSERT_TRUE(until_written(1));

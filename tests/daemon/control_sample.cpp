@@ -1,5 +1,5 @@
-// A gateway without buses, for control_test.py: its face on D-Bus and its metrics, over a status
-// that moves by itself. Prints a line a second: a loop that waits for the bus would not.
+// A gateway without buses, for control_test.py: its D-Bus interface and its metrics, for a status
+// that changes by itself. Prints a line a second, which a loop that waits for the bus would not.
 
 #include <cmath>
 #include <cstdio>
@@ -93,7 +93,7 @@ struct SampleGateway {
                    .last = "/captures/20261130T204835Z-contradicted"};
   }
 
-  // As of a gateway without --capture in shadow mode; else answered a second later.
+  // In shadow mode like a gateway without --capture; otherwise answers a second later.
   Expected<void> capture(std::function<void(const Expected<std::string>&)> answer) {
     if (!now.capture) return fail({}, "the gateway keeps no recording", "start it with --capture");
     if (asked) return fail({}, "a capture that was asked for is still being written");

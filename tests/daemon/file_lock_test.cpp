@@ -1,4 +1,4 @@
-// One owner at a time, whatever becomes of the owner.
+// One owner at a time, however the owner ends.
 
 #include "daemon/file_lock.h"
 
@@ -70,7 +70,7 @@ TEST_F(FileLockTest, AKilledOwnerHoldsItNoLonger) {
   EXPECT_EQ(second.take(), Outcome::kTaken);
 }
 
-// Who opens the lock file of an owner that just ends must not lock what has no name any more.
+// A process that opens the lock file while its owner ends must not lock the unlinked file.
 TEST_F(FileLockTest, NeverHasTwoOwnersHoweverManyComeAndGo) {
   constexpr int kThreads = 4;
   constexpr int kRounds = 2000;

@@ -41,8 +41,8 @@ TEST(ForwardTime, IsTheWallClockAgainWhenASampleHasToldOfIt) {
   EXPECT_EQ(time.update(at(-1h + 1s), steady(2s)), at(-1h + 1s));
 }
 
-// While samples come the clock is not looked at; set back in the silence behind them, it is noticed
-// all the same.
+// While samples come the clock is not read; a step back in the silence after them is noticed all
+// the same.
 TEST(ForwardTime, GoesOnFromTheLastSampleWhenTheClockIsSetBackBehindIt) {
   ForwardTime time;
   time.update(at(0s), steady(0s));
@@ -51,7 +51,7 @@ TEST(ForwardTime, GoesOnFromTheLastSampleWhenTheClockIsSetBackBehindIt) {
   EXPECT_EQ(time.update(at(31s - 1h), steady(32s)), at(31s));
 }
 
-// And set back among them, it is their stamps' to tell.
+// A step back between samples is left to their stamps.
 TEST(ForwardTime, LeavesAStepBetweenSamplesToTheirStamps) {
   ForwardTime time;
   time.update(at(0s), steady(0s));
@@ -93,7 +93,7 @@ TEST(Alarm, GoesOffForTheEarlierDeadline) {
   EXPECT_EQ(alarm.set(at(400ms), at(0ms), TimePoint::max(), steady(0ms)), Duration(400ms));
 }
 
-// What moves to a later time leaves it alone; it goes off and is set again.
+// A deadline that moves to a later time does not set the alarm: it goes off and is set again then.
 TEST(Alarm, IsLateOnlyForADeadlineThatCameNearer) {
   Alarm alarm;
   alarm.set(at(40ms), at(0ms), TimePoint::max(), steady(0ms));
@@ -153,7 +153,7 @@ TEST(LifeSign, EndsWhenNothingGoesOutAlthoughTheLoopTurns) {
   EXPECT_TRUE(life.has_moved(steady(15s), 11));
 }
 
-// Between two heartbeats that are looked at too often lies no death.
+// Calls between two frames must not count as a hang.
 TEST(LifeSign, MayBeAskedMoreOftenThanFramesGoOut) {
   LifeSign life;
   EXPECT_TRUE(life.has_moved(steady(0ms), 10));

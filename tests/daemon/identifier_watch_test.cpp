@@ -1,4 +1,4 @@
-// Who else sends our identifiers is noticed; what we sent ourselves is not held against us.
+// Other senders of our identifiers are noticed; our own echoes do not count.
 
 #include "daemon/identifier_watch.h"
 

@@ -1,4 +1,4 @@
-// What a line looks like in the journal, and without one; and that nobody waits for who reads it.
+// The form of a line in the journal and without one; and that no call waits for a reader.
 
 #include "daemon/log.h"
 
@@ -23,7 +23,7 @@
 namespace vgyro::daemon {
 namespace {
 
-// A hang, and not a slow machine.
+// Long enough that only a hang exceeds it, not a slow machine.
 constexpr std::chrono::minutes kPatience{1};
 constexpr int kPatience_ms = std::chrono::milliseconds(kPatience).count();
 
@@ -77,7 +77,7 @@ TEST(Log, WritesNothingLessSevereThanItsLevel) {
   EXPECT_TRUE(is_written([&] { log.error("a"); }));
 }
 
-// Each of the two changes is said, at whatever level; a reload in between does not end it.
+// Both changes are logged at any level; a reload in between does not end debugging.
 TEST(Log, DebuggingOverridesTheLevelUntilItIsToggledAgain) {
   Log log(&keep);
   log.set_level(Severity::kError);
@@ -111,7 +111,7 @@ TEST(Log, SpeaksPlainlyToATerminal) {
   EXPECT_EQ(testing::internal::GetCapturedStderr(), "vgyrod: gyro 1 is stuck\n");
 }
 
-/// stderr is a pipe that holds little, and nobody reads it, until read_all() does.
+/// Makes stderr a small pipe that nothing reads until read_all().
 class UnreadStderr {
  public:
   UnreadStderr() : before_(::dup(STDERR_FILENO)) {
@@ -129,7 +129,7 @@ class UnreadStderr {
     ::close(before_);
     ::close(reader_);
   }
-  /// Until `end` has come, or nothing more does.
+  /// Reads until `end` has come, or nothing more comes.
   [[nodiscard]] std::string read_until(const std::string& end) const {
     std::string text;
     std::array<char, 4096> block{};
@@ -147,7 +147,7 @@ class UnreadStderr {
   int reader_ = -1;
 };
 
-/// The lines that remarks in `text` say are missing.
+/// Number of missing lines, by the remarks in `text`.
 std::uint64_t missing_lines(const std::string& text) {
   static const std::regex remark(R"((\d+) lines of this log are missing here)");
   std::uint64_t sum = 0;
@@ -182,7 +182,7 @@ TEST(Log, EndsAlthoughNobodyReads) {
     log->notice("line {} of a daemon that has much to say and nobody who listens", i);
   EXPECT_FALSE(log->flush(std::chrono::milliseconds(1)));
   log.reset();
-  // The thread that was left behind has what it works on; here it ends, for the sake of other
+  // The thread that was left behind owns its data. It ends here, so that it does not disturb other
   // tests.
   EXPECT_NE(unread.read_until("are missing here").find("line 0 of"), std::string::npos);
 }

@@ -1,4 +1,4 @@
-// What becomes of the metrics when they cannot be written.
+// Metrics that cannot be written.
 
 #include "daemon/metrics.h"
 
@@ -28,7 +28,7 @@ int keep(const iovec* fields, int count) {
   return 0;
 }
 
-/// As of a disk that is full in the middle of a file.
+/// Limits files to 64 bytes, like a disk that fills up in the middle of one.
 class SmallFiles {
  public:
   SmallFiles() {

@@ -1,4 +1,4 @@
-// What waits for one bus is not sent to another, and nothing falls out of the books.
+// A frame that waits for one bus is not sent to another, and every frame is counted.
 
 #include "daemon/outlets.h"
 
@@ -10,7 +10,7 @@ namespace {
 constexpr TimePoint kSoon = time_from_ns(1'000'000);
 constexpr TimePoint kLater = time_from_ns(2'000'000);
 
-/// Takes everything.
+/// Takes every frame.
 class Open final : public can::Transmitter {
  public:
   can::SendResult send(const can::Frame&) override {

@@ -1,4 +1,4 @@
-// The loop's side of a reload: it never waits, and every end of a load comes as a result.
+// The loop's side of a reload: it never waits, and every load ends with a result.
 
 #include "daemon/plan_loader.h"
 
@@ -19,7 +19,7 @@
 namespace vgyro::daemon {
 namespace {
 
-/// A disk that gives nothing until it is told to.
+/// A disk that answers no read before give().
 class SlowDisk {
  public:
   void give() {
@@ -57,7 +57,7 @@ bool is_ready(const PlanLoader& loader, int wait_ms) {
   return ::poll(&event, 1, wait_ms) == 1;
 }
 
-// A hang, and not a slow machine.
+// Long enough that only a hang exceeds it, not a slow machine.
 constexpr int kPatience_ms = 60'000;
 
 LoadResult result_of(PlanLoader& loader) {
@@ -118,7 +118,7 @@ TEST(PlanLoader, WhateverIsThrownIsARefusal) {
   EXPECT_EQ(result_of(loader).error().front().message(), "the parser gave up");
 }
 
-// What it works on is its own: the disk outlives the loader, and the sanitizers watch.
+// The thread owns its data: the disk outlives the loader, and the sanitizers check that.
 TEST(PlanLoader, EndsAlthoughADiskNeverAnswers) {
   auto disk = std::make_shared<SlowDisk>();
   {
@@ -148,7 +148,7 @@ TEST(PlanLoader, APipeInsteadOfADbcFileIsRefused) {
       << result.error().front().message();
 }
 
-/// Two gyros, 16 bits from bit 0 each.
+/// Two gyros, each with 16 bits from bit 0 on.
 void put_configuration(const Scratch& scratch) {
   std::string dbc = "VERSION \"\"\nBU_: A\n";
   std::string text = "[output]\nbus = \"can0\"\n[calibration]\nrest_s = 5\n";
@@ -179,7 +179,7 @@ TEST(PlanLoader, TheConfigurationSetsTheLevelOfTheLog) {
   EXPECT_EQ(wrong.error().front().what, "there is no level \"warn\"");
 }
 
-// The folder is read anew with each load: overlays come, go wrong and go away.
+// Each load reads the folder of overlays again: one is added, broken and removed.
 TEST(PlanLoader, AReloadTakesWhatLiesOverTheConfiguration) {
   Scratch scratch;
   put_configuration(scratch);

@@ -307,7 +307,7 @@ TEST_F(ReporterTest, SaysInTheStatusWhichInterfaceIsMissingOrDown) {
   EXPECT_NE(last_line.find("; can0 is down;"), std::string::npos) << last_line;
 }
 
-// After a reload the queue's counters go on, and so does what was told of them.
+// After a reload the queue's counters go on; earlier counts must not be reported again.
 TEST_F(ReporterTest, DoesNotTellAgainWhatWasSentBeforeItBegan) {
   traffic.transmitted.sent = 1'000'000;
   traffic.transmitted.dropped_stale = 50;

@@ -1,6 +1,6 @@
 #pragma once
 
-// A folder of the test's own, gone afterwards.
+// A temporary folder for one test, removed afterwards.
 
 #include <cstdlib>
 #include <filesystem>

@@ -1,4 +1,4 @@
-// What systemd is told when it reads, when it does not, and when it reads again.
+// Messages to systemd while it reads, while it does not, and when it reads again.
 
 #include "daemon/service.h"
 

@@ -1,5 +1,5 @@
-// A file that is whole at every moment. The system calls by which that is reached are watched, and
-// made to fail (watched_calls.h).
+// A file that is whole at every moment. The tests watch the system calls that achieve this, and
+// make them fail (watched_calls.h).
 
 #include "daemon/state_file.h"
 
@@ -62,7 +62,8 @@ TEST_F(StateFileTest, OthersCannotReadIt) {
   EXPECT_EQ(about.st_mode & 0777U, 0600U);
 }
 
-// Against a loss of power: the bytes before the name, and the name before success is told.
+// Against a loss of power: bytes are synced before the name, and the name before success is
+// reported.
 TEST_F(StateFileTest, BytesAreOnTheDiskBeforeTheName) {
   ASSERT_TRUE(watched(file, "one"));
   const std::vector<std::string> right{"write", "fsync file", "rename", "fsync directory"};
@@ -107,7 +108,7 @@ TEST_F(StateFileTest, LeftoversOfAKilledWriterGo) {
   EXPECT_EQ(scratch.count(), 1U);
 }
 
-// Somebody who may write to the directory could point the new name elsewhere.
+// Another user with write access to the directory could make the new name a link.
 TEST_F(StateFileTest, WritesThroughNoLink) {
   scratch.put("victim", "untouched");
   ASSERT_EQ(::symlink(scratch.path("victim").c_str(), scratch.path("state.toml.new").c_str()), 0);
@@ -181,13 +182,13 @@ int kills() {
   return wish != nullptr ? std::atoi(wish) : 200;
 }
 
-// The child writes as fast as it can and dies between any two instructions. What it had finished
-// before must be there, whole; so is nothing else.
+// The child writes as fast as it can and is killed at a random moment. The file must be whole, and
+// hold the last state that was finished or begun.
 TEST_F(StateFileTest, KilledAtAnyMomentTheFileIsWholeAndTheLastOneFinishedOrBegun) {
   constexpr std::uint32_t kSeed = 7;
   SCOPED_TRACE(kSeed);
   std::mt19937 rng(kSeed);
-  // Moments spread over two writes, however long this disk takes.
+  // The moments are spread over two writes, however long this disk takes.
   constexpr int kTimed = 5;
   const auto begin = std::chrono::steady_clock::now();
   for (int i = 0; i < kTimed; ++i)

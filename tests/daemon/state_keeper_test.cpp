@@ -1,4 +1,4 @@
-// What is loaded, refused, set aside and written, and what people are told of it.
+// Loading, refusing, renaming and writing the state, and the log lines about it.
 
 #include "daemon/state_keeper.h"
 
@@ -90,7 +90,7 @@ TEST_F(StateKeeperTest, TheLastWordIsOnTheDiskWhenFinishReturns) {
   }
 }
 
-// A corrector that has gone astray must not take the last good state along.
+// A corrector with a wrong state must not overwrite the last good one.
 TEST_F(StateKeeperTest, AStateThatWouldBeRefusedIsNotWritten) {
   StateKeeper keeper(path, log);
   const std::string said = said_during([&] {

@@ -1,4 +1,4 @@
-// The age of the last stop that was learned from, over whatever the pipeline's counter does.
+// The age of the last stop that was learned from, for every change of the pipeline's counter.
 
 #include "daemon/stop_age.h"
 

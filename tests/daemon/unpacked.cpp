@@ -53,7 +53,7 @@ can::Frame numbered_frame(std::uint32_t number) {
   return frame;
 }
 
-// 123 ns more than a microsecond: candump's digits leave them out.
+// The last 123 ns do not show in candump's digits.
 TimePoint numbered_stamp(std::uint32_t number) {
   return time_from_ns(1'700'000'000'000'000'123 + std::int64_t{number} * 1'000'000);
 }

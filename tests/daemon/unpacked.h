@@ -1,6 +1,6 @@
 #pragma once
 
-// What a recording holds, read without the product's own reader.
+// Unpacks a recording without the product's own reader.
 
 #include <string>
 #include <vector>
@@ -9,16 +9,16 @@
 
 namespace vgyro::daemon {
 
-/// The text in one or more xz streams, one behind the other. Adds a failure of the test where they
-/// are not whole.
+/// The text in one or more concatenated xz streams. Fails the test if they are not whole.
 std::string unpacked(const std::string& xz);
 
-/// The text of blocks, one behind the other.
+/// The text of consecutive blocks.
 std::string unpacked(const CaptureRing::Blocks& blocks);
 
 std::vector<std::string> lines_of(const std::string& text);
 
-/// Frame number `number` of a test: a counter as payload, a millisecond after the one before.
+/// Frame number `number` of a test: its payload is a counter, and it comes a millisecond after the
+/// frame before.
 can::Frame numbered_frame(std::uint32_t number);
 TimePoint numbered_stamp(std::uint32_t number);
 /// Its line in a candump log, without the line's end.

@@ -1,7 +1,7 @@
 #pragma once
 
-// The system calls by which a file gets onto the disk are watched, and made to fail, from a test:
-// the program's own fsync, write and rename stand in front of the library's.
+// Lets a test watch the system calls that bring a file to the disk, and make them fail: the
+// program's own fsync, write and rename take the place of the library's.
 
 #include <cerrno>
 #include <cstddef>
