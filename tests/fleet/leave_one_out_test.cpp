@@ -10,7 +10,7 @@ namespace {
 
 constexpr std::uint64_t kSeed = 17;
 
-/// A fleet whose units differ by `between`; every `odd`-th by a thousand times as much.
+/// A fleet whose units differ by `between`, and every `odd`-th by a thousand times as much.
 struct Fleet {
   std::size_t units;
   double between;
@@ -37,14 +37,15 @@ RandomEffects directly(std::vector<Estimate> units, std::size_t without) {
   return random_effects(units);
 }
 
-// Of a mean in its σ, of all else relative: sums of some thousand terms keep so many digits.
+// Tolerance: of a mean in units of its σ, of all else relative. Sums of some thousand terms are
+// this precise.
 constexpr double kRounding = 1e-9;
 
 void expect_same(const RandomEffects& got, const RandomEffects& want) {
   EXPECT_NEAR(got.mean, want.mean, kRounding * want.sigma);
   EXPECT_NEAR(got.sigma, want.sigma, kRounding * want.sigma);
   EXPECT_NEAR(got.q, want.q, kRounding * want.q);
-  // Near 0 a spread is the root of a difference.
+  // Compared as squares: near 0, a spread is the root of a difference.
   EXPECT_NEAR(got.between * got.between, want.between * want.between,
               kRounding * (want.between * want.between + want.between_sigma * want.between_sigma));
   EXPECT_NEAR(got.between_sigma, want.between_sigma, kRounding * want.between_sigma);

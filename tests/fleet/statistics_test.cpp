@@ -8,7 +8,7 @@
 namespace vgyro::fleet {
 namespace {
 
-// Values of printed tables.
+// Values from printed tables.
 TEST(Statistics, TailsAreThoseOfTheTables) {
   EXPECT_NEAR(normal_tail(1.959964), 0.05, 1e-7);
   EXPECT_NEAR(student_tail(2.228139, 10.0), 0.05, 1e-7);
@@ -47,8 +47,8 @@ TEST(Statistics, SpreadAndMeanOfUnitsAreRightOnAverage) {
     inside += std::abs(pooled.mean - kMean) <= pooled.half_width95() ? 1 : 0;
     variance += pooled.between * pooled.between / kFleets;
   }
-  // Three standard errors of a binomial count of 95 %, which Knapp and Hartung's interval has at
-  // least.
+  // Knapp and Hartung's interval covers at least 95 %; tolerance: three standard errors of a
+  // binomial count.
   EXPECT_GE(inside, 0.95 * kFleets - 3.0 * std::sqrt(0.05 * 0.95 * kFleets));
   EXPECT_NEAR(variance, kBetween * kBetween, 0.2);
 }

@@ -12,7 +12,7 @@ constexpr std::uint64_t kSeed = 23;
 constexpr double kThreshold = 1e-6;
 constexpr double kFreedom = 8.0;
 
-/// Slopes about `mean`, each with a σ as ten drives estimate it.
+/// Slopes about `mean`, each with a σ as estimated from ten drives.
 std::vector<UnitSlope> drawn(std::size_t units, double mean, double between,
                              std::mt19937_64& random) {
   std::normal_distribution<double> normal;
@@ -59,7 +59,8 @@ TEST(Trends, AreOneUnitsWhereItAloneMoves) {
   EXPECT_EQ(found, 100);
 }
 
-// Biases that wander over the months: each unit seems to drift, and none is worse than the others.
+// Biases that wander over the months: each unit seems to have a trend, and none is worse than the
+// others.
 TEST(Trends, OfUnitsThatMoveEachItsOwnWayAreASpread) {
   std::mt19937_64 random(kSeed + 3);
   for (int fleet = 0; fleet < 100; ++fleet) {
