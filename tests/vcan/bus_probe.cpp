@@ -1,5 +1,5 @@
-// daemon::Bus on a real kernel, whose interfaces are renamed, swapped, moved, taken down and given
-// other MTUs under it, and whose frames carry launch times. Run by run_vcan_tests.py in a network
+// daemon::Bus on a real kernel, while its interfaces are renamed, swapped, moved, taken down and
+// given other MTUs, and while frames carry launch times. Run by run_vcan_tests.py in a network
 // namespace or a kernel of its own, as root; never run it on a host's own network.
 
 #include <algorithm>
@@ -39,8 +39,8 @@ constexpr const char* kBus = "probe0";
 constexpr const char* kOtherBus = "probe1";
 constexpr int kSettleMs = 20;  // the kernel may hand a frame on only when its own thread runs
 
-// NOLINTBEGIN(*-avoid-non-const-global-variables): a TurnClock's and a Journal's have no state
-/// So much further than the kernel's are the clocks that the buses are shown.
+// NOLINTBEGIN(*-avoid-non-const-global-variables): functions of TurnClock and Journal have no state
+/// How far the clocks shown to the buses are ahead of the kernel's.
 Duration wall_ahead{};
 Duration steady_ahead{};
 std::vector<std::string> said;
@@ -113,14 +113,14 @@ class BusProbe : public testing::Test {
     ASSERT_TRUE(opened) << opened.error().message();
   }
 
-  /// As the loop does it each second.
+  /// The loop's work of one second.
   void second(Bus& bus) {
     clock.begin_turn();
     bus.second_passed();
     if (!bus.is_open()) open(bus);
   }
 
-  /// What a turn of the loop takes off the bus, when there is something to be read.
+  /// Frames that a turn of the loop takes from the bus, if there is something to read.
   std::vector<Seen> turn(Bus& bus) {
     clock.begin_turn();
     std::vector<Seen> seen;
@@ -253,7 +253,7 @@ TEST_F(BusProbe, TwoBusesWhoseNamesAreSwappedFollowTheirNames) {
   EXPECT_EQ(heard(on_second), 0U);
 }
 
-/// A network namespace besides ours, held by a process that does nothing.
+/// Another network namespace, kept alive by an idle process.
 class Elsewhere {
  public:
   Elsewhere() {
@@ -412,7 +412,7 @@ TEST_F(BusProbe, ALinkThatIsGivenAnotherMtuWhileItIsDownCarriesFdWhenItIsUp) {
 
 // --- stamps --------------------------------------------------------------------------------------
 
-/// Sends with a launch time, as programs do that schedule their frames (SO_TXTIME).
+/// Sends with a launch time (SO_TXTIME), like a program that schedules its frames.
 class Launcher {
  public:
   Launcher(const char* interface, clockid_t clock) : fd_(::socket(PF_CAN, SOCK_RAW, CAN_RAW)) {
@@ -505,7 +505,7 @@ TEST_F(StampProbe, WhatWaitedInTheQueueOfAStoppedProcessKeepsItsStamp) {
     EXPECT_EQ(honest.send(frame_of(0x102)), SendResult::kSent);
   Launcher(kBus, CLOCK_MONOTONIC).send(0x101, kernels_clock<CLOCK_MONOTONIC>());
   const TimePoint sent = kernels_clock<CLOCK_REALTIME>();
-  wall_ahead = steady_ahead = 90s;  // as those find them who were stopped for so long
+  wall_ahead = steady_ahead = 90s;  // as after a process was stopped for so long
   const std::vector<Seen> seen = turn(bus);
   ASSERT_EQ(seen.size(), 201U);
   for (const Seen& one : seen) {
@@ -518,7 +518,7 @@ TEST_F(StampProbe, WhatWaitedInTheQueueOfAStoppedProcessKeepsItsStamp) {
 }
 
 TEST_F(StampProbe, StampsOfAClockThatWasSetMeanwhileAreTheKernelsOwn) {
-  // The kernel's clocks stay; it is the past that stood on another one.
+  // The kernel's clocks cannot be set here, so the earlier turns see another clock instead.
   wall_ahead = 3h;
   for (int i = 0; i < 3; ++i)
     second(bus);

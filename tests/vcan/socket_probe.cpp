@@ -71,7 +71,7 @@ std::vector<Received> receive_now(Socket& socket) {
   return all;
 }
 
-// Everything that arrives until nothing more does.
+// Receives until no more frames arrive.
 std::vector<Received> receive_all(Socket& socket, int first_within_ms = kArrivalMs) {
   std::vector<Received> all;
   for (int wait_ms = first_within_ms; wait_readable(socket, wait_ms); wait_ms = kSettleMs) {
@@ -211,7 +211,7 @@ TEST_F(SocketProbe, GivesTheKernelsStampsTheSameToEveryReceiver) {
   }
 }
 
-// vcan makes no error frames of its own; a peer may write them.
+// vcan makes no error frames itself, but a peer may send them.
 TEST_F(SocketProbe, HearsErrorFramesAlsoWithoutFiltersAndAfterRebinding) {
   const auto error_frame = [](std::uint32_t classes) { return frame_of(classes, kError, 8); };
   for (int round = 0; round < 2; ++round) {
@@ -240,7 +240,7 @@ TEST_F(SocketProbe, KnowsWhichInterfacesMayStillAppear) {
   EXPECT_FALSE(may_appear("a-name-that-is-longer-than-the-kernel-allows"));
 }
 
-// What has gone to the kernel cannot be called back, so little may be there.
+// Frames in the kernel cannot be recalled, so it must hold few.
 TEST_F(SocketProbe, HoldsFewFramesInTheKernelWhereTheBufferIsSmall) {
   change_links("tc qdisc add dev probe0 root tbf rate 1kbit burst 200 limit 100000");
   Socket socket = open(kBus, {}, {.send_buffer_bytes = 1});
