@@ -1,6 +1,6 @@
-// Any bytes are a log, and arrive in any pieces: reading stays inside its memory, the quick path
-// and parse_line() agree, batches hold the same, and what was read is written and read back as it
-// was.
+// Input: a log of arbitrary bytes, which arrives in arbitrary pieces. Reading must stay inside its
+// memory, the quick path must agree with parse_line() and with reading in batches, and the records
+// must be the same after they are written and read back.
 
 #include <algorithm>
 #include <cstddef>
@@ -21,7 +21,7 @@ using vgyro::can::Frame;
 using vgyro::canlog::ReadLog;
 using vgyro::canlog::ReadRecord;
 
-/// Hands the text out in pieces whose sizes the fuzzer chooses.
+/// Returns the text in pieces whose sizes the fuzzer chooses.
 class PiecesSource final : public vgyro::canlog::ByteSource {
  public:
   PiecesSource(std::string text, std::vector<std::uint8_t> sizes)
@@ -52,7 +52,7 @@ void require(bool holds, const char* what) {
   std::abort();
 }
 
-/// The same records, some at a time.
+/// Requires the same records from reading in batches.
 void require_same_in_batches(const ReadLog& log, const std::string& text,
                              const std::vector<std::uint8_t>& sizes) {
   vgyro::canlog::CandumpReader reader(

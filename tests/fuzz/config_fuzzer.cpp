@@ -1,5 +1,5 @@
-// Any text is a configuration, any text the DBC file that it names: loading either gives a plan
-// that a pipeline can be made of, or complaints that say something. A NUL byte parts the two texts.
+// Input: the text of a configuration, a NUL byte, and the text of the DBC file that it names.
+// Loading must give a plan from which a pipeline can be made, or errors with texts.
 
 #include <cassert>
 #include <cstddef>
@@ -15,7 +15,7 @@
 
 namespace {
 
-// The configuration finds its DBC files beside itself, here in /proc/self/fd: dbc = "201".
+// The configuration's DBC file is in its own folder, here /proc/self/fd: dbc = "201".
 constexpr int kConfigFd = 200;
 constexpr int kDbcFd = 201;
 

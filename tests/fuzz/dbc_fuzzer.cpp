@@ -1,4 +1,5 @@
-// Any text is a DBC file, any bytes are a frame: reading them stays inside its memory.
+// Input: a frame's bytes and the text of a DBC file, both arbitrary. Reading must stay inside its
+// memory.
 
 #include <algorithm>
 #include <cstddef>

@@ -1,5 +1,5 @@
-// Any bytes are a log of some form, packed or not, and arrive in any pieces: opening and reading
-// stay inside their memory, pieces make no difference, and what was read can be written again.
+// Input: a log of any form, packed or not, which arrives in pieces. Opening and reading must stay
+// inside their memory, the pieces must make no difference, and the records must be writable again.
 
 #include <algorithm>
 #include <cstddef>
@@ -17,7 +17,7 @@ namespace {
 
 using namespace vgyro::canlog;
 
-// A few kilobytes may unpack to gigabytes: no more than this is read.
+// Most bytes that are read, because a few kilobytes may unpack to gigabytes.
 constexpr std::size_t kBytesMax = 1U << 20U;
 
 void require(bool holds, const char* what) {

@@ -1,5 +1,5 @@
-// Any text is a model file: reading it gives effects whose compensation keeps every rate a number,
-// or complaints that say something.
+// Input: the text of a model file. Reading it must give effects whose compensation keeps every rate
+// finite, or errors with texts.
 
 #include <cassert>
 #include <cmath>

@@ -1,5 +1,6 @@
-// Any frames at any times on any bus: the pipeline stays inside its memory and its numbers, keeps
-// its books, never asks to be woken in the past, and sends nothing that looks valid and is not.
+// Input: arbitrary frames at arbitrary times on any bus. The pipeline must stay inside its memory
+// and the range of its numbers, its counters must be consistent, its deadline must not be in the
+// past, and it must send no rate as valid that is not.
 
 #include <algorithm>
 #include <array>
@@ -143,7 +144,7 @@ void add_model(gateway::Plan& plan) {
   assert(errors.empty());
 }
 
-// Each bit of `choice` is one of the ways to configure a gateway.
+// Each bit of `choice` is one option of the configuration.
 gateway::Plan plan_of(std::uint8_t choice) {
   static const dbc::Database database = dbc::parse(kBench, "fuzzer.dbc");
   const dbc::Message& a = *database.find_message("GYRO_A");
@@ -190,7 +191,7 @@ class Counter final : public gateway::FrameSink {
   std::uint64_t valid = 0;
 
  private:
-  // A rate that says it is valid has a value, one that says it is not has none.
+  // A rate flagged valid has a value, and one flagged invalid has none.
   void check_rate(const can::Frame& frame) {
     if (frame.length != 8) return;  // the FD variant keeps both elsewhere
     const auto raw =
@@ -201,7 +202,7 @@ class Counter final : public gateway::FrameSink {
   }
 };
 
-// Stamps go on by milliseconds as a rule; one kind of step goes anywhere that a log can name.
+// Stamps usually advance by milliseconds; one kind of step goes to any stamp that a log can hold.
 TimePoint next_stamp(Input& input, TimePoint now, std::uint8_t kind) {
   constexpr std::uint64_t kStampEnd = 9'000'000'000'000'000'001;
   if (kind % 16 == 15) {
@@ -255,7 +256,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     wild = wild || kind % 16 == 15;
     if (kind % 8 != 3) continue;
     pipeline.advance(now, out);
-    // Centuries of steps back use up the time that 64 bits hold; then nothing is due any more.
+    // Centuries of backward steps exhaust the range of 64 bits; after that, no deadline is due.
     assert(wild || pipeline.next_deadline() > now);
   }
   check_books(pipeline.status(), out);

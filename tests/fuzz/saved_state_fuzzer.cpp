@@ -1,6 +1,6 @@
-// Any text may stand where the biases of the last run are expected. As it is, its checksum refuses
-// it; with a right checksum behind it, it is refused with a reason, or read, and then what was read
-// says the same when it is written and read again, and is sane.
+// Input: arbitrary text instead of a state file. Without a right checksum it must be refused. With
+// one, it must be refused with a reason, or read as a sane state that is the same after it is
+// written and read again.
 
 #include <cassert>
 #include <cmath>
