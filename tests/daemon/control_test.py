@@ -1,5 +1,5 @@
-"""The gateway's face on D-Bus, `vgyro status` and the metrics: on a private bus with the policy file as it is
-installed, seen through busctl. The gateway is control_sample; its figures are known."""
+"""The gateway's D-Bus interface, `vgyro status` and the metrics, on a private bus with the installed policy file,
+checked with busctl. The gateway is control_sample, whose figures are known."""
 
 import contextlib
 import json
@@ -23,7 +23,7 @@ NOBODY = 65534
 GYRO = 'left "one" \\'
 IS_ROOT = os.geteuid() == 0
 
-# What Debian's system bus lets through; who may own the name in production is the policy file's, here it is also us.
+# Like Debian's system bus, but this test's user may own the name too, which in production the policy file decides.
 BUS_CONFIG = """<!DOCTYPE busconfig PUBLIC "-//freedesktop//DTD D-Bus Bus Configuration 1.0//EN"
  "http://www.freedesktop.org/standards/dbus/1.0/busconfig.dtd">
 <busconfig>
@@ -213,7 +213,7 @@ class OnTheBus(Bench):
         self.assertEqual(seen.returncode, 0, seen.stderr)
         written = self.busctl("set-property", NAME, OBJECT, NAME, "State", "s", "lost", uid=stranger)
         self.assertNotEqual(written.returncode, 0)
-        # Nobody may take the name either.
+        # Another user must not take the name either.
         if IS_ROOT:
             thief = self.busctl("call", "org.freedesktop.DBus", "/org/freedesktop/DBus", "org.freedesktop.DBus",
                                 "RequestName", "su", NAME, "2", uid=NOBODY)
@@ -324,7 +324,7 @@ class OnTheBus(Bench):
             states = [one["state"] for one in json.loads(self.vgyro("status", "--all", "--json").stdout)["gateways"]]
             self.assertEqual(states, ["running", "calibrating", "running"])
             self.assertEqual(self.vgyro("recalibrate", "--all").stdout.count("has forgotten its biases"), 3)
-        # node_exporter reads all files as one: no two samples may be the same.
+        # node_exporter merges all files, so no two samples may have the same name and labels.
         self.assertTrue(until(front.exists))
         samples = parse_metrics(front.read_text())[1]
         self.assertEqual({labels[:1] for _, labels in samples}, {(("gateway", "front"),)})
@@ -349,7 +349,7 @@ class OnTheBus(Bench):
         self.assertIn("layouts: 1000 frames, 900 with a valid rate, 3 rates beyond what they can carry, "
                       "5 times silent while no rate was valid\n", done.stdout)
         self.assertRegex(done.stdout, r"(?m)^frames not used: accelerometer 4, speed 2$")
-        # Columns stand under each other, also beside characters of several bytes.
+        # Columns are aligned, even after characters of several bytes.
         lines = done.stdout.splitlines()
         at = next(i for i, line in enumerate(lines) if line.startswith("gyro "))
         column = lines[at].index("bus")
@@ -400,7 +400,7 @@ class OnTheBus(Bench):
         self.assertTrue(until(lambda: read_some() or seen.count("\x1b[H") >= 15))
         self.assertIn("\x1b[32mrunning\x1b[0m", seen)
         self.assertRegex(seen, "[▁▂▃▄▅▆▇█]{5}", "no picture of the rate")
-        # The gateway goes away: said in place, and nothing ends.
+        # The gateway goes away: the view says so and goes on.
         self.end(self.sample)
         self.assertTrue(until(lambda: read_some() or "no gateway answers" in seen))
         watch.send_signal(signal.SIGINT)
@@ -434,7 +434,7 @@ class OnTheBus(Bench):
         self.start_bus()
         self.assertTrue(until(self.is_there, 60), (self.folder / "sample.err").read_text())
         said = (self.folder / "sample.err").read_text
-        # The bus knows the name a moment before the gateway learns that it has it.
+        # The bus assigns the name a moment before the gateway receives the reply.
         self.assertTrue(until(lambda: "on D-Bus as org.vgyro.Gateway1" in said()), said())
         self.assertEqual(said().count("no D-Bus: "), 1, said())
 

@@ -1,4 +1,4 @@
-"""The alert rules and the dashboard ask only for metrics and labels that the gateway writes. metrics_sample writes
+"""The alert rules and the dashboard use only metrics and labels that the gateway writes. metrics_sample writes
 all of them."""
 
 import json
@@ -15,11 +15,11 @@ import yaml
 FOLDER = Path(os.environ["VGYRO_SOURCE"]) / "monitoring"
 SAMPLE = sys.argv.pop(1)
 
-# What Prometheus adds to every series.
+# Labels that Prometheus adds to every series.
 ADDED = {"instance", "job"}
-# Metrics of others, with their labels.
+# Metrics of other programs, with their labels.
 OTHERS = {"node_textfile_mtime_seconds": {"file"}}
-# Their values are names of the installation, not of vgyro.
+# Labels whose values are names of the installation, not of vgyro.
 FREE = {"gateway", "gyro", "bus", "message", "id", "version", "fingerprint", "method"} | ADDED
 
 STRING = r'"(?:[^"\\]|\\.)*"'
@@ -32,7 +32,7 @@ FUNCTIONS = {"label_values", "label_replace", "histogram_quantile", "avg_over_ti
 
 
 def written():
-    """Family → label → its values."""
+    """Metric family → label → values of the label."""
     text = subprocess.run([SAMPLE], capture_output=True, text=True, check=True).stdout
     families = {}
     for line in text.splitlines():
@@ -46,7 +46,7 @@ def written():
 
 
 def mistakes(expression, families, shown=()):
-    """What the expression, and labels that a text shows of its result, asks for in vain."""
+    """Metrics and labels that the expression, or a text that shows labels of its result, uses but the gateway does not write."""
     found = [f"{kind} {expression}" for kind, (a, b) in {"(": "()", "{": "{}", "[": "[]"}.items()
              if expression.count(a) != expression.count(b)]
     known = set(ADDED)
@@ -72,7 +72,7 @@ def mistakes(expression, families, shown=()):
 
 
 def queries(dashboard):
-    """(expression, labels that its legend shows) of all panels, rows included."""
+    """(expression, labels shown in its legend) of all panels, including those in rows."""
     for panel in dashboard["panels"]:
         for target in panel.get("targets", []):
             yield target["expr"], re.findall(r"\{\{\s*(\w+)\s*\}\}", target.get("legendFormat", ""))
