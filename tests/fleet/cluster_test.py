@@ -1,6 +1,6 @@
 #!/usr/bin/python3
-"""vgyro-fleet over real recordings: on this machine and on a Dask cluster that the test starts, of which a worker is killed
-in the middle. Every drive counts once, and the bytes are the same."""
+"""vgyro-fleet over real recordings: on this machine, and on a Dask cluster that the test starts and of which it kills a
+worker in the middle. Every drive counts once, and the bytes are the same."""
 
 import json
 import lzma
@@ -142,7 +142,7 @@ class VgyroFleet(unittest.TestCase):
 
 
 class WeakEffect(unittest.TestCase):
-    """Whole drives, through decoding, search and pooling: what no drive names, the pool does, and nothing else."""
+    """Whole drives, through decoding, search and pooling: the pool names an effect that no drive names, and no other."""
 
     def pooled(self, scale_error, drives=24):
         with tempfile.TemporaryDirectory() as scratch:
@@ -164,7 +164,7 @@ class WeakEffect(unittest.TestCase):
             return json.loads((folder / "out" / "fleet" / "fleet.json").read_text())
 
     def test_is_named_by_the_pool_alone(self):
-        weak = 1.4e-5  # of which a drive's standard error is 7e-6
+        weak = 1.4e-5  # two standard errors of one drive
         found = self.pooled(weak)
         self.assertEqual([(e["kind"], e["type"]) for e in found["effects"]], [("scale_factor", "right")])
         low, high = found["effects"][0]["interval95"]

@@ -1,6 +1,6 @@
 #!/usr/bin/python3
-"""`vgyro fleet` against fleets whose truth is known: what is named, how sure, which unit stands apart, and that merging in
-any order and grouping gives the same bytes."""
+"""`vgyro fleet` against fleets whose truth is known: the names, their σ, the units that stand apart; and merging in any
+order and grouping gives the same bytes."""
 
 import json
 import os
@@ -48,14 +48,14 @@ def plain_pairs(rng, count, **first):
 
 class Truth(FleetBench):
     def test_names_what_no_drive_can_name(self):
-        """|t| = 2 in each of 60 drives, of one kind after the other: right kind and type, and the size inside."""
+        """|t| = 2 in each of 60 drives, for each kind in turn: right kind and type, and the size inside its interval."""
         kinds = [name for name in SHAPES if not name.startswith("bandwidth")]
         right = inside = false = 0
         for number in range(FLEETS):
             rng = np.random.default_rng([SEED, 1, number])
             shape = kinds[number % len(kinds)]
             vehicles = (1, 6, 20, 60)[number % 4]
-            # What a drive's own error is beside all other shapes, which its information alone does not say.
+            # A drive's σ with all other shapes fitted, which is larger than its information alone implies.
             spread = np.mean([np.sqrt(1.0 / np.linalg.inv(np.linalg.inv(made_fleet.information(rng)))[i, i])
                               for i in [made_fleet.NAMES.index(shape)] for _ in range(20)])
             size = 2.0 * spread * (-1.0) ** number
@@ -85,15 +85,15 @@ class Truth(FleetBench):
         self.assertEqual(false, 0)
 
     def judge_found(self, found, expected, seed):
-        """`expected`: unit → a word of what is said of it. How many are found; nothing else may be."""
+        """Number of `expected` units (unit → a word of its `why`) that are found; no other may be."""
         why = {unit["unit"]: unit for unit in found["units"] if unit["why"]}
         self.assertLessEqual(set(why), set(expected), f"seed {seed}")
         self.assertEqual([type_["trends"] for type_ in found["types"]], [[], []], f"seed {seed}")
         return sum(unit in why and word in why[unit]["why"] for unit, word in expected.items())
 
     def test_finds_the_bad_units_among_fifty(self):
-        """One with three times the noise, one whose bias wanders from drive to drive, one within a drive, one with an error of its
-        own; ten drives each."""
+        """A unit with three times the noise, one whose bias wanders from drive to drive, one within a drive, one with a scale
+        factor of its own; ten drives each."""
         right = 0
         expected = {"loud": "white noise", "wanders": "scatters", "strays": "within a drive", "skewed": "scale_factor"}
         for number in range(SEEDS):
@@ -109,7 +109,7 @@ class Truth(FleetBench):
         self.assertGreaterEqual(right, 0.95 * 4 * SEEDS)
 
     def test_finds_the_unit_that_moves_over_the_months(self):
-        """One of 50 units each: the bias, or a size that its type has, or one that its type has not."""
+        """One of 50 units each has a trend of its bias, of a size that its type has, or of one that its type has not."""
         right = 0
         moves = {"drifts": ("its bias moves by", 0.04), "ages": ("scale_factor: changes by", 4e-4),
                  "loosens": ("g_sensitivity:x: changes by", 1.6e-2)}
@@ -117,7 +117,7 @@ class Truth(FleetBench):
             rng = np.random.default_rng([SEED, 9, number])
             pairs = plain_pairs(rng, 50, effects={"scale_factor": 5e-4})
             pairs[11] = (Unit(rng, "alpha", "drifts", effects={"scale_factor": 5e-4}, bias_a_year_dps=0.04), pairs[11][1])
-            # Their sizes are those of their types in the middle of the year.
+            # In the middle of the year their sizes equal those of their types.
             pairs[12] = (Unit(rng, "alpha", "ages", effects={"scale_factor": 3e-4}, effects_a_year={"scale_factor": 4e-4}), pairs[12][1])
             pairs[13] = (pairs[13][0], Unit(rng, "beta", "loosens", effects={"g_sensitivity:x": -8e-3},
                                             effects_a_year={"g_sensitivity:x": 1.6e-2}))

@@ -1,13 +1,13 @@
-"""Evidence files of fleets whose truth is known, drawn from statistics: no drive is simulated, and nothing of the product
-is used. A drive has an information matrix of its own, scores that scatter by it about what the true sizes make of it, and
-noise and bias as a unit of its type has them."""
+"""Evidence files of fleets whose truth is known, drawn from statistics: no drive is simulated, and no code of the product
+is used. A drive has an information matrix of its own, scores that scatter by it about those of the true sizes, and noise
+and bias like a unit of its type."""
 
 import base64
 import json
 
 import numpy as np
 
-# Shapes with a size of which one standard error of a drive is.
+# Shapes, each with the size of one standard error of a drive.
 SHAPES = {"bias_ramp": 2e-6, "warm_up:15": 5e-3, "warm_up:60": 8e-3, "temperature_bias": 2e-3, "temperature_rate_bias": 0.02,
           "scale_factor": 5e-5, "scale_factor_asymmetry": 8e-5, "scale_factor_quadratic": 3e-6, "scale_factor_cubic": 4e-8,
           "g_sensitivity:x": 2e-3, "g_sensitivity:y": 2e-3, "g_sensitivity:z": 4e-3, "vibration_rectification": 0.5,
@@ -18,10 +18,10 @@ YEAR_S = 365.25 * 86400.0
 
 
 def information(rng):
-    """Of one drive: shapes that resemble each other, and more or less motion."""
+    """Information matrix of one drive: some shapes resemble each other, and there is more or less motion."""
     count = len(NAMES)
     factors = 0.6 * rng.standard_normal((count, 4))
-    # A scale factor and its cousins, a delay and low-passes, what is slow: families.
+    # Families that resemble each other: scale factors; delay and low-passes; slow effects.
     for family in ((5, 6, 7, 8), (13, 14, 15, 16), (0, 1, 2, 3, 4)):
         factors[list(family)] += 0.9 * rng.standard_normal(4)
     covariance = factors @ factors.T + np.eye(count)
@@ -46,7 +46,7 @@ def place(rng, gyro, sizes):
 
 
 class Unit:
-    """What one gyro has of its own. `effects`: shape → size in parameter units, beside its type's."""
+    """One gyro, with its own deviations. `effects`: shape → size in parameter units, in addition to its type's."""
 
     def __init__(self, rng, gyro_type, serial, noise=1.0, wander=1.0, walk=1.0, effects=None, spread=None, bias_a_year_dps=0.0,
                  effects_a_year=None):
@@ -84,7 +84,7 @@ def drive(rng, number, pair):
 
 
 def lines(rng, pairs, drives):
-    """Drives one after the other over the vehicles, each a line."""
+    """Evidence lines of drives, which go round the vehicles."""
     return [json.dumps(drive(rng, number, pairs[number % len(pairs)])) + "\n" for number in range(drives)]
 
 
@@ -93,8 +93,8 @@ def numbers(values):
 
 
 class QuickDrives:
-    """Lines for fleets of a million drives, with numbers as short as `vgyro gap` writes them. A drive's information is one of
-    a few hundred that were drawn before."""
+    """Lines for fleets of a million drives, with numbers as short as `vgyro gap` writes them. The information of a drive is one
+    of a few hundred drawn in advance."""
 
     def __init__(self, rng, matrices=400):
         self.rng = rng

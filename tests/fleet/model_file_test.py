@@ -1,6 +1,6 @@
 #!/usr/bin/python3
-"""Each model file that `vgyro fleet` writes, in use: `vgyro check` takes it, and with it the heading of `vgyro replay` over a
-simulated drive is nearer to the simulated truth than without. The drive shares no code with the product."""
+"""Uses each model file that `vgyro fleet` writes: `vgyro check` accepts it, and with it the heading of `vgyro replay` over a
+simulated drive is nearer to the truth than without it. The simulation shares no code with the product."""
 
 import json
 import os
@@ -27,12 +27,12 @@ HZ, SECONDS, REST_S = 50.0, 240.0, 60.0
 TURN_DPS = 30.0
 WHITE_DPS_RTHZ = (2e-4, 4e-4)
 BEGIN_US = 1_700_000_000_000_000
-# Errors that the simulated fleet has, and the unit that is not as its type.
+# Scale factors of the simulated types, and of the unit that is not as its type.
 ALPHA, ODD, BETA = 4e-3, 7e-3, -3e-3
 
 
 def turned_deg(t):
-    """After the rest a turn one way that swells and ebbs: scale factors show in its sum."""
+    """After the rest, the rate pulses in one direction, so that scale factors show in the heading."""
     since = np.maximum(t - REST_S, 0.0)
     pulse_s = 30.0
     return TURN_DPS * 0.5 * (since - pulse_s / (2 * np.pi) * np.sin(2 * np.pi * since / pulse_s))
@@ -79,7 +79,7 @@ class ModelFiles(unittest.TestCase):
         return done.stdout
 
     def heading_error_deg(self, log, model=None):
-        """At the end of the drive, from the sum of the rates that were sent."""
+        """Heading error at the end of the drive, from the integral of the sent rates."""
         options = ["--model", f"fleet/models/{model}.toml"] if model else []
         self.run_vgyro("check", "vgyro.toml", *options)
         self.run_vgyro("replay", "-q", "--config", "vgyro.toml", *options, "-o", "sent.log", "--csv", "rates.csv", log)
@@ -99,8 +99,8 @@ class ModelFiles(unittest.TestCase):
     def test_make_the_heading_better_in_the_vehicles_that_they_are_for(self):
         rng = np.random.default_rng(SEED + 1)
         turned = turned_deg(SECONDS)
-        # Errors of the vehicle's gyros, the model file, and the share of the error without it that may be left: sizes have a
-        # σ of some parts in a thousand.
+        # Errors of the vehicle's gyros, the model file, and the greatest share of the heading error that it may leave:
+        # sizes have a σ of some parts in a thousand.
         for errors, model, most in (((ALPHA, BETA), "alpha+beta", 0.02), ((ALPHA, 0.0), "alpha", 0.02), ((0.0, BETA), "beta", 0.02),
                                     ((ODD, 0.0), "alpha-odd", 0.02)):
             (self.folder / "drive.log").write_text(recording(errors, rng))
