@@ -1,5 +1,5 @@
-"""What the harness plays, and what must come of it. A case prepares its folder (config, DBC, log to
-play), says what the guest has to do, and judges the result."""
+"""The cases of the vcan tests. A case prepares its folder (config, DBC, log to play), lists the steps for the guest, and
+judges the result."""
 
 import dataclasses
 import json
@@ -26,10 +26,10 @@ sys.path.insert(0, str(SOURCE / "tests/twin"))
 import make_twin  # noqa: E402
 
 RSS_MOST_KB = 12 * 1024
-# Blocks, the packer's own memory while it packs, and what a short case holds.
+# The blocks, the packer's memory while it packs, and the packed frames of a short case.
 CAPTURE_RSS_MOST_KB = 10 * 1024
 REST_S, RUN_S, RAMP_S = 2.0, 3.0, make_twin.RAMP_S
-# A player that stalls brings the motion nearer: none of it may reach into the calibration.
+# A player that stalls may shorten the rest as received: no motion may reach into the calibration.
 STILL_S = REST_S + 1.0
 TURN_DPS = 50.0
 
@@ -69,7 +69,7 @@ fd = {fd}
 
 @dataclasses.dataclass
 class Twin:
-    """A short cut of the paper's experiment: at rest, then turning at a constant rate."""
+    """A short version of the paper's experiment: at rest, then turning at a constant rate."""
 
     bus_a: str = "can0"
     bus_b: str = "can0"
@@ -108,20 +108,20 @@ class Twin:
 
 @dataclasses.dataclass
 class Run:
-    """A case after the guest has run it: files of its folder, read and split."""
+    """The result of a case that the guest has run: the files of its folder, parsed."""
 
     folder: Path
     result: dict
     inputs: list
     outputs: list
-    said: str  # by the daemon, to people
+    said: str  # the daemon's log
     ids: tuple = (0x610, 0x611, 0x612)
 
     def of(self, can_id):
         return [line for line in self.outputs if int(line.name, 16) == can_id]
 
     def replay(self, *options):
-        """What `vgyro replay` makes of the captured input frames."""
+        """Output frames of `vgyro replay` over the captured input frames."""
         log, out = self.folder / "inputs.log", self.folder / "replayed.log"
         log.write_text("".join(line.text for line in self.inputs), encoding="ascii")
         done = subprocess.run([str(BIN / "vgyro"), "replay", "--config", str(self.folder / "vgyro.toml"), *options,
@@ -155,7 +155,7 @@ def check_life(run):
 
 
 def check_service(run):
-    """What check_life() does, and what it said, and memory."""
+    """check_life(), the daemon's log, and its memory."""
     check_life(run)
     require("stopped: " in run.said, f"no summary; it said: {run.said.strip()}")
     require("with our identifiers" not in run.said, f"heard itself: {run.said.strip()}")
@@ -164,7 +164,7 @@ def check_service(run):
 
 
 def check_played(run):
-    """The capture holds every frame that was played, in order: else nothing can be compared."""
+    """The capture holds every frame that was played, in order; otherwise nothing can be compared."""
     played = verdicts.read_log(run.folder / "played.log")
     for bus in {line.bus for line in played}:
         sent = [line.content for line in played if line.bus == bus]
@@ -185,7 +185,7 @@ def check_against_replay(run, *options):
 
 
 def check_truth(run, oracle):
-    """The decoded rate against the known truth, where that is constant."""
+    """The decoded rate against the known truth, wherever that is constant."""
     t, rate, state = verdicts.rates_of(run.of(0x610), oracle)
     since = t - run.inputs[0].us * 1e-6
     resting = (since > 1.0) & (since < REST_S - 0.2)
@@ -193,7 +193,7 @@ def check_truth(run, oracle):
     require(np.isnan(rate[resting]).all() and set(state[resting]) == {1}, "valid rates while calibrating")
     require(np.isfinite(rate[turning]).all() and set(state[turning]) == {2}, "not running while turning")
     error = rate[turning] - (TURN_DPS + make_twin.EARTH_DPS)
-    # Noise of the mean of both gyros at 500 Hz is 3.5e-3 deg/s; the biases' mean, uncorrected, 1.3e-2.
+    # The noise of the mean of both gyros at 500 Hz is 3.5e-3 deg/s; the mean of the uncorrected biases is 1.3e-2 deg/s.
     require(abs(error.mean()) < 1e-3, f"mean error {error.mean():.5f} deg/s")
     require(2.5e-3 < error.std() < 5e-3, f"noise {error.std():.5f} deg/s")
     return f"mean error {error.mean() * 3600:+.1f} deg/h"
@@ -241,7 +241,7 @@ def check_fd(run, oracle):
 
 
 class SlowBusCase:
-    """The output bus takes less than the gateway sends: tbf says ENOBUFS while poll says writable."""
+    """The output bus takes less than the gateway sends: with tbf, send() fails with ENOBUFS while poll reports writable."""
 
     name = "slow_bus"
     says = "output bus behind a token bucket: survives, sends in time or not at all"
@@ -282,8 +282,8 @@ class SlowBusCase:
 
 
 class LinkFaultsCase:
-    """The output's interface goes down and up, then the inputs' one is deleted and made anew, while the
-    gyros go on."""
+    """The interface of the output goes down and up, then that of the inputs is deleted and created again, while the gyros
+    go on."""
 
     name = "link_faults"
     says = "links down and up, deleted and made anew: no restart, no stale burst"
@@ -325,9 +325,9 @@ class LinkFaultsCase:
 
 
 class FrozenCase:
-    """The process is stopped amid traffic and let go: what has come meanwhile is no news, and does not go out."""
+    """The process is stopped amid traffic and continued: frames that came meanwhile are old, and cause no output."""
 
-    # What may still go out is 250 ms old at most; the rest is the harness's, which sends the signals.
+    # A rate goes out at most 250 ms late; the rest is the time that the harness takes to send the signals.
     late_most_us = 250_000 + 30_000
 
     def __init__(self, name, says, frozen_s, run_s):
@@ -350,7 +350,7 @@ class FrozenCase:
         require(not [line for line in live if begin_us + 50_000 < line.us < end_us], "it was not stopped")
         require(verdicts.is_subsequence([line.content for line in live], [line.content for line in replayed]),
                 "rates that are not in the replay, or not in this order")
-        # Among the many that were dropped some are equal to one that went out: the newest may have caused it.
+        # Some of the many dropped rates equal one that went out; the newest equal one may be its origin.
         causes = {}
         for line in replayed:
             causes.setdefault(line.content, []).append(line.us)
@@ -366,7 +366,7 @@ class FrozenCase:
 
 
 class AbsentCase:
-    """Started before its interfaces are there: waits, and needs no restart when they come."""
+    """Started before its interfaces exist: the gateway waits, and needs no restart when they appear."""
 
     name = "absent"
     says = "interfaces that come seconds after the start: waits, then as the replay"
@@ -403,8 +403,8 @@ class AbsentCase:
 
 
 class RenamedCase:
-    """Interfaces change their names under the gateway: one before it was ever up, two others swap theirs, as udev does.
-    Before any frame came: candump goes on with the names under which it has heard interfaces first."""
+    """Interfaces are renamed while the gateway runs: one before it was ever up, two others swap their names, as udev does. All
+    before the first frame, because candump keeps the name under which it first received from an interface."""
 
     name = "renamed"
     says = "interfaces are renamed, and two swap their names: the gateway follows the names, and what is renamed is let go"
@@ -442,7 +442,7 @@ class RenamedCase:
 
 
 class FlappingCase:
-    """The output's link goes down and up again and again, while frames go out."""
+    """The link of the output goes down and up repeatedly, while frames go out."""
 
     name = "flapping"
     says = "the output's link goes down 30 times amid traffic: each is counted, and the rates go on"
@@ -464,13 +464,13 @@ class FlappingCase:
         require(metric(folder, "vgyro_bus_link_downs_total", 'bus="can0"') == 0, "the other link counts too")
         rates = len(run.of(0x610))
         samples = len([line for line in run.inputs if line.name == "102"])
-        # It was down for some 1.2 s.
+        # The link was down for some 1.2 s in all.
         require(rates > 0.5 * samples, f"{rates} rates of {samples} samples")
         return f"{downs:g} downs counted, {rates} rates of {samples} samples, {describe(run)}"
 
 
 def metric(folder, name, labels=None):
-    """Of the metrics file that the daemon left."""
+    """A value of the metrics file that the daemon left."""
     text = (folder / "state.toml.prom").read_text(encoding="ascii")
     found = re.search(rf"^{name}{re.escape('{' + labels + '}') if labels else ''} (\S+)$", text, re.MULTILINE)
     require(found, f"no {name} in the metrics")
@@ -478,7 +478,7 @@ def metric(folder, name, labels=None):
 
 
 class LaunchTimeCase:
-    """Both gyros' frames carry a launch time on the monotonic clock, which every reader gets as the time of arrival."""
+    """The frames of both gyros carry a launch time on the monotonic clock, which every receiver gets as the time of arrival."""
 
     name = "launch_time"
     says = "frames with a launch time (SO_TXTIME) on another clock: the time of reading stands in, and it is said"
@@ -513,7 +513,7 @@ class LaunchTimeCase:
 
 
 class UnreadNoticesCase:
-    """The service manager stops reading once it is told READY: its socket is full within seconds."""
+    """The service manager stops reading after READY: its socket is full within seconds."""
 
     name = "unread_notices"
     says = "the service manager does not read its socket: rates and SIGTERM as ever"
@@ -538,7 +538,7 @@ class UnreadNoticesCase:
 
 
 class LateFdCase:
-    """The link is given a CAN XL's MTU, which carries FD, while it is down, after it was bound."""
+    """A bound link is given the MTU of CAN XL, which carries FD frames, while it is down."""
 
     name = "late_fd"
     says = "a link that is made a CAN XL one after it was bound: FD in and out"
@@ -564,7 +564,7 @@ class LateFdCase:
 
 
 class DeadBusCase:
-    """One interface is down, the other is not there: nothing to do, so nothing is done."""
+    """One interface is down, the other does not exist: the gateway has nothing to do, and must do nothing."""
 
     name = "dead_bus"
     says = "an output that is down and an input that is not there: no busy loop"
@@ -583,16 +583,16 @@ class DeadBusCase:
         require("can1: link is down" in run.said, run.said)
         require(any("can0 is not there; can1 is down" in text for _, text in result["notices"]), "STATUS did not say so")
         used, wake_ups = (result["resources"][what] - result["resources_at_start"][what] for what in ("cpu_s", "wake_ups"))
-        # Ten heartbeats a second that nothing takes, each dropped when it is stale, and the clockwork of each second.
+        # Ten heartbeats a second that no bus takes, each dropped when it is stale, and the work of each second.
         require(wake_ups <= 40 * self.seconds, f"woke up {wake_ups} times in {self.seconds:g} s")
-        # A busy loop takes all. Guests pay twenty times as much for a system call, and for what their host is busy with:
-        # each wake-up may take what is a millisecond there.
+        # A busy loop would take all of it. In a guest a system call costs twenty times as much, more on a busy host: each
+        # wake-up may take some milliseconds.
         require(used <= 0.1 * self.seconds, f"{used:.2f} s of processor time in {self.seconds:g} s")
         return f"{wake_ups / self.seconds:.0f} wake-ups a second, {used / self.seconds:.1%} of a processor, {describe(run)}"
 
 
 class ErrorFramesCase:
-    """A peer writes the error frames that a driver in trouble would; vcan hands them to who asked."""
+    """A peer sends the error frames that a driver in trouble would; vcan passes them to sockets that asked for them."""
 
     name = "error_frames"
     says = "error frames: bus-off, restart, error-passive, arbitration in log and status"
@@ -623,7 +623,7 @@ class ErrorFramesCase:
 
 
 class ShadowCase:
-    """`[output] transmit = false`: everything but sending, until a reload ends it; and somebody has our identifier."""
+    """`[output] transmit = false`: everything but sending, until a reload ends it; another sender uses our identifier."""
 
     name = "shadow"
     says = "shadow mode: all is computed, nothing is sent; a stranger is seen all the same; a reload ends it"
@@ -631,7 +631,7 @@ class ShadowCase:
     def prepare(self, folder):
         Twin().prepare(folder)
         config = (folder / "vgyro.toml").read_text(encoding="utf-8")
-        # A key of [output], which is the last table.
+        # Appended to [output], which is the last table.
         (folder / "vgyro.toml").write_text(config + "transmit = false\n", encoding="utf-8")
         (folder / "loud.toml").write_text(config, encoding="utf-8")
         (folder / "stranger.log").write_text("(1700000000.000000) can0 610#0011223344556677\n", encoding="ascii")
@@ -696,7 +696,7 @@ class ReloadCase:
         require(any("the new configuration was refused" in text for text in statuses), "STATUS did not say so")
         times = [text for text in statuses if re.match(r"RELOADING=1\nMONOTONIC_USEC=\d+", text)]
         require(len(times) == 3, f"{len(times)} notices of a reload: {statuses}")
-        # One stream for receivers: every CRC right, every counter the next.
+        # Receivers see one stream: every CRC is right, and every counter follows the one before.
         verdicts.check_protection(run.of(0x610), 0x610)
         verdicts.check_protection(run.of(0x612), 0x612)
         verdicts.check_protection(run.of(0x613), 0x613)
@@ -710,14 +710,14 @@ class ReloadCase:
         since, until = result["reloads_us"][0] - 50_000, result["reloads_us"][0] + 150_000
         samples = sum(line.name == "102" and since <= line.us < until for line in run.inputs)
         missed = samples - int(((t >= since * 1e-6) & (t < until * 1e-6)).sum())
-        # A host that stands still at this moment takes some of them.
+        # A host that stalls at this moment costs some of them.
         require(missed <= 90, f"{missed} of {samples} rates missed in the reload amid traffic")
         errors = []
         for begin in begins[1:]:
             resting = (t > begin * 1e-6 + 0.1) & (t < begin * 1e-6 + REST_S - 0.2)
             require(np.isfinite(rate[resting]).all() and set(state[resting]) == {2}, "not valid after a reload")
             errors.append(float((rate[resting] - make_twin.EARTH_DPS).mean()))
-        # The bias of two seconds of rest, and the noise of the better gyro at 500 Hz.
+        # The error of a bias from two seconds of rest, and the noise of the better gyro at 500 Hz.
         require(max(map(abs, errors)) < 1e-3, f"mean errors {errors} deg/s")
         return f"{missed} rates missed amid traffic, valid from the first pair after each, mean errors {[f'{e * 3600:+.1f}' for e in errors]} deg/h, {describe(run)}"
 
@@ -733,7 +733,7 @@ class SlowReloadCase:
     name = "slow_reload"
     says = "a pipe as DBC is refused; while a large DBC is read the rates go on"
     messages = 60_000
-    limits = []  # a program that starts the gateway within them
+    limits = []  # command that starts the gateway with limits
 
     def prepare(self, folder):
         twin = Twin(run_s=0.0)
@@ -776,7 +776,7 @@ class SlowReloadCase:
 
 
 class ShortMemoryCase(SlowReloadCase):
-    """The same, but there is no memory for the large file."""
+    """As above, but there is not enough memory for the large file."""
 
     name = "short_memory"
     says = "a DBC that the memory is too short for is refused; the rates go on"
@@ -788,12 +788,12 @@ class ShortMemoryCase(SlowReloadCase):
 
 
 class UnreadLogCase:
-    """stderr is a pipe that nobody reads, and much is said: nobody notices on the bus."""
+    """stderr is a pipe that nothing reads, and the log is long: the bus shows no effect."""
 
     name = "unread_log"
     says = "stderr is a full pipe that nobody reads: rates, watchdog and SIGTERM as ever"
     filled_bytes = 60000  # of 65536
-    refusals = 50  # each is told in ten lines or more
+    refusals = 50  # each logged in ten lines or more
 
     def prepare(self, folder):
         twin = Twin(run_s=0.0)
@@ -823,7 +823,7 @@ class UnreadLogCase:
 
 
 class SharedCase:
-    """A second gateway on the same state file, and somebody else who sends one of our identifiers."""
+    """A second gateway on the same state file, and another sender of one of our identifiers."""
 
     name = "shared"
     says = "a second gateway on the state file does not start; foreign frames with our identifiers are told"
@@ -851,7 +851,7 @@ class SharedCase:
 
 
 class RestartCase:
-    """Killed without warning after it has calibrated, and started again: it goes on where it was."""
+    """Killed after the calibration and started again: the gateway goes on with its biases."""
 
     name = "restart"
     says = "killed and started again with its state file: valid from the first pair, as the replay with that file"
@@ -880,7 +880,7 @@ class RestartCase:
         require(np.isfinite(rate).all() and set(state) == {2}, "a rate that is not valid after the restart")
         resting = t - run.inputs[0].us * 1e-6 < REST_S
         error = rate[resting] - make_twin.EARTH_DPS
-        # The bias of the first two seconds of rest, and the noise of the better gyro at 500 Hz.
+        # The error of the bias from the first two seconds of rest, and the noise of the better gyro at 500 Hz.
         require(abs(error.mean()) < 1e-3, f"mean error {error.mean():.5f} deg/s after the restart")
         self.check_file(folder / "state.toml")
         require(not (folder / "state.toml.new").exists(), "the writer left something behind")
@@ -888,7 +888,7 @@ class RestartCase:
                 f"mean error {error.mean() * 3600:+.1f} deg/h, {describe(run)}")
 
     def check_file(self, path):
-        """Its checksum and its form, by Python's own readers."""
+        """Checks the checksum and the form of the state file with Python's own readers."""
         require(path.exists(), f"{path.name} was not written")
         data = path.read_bytes()
         content, _, _ = data.rpartition(b"\n[checksum]\n")
@@ -902,14 +902,14 @@ class RestartCase:
 
 
 class InheritedCase:
-    """Two reloads without a sample between them; then one that needs a new calibration, and the platform turns."""
+    """Two reloads without a sample between them; then one that needs a new calibration, while the platform turns."""
 
     name = "inherited"
     says = "biases outlive reloads in a row, and a steady turn that is calibrated as rest does not replace them"
     new_rate_dps = make_twin.EARTH_DPS + 0.001
 
     def prepare(self, folder):
-        twin = Twin(turn_dps=2.0)  # a faster one is no bias of two gyros, and is not calibrated with
+        twin = Twin(turn_dps=2.0)  # a faster turn is no plausible bias of two gyros, and would be refused for the calibration
         twin.prepare(folder)
         config = folder / "vgyro.toml"
         text = config.read_text(encoding="utf-8")
@@ -939,8 +939,8 @@ class InheritedCase:
 
 
 class ForeignLayoutsCase:
-    """The rate in two layouts of others, read by a node on the kernel's own J1939 stack with its own arithmetic: the
-    angular rate of SAE J1939 beside VG_Rate, and NMEA 2000's rate of turn on a bus of its own."""
+    """The rate in two foreign layouts, read by a node on the kernel's J1939 stack with arithmetic of its own: the angular rate
+    of SAE J1939 beside VG_Rate, and the rate of turn of NMEA 2000 on another bus."""
 
     name = "foreign_layouts"
     says = "J1939 and NMEA 2000 nodes read the rate in their own layouts"
@@ -986,7 +986,7 @@ source_address = {self.boat[3]}
         require(np.isfinite(rate_dps).sum() > 1000 and np.isnan(rate_dps).sum() > 500, "no good mixture of rates")
         reader = "the kernel's J1939"
         heard = (folder / "heard.txt").read_text(encoding="ascii").splitlines() if (folder / "heard.txt").exists() else []
-        if not heard:  # a host may have vcan without J1939
+        if not heard:  # the kernel has vcan, but no J1939
             reader = "a raw reader, for this kernel has no J1939"
             heard = [f"{line.bus} {int(line.name, 16) >> 8 & 0x3FFFF} {int(line.name, 16) & 0xFF} {line.data.hex()}"
                      for line in foreign]
@@ -1003,7 +1003,7 @@ source_address = {self.boat[3]}
 
     @staticmethod
     def check_ari(frames, rate_dps):
-        """SAE J1939: 1/128 deg/s from -250, the topmost codes are none; merit 0 of 0 to 3 is good."""
+        """SAE J1939: steps of 1/128 deg/s from -250 deg/s, the topmost codes are no value; merit 0 (of 0 to 3) is good."""
         raw = np.array([int.from_bytes(data[4:6], "little") for data in frames])
         merit = np.array([data[6] >> 4 & 3 for data in frames])
         value = np.where(merit == 0, raw / 128 - 250, np.nan)
@@ -1013,7 +1013,7 @@ source_address = {self.boat[3]}
 
     @staticmethod
     def check_boat(frames, rate_dps):
-        """NMEA 2000: 1/32 µrad/s, 0x7FFFFFFF is none; the sequence number runs from 0 to 252."""
+        """NMEA 2000: steps of 1/32 µrad/s, 0x7FFFFFFF is no value; the sequence number runs from 0 to 252."""
         raw = np.array([int.from_bytes(data[1:5], "little", signed=True) for data in frames])
         value = np.where(raw == 0x7FFFFFFF, np.nan, raw / 32e6 * 180 / np.pi)
         require(np.array_equal(np.isnan(value), np.isnan(rate_dps)), "the boat and VG_Rate differ in what is valid")
@@ -1022,8 +1022,8 @@ source_address = {self.boat[3]}
 
 
 class CaptureCase:
-    """Two recordings of the inputs, one that is asked for on a bus of D-Bus that only this case has, one because the
-    gyros contradict each other, while others talk on the same bus."""
+    """Two captures of the inputs while other nodes send on the same buses: one requested on a private D-Bus, one because the
+    gyros contradict each other."""
 
     name = "capture"
     says = "recordings of the inputs hold each of their frames as candump has it, and no other; their replay gives the rates"
@@ -1064,12 +1064,12 @@ class CaptureCase:
                 log.write(line)
                 if number % 50 == 0:
                     for bus in ("can0", "can1"):
-                        # The other bus's identifiers are foreign here.
+                        # An input's identifier is foreign on the other bus.
                         for frame in (*self.foreign, "102#00" if bus == "can0" else "101#00"):
                             log.write(f"{line.split(' ')[0]} {bus} {frame}\n")
         (folder / "sway.log").write_text("".join(self.swaying()), encoding="ascii")
         (folder / "bus.in").write_text(self.bus_config.format(policy=SOURCE / "dbus/org.vgyro.Gateway1.conf"), encoding="ascii")
-        # The bus's configuration names a place that only the guest knows.
+        # Only the guest knows the path in the configuration of D-Bus.
         script = (f"sed 's|@MEMORY@|{{memory}}|' {folder}/bus.in > {{memory}}/bus.conf; "
                   f"dbus-daemon --config-file={{memory}}/bus.conf --fork || exit 9; "
                   f"exec {BIN / 'vgyrod'} --config {folder / 'vgyro.toml'} --capture captures")
@@ -1083,7 +1083,7 @@ class CaptureCase:
                 "command": [*environment, "STATE_DIRECTORY={memory}", "sh", "-c", script]}
 
     def swaying(self):
-        """To and fro, and gyro B the other way round."""
+        """The platform sways; gyro B reads the opposite sign."""
         for i in range(int(self.sway_s * 200)):
             us = 1_700_001_000_000_000 + 5000 * i
             raw = round(1e6 * self.sway_dps * math.sin(2 * math.pi * self.sway_hz * i / 200))
@@ -1132,7 +1132,7 @@ class CaptureCase:
 
 
 class IdleCase:
-    """No gyro is there: heartbeat, status, and a clean end."""
+    """There is no gyro: heartbeat, status, and a clean end."""
 
     name = "idle"
     says = "no gyro there: heartbeat ten times a second, SIGINT ends it"
@@ -1158,7 +1158,7 @@ class IdleCase:
 
 
 class CommandCase:
-    """A program that judges by itself."""
+    """A test program with a verdict of its own."""
 
     def __init__(self, name, says, command, exit_code, expected):
         self.name, self.says, self.command = name, says, command
@@ -1216,7 +1216,7 @@ bus = "can0"
 
 
 class UnitsCase:
-    """Two whole units on two buses, one of them turned by 90 deg: at rest, then turning about all axes."""
+    """Two whole units on two buses, one of them mounted at 90 deg: at rest, then turning about all axes."""
 
     name = "units"
     says = "two units of three axes, one turned by 90 deg"
@@ -1264,7 +1264,7 @@ class UnitsCase:
 
 
 class UnitsRestartCase(UnitsCase):
-    """Killed without warning after all axes have calibrated, and started again."""
+    """Killed after all axes have calibrated, and started again."""
 
     name = "units_restart"
     says = "two units, killed and started again with the state file: all axes go on where they were"
@@ -1300,17 +1300,17 @@ class UnitsRestartCase(UnitsCase):
 
     def check_kept(self, kept):
         require(set(kept["axis"]) == set("xyz") and "misalignment" in kept, f"{kept.keys()}")
-        # Six standard errors of the mean over two seconds, and the wire's step.
+        # Six standard errors of the mean over two seconds, and the step of the signal.
         for axis in "xyz":
             biases = kept["axis"][axis]["drift"]["bias_dps"]
-            # The second unit's mount turns its x to the left, so about x it reads less its own y.
+            # The mount turns the second unit's x to the left, so its reading about the vehicle's x is minus its own y.
             second = 0.3 if axis == "x" else -0.3
             require(np.allclose(biases, [0.4, second], rtol=0, atol=6 * self.noise_dps / 200 ** 0.5 + 0.01), f"{axis}: {biases}")
         require(0.0 <= kept["heading"]["sigma_rad"] < 4.0, f"{kept['heading']}")
 
 
 class UnitsReloadCase(UnitsCase):
-    """SIGHUP, with the platform at rest: a bad configuration, another window, and then another output."""
+    """SIGHUP with the platform at rest: a bad configuration, another window, and then another output."""
 
     name = "units_reload"
     says = "two units, configuration read again: all axes' biases and counters go on; a bad one is refused"
@@ -1347,7 +1347,7 @@ window_s = 3.0
             require(run.said.count(text) == 1, f"{text}: {run.said.count(text)} times\n{run.said}")
         require(re.search(r'vgyro\.toml:\d+: .*"YY"', run.said), f"no place\n{run.said}")
         oracle = verdicts.Oracle(SOURCE / "dbc/vgyro_axes.dbc")
-        # One stream for receivers: every CRC right, every counter the next.
+        # Receivers see one stream: every CRC is right, and every counter follows the one before.
         for can_id in self.ids:
             verdicts.check_protection(run.of(can_id), can_id)
         plays = np.array([line.us for line in run.inputs if line.name == "101"])
@@ -1359,7 +1359,7 @@ window_s = 3.0
             rates = [oracle.decode(line) for line in later]
             require(all(signals["VG_Valid"] == 1.0 for signals in rates), f"a rate about {'xyz'[axis]} is not valid after a reload")
             mean = np.mean([oracle.decode(line)["VG_Rate"] for line in resting])
-            # The bias of two seconds of rest, and the wire of the sensors.
+            # The error of a bias from two seconds of rest, and the steps of the sensors' signals.
             require(abs(mean) < 6 * self.noise_dps / 400 ** 0.5 + 0.005, f"about {'xyz'[axis]} {mean:.4f} deg/s at rest")
         layouts = run.of(0x122)
         require(layouts and min(line.us for line in layouts) > begins[2], "the layout is not there after the last reload, or before")
@@ -1369,12 +1369,12 @@ window_s = 3.0
 
 
 class CarCase:
-    """Recorded traffic of a car: one gyro among many identifiers, the other and the reference on a bus
-    of their own. At real time."""
+    """Recorded traffic of a car in real time: one gyro among many identifiers, the other one and the reference on a bus of
+    their own."""
 
     name = "car"
     says = "real car traffic around the gyros, at real time"
-    seconds = 22.0  # ten of them calibrate, ten are the first window
+    seconds = 22.0  # ten for the calibration, ten for the first window
 
     def __init__(self, recordings):
         self.source = recordings / "car_rav4"
@@ -1397,7 +1397,7 @@ class CarCase:
                 "command": [str(BIN / "vgyrod"), "--config", str(folder / "vgyro.toml")]}
 
     def rewritten_config(self):
-        """As recorded, but on identifiers that the car itself does not use."""
+        """The recording's configuration, but with output identifiers that the car does not use."""
         text = (self.source / "vgyro.toml").read_text(encoding="utf-8")
         return text.replace("[output]", f"[output]\nrate_id = {self.ids[0]}\nbias_id = {self.ids[1]}\nmodel_id = {self.ids[2]}", 1)
 
@@ -1460,7 +1460,7 @@ def all_cases(recordings):
 
 
 def judge(case, folder, orders):
-    """Passed or not, the longest stall in microseconds (0 where nothing played in real time), and a text."""
+    """Whether the case passed, the longest stall in microseconds (0 if nothing played in real time), and a text."""
     path = folder / "result.json"
     if not path.exists():
         return False, 0, "did not run"

@@ -1,5 +1,5 @@
-"""Where the vcan tests run: natively in a network namespace of their own, or, where the host's kernel
-has no vcan, inside a User Mode Linux kernel on the host's own files."""
+"""Where the vcan tests run: natively in a network namespace of their own or, if the host's kernel has no vcan, in a
+User Mode Linux kernel on the host's own files."""
 
 import os
 import shlex
@@ -12,7 +12,7 @@ HERE = Path(__file__).resolve().parent
 PYTHON = os.path.realpath(sys.executable)
 UML_MODULES = Path("/usr/lib/uml/modules")
 MODULES = ("can", "can-raw", "can-dev", "can-j1939", "vcan", "sch_tbf")
-# What the tests need of a kernel, tried out in a namespace that vanishes at once.
+# Tries the kernel features that the tests need, in a namespace that vanishes at once.
 PROBE = "ip link add vgprobe0 type vcan && tc qdisc add dev vgprobe0 root tbf rate 100kbit burst 200 limit 400"
 
 GUEST_INIT = """\
@@ -31,8 +31,8 @@ exec {python} -c 'import ctypes; ctypes.CDLL(None).reboot(0x4321FEDC)'
 
 
 def foremost():
-    """What plays in real time goes before what the host computes meanwhile, where it may. A guest is many processes that
-    wait for each other: at a common priority each would wait for the end of a neighbour's turn."""
+    """Gives real-time tests priority over other work of the host, if permitted. A guest is many processes that wait for each
+    other: at a common priority each would wait for the end of another's time slice."""
     try:
         os.sched_setscheduler(0, os.SCHED_RR, os.sched_param(1))
     except OSError:
@@ -93,7 +93,7 @@ def user_mode_linux():
 
 
 def choose(wish):
-    """`wish`: native, uml, or auto. Returns the ground, or exits with what is missing."""
+    """`wish`: native, uml, or auto. Returns the ground, or exits with a text that says what is missing."""
     reasons = []
     for name, find in (("native", native), ("uml", user_mode_linux)):
         if wish not in ("auto", name):

@@ -1,8 +1,7 @@
 #!/usr/bin/python3
-"""The part of the vcan harness that runs where the CAN interfaces are: in a network namespace of its
-own, or in a User Mode Linux guest. Takes its orders from plan.json in the folder named first, writes
-what it saw beside it, and keeps captures meanwhile in the folder named second. Starting programs is
-slow in the guest, so this starts few and imports little."""
+"""The part of the vcan harness that runs where the CAN interfaces are: in a network namespace of its own, or in a User Mode
+Linux guest. Reads its plan from plan.json in the first folder, writes the results beside it, and keeps captures in the
+second folder meanwhile. Starting programs is slow in the guest, so this starts few and imports little."""
 
 import fcntl
 import json
@@ -23,7 +22,7 @@ WATCHDOG_USEC = 2_000_000
 
 
 class Daemon:
-    """The gateway under test and what it tells its service manager."""
+    """The gateway under test, and its messages to the service manager."""
 
     def __init__(self, command, folder):
         self.notices = []  # (seconds since the start, text)
@@ -37,8 +36,8 @@ class Daemon:
         self.restarts_us = []  # on the clock of the frames
         self.reloads_us = []
         self.frozen_us = []  # from, to
-        self.listened_us = []  # from, to: what this harness does in between, starting programs, takes the processor too
-        self.is_heard = True  # else nobody reads what it tells
+        self.listened_us = []  # from, to; in between the harness starts programs, which takes the processor too
+        self.is_heard = True  # False: nothing reads its messages
         self.start()
 
     def start(self):
@@ -61,7 +60,7 @@ class Daemon:
             raise OSError("no RELOADING and READY after SIGHUP")
 
     def freeze(self, seconds):
-        """Stopped, as by a debugger or a host that is suspended, and let go."""
+        """Stops the process for some time, like a debugger or a suspended host."""
         self.process.send_signal(signal.SIGSTOP)
         self.frozen_us.append(time.time_ns() // 1000)
         self.listen(seconds)
@@ -95,7 +94,7 @@ class Daemon:
         return until is None
 
     def resources(self):
-        """Resident kilobytes (now and at most), and the processor time it took, in seconds."""
+        """Resident memory (now and at most, in kB), and processor time in seconds."""
         with open(f"/proc/{self.process.pid}/status", encoding="ascii") as file:
             fields = dict(line.split(":", 1) for line in file)
         with open(f"/proc/{self.process.pid}/stat", encoding="ascii") as file:
@@ -123,7 +122,7 @@ class Daemon:
 
 
 class StallWatch:
-    """A process that naps again and again, and notes when it overslept: the daemon had no processor then either."""
+    """A process that sleeps repeatedly and notes when it overslept: the daemon had no processor then either."""
 
     def __init__(self, path):
         self.path = path
@@ -135,7 +134,7 @@ class StallWatch:
             try:
                 self.watch(parent)
             finally:
-                os._exit(1)  # without what the parent would still write
+                os._exit(1)  # without flushing the parent's buffers
 
     def watch(self, parent):
         with open(self.path, "ab", buffering=0) as notes:
@@ -148,7 +147,7 @@ class StallWatch:
                 before = now
 
     def stop(self):
-        """What it saw: when each stall ended, on the clock of the frames, and its length, in microseconds."""
+        """The end of each stall, on the clock of the frames, and its length, both in microseconds."""
         os.kill(self.child, signal.SIGKILL)
         os.waitpid(self.child, 0)
         with open(self.path, encoding="ascii") as notes:
@@ -166,7 +165,7 @@ def stop_quietly(process):
 
 
 def wait_until_still(path):
-    """candump may lag behind the buses; it has caught up when its file does not grow any more."""
+    """candump may lag behind the buses; it has caught up when its file no longer grows."""
     size, still = -1, 0
     for _ in range(200):
         time.sleep(0.1)
@@ -185,7 +184,7 @@ def run_program(command, **options):
 def make_links(case):
     lines = []
     for link in case["links"]:
-        if not link.get("absent"):  # a step will make it
+        if not link.get("absent"):  # made by a later step
             lines += [f"link add {link['name']} mtu {link.get('mtu', 16)} type vcan", f"link set {link['name']} up"]
     if lines:
         run_program(["ip", "-batch", "-"], input="\n".join(lines).encode())
@@ -194,7 +193,7 @@ def make_links(case):
 
 
 def remove_links(case):
-    """Those that are there: ip ends a batch at the first that is not, and the next case would find the others."""
+    """Deletes only links that exist: ip ends a batch at the first missing one, and would leave the others to the next case."""
     there = {name for _, name in socket.if_nameindex()}
     lines = [f"link del {link['name']}" for link in case["links"] if link["name"] in there]
     if lines:
@@ -202,7 +201,7 @@ def remove_links(case):
 
 
 def play(log, daemon, folder, after_s=None, what=None):
-    """Recorded traffic onto the buses, in its own time; something else in the midst of it."""
+    """Plays a log onto the buses in real time, and does something else in the middle of it."""
     with open(os.path.join(folder, "canplayer.err"), "ab") as stderr:
         player = subprocess.Popen(["canplayer", "-I", log], stderr=stderr)
     if what is not None:
@@ -215,7 +214,7 @@ def play(log, daemon, folder, after_s=None, what=None):
 
 
 def run_meanwhile(command, daemon):
-    """A program that takes long."""
+    """Runs a program that takes long."""
     running = subprocess.Popen(command)
     while running.poll() is None:
         daemon.listen(0.2)
@@ -224,7 +223,7 @@ def run_meanwhile(command, daemon):
 
 
 def wait_until_said(text, daemon, seconds):
-    """By the daemon, to people."""
+    """Waits until the daemon has logged a text."""
     end = time.monotonic() + seconds
     while time.monotonic() < end:
         with open(daemon.stderr_path, encoding="utf-8", errors="replace") as file:
@@ -235,7 +234,7 @@ def wait_until_said(text, daemon, seconds):
 
 
 def flap(interface, times, pause_s, daemon):
-    """Takes a link down and up again and again, from here: starting programs would take too long for it."""
+    """Takes a link down and up repeatedly by ioctl, because starting programs would take too long."""
     get_flags, set_flags, up = 0x8913, 0x8914, 1  # linux/sockios.h, linux/if.h
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as control:
         for _ in range(times):
@@ -273,7 +272,8 @@ def take_steps(steps, daemon, folder):
 
 
 def keep_files(memory, folder):
-    """What the daemon writes is in memory meanwhile: where the folder is the host's, the whole guest waits for its disk."""
+    """Copies the daemon's files from memory. It writes them there because the folder is the host's, on whose disk the whole
+    guest would wait."""
     for name in os.listdir(memory):
         if name.startswith(("state.toml", "vgyrod.err", "heard.txt")):
             run_program(["cp", "-p", os.path.join(memory, name), folder])
@@ -281,7 +281,7 @@ def keep_files(memory, folder):
 
 
 def run_case(case, folder, memory, result):
-    # A memory file system keeps the capture from waiting for a disk.
+    # In a memory file system the capture does not wait for a disk.
     capture_path = os.path.join(memory, "capture.tmp")
     watch = dump = daemon = beside = None
     try:
@@ -323,7 +323,7 @@ def run_case(case, folder, memory, result):
 
 
 def run_command(case, folder, _memory, result):
-    """A program that tests something by itself."""
+    """Runs a test program with a verdict of its own."""
     with open(os.path.join(folder, "output.txt"), "wb") as out:
         done = subprocess.run(case["command"], stdout=out, stderr=subprocess.STDOUT, check=False)
     result["exit"] = done.returncode

@@ -1,6 +1,6 @@
 #!/usr/bin/python3
-"""A node that knows nothing of the gateway: listens on the kernel's own J1939 stack, as the devices on a truck's or a
-boat's bus do, and writes down what it hears: interface, parameter group, source address, payload. Ends with SIGTERM."""
+"""A node that is independent of the gateway: receives on the kernel's J1939 stack, like a device on the bus of a truck or a
+boat, and writes a line for each message: interface, parameter group, source address, payload. Ends with SIGTERM."""
 
 import selectors
 import socket
@@ -9,7 +9,7 @@ import sys
 
 def listen(interface):
     node = socket.socket(socket.AF_CAN, socket.SOCK_DGRAM, socket.CAN_J1939)
-    # Without it the kernel hands over nothing that is sent to everybody.
+    # Without it the kernel delivers no broadcasts.
     node.setsockopt(socket.SOL_SOCKET, socket.SO_BROADCAST, 1)
     node.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4_000_000)
     node.bind((interface, socket.J1939_NO_NAME, socket.J1939_NO_PGN, socket.J1939_NO_ADDR))

@@ -1,6 +1,6 @@
 #!/usr/bin/python3
-"""Plays a candump log onto the buses that it names, in its own time, as a program does that gives each
-frame a launch time (SO_TXTIME) on the monotonic clock. Classic frames; no tool of Debian 12 does it."""
+"""Plays a candump log onto its buses in real time, with a launch time (SO_TXTIME) on the monotonic clock for each frame.
+Classic frames only; no tool of Debian 12 can do it."""
 
 import socket
 import struct

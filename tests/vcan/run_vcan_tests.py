@@ -1,8 +1,7 @@
 #!/usr/bin/python3
-"""Runs the real vgyrod on a real vcan, and holds what it sent against `vgyro replay` of what it
-received. Natively where the host's kernel has vcan, else inside User Mode Linux. Never skips: exits
-with 1 when a case fails or nothing could run. A case that fails while the machine stood still is void
-and run again; see timekeeping.py."""
+"""Runs the real vgyrod on a real vcan, and compares the frames that it sent with `vgyro replay` of those that it received.
+Runs natively if the host's kernel has vcan, otherwise inside User Mode Linux. Never skips: exits with 1 if a case fails or
+nothing could run. A case that fails while the machine stalled is void and run again; see timekeeping.py."""
 
 import argparse
 import json
@@ -20,9 +19,9 @@ import ground  # noqa: E402
 import timekeeping  # noqa: E402
 import verdicts  # noqa: E402
 
-# Booting, and what a busy host may add to each case.
+# Time for booting, and for the delays of a busy host in each case.
 SECONDS_MOST = 600
-# A case that fails while the machine stands still proves nothing and is run again, so often.
+# Most runs of a case that fails while the machine stalls, which proves nothing.
 RUNS_MOST = 5
 
 
@@ -53,7 +52,7 @@ def check_programs():
 
 
 def run(folder, selected, where):
-    """The cases that failed, and those that the machine spoilt."""
+    """The cases that failed, and those that a stall made void."""
     folder.mkdir(parents=True, exist_ok=True)
     plan = []
     for case in selected:

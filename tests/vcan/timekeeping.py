@@ -1,15 +1,15 @@
-"""Whether the machine kept time while a case played in real time. Only then is a failure the product's: a host
-that stands still fires time-outs for frames that it would have brought in time."""
+"""Whether the machine kept time while a case played in real time. Only then is a failure the product's: a host that stalls
+causes time-outs for frames that would have come in time."""
 
 import verdicts
 
-# Half of the shortest time-out of a gyro.
+# Half the shortest time-out of a gyro.
 STALL_MOST_US = 50_000
 
 
 def longest_stall_us(folder, steps, result):
-    """Of the whole guest, as its watch saw it while nothing but daemon and player should run, or of the player alone, as
-    the capture tells."""
+    """The longest stall of the whole guest, by its watch while only daemon and player should run, or of the player alone, by
+    the capture."""
     seen = [overlap_us(end - length, end, result["listened_us"]) for end, length in result.get("stalls_us", [])]
     return max([*seen, player_lateness_us(folder, steps)])
 
@@ -19,8 +19,8 @@ def overlap_us(begin, end, spans):
 
 
 def player_lateness_us(folder, steps):
-    """How late a frame was captured, by the log that was played; the earliest of each play counts as in time. 0 where
-    frames are missing, which no stall of the player explains."""
+    """Greatest delay of a captured frame against the played log; the earliest frame of each play counts as in time. 0 if frames
+    are missing, which no stall of the player explains."""
     plays = [verdicts.read_log(what if verb == "play" else what[0]) for verb, what in steps if verb.startswith("play")]
     if not plays or not (folder / "capture.log").exists():
         return 0

@@ -1,5 +1,5 @@
-"""Judges what was captured on the buses, sharing no code with the product: its own E2E check, and
-canmatrix as an independent reader of the DBC files."""
+"""Judges the frames captured on the buses without code of the product: with an E2E check of its own, and canmatrix as an
+independent reader of the DBC files."""
 
 import contextlib
 import dataclasses
@@ -14,7 +14,7 @@ LINE = re.compile(r"\((\d+)\.(\d{6})\)\s+(\S+)\s+([0-9A-Fa-f]+)#(#[0-9A-Fa-f])?(
 
 
 class Failure(Exception):
-    """What is wrong, for people."""
+    """A failed check; its text is for people."""
 
 
 def require(condition, text):
@@ -86,7 +86,7 @@ def check_crc(line, can_id):
 
 
 def check_protection(lines, can_id):
-    """Every frame's CRC, and that the counter runs without a gap from 0."""
+    """Checks the CRC of every frame, and that the counter runs from 0 without a gap."""
     for position, line in enumerate(lines):
         check_crc(line, can_id)
         counter, expected = (line.data[2], position % 256) if line.fd else (line.data[1] & 0x0F, position % 15)
@@ -102,7 +102,7 @@ def without_protection(line):
 # --- live against replay --------------------------------------------------------------------------
 
 def check_same_rates(live, replayed):
-    """Byte for byte from the first frame to the last."""
+    """Compares byte for byte, from the first frame to the last."""
     for position, (a, b) in enumerate(zip(live, replayed)):
         require(a.data == b.data and a.fd == b.fd,
                 f"VG_Rate {position} differs\n  live   {a.text}  replay {b.text}")
@@ -110,9 +110,9 @@ def check_same_rates(live, replayed):
 
 
 def check_same_sequence(live, replayed, rate_id):
-    """All output frames in their order, from 0.3 s after the first rate on. Live has heartbeats while
-    no gyro is heard, which a replay cannot have: they shift VG_Bias until both are on its grid of
-    0.1 s, and its counter (and checksum) for good."""
+    """Compares all output frames in their order, from 0.3 s after the first rate on. Unlike a replay, the live gateway sends
+    heartbeats while no gyro is heard: they shift VG_Bias until both are on its grid of 0.1 s, and shift its counter and
+    checksum for good."""
     rates = [line for line in live if int(line.name, 16) == rate_id]
     skipped = sum(line.us < rates[0].us + 300_000 for line in rates)
     live, replayed = after_rates(live, rate_id, skipped), after_rates(replayed, rate_id, skipped)
@@ -123,7 +123,7 @@ def check_same_sequence(live, replayed, rate_id):
 
 
 def after_rates(lines, rate_id, count):
-    """What follows the rate of this number."""
+    """The frames from rate number `count` on."""
     position = [i for i, line in enumerate(lines) if int(line.name, 16) == rate_id][count]
     return lines[position:]
 
@@ -155,7 +155,7 @@ class Oracle:
 
 
 def rates_of(lines, oracle):
-    """Columns of VG_Rate as arrays: stamps (s), rate (deg/s, NaN where invalid), state."""
+    """Columns of VG_Rate as arrays: stamps (s), rate (deg/s, NaN if invalid), state."""
     decoded = [oracle.decode(line) for line in lines]
     valid = np.array([one["VG_Valid"] for one in decoded]) == 1
     rate = np.array([one["VG_Rate"] for one in decoded])
