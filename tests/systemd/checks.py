@@ -1,4 +1,4 @@
-"""Judges what the guest left behind: exit codes and outputs of the scenario's steps, and the captured frames."""
+"""Judges the results of the guest: exit codes and outputs of the scenario's steps, and the captured frames."""
 
 import json
 import math
@@ -19,22 +19,23 @@ REST_S = 3.0
 PLAY_S = 5.0
 SHORT_S = 2.5
 RATE_HZ = 100.0
-# The calibration's bias of both, weighed equally: N / √(2 rest). A mean of half a second of rates adds the rest.
+# σ of the calibrated bias of both gyros, weighted equally: N / √(2 rest). The mean of half a second of rates adds its own
+# noise.
 BIAS_SIGMA_DPS = NOISE_DPS_RTHZ / math.sqrt(2 * REST_S)
 ERROR_MOST_DPS = 6 * math.hypot(BIAS_SIGMA_DPS, NOISE_DPS_RTHZ / math.sqrt(2 * 0.5))
 EXPOSURE_MOST = 1.3
-# A gyro that is not heard for 0.1 s is timed out, and heard again with its next frames.
+# A gyro times out after 0.1 s without frames, and is used again with its next frames.
 AFTER_STALL_US = 300_000
 
 
 class Run:
-    """The folder that the guest wrote."""
+    """The results in the folder that the guest wrote."""
 
     def __init__(self, out):
         self.out = out
         self.oracle = verdicts.Oracle(SOURCE / "dbc/vgyro.dbc")
         self.frames = verdicts.read_log(out / "capture.log")
-        # Of the whole guest: (begin, end).
+        # Stalls of the whole guest: (begin, end).
         noted = (map(int, line.split()) for line in (out / "stalls.txt").read_text(encoding="ascii").splitlines())
         self.stalls_us = [(end - length, end) for end, length in noted]
 
@@ -68,11 +69,11 @@ class Run:
                 if int(line.name, 16) == can_id and self.began_us(begin) <= line.us < until]
 
     def kept_time(self, us):
-        """No stall could have timed out a gyro at this moment."""
+        """Whether no stall could have caused a time-out of a gyro at this moment."""
         return not any(begin < us < end + AFTER_STALL_US for begin, end in self.stalls_us)
 
     def check_rates(self, begin, end, calibrated):
-        """Near the truth, 0, which no gyro reads; valid from the first pair on if biases were known before."""
+        """Rates are near the truth, 0, which neither gyro reads; valid from the first pair on if biases were known before."""
         lines = self.sent(0x610, begin, end)
         _, rate, state = verdicts.rates_of(lines, self.oracle)
         play_s = SHORT_S if calibrated else PLAY_S
@@ -84,7 +85,7 @@ class Run:
             require(valid.all(), f"{begin}: {(~valid).sum()} of {len(rate)} rates are not valid")
         else:
             require(not valid[: int(0.9 * REST_S * RATE_HZ)].any(), f"{begin}: valid before the calibration was complete")
-        # After both were lost the first samples are one gyro's alone.
+        # After both gyros were lost, the first samples are of one gyro alone.
         kept = np.array([self.kept_time(line.us) for line in lines])
         judged = state[valid & kept][5:]
         require(set(judged) == {2}, f"{begin}: states {set(judged)}")
@@ -105,14 +106,14 @@ def installs_and_waits(run):
 
 def starts(run):
     """A bad configuration fails once; with a good one it is active when `systemctl start` returns, at READY."""
-    # A configuration that cannot be used is told at once, and not tried again and again.
+    # A bad configuration is reported at once, and not tried again.
     run.require_shows("bad_started", ActiveState="failed", Result="exit-code", NRestarts="0", ExecMainStatus="1")
     run.done("start")
     run.require_shows("started", ActiveState="active", SubState="running", NRestarts="0", Result="success")
 
 
 def sandbox(run):
-    """No user of the host's, no capability, filtered system calls, namespaces of its own, a read-only system."""
+    """No user of the host, no capability, filtered system calls, namespaces of its own, a read-only system."""
     run.done("process", "namespaces", "security")
     status = dict(line.split(":\t", 1) for line in run.text("process").splitlines() if ":\t" in line)
     require("0" not in status["Uid"].split(), f"Uid {status['Uid']}")
@@ -135,7 +136,7 @@ def calibrates(run):
 
 
 def speaks_on_dbus(run):
-    """Over D-Bus: introspected, read by everybody, told to calibrate anew by root alone."""
+    """D-Bus: every user can introspect and read, only root can recalibrate."""
     run.done("introspect", "property", "status", "recalibrate", "recalibrate_play", "save")
     for member in (".State", ".RateDps", ".Recalibrate", ".SaveState"):
         require(re.search(rf"^\{member} ", run.text("introspect"), re.MULTILINE), f"no {member}\n{run.text('introspect')}")
@@ -148,7 +149,7 @@ def speaks_on_dbus(run):
 
 
 def kill_nine(run):
-    """Killed without warning: started again, and valid from the first pair with the biases of before."""
+    """Killed: started again, and valid from the first pair with the saved biases."""
     run.done("killed", "killed_play")
     run.require_shows("killed_show", ActiveState="active", NRestarts="1")
     require("took up the biases" in run.text("killed_journal"), run.text("killed_journal"))
@@ -156,7 +157,7 @@ def kill_nine(run):
 
 
 def reloads(run):
-    """SIGHUP: a bad configuration is refused with its line, a good one taken; the same process, what was learned kept."""
+    """SIGHUP: a bad configuration is refused with its line, a good one is used; the process and the biases stay."""
     run.done("reload_bad", "reload_bad_said", "reload_good", "reload_good_said", "reload_play", "reload_back", "reload_back_said")
     pid = run.show("killed_show")["MainPID"]
     run.require_shows("reload_bad_show", ActiveState="active", MainPID=pid)
@@ -169,7 +170,7 @@ def reloads(run):
 
 
 def watchdog(run):
-    """A process that is stopped: ended by the watchdog, started again with what it knew."""
+    """A stopped process: ended by the watchdog, started again with its biases."""
     run.done("watchdog", "watchdog_play")
     run.require_shows("watchdog_show", ActiveState="active", NRestarts="2")
     require("watchdog" in run.text("watchdog_journal").lower(), run.text("watchdog_journal"))
@@ -177,7 +178,7 @@ def watchdog(run):
 
 
 def link_faults(run):
-    """Link down and up: the same process goes on, and no burst of old frames comes out."""
+    """Link down and up: the same process goes on, and sends no burst of old frames."""
     run.done("link_down", "link_up", "link_play")
     shown = run.require_shows("link_show", ActiveState="active")
     require(shown["MainPID"] == run.text("link_main").strip(), "another process")
@@ -198,7 +199,7 @@ def upgrades(run):
 
 
 def stops(run):
-    """Stopped: a clean end, and what it knew is on the disk, for its own eyes."""
+    """Stopped: a clean end, and the state is on the disk, readable by its own user only."""
     run.done("stop", "state")
     run.require_shows("stopped", ActiveState="inactive", Result="success", ExecMainStatus="0")
     directory, file = run.text("state").splitlines()
@@ -214,7 +215,7 @@ def stops(run):
 
 
 def goes_away(run):
-    """Removed: stopped, configuration and state kept. Purged: nothing left."""
+    """Removed: stopped, configuration and state stay. Purged: nothing is left."""
     run.done("remove", "removed_left", "purge", "purged_failed")
     run.require_shows("removed", ActiveState="inactive", LoadState="not-found")
     require("vgyrod" not in run.text("removed_processes"), "it still runs")
@@ -223,7 +224,7 @@ def goes_away(run):
 
 
 def network_examples(run):
-    """systemd-networkd and udev understand the example units; the queue's length is set."""
+    """systemd-networkd and udev accept the example units; the length of the queue is set."""
     run.done("links", "networkd")
     told = [line for line in run.text("networkd").splitlines() if re.search(r"[78]0-can\d\.(network|link)", line)
             and re.search(r"Unknown|Failed|Invalid|ignoring|not supported", line, re.IGNORECASE)]
@@ -233,7 +234,7 @@ def network_examples(run):
 
 
 def protection(run):
-    """Every frame that went out carries a right E2E header."""
+    """Every sent frame has a right E2E header."""
     require(len(run.frames) > 1000, f"{len(run.frames)} frames")
     for line in run.frames:
         verdicts.check_crc(line, int(line.name, 16))

@@ -1,7 +1,7 @@
 #!/usr/bin/python3
-"""The package under a real systemd: a small Debian boots in User Mode Linux, installs the .deb, and goes through the
-service's life with recorded traffic on vcan interfaces. The unit's sandbox is on. Never skips: exits with 1
-when a check fails or nothing could run."""
+"""The package under a real systemd: a small Debian boots in User Mode Linux, installs the .deb, and goes through the life
+of the service with recorded traffic on vcan interfaces. The unit's sandbox is on. Never skips: exits with 1 if a check
+fails or nothing could run."""
 
 import argparse
 import os
@@ -62,7 +62,7 @@ def output_of(*command):
 
 
 def another_version(deb, folder):
-    """The same package under a higher version number."""
+    """The same package with a higher version number."""
     tree = folder / "next"
     output_of("dpkg-deb", "--raw-extract", deb, tree)
     control = tree / "DEBIAN/control"
@@ -73,7 +73,7 @@ def another_version(deb, folder):
 
 
 def recordings(folder):
-    """What the gyros send at rest: long enough to calibrate, and shorter; in `vgyro simulate`'s truth."""
+    """Simulates the gyros at rest with `vgyro simulate`: long enough to calibrate, and shorter."""
     (folder / "model.toml").write_text(MODEL, encoding="utf-8")
     (folder / "profile.csv").write_text(f"t_s,rate_dps\n0,0\n{checks.PLAY_S},0\n", encoding="ascii")
     config = folder / "simulated.toml"

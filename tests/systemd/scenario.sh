@@ -1,5 +1,5 @@
-# Runs in the guest, on a Debian that has just started: the package's whole life. Each step leaves what it printed
-# and its exit code in out/, in the host's folder; the host judges. Starting a program is slow here (45 ms).
+# Runs in the guest, on a Debian that has just started: the whole life of the package. Each step leaves its output and exit
+# code in out/, in the host's folder; the host judges them. Starting a program is slow here (45 ms).
 here=/run/proof
 out=$here/out
 export LC_ALL=C SYSTEMD_COLORS=0 SYSTEMD_PAGER= DEBIAN_FRONTEND=noninteractive
@@ -21,13 +21,13 @@ show() { systemctl show vgyrod -p ActiveState,SubState,Result,MainPID,NRestarts,
 says() { [[ $(systemctl show vgyrod -p "$1" --value) == $2 ]]; }
 pid() { systemctl show vgyrod -p MainPID --value; }
 journal() { journalctl -u vgyrod --no-pager -o short-unix --since "@$1"; }
-other_pid() {  # at one look: between two, the process may go
+other_pid() {  # one call, because between two the process may change
     local shown; shown=$(systemctl show vgyrod -p ActiveState,MainPID)
     [[ $shown == *ActiveState=active* && $shown =~ MainPID=([1-9][0-9]*) && ${BASH_REMATCH[1]} != "$1" ]]
 }
 said() { (($(journal "$since" | grep -c -e "$1") >= ${2-1})); }  # said TEXT [TIMES]: since $since
 play() { canplayer -I "$here/$1.log"; }
-watch_time() {  # notes when a nap of 20 ms took 50 ms more: when it ended and how long, in microseconds
+watch_time() {  # notes the end and the length, in microseconds, of each 20 ms sleep that took 50 ms more
     local before=${EPOCHREALTIME/./} now never
     exec {never}<><(:)
     while :; do
@@ -41,7 +41,7 @@ mkdir -p /run/modules
 mount -t hostfs none /run/modules -o "$(cat $here/modules.path)"
 for module in can can-raw can-dev vcan; do insmod "$(find /run/modules -name "$module.ko*")"; done 2>"$out/modules.txt"
 
-# The examples, before the interfaces are there.
+# The example units, installed before the interfaces exist.
 cp $here/examples/*.network $here/examples/*.link /etc/systemd/network/
 udevadm control --reload
 for name in vcan0 vcan1 can0; do ip link add $name type vcan && ip link set $name up; done
@@ -68,7 +68,7 @@ cp /run/capture.log $out/unconfigured.log
 # Badly configured.
 echo '[[gyro]]' >/etc/vgyro/vgyro.toml
 step bad_start systemctl start vgyrod
-sleep 3  # it must not try again
+sleep 3  # it must not be started again
 step bad_started show
 
 # Configured.
@@ -83,10 +83,10 @@ step mounts grep -E ' / | /etc | /tmp | /dev ' /proc/$main/mountinfo
 step security systemd-analyze security vgyrod --no-pager
 step play play calibration
 
-# Asked over D-Bus: by anybody to be read, by root alone to do something.
+# D-Bus: any user may read, only root may call methods.
 gateway=(org.vgyro.Gateway1 /org/vgyro/Gateway1)
 nobody() { setpriv --reuid=65534 --regid=65534 --clear-groups "$@"; }
-while_running() {  # STATUS comes once a second, and a busy host may miss it
+while_running() {  # STATUS is sent once a second, which a busy host may miss
     local try code=1
     for try in 1 2 3 4; do
         play rest &
@@ -105,7 +105,7 @@ sleep 1
 step recalibrate_play play calibration
 step save busctl call "${gateway[@]}" org.vgyro.Gateway1 SaveState
 
-# Killed without warning, and back with what it knew.
+# Killed, and started again with its saved biases.
 since=$(date +%s)
 kill -9 $main
 step killed within 60 other_pid $main
@@ -132,7 +132,7 @@ within 30 says ActiveState active
 step reload_show show
 step reload_journal journal $since
 
-# Stopped by somebody: the watchdog ends it.
+# Stopped by a signal: the watchdog ends it.
 since=$(date +%s)
 kill -STOP $main
 step watchdog within 90 other_pid $main
@@ -141,11 +141,11 @@ step watchdog_play play rest
 step watchdog_journal journal $since
 main=$(pid)
 
-# The link goes and comes.
+# The link goes down and up.
 since=$(date +%s)
 ip link set vcan0 down
 step link_down within 30 said 'vcan0: link went down'
-sleep 1  # of frames that must not come out afterwards
+sleep 1  # frames of this second must not be sent afterwards
 ip link set vcan0 up
 step link_up within 30 said 'vcan0: link is up again'
 step link_play play rest
