@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""What bash offers after <Tab>, asked of bash itself with the completion file loaded."""
+"""The completions that bash itself offers after <Tab>, with the completion file loaded."""
 
 import os
 import re

@@ -1,6 +1,6 @@
 #!/usr/bin/python3
-"""The Debian package as dpkg-deb and lintian see it. That it installs, upgrades and goes away is judged under a
-real systemd, in tests/systemd."""
+"""Checks the Debian package with dpkg-deb and lintian. tests/systemd checks its installation, upgrade and removal under a
+real systemd."""
 
 import os
 import platform
@@ -59,7 +59,7 @@ class Deb(unittest.TestCase):
             cls.members[name.split(" -> ")[0].removeprefix(".")] = (mode, owner)
 
     def programs(self):
-        """Path of each packed program, one after the other."""
+        """The path of each packaged program, in turn."""
         with tempfile.TemporaryDirectory() as folder:
             output_of("dpkg-deb", "--extract", self.deb, folder)
             for name in ("vgyro", "vgyrod"):
@@ -67,7 +67,7 @@ class Deb(unittest.TestCase):
                     yield Path(folder, "usr/bin", name)
 
     def test_the_programs_are_hardened(self):
-        # Anywhere in memory, with guarded stacks, and with nothing that can be overwritten and then called.
+        # Position-independent, with guarded stacks, and without writable tables of functions.
         for program in self.programs():
             seen = output_of("readelf", "--wide", "--file-header", "--dynamic", "--segments", "--dyn-syms", program)
             self.assertRegex(seen, r"Type: +DYN")
@@ -80,9 +80,10 @@ class Deb(unittest.TestCase):
     def test_calls_and_a_growing_stack_are_guarded(self):
         for program in self.programs():
             code = output_of("objdump", "--disassemble", program)
-            # Our functions are marked as places to go to. (Debian 12's own start files are not, so its processor leaves it at that.)
+            # Our functions are marked as branch targets. (Debian 12's start files are not, so the processor does not
+            # enforce it.)
             self.assertGreater(code.count("endbr64"), 500)
-            # A large frame touches each of its pages on the way.
+            # A large stack frame touches each of its pages in turn.
             self.assertRegex(code, r"or[ql] +\$0x0,\(%rsp\)")
 
     def test_nothing_in_the_programs_tells_where_they_were_built(self):
@@ -121,7 +122,7 @@ class Deb(unittest.TestCase):
                 self.assertEqual(output_of(f"{folder}/usr/bin/{program}", "--version").strip(), f"{program} {version}")
 
     def test_lintian_has_no_complaint(self):
-        # It refuses to be root without being told that this is meant.
+        # Without this option, lintian refuses to run as root.
         root = ["--allow-root"] if os.geteuid() == 0 else []
         done = subprocess.run(["lintian", *root, "--fail-on", "error,warning", "--tag-display-limit", "0", self.deb],
                               capture_output=True, text=True, check=False)

@@ -1,6 +1,6 @@
 #!/usr/bin/python3
-"""The manual pages name every option that --help names, and no other; every key that the gateway reads, and no
-other; and groff has nothing to say about them."""
+"""The manual pages name exactly the options of --help and the keys that the gateway reads, and groff has no complaints
+about them."""
 
 import os
 import re
@@ -24,7 +24,7 @@ def sections(text):
 
 
 def terms(section):
-    """The lines that head an indented explanation."""
+    """The lines above an indented explanation."""
     return [above for above, below in zip(section.splitlines(), section.splitlines()[1:])
             if above.startswith("*") and below.startswith("\t")]
 
@@ -95,7 +95,7 @@ class Manual(unittest.TestCase):
         self.assertEqual(rows - told, set(), "in docs/configuration.md, not in the manual")
 
     def test_every_key_that_the_gateway_asks_for_is_told(self):
-        """By what its sources ask the reader for: the program itself lists no keys."""
+        """Finds the keys in the sources that read them, because the program lists no keys."""
         told = set().union(*keys_of_manual().values())
         asked = set()
         for name in ("config.cpp", "e2e_config.cpp", "output_layout_config.cpp", "signal_resolver.cpp", "valid_config.cpp",
@@ -106,7 +106,7 @@ class Manual(unittest.TestCase):
         self.assertEqual(asked - told, set())
 
     def test_the_columns_of_a_profile_are_told_everywhere(self):
-        """As the program itself says when the header is wrong."""
+        """Takes the columns from the program's message about a wrong header."""
         with tempfile.TemporaryDirectory() as folder:
             profile, model = Path(folder) / "p.csv", Path(folder) / "m.toml"
             profile.write_text("0,1\n1,1\n")

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""The service's unit as systemd itself judges it, and the configuration that the package brings."""
+"""Checks the service's unit with systemd itself, and the configuration in the package."""
 
 import os
 import re
@@ -12,7 +12,7 @@ SOURCE = Path(os.environ.get("VGYRO_SOURCE", Path(__file__).resolve().parents[2]
 BIN = Path(os.environ.get("VGYRO_BIN", SOURCE / "build/release/bin"))
 UNIT = SOURCE / "systemd/vgyrod.service"
 TEMPLATE = SOURCE / "systemd/vgyrod@.service"
-# Lower is better. 0.5 of it is the network: the gateway would have no bus without.
+# Lower is better. The network is 0.5 of it: without it the gateway would have no bus.
 EXPOSURE_MOST = 1.3
 
 
@@ -20,7 +20,7 @@ class Unit(unittest.TestCase):
     def test_systemd_finds_nothing_wrong(self):
         for unit, name in ((UNIT, UNIT.name), (TEMPLATE, "vgyrod@front.service")):
             with self.subTest(unit=unit.name), tempfile.TemporaryDirectory() as folder:
-                # It wants the program where the unit says; its pages are not installed.
+                # systemd-analyze needs the program at the unit's path, and the manual pages, which are not installed.
                 copy = Path(folder) / name
                 text = unit.read_text(encoding="utf-8").replace("/usr/bin/vgyrod", str(BIN / "vgyrod"))
                 copy.write_text(text.replace("Documentation=man:", "#"), encoding="utf-8")
@@ -47,7 +47,7 @@ class Unit(unittest.TestCase):
         self.assertNotRegex(done.stdout, r"✗ (User=/DynamicUser=|NoNewPrivileges=|ProtectSystem=|SystemCallFilter=)")
 
     def condition(self, config):
-        """Exit code of the unit's condition for a configuration at the place that the unit names."""
+        """Result of the unit's condition for this configuration."""
         line = re.search(r"^ExecCondition=/bin/sh -c '(.*)'$", UNIT.read_text(encoding="utf-8"), re.MULTILINE).group(1)
         return subprocess.run(["sh", "-c", line.replace("/etc/vgyro/vgyro.toml", str(config))], capture_output=True,
                               text=True, check=False)
