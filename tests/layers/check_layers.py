@@ -1,6 +1,6 @@
 #!/usr/bin/python3
-"""Fails when a source includes what its layer must not know: another layer against the arrows, the
-operating system's CAN, systemd, Eigen, iostreams, or a clock."""
+"""Fails if a source includes what its layer must not use: another layer against the arrows, the CAN headers of the
+operating system, systemd, Eigen, iostreams, or a clock."""
 
 import argparse
 import os
@@ -26,8 +26,8 @@ ARROWS = {
     "cli": {"base", "can", "canlog", "dbc", "model", "simulation", "fusion", "analysis", "gap", "fleet", "gateway", "cli"},
 }
 
-# The gap workflow is as much as all other layers together, so it has arrows of its own: file → the files of its folder
-# that it may include. The search decides on top of what only answers; what answers knows no search.
+# The gap workflow is as large as all other layers together, so it has arrows of its own: file → the files of its folder
+# that it may include. The search uses the files that only compute answers; these do not include the search.
 GAP_BASE = {"curve", "median", "recording", "result", "kinds"}
 GAP_DATA = GAP_BASE | {"noise", "signals", "observations", "unseen_motion"}
 GAP_REGRESSION = GAP_DATA | {"least_squares", "regression", "found"}
@@ -67,10 +67,10 @@ GAP_ARROWS = {
     "workflow": GAP_STUDY | {"acceptance", "describe", "differences", "figures", "identifiable", "leftover", "score", "search", "weigh"},
 }
 
-# What, as a pattern of an included header → the files that may include it.
+# Pattern of an included header → the files that may include it.
 SYSTEM_HEADERS = (
     (r"linux/can.*|net/if\.h", r"can/socket\.(h|cpp)"),
-    # The other one speaks to the service manager.
+    # daemon/service.cpp sends to the service manager.
     (r"sys/socket\.h|sys/un\.h", r"can/socket\.(h|cpp)|daemon/service\.cpp"),
     (r"systemd/.*", r"daemon/.*|cli/status/gateway_client\.cpp"),
     (r"Eigen/.*|unsupported/Eigen/.*", r"(fusion|analysis|gap|fleet)/.*"),
@@ -85,7 +85,7 @@ COMMENT_OR_STRING = re.compile(r'//[^\n]*|/\*.*?\*/|"(?:\\.|[^"\\\n])*"', re.DOT
 
 
 def without_comments_and_strings(text):
-    """Blanked out, line numbers kept."""
+    """`text` with comments and strings removed; line numbers stay."""
     return COMMENT_OR_STRING.sub(lambda m: "\n" * m.group().count("\n"), text)
 
 
@@ -120,7 +120,7 @@ def include_complaint(root, layer, name, quote, header):
 
 
 def complaints(root):
-    """All breaches below root, as "file:line: what"."""
+    """All violations below root, as "file:line: what"."""
     found = []
     for layer, path in sources(root):
         name = path.relative_to(root).as_posix()

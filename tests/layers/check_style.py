@@ -15,16 +15,16 @@ from check_layers import ARROWS
 from function_lengths import UnbalancedBraces, function_lengths
 
 BYTES_MAX = 2_000_000
-# Split, so that this file does not hold what it looks for.
+# The strings are split so that this file does not match them itself.
 FORBIDDEN = (
     (re.compile(r"(?<![\w.])/(?:work|home|root|Users|mnt)/" + r"\w"), "path of one machine"),
     (re.compile(r"\b(?:registry\.|[\w-]+\.(?:pkg|gcr|jfrog|artifactory)\.|ghcr\.|quay\.)" + r"[\w-]+"), "registry host"),
     (re.compile(r"\b(?:TO" + r"DO|FIX" + r"ME|XX" + r"X)\b"), "note to oneself"),
     (re.compile(r"\.\./" + r"shared\b"), "path outside the repository"),
 )
-# The build machine's own entry may say where that machine keeps its recordings.
+# The CI configuration may name the machine's folder of recordings.
 MACHINE_FILES = re.compile(r"\.ci/.*")
-# Third-party spellings that only look like a note.
+# Third-party names that only look like a note.
 NOT_NOTES = re.compile(r"Vector__" + "XX" + "X")
 
 SOURCES = re.compile(rf"(?:{'|'.join(ARROWS)})/.*\.(?:h|cpp)")
@@ -66,7 +66,7 @@ def text_complaints(root, name):
 
 
 def known_tests(root):
-    """Suite.Name of GoogleTest, Class.test_name of Python's unittest, and the suites by themselves."""
+    """Suite.Name of GoogleTest, Class.test_name of Python's unittest, and the names of suites and classes."""
     names = set()
     for path in sorted((root / "tests").rglob("*")):
         if path.suffix == ".cpp":
@@ -81,7 +81,7 @@ def known_tests(root):
 
 
 def invariants(text):
-    """(line number, number, text) of every numbered item of the sections whose title says "invariant"."""
+    """(line number, number, text) of every numbered item in sections with "invariant" in their title."""
     inside, item = False, None
     for number, line in enumerate(text.splitlines(), 1):
         if line.startswith("#"):

@@ -1,9 +1,9 @@
-"""How many lines the functions of a C++ source have, from the first line of their declaration to the
-closing brace. Reads what clang-format has laid out; knows no macros that hold braces."""
+"""Counts the lines of each function in a C++ source, from the first line of its declaration to the closing brace. Expects
+the layout of clang-format, and no macros that contain braces."""
 
 import re
 
-# Raw strings before strings, for they may hold anything.
+# Raw strings come before strings, because they may contain anything.
 NO_CODE = re.compile(r'R"(\w*)\(.*?\)\1"|//[^\n]*|/\*.*?\*/|"(?:\\.|[^"\\\n])*"' r"|'(?:\\.|[^'\\\n])+'|^\s*#(?:\\\n|[^\n])*",
                      re.DOTALL | re.MULTILINE)
 DIGIT_SEPARATOR = re.compile(r"(?<=[0-9a-fA-F])'(?=[0-9a-fA-F])")
@@ -18,19 +18,19 @@ class UnbalancedBraces(ValueError):
 
 
 def function_name(head):
-    """None where the brace behind this text opens no function."""
+    """The function's name; None if the brace after this text opens no function."""
     text = TEMPLATE.sub("", ACCESS.sub("", head)).strip()
     if SCOPE.match(text) or ")" not in text or text.endswith("="):
         return None
     match = NAME.search(text)
-    return match.group(1) if match else text.split("=")[0].split()[-1]  # a lambda that has a name
+    return match.group(1) if match else text.split("=")[0].split()[-1]  # a named lambda
 
 
 def function_lengths(text):
-    """[(name, first line, lines)] of every function with a body, in the text's order."""
+    """[(name, first line, lines)] of every function with a body, in the order of the text."""
     text = NO_CODE.sub(lambda m: "\n" * m.group().count("\n"), DIGIT_SEPARATOR.sub("", text))
     found, scopes, head_begin, inside = [], [], 0, None
-    just_closed = False  # the token before closed a function
+    just_closed = False  # the previous token closed a function
     for at in (m.start() for m in re.finditer(r"[;{}]", text)):
         head = ACCESS.sub("", text[head_begin:at])
         head_begin = at + 1
@@ -44,7 +44,7 @@ def function_lengths(text):
                 first = text.count("\n", 0, at - len(head.lstrip())) + 1
                 inside = {"name": name, "first": first, "depth": 1}
             elif goes_on and re.match(r"\s*(,|$)", head):
-                # Behind members that braces initialise: the constructor goes on.
+                # After members initialised with braces, the constructor goes on.
                 inside = found.pop() | {"depth": 1}
             else:
                 scopes.append(at)
