@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Corpora for the fuzzers to begin with, from the project's own recordings and files: make_seeds.py FOLDER."""
+"""Makes the initial corpora of the fuzzers from the project's own recordings and files: make_seeds.py FOLDER."""
 
 import bz2
 import gzip
@@ -28,7 +28,8 @@ def candump_logs(lines):
     yield b"\x01\x07\x3f\xff" + "".join(forms).encode()
     yield b"\xff\xff\xff\xff" + "".join(lines[:200]).encode()
     yield b"\x00\x00\x00\x00" + "".join(lines[5000:5040] + forms).encode()
-    # The usual form: more interfaces than are compared quickly, all widths, seconds that pass; and among it what is not quite so.
+    # The usual form, with more interfaces than the quick comparison covers, all widths and successive seconds; then also
+    # with slightly malformed lines.
     usual = [f"(17000000{i // 8:02}.{i * 111111 % 1000000:06}) {('can0', 'can1', 'c', 'vcan123', 'can01', 'vcan1234')[i % 6]} "
              f"{i * 37 % 2048:03X}#{'0123456789abcDEF'[: 2 * (i % 9)]}\n" for i in range(60)]
     yield b"\x40\x21\x05\xff" + "".join(usual).encode()
@@ -37,7 +38,7 @@ def candump_logs(lines):
 
 
 def logs_of_all_forms(lines):
-    """The fuzzer's first byte is the size of the pieces in which a log arrives; then the log, from the forms' own test."""
+    """The fuzzer's first byte is the size of the pieces in which a log arrives; then comes a log from the test of the forms."""
     text = (ROOT / "tests/canlog/forms_test.cpp").read_text(encoding="utf-8")
     # Adjacent string literals of C++ are one text.
     for parts in re.findall(r'((?:"(?:[^"\\\n]|\\.)*"\s*)+)', text):
@@ -59,10 +60,10 @@ def configurations():
         text = re.sub(r"^#(?=[a-z\[])", "", path.read_text(encoding="utf-8"), flags=re.MULTILINE)
         text = re.sub(r'^dbc = ".*?"', 'dbc = "201"', text, flags=re.MULTILINE)
         yield text.encode() + b"\0" + (ROOT / "examples/twin.dbc").read_bytes()
-    # Every key that the manual has, over frames that have everything.
+    # Every key of the manual, for messages with every signal.
     bench = (ROOT / "tests/fuzz/pipeline_fuzzer.cpp").read_text(encoding="utf-8").split('R"(')[1].split(')"')[0]
     yield EVERYTHING.encode() + b"\0" + bench.encode()
-    # Whole units: axes in one message and in their own, mounts in both forms, layouts of one axis and of several.
+    # Whole units: axes in one message and in several, mounts in both forms, layouts of one axis and of several.
     for text in UNITS:
         yield text.encode() + b"\0" + UNITS_DBC.encode()
 
@@ -160,7 +161,7 @@ def models():
 
 
 def saved_states():
-    """As the gateway writes it, and as it did before slopes, kinds and temperatures were learned."""
+    """The state file as the gateway writes it, and as it did before it learned slopes, kinds and temperatures."""
     for name in ("state.toml", "older_state.toml"):
         text = (ROOT / "tests/fuzz" / name).read_bytes()
         yield text
@@ -168,8 +169,8 @@ def saved_states():
 
 
 def frames(lines):
-    """The recording in the pipeline fuzzer's form: choice of the configuration, then for every frame its kind, the step
-    of its stamp in microseconds, and its payload."""
+    """The recording in the form of the pipeline fuzzer: the choice of the configuration, then for every frame its kind, the
+    step of its stamp in microseconds, and its payload."""
     for choice in (0b000, 0b1000, 0b10, 0b100, 0b100000, 0b1000000, 0b1100000, 0b11000000, 0b11000001):
         out, last = [bytes([choice])], None
         for line in lines[:400]:
