@@ -1,4 +1,4 @@
-# What ./run and ./test share: installing what is missing, building, saying what goes on.
+# Shared by ./run and ./test: installing missing packages, building, progress messages.
 
 BUILD_PACKAGES=(g++ cmake ninja-build pkg-config libeigen3-dev libfmt-dev libcli11-dev
   libtomlplusplus-dev libexpected-dev nlohmann-json3-dev liblzma-dev libsystemd-dev libnlopt-cxx-dev
@@ -12,7 +12,8 @@ TIDY_PACKAGES=(clang-tidy)
 
 LAYERS=(base can canlog dbc model simulation fusion analysis gap fleet gateway daemon cli)
 
-# clang-tidy goes by the debug preset's commands: clang cannot read the precompiled headers of another compiler.
+# clang-tidy uses the commands of the debug preset, because clang cannot read the precompiled headers of
+# another compiler.
 configure_tidy() {
   mkdir -p build
   cmake --preset debug >build/debug.log 2>&1 || { cat build/debug.log; die "the configuration of debug failed"; }
@@ -37,7 +38,7 @@ install_missing() {
   [ ${#missing[@]} = 0 ] && return
   say "installing ${missing[*]}"
   as_root env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "${missing[@]}" >/dev/null 2>&1 && return
-  # The package lists of a fresh machine are empty or old.
+  # A fresh machine's package lists are empty or old.
   as_root apt-get update -qq
   as_root env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "${missing[@]}" >/dev/null
 }
