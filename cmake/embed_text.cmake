@@ -1,5 +1,5 @@
-# vgyro_embed_text(TARGET NAMESPACE NAME=FILE...): files become part of the program, as string_views
-# NAME in a header "TARGET_text.h". Read again when a file changes.
+# vgyro_embed_text(TARGET NAMESPACE NAME=FILE...): embeds files in the program, as string_views NAME in a
+# header "TARGET_text.h". A changed file is embedded again.
 function(vgyro_embed_text target namespace)
   set(header "#pragma once\n#include <string_view>\nnamespace ${namespace} {\n")
   set(body "#include \"${target}_text.h\"\nnamespace ${namespace} {\n")
@@ -8,7 +8,7 @@ function(vgyro_embed_text target namespace)
     set(name ${CMAKE_MATCH_1})
     get_filename_component(file "${CMAKE_MATCH_2}" ABSOLUTE)
     set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS "${file}")
-    # Bytes as hexadecimal digits: no text can break out of that.
+    # Bytes are written as hexadecimal numbers, which need no escaping.
     file(READ "${file}" bytes HEX)
     string(REGEX REPLACE "(................................)" "\\1\n" bytes "${bytes}")
     string(REGEX REPLACE "([0-9a-f][0-9a-f])" "0x\\1," bytes "${bytes}")

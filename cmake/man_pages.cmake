@@ -1,4 +1,4 @@
-# Manual pages into build/PRESET/man, target `man`, where scdoc is installed; the package needs it.
+# Makes the manual pages in build/PRESET/man (target `man`) if scdoc is installed; the package needs it.
 find_program(SCDOC scdoc)
 if(SCDOC)
   set(pages "")

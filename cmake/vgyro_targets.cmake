@@ -1,10 +1,11 @@
-# One place for flags, so that a layer's CMakeLists.txt says only what it is made of.
+# One place for flags, so that a layer's CMakeLists.txt lists only its parts.
 
 # Assertions stay on in a release: a bug must stop the daemon, not publish a rate.
 set(CMAKE_CXX_FLAGS_RELEASE "-O2")
 set(CMAKE_CXX_FLAGS_RELWITHDEBINFO "-O2 -g")
 if(VGYRO_SANITIZE)
-  # GCC takes minutes to optimise and describe what the sanitizers make of Eigen; lines are enough.
+  # GCC takes minutes to optimise sanitized Eigen code and to write its debug information; line numbers are
+  # enough.
   set(CMAKE_CXX_FLAGS_RELWITHDEBINFO "-O1 -g1")
 endif()
 
@@ -12,14 +13,14 @@ add_library(vgyro_flags INTERFACE)
 target_include_directories(vgyro_flags INTERFACE ${PROJECT_SOURCE_DIR})
 target_compile_options(vgyro_flags INTERFACE
   -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wsign-conversion -Wnon-virtual-dtor -Werror
-  # A fused multiply-add rounds differently from machine to machine: same input, same bytes out.
+  # Same input, same bytes out: a fused multiply-add would round differently on some machines.
   -ffp-contract=off
-  # Nobody reads errno after mathematics; without it rounding is one instruction.
+  # No code reads errno after mathematics; without it, rounding is one instruction.
   -fno-math-errno)
 if(CMAKE_BUILD_TYPE STREQUAL "Release")
-  # A frame on the bus can be anything: what a mistake of ours would let it overwrite is noticed.
+  # A frame on the bus can hold anything: if a bug lets it overwrite memory, these checks stop the program.
   target_compile_options(vgyro_flags INTERFACE -fstack-protector-strong -D_FORTIFY_SOURCE=2)
-  # A stack that grows past its guard page is noticed at the page, and a call or a return that was bent goes nowhere.
+  # Stops a stack that grows past its guard page, and calls and returns to manipulated addresses.
   include(CheckCXXCompilerFlag)
   foreach(guard stack-clash-protection cf-protection=full)
     string(MAKE_C_IDENTIFIER "VGYRO_HAS_${guard}" known)
@@ -28,14 +29,14 @@ if(CMAKE_BUILD_TYPE STREQUAL "Release")
       target_compile_options(vgyro_flags INTERFACE -f${guard})
     endif()
   endforeach()
-  # An assertion tells its place within the project; where that was built is nobody's business.
+  # Assertions show paths within the project, not the folder of the build.
   target_compile_options(vgyro_flags INTERFACE -ffile-prefix-map=${PROJECT_SOURCE_DIR}=.)
 endif()
 if(VGYRO_SANITIZE)
   target_compile_options(vgyro_flags INTERFACE -fsanitize=${VGYRO_SANITIZE} -fno-sanitize-recover=all -fno-omit-frame-pointer)
   target_link_options(vgyro_flags INTERFACE -fsanitize=${VGYRO_SANITIZE})
   if(CMAKE_CXX_COMPILER_ID STREQUAL GNU)
-    # With a sanitizer GCC 12 warns of uninitialised use inside std::optional and std::regex where there is none.
+    # With a sanitizer, GCC 12 gives false warnings of uninitialised use inside std::optional and std::regex.
     target_compile_options(vgyro_flags INTERFACE -Wno-maybe-uninitialized)
   endif()
 endif()
@@ -43,21 +44,21 @@ if(VGYRO_FUZZERS)
   target_compile_options(vgyro_flags INTERFACE -fsanitize=fuzzer-no-link)
 endif()
 
-# A frame crosses every layer in some tens of nanoseconds: in a release the sources that it goes through,
-# a layer's FRAME_PATH, are optimised across layers. Tests link the same objects' ordinary code.
+# A frame crosses every layer in some tens of nanoseconds, so in a release the sources on its way, a layer's
+# FRAME_PATH, are optimised across layers. Tests link the ordinary code of the same objects.
 if(CMAKE_BUILD_TYPE STREQUAL "Release" AND CMAKE_CXX_COMPILER_ID STREQUAL GNU)
   set(VGYRO_WHOLE_PROGRAM ON)
 endif()
 function(vgyro_whole_program target)
   if(VGYRO_WHOLE_PROGRAM)
-    # Resolved at the start and read-only from then on: nothing overwrites where a call goes.
+    # Symbols are resolved at the start and then read-only, so that no call can be redirected.
     target_link_options(${target} PRIVATE -flto=auto -Wno-stringop-overflow -Wl,-z,relro,-z,now)
   endif()
 endfunction()
 
-# What many sources include of other people's headers is parsed once for all: STL here, and with it Eigen,
-# JSON or GoogleTest. A source still includes what it uses; CMAKE_DISABLE_PRECOMPILE_HEADERS, which the
-# debug preset sets, shows what is missing.
+# Precompiles third-party headers that many sources include: the STL here, and with it Eigen, JSON or
+# GoogleTest. A source still includes what it uses; CMAKE_DISABLE_PRECOMPILE_HEADERS, which the debug preset
+# sets, shows missing includes.
 function(vgyro_precompiled name)
   add_library(vgyro_${name}_pch OBJECT ${PROJECT_SOURCE_DIR}/cmake/precompiled.cpp)
   target_link_libraries(vgyro_${name}_pch PRIVATE vgyro_flags fmt::fmt)
