@@ -45,7 +45,7 @@ TEST(CaptureTriggers, ARefusedStopIsACauseWhereMostStretchesTaughtLittle) {
     bool is_cause;
   };
   constexpr Step kSteps[] = {
-      {0, 1, 0, false}, {0, 2, 0, false},  // too few to tell
+      {0, 1, 0, false}, {0, 2, 0, false},  // too few to judge
       {0, 3, 0, true},                     // most taught little, and this one too
       {0, 3, 0, false},                    // nothing new
       {1, 3, 0, false},                    // a good one

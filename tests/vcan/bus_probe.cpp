@@ -103,7 +103,7 @@ class BusProbe : public testing::Test {
     const std::string command =
         fmt::format("printf '{}' | ip {} -batch - {}", lines, may_fail ? "-force" : "",
                     may_fail ? "2>/dev/null" : "");
-    // NOLINTNEXTLINE(concurrency-mt-unsafe): nobody else starts programs
+    // NOLINTNEXTLINE(concurrency-mt-unsafe): no other thread starts programs
     const int status = std::system(command.c_str());
     ASSERT_TRUE(may_fail || status == 0) << lines;
   }
@@ -293,7 +293,7 @@ TEST_F(BusProbe, AnInterfaceThatMovesToAnotherNamespaceIsGoneUntilItComesBack) {
   EXPECT_TRUE(was_said("probe0: the interface was removed; waiting for it"));
   const std::string back = fmt::format("nsenter --target {} --net ip link set probe0 netns {}",
                                        elsewhere.process(), ::getpid());
-  // NOLINTNEXTLINE(concurrency-mt-unsafe): nobody else starts programs
+  // NOLINTNEXTLINE(concurrency-mt-unsafe): no other thread starts programs
   ASSERT_EQ(std::system(back.c_str()), 0);
   change_links("link set probe0 up\n");
   second(bus);
