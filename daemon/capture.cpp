@@ -135,7 +135,7 @@ std::string Capture::text_of(CaptureCause cause, const gateway::Status& status) 
     case CaptureCause::kAsked:
       break;
   }
-  return "asked for on D-Bus";
+  return "requested on D-Bus";
 }
 
 CaptureNote Capture::note_of(CaptureCause cause, std::string text, TimePoint now) const {
@@ -242,7 +242,7 @@ void Capture::tell(const Expected<std::string>& written) {
   ++written_[static_cast<std::size_t>(writing_->cause)];
   last_ = *written;
   last_stamp_ = writing_last_;
-  log_.tell(Severity::kNotice, {.cause = "capture"}, "{}: {} frames of the inputs, because: {}",
+  log_.tell(Severity::kNotice, {.cause = "capture"}, "{}: capture of {} input frames; cause: {}",
             last_, writing_frames_, writing_->text);
 }
 

@@ -189,7 +189,7 @@ Expected<std::string> CaptureStore::write(const CaptureNote& note,
 // Called before the capture is written, so that the limits hold while it is.
 Expected<void> CaptureStore::make_room(std::uint64_t bytes) const {
   if (bytes > limits_.bytes) {
-    return fail(directory_, fmt::format("a capture of {} bytes is more than may lie there", bytes),
+    return fail(directory_, fmt::format("a capture of {} bytes exceeds the disk limit", bytes),
                 "raise --capture-disk, or lower --capture-memory");
   }
   const std::vector<std::string> captures = names();

@@ -567,7 +567,7 @@ Expected<void> GatewayLoop::try_to_replace_setup(gateway::Plan plan, bool keep) 
   try {
     return replace_setup(std::move(plan), keep);
   } catch (const std::bad_alloc&) {
-    return fail({}, "there is not memory enough for a second configuration beside the first");
+    return fail({}, "there is not enough memory for a second configuration beside the first");
   }
 }
 
@@ -652,7 +652,7 @@ int GatewayLoop::on_second(sd_event_source* source, std::uint64_t, void* self) {
     loop.told_of_shortage_ = false;
   } catch (const std::exception& error) {
     if (!std::exchange(loop.told_of_shortage_, true))
-      loop.log_.warning("the system gives the gateway too little: {}", error.what());
+      loop.log_.warning("the system is short of resources: {}", error.what());
   }
   sd_event_source_set_time_relative(source, kSecondUsec);
   return sd_event_source_set_enabled(source, SD_EVENT_ONESHOT);

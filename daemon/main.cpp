@@ -176,7 +176,7 @@ void add_capture_options(CLI::App& app, CaptureOptions& capture) {
       app.add_option("--capture", capture.directory,
                      "keeps the last minutes of the inputs in memory and writes them into this "
                      "directory when the gyros contradict each other, when most stops are refused, "
-                     "and for `vgyro capture`; a relative one is in $STATE_DIRECTORY")
+                     "and for `vgyro capture`; a relative path is below $STATE_DIRECTORY")
           ->type_name("DIR");
   const auto add = [&](const char* name, auto& value, double least, double most,
                        const std::string& text) {
@@ -225,7 +225,7 @@ void add_options(CLI::App& app, Options& options) {
   app.footer(
       "`vgyro check FILE` explains a configuration before it is trusted.\n"
       "SIGHUP reads the configuration again; one that cannot be used is refused.\n"
-      "SIGUSR1 begins debug messages, and ends them.\n"
+      "SIGUSR1 toggles debug messages.\n"
       "Exit codes: 0 stopped by a signal, 1 configuration unusable, or another gateway has the "
       "state "
       "file or the captures, 2 wrong usage, 3 the system failed.");
@@ -236,7 +236,7 @@ std::string capture_conflict(const CaptureOptions& capture) {
   if (capture.disk_mib >= capture.memory_mib) return {};
   return fmt::format(
       "--capture-disk is {:g} MiB, less than the {:g} MiB of --capture-memory, which one capture "
-      "may take; raise the one or lower the other",
+      "may take; raise --capture-disk or lower --capture-memory",
       capture.disk_mib, capture.memory_mib);
 }
 

@@ -98,7 +98,7 @@ void add_rate(Text& text, const Snapshot& now) {
   text.family("vgyro_gyros_disagree", "gauge", "1 while the gyros contradict each other.");
   text.sample({}, status.disagree);
   text.family("vgyro_pair_contradicted", "gauge",
-              "1 while the gyros cannot be of one platform, by why; no rate is valid then.");
+              "1 while the gyros cannot be on one platform, by reason; no rate is valid then.");
   for (std::size_t i = 1; i < fusion::kContradictions; ++i) {
     const auto contradiction = static_cast<fusion::Contradiction>(i);
     text.sample({{"why", gateway::to_string(contradiction)}},
@@ -107,7 +107,7 @@ void add_rate(Text& text, const Snapshot& now) {
   text.family("vgyro_ambiguous", "gauge",
               "1 while the data can be read in two ways; sigma spans both.");
   text.sample({}, status.ambiguous);
-  text.family("vgyro_hypothesis_probability", "gauge", "Of what may be the case.");
+  text.family("vgyro_hypothesis_probability", "gauge", "Probability of each hypothesis.");
   for (std::size_t i = 0; i < status.probability.size(); ++i) {
     text.sample({{"hypothesis", gateway::to_string(static_cast<fusion::Hypothesis>(i))}},
                 status.probability[i]);
@@ -146,7 +146,7 @@ void add_counters(Text& text, const Snapshot& now) {
   text.sample({}, status.estimate_restarts);
   text.family("vgyro_clock_steps_total", "counter", "Times that the stamps were set back.");
   text.sample({}, status.clock_steps);
-  text.family("vgyro_sent_frames_total", "counter", "Frames that the bus took.");
+  text.family("vgyro_sent_frames_total", "counter", "Frames sent.");
   text.sample({}, sent.sent);
   text.family("vgyro_dropped_frames_total", "counter", "Frames that did not go out, by cause.");
   text.sample({{"cause", "stale"}}, sent.dropped_stale);
@@ -199,18 +199,19 @@ void add_gyros(Text& text, const Snapshot& now) {
   using Name = std::string_view;
   text.family("vgyro_gyro_in_use", "gauge", "1 while the gyro's samples are used.");
   each([&](Name name, Gyro gyro, std::size_t) { text.sample({{"gyro", name}}, gyro.heard); });
-  text.family("vgyro_gyro_rate_degrees_per_second", "gauge", "Its last sample.");
+  text.family("vgyro_gyro_rate_degrees_per_second", "gauge", "Last sample of the gyro.");
   each([&](Name name, Gyro gyro, std::size_t) {
     text.sample({{"gyro", name}}, gyro.last_rate_dps);
   });
-  text.family("vgyro_gyro_bias_degrees_per_second", "gauge", "Its drift; NaN until calibrated.");
+  text.family("vgyro_gyro_bias_degrees_per_second", "gauge",
+              "Bias of the gyro; NaN until calibrated.");
   each([&](Name name, Gyro gyro, std::size_t) { text.sample({{"gyro", name}}, gyro.bias_dps); });
   text.family("vgyro_gyro_bias_sigma_degrees_per_second", "gauge", "How well that is known.");
   each([&](Name name, Gyro, std::size_t k) {
     text.sample({{"gyro", name}}, now.bias_sigma_dps[k]);
   });
   text.family("vgyro_gyro_bias_slope_degrees_per_second_squared", "gauge",
-              "How fast its drift moves; NaN where that is not known.");
+              "Slope of the bias; NaN if unknown.");
   each([&](Name name, Gyro, std::size_t k) { text.sample({{"gyro", name}}, now.slope_dps_s[k]); });
   text.family("vgyro_gyro_bias_slope_sigma_degrees_per_second_squared", "gauge",
               "How well that is known.");
@@ -223,9 +224,10 @@ void add_gyros(Text& text, const Snapshot& now) {
   });
   text.family("vgyro_gyro_frames_total", "counter", "Frames with its identifier.");
   each([&](Name name, Gyro gyro, std::size_t) { text.sample({{"gyro", name}}, gyro.frames); });
-  text.family("vgyro_gyro_missing_frames_total", "counter", "Lost on the way, by its counter.");
+  text.family("vgyro_gyro_missing_frames_total", "counter",
+              "Frames missing by the gyro's counter.");
   each([&](Name name, Gyro gyro, std::size_t) { text.sample({{"gyro", name}}, gyro.missing); });
-  text.family("vgyro_gyro_rejected_frames_total", "counter", "Not used, by cause.");
+  text.family("vgyro_gyro_rejected_frames_total", "counter", "Frames not used, by cause.");
   each([&](Name name, Gyro gyro, std::size_t) {
     for (std::size_t i = 0; i < gateway::kRejectCount; ++i) {
       text.sample({{"gyro", name}, {"cause", to_string(static_cast<gateway::Reject>(i))}},
@@ -351,7 +353,7 @@ void add_buses(Text& text, const Snapshot& now) {
   for (const BusStatus& bus : buses)
     text.sample({{"bus", bus.name}}, bus.lost);
   text.family("vgyro_bus_link_downs_total", "counter",
-              "Times that the link went down, or the interface away while up.");
+              "Times that the link went down, or the interface was removed while up.");
   for (const BusStatus& bus : buses)
     text.sample({{"bus", bus.name}}, bus.downs);
   text.family("vgyro_bus_restamped_frames_total", "counter",

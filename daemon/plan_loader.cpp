@@ -37,7 +37,7 @@ LoadResult load_with_fingerprint(const std::string& path,
 LoadResult load_or_refuse(const LoadPlan& load) {
   // Made in advance, because later there may be no memory for it.
   std::vector<Error> no_memory =
-      refusal("there is not memory enough to read the configuration",
+      refusal("there is not enough memory to read the configuration",
               "name a DBC file that holds only the messages that are needed");
   try {
     return load();

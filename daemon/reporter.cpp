@@ -32,9 +32,9 @@ std::string sentence(gateway::Fault fault) {
     case gateway::Fault::kSilent:
       return "is silent";
     case gateway::Fault::kFlaggedInvalid:
-      return "is not used: it says itself that its rate is invalid";
+      return "is not used: it flags its rate as invalid";
     case gateway::Fault::kUnreadable:
-      return "is not used: one frame after the other holds no rate";
+      return "is not used: its frames hold no rate";
     case gateway::Fault::kCounterStuck:
       return "is not used: its alive counter stands still";
     case gateway::Fault::kSaturated:
@@ -140,7 +140,7 @@ void Reporter::fault_changed(std::size_t gyro, const gateway::Status& status) {
               names_[gyro], sentence(*now));
   } else if (status.gyros[gyro].heard) {
     log_.tell(Severity::kNotice, {.gyro = names_[gyro], .cause = "well"},
-              "gyro {} is well again (was {})", names_[gyro], to_string(*before));
+              "gyro {} is healthy again (was {})", names_[gyro], to_string(*before));
   } else {
     log_.tell(Severity::kNotice, {.gyro = names_[gyro], .cause = "silent"},
               "gyro {} is silent (was {})", names_[gyro], to_string(*before));
@@ -229,7 +229,8 @@ std::string Reporter::second_passed(const gateway::Status& status, const Traffic
     doing += fmt::format(", {:.5f} deg/s", status.rate_dps);
   }
   if (status.restored == gateway::Restored::kTakenUp) {
-    doing += fmt::format(", on biases of {} before the start", age_text(status.restored_age_s));
+    doing +=
+        fmt::format(", with biases saved {} before the start", age_text(status.restored_age_s));
   }
   if (const std::string contradiction = gateway::contradiction_text(status.pair, names_);
       !contradiction.empty()) {
@@ -354,7 +355,7 @@ void Reporter::tell_restored(const gateway::Status& status) {
       break;
   }
   if (!was_told) {
-    log_.notice("took up the biases of {} ago: {} {:+.5f}, {} {:+.5f} deg/s; the rate ± {:.5f}",
+    log_.notice("restored the biases saved {} ago: {} {:+.5f}, {} {:+.5f} deg/s; the rate ± {:.5f}",
                 age_text(status.restored_age_s), names_[0], status.gyros[0].bias_dps, names_[1],
                 status.gyros[1].bias_dps, status.restored_bias_sigma_dps);
   }

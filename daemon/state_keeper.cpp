@@ -27,7 +27,7 @@ std::optional<gateway::SavedState> StateKeeper::load(const gateway::Plan& plan) 
     return std::nullopt;
   }
   if (!*text) {
-    log_.info("{}: not there yet; the biases will be kept in it", file_.path());
+    log_.info("{}: does not exist yet; the biases will be saved there", file_.path());
     return std::nullopt;
   }
   Expected<gateway::SavedState> state = gateway::saved_state_from(**text, file_.path());

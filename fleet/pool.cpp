@@ -57,8 +57,8 @@ Expected<void> check_free(const Pool& pool, const std::string& id) {
   if (at == pool.drives.end() || at->compare(0, recording.size(), recording) != 0) return {};
   if (*at == id)
     return fail("", fmt::format("drive {} is in two merged files", id),
-                "merge each drive once: sums that share a drive cannot be told apart again");
-  return fail("", fmt::format("recording {} was judged twice, and differently", recording),
+                "merge each drive once: a drive cannot be taken out of a sum");
+  return fail("", fmt::format("recording {} has two different evidences", recording),
               "give one evidence file of each recording, all by the same model file and version");
 }
 

@@ -23,7 +23,7 @@ constexpr std::size_t kWordMax = 200;
 std::string word_of(JsonValue json, std::string_view key) {
   const std::string word(text_of(member(json, key), key));
   if (word.empty() || word.size() > kWordMax || printable(word) != word)
-    throw Fault{fmt::format("\"{}\" is no plain word", key)};
+    throw Fault{fmt::format("\"{}\" is not a plain name", key)};
   return word;
 }
 
@@ -88,12 +88,12 @@ std::vector<double> numbers_of(JsonValue json, std::string_view key, std::size_t
 void read_gyros(JsonValue json, fleet::DrivePlace& place) {
   for (const JsonValue gyro : list_of(json, "gyros")) {
     const std::uint64_t number = count_of(gyro, "gyros");
-    if (number != 1 && number != 2) throw Fault{"a gyro is 1 or 2"};
+    if (number != 1 && number != 2) throw Fault{"a gyro must be 1 or 2"};
     place.gyros.push_back(number - 1);
   }
   if (place.gyros.empty() || place.gyros.size() > 2 ||
       (place.gyros.size() == 2 && place.gyros[0] == place.gyros[1]))
-    throw Fault{"a place is of one gyro or of both"};
+    throw Fault{"a place must have one gyro or both"};
 }
 
 // Most files list shapes in the order of the catalogue, so the one after `last` is tried first.
@@ -117,14 +117,14 @@ std::size_t read_columns(JsonValue json, fleet::DrivePlace& place, std::vector<s
     const std::size_t shape = shape_after(last, text_of(name, "shapes"));
     const auto slot =
         std::find(place.gyros.begin(), place.gyros.end(), count_of(*gyro, "gyro") - 1);
-    if (slot == place.gyros.end()) throw Fault{"a shape is of a gyro that is not of its place"};
+    if (slot == place.gyros.end()) throw Fault{"a shape names a gyro outside its place"};
     ++gyro;
     const std::size_t at = i++;
     if (shape == model::kShapeCount) continue;
     last = shape;
     const std::size_t column =
         static_cast<std::size_t>(slot - place.gyros.begin()) * model::kShapeCount + shape;
-    if (is_there[column]) throw Fault{"a shape is there twice"};
+    if (is_there[column]) throw Fault{"a shape appears twice"};
     is_there[column] = true;
     place.column.push_back(column);
     keep.push_back(at);
@@ -141,7 +141,7 @@ fleet::DrivePlace drive_place(JsonValue json) {
   const std::vector<double> score = numbers_of(json, "score", count);
   const auto correlations = correlations_of(text_of(member(json, "correlation"), "correlation"),
                                             fleet::triangle(count, 0) - count);
-  if (!correlations) throw Fault{"\"correlation\" does not fit to \"shapes\""};
+  if (!correlations) throw Fault{"\"correlation\" does not match \"shapes\""};
   std::vector<double> root;
   place.information.reserve(fleet::triangle(keep.size(), 0));
   for (std::size_t i = 0; i < keep.size(); ++i) {

@@ -88,9 +88,9 @@ void read_group(JsonValue json, fleet::Pool& pool) {
     simdjson::dom::array words;
     if (unit.get(words) != simdjson::SUCCESS) throw Fault{"a unit of a group is not a list"};
     who.push_back(identity_of(words, "units"));
-    if (!pool.units.contains(who.back())) throw Fault{"a group is of a unit that is not there"};
+    if (!pool.units.contains(who.back())) throw Fault{"a group names an unknown unit"};
   }
-  if (who.empty() || who.size() > 2) throw Fault{"a group is of one gyro or of two"};
+  if (who.empty() || who.size() > 2) throw Fault{"a group must have one or two gyros"};
   fleet::GroupSums sums(who.size());
   WholeReader reader(text_of(member(json, "sums"), "sums"));
   visit_group(sums, [&](fleet::Whole& value) { value = reader.get(); });

@@ -264,13 +264,13 @@ details { border-bottom: 1px solid var(--line); padding: .35rem 0; } summary { c
 )";
 
 std::string effects_table(const std::vector<PooledEffect>& effects) {
-  if (effects.empty()) return "<p class=\"soft\">Nothing that is beyond chance.</p>";
+  if (effects.empty()) return "<p class=\"soft\">No effect beyond chance.</p>";
   std::string html =
       "<div class=\"wide\"><table><tr><th>effect</th><th>size ± σ</th><th>between units</th>"
       "<th>a year</th><th>drives</th><th>units</th><th>standard errors</th><th></th></tr>";
   for (const PooledEffect& effect : effects) {
     std::string note;
-    if (effect.varies) note = "differs from unit to unit; no mean to take off";
+    if (effect.varies) note = "differs from unit to unit; no common size to correct";
     for (const auto& [type, shape] : effect.ambiguous_with)
       note += fmt::format("{}may also be {} of {}", note.empty() ? "" : "; ",
                           model::info(model::shapes()[shape].kind).name, type);
@@ -317,7 +317,7 @@ std::string_view advice(fleet::Status status) {
     case fleet::Status::kWandering:
       return "replace it, or give its own model file to its vehicle";
     case fleet::Status::kTrend:
-      return "watch it: ask again in a month";
+      return "watch it: run vgyro fleet again in a month";
     case fleet::Status::kLossy:
       return "look at its cable and its bus";
     case fleet::Status::kApart:
@@ -368,8 +368,9 @@ std::size_t bad_units(const fleet::Judgement& judgement) {
 }
 
 std::string summary(const fleet::Pool& pool, const fleet::Judgement& judgement) {
-  return fmt::format("{} drives of {} gyros of {} types; {} not as their type", pool.drives.size(),
-                     judgement.units.size(), judgement.types.size(), bad_units(judgement));
+  return fmt::format("{} drives of {} gyros of {} types; {} differ from their type",
+                     pool.drives.size(), judgement.units.size(), judgement.types.size(),
+                     bad_units(judgement));
 }
 
 std::string promise(const fleet::Judgement& judgement) {

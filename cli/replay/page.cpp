@@ -221,7 +221,7 @@ Expected<std::string> replay_page(const PageSubject& subject, const gateway::Pla
         course_json(courses[i], plan.axes.empty() ? "" : axis_name(plan.axes[i]), names));
   }
   if (json["courses"].empty())
-    return fail({}, "there is nothing to draw: no pair of samples came together");
+    return fail({}, "there is nothing to draw: no pair of samples was formed");
   return page_of({.title = "vgyro replay",
                   .noscript = "This page draws its tables and plots with a script that it holds "
                               "itself; please allow it. --plot draws a picture without one.",

@@ -437,7 +437,7 @@ std::string Plot::whole_script(const std::string& path) const {
 
 Expected<void> draw_plot(const Course& course, const std::string& path, const PlotTexts& texts) {
   if (course.empty()) {
-    return fail(path, "there is nothing to draw: no pair of samples came together");
+    return fail(path, "there is nothing to draw: no pair of samples was formed");
   }
   return run_gnuplot(path, Plot(course, texts).whole_script(path));
 }

@@ -183,7 +183,7 @@ int run_recalibrate(const WhichGateway& which) {
       continue;
     }
     const std::string who = instance.empty() ? "the gateway" : "the gateway " + instance;
-    say("{} has forgotten its biases and calibrates; `vgyro status` shows how far it is\n", who);
+    say("{} discarded its biases and is calibrating; `vgyro status` shows how far it is\n", who);
   }
   return code;
 }

@@ -168,7 +168,7 @@ std::string axes_table(const Json& status, const Paint& paint) {
   if (!axes.is_array() || axes.empty()) return {};
   std::vector<std::vector<Cell>> rows{
       header({"axis", "state", "rate, deg/s", "bias 1, deg/h", "bias 2, deg/h", "health 1",
-              "health 2", "tilt of 2, deg"})};
+              "health 2", "misalignment, deg"})};
   for (const Json& axis : axes) {
     const std::string state = text_of(axis, "state");
     const auto health = [&](const char* key) {
@@ -264,7 +264,7 @@ std::string opinion(const Json& status, const Paint& paint) {
   if (flag_of(status, "ambiguous")) {
     line(Mood::kDoubtful, "", gateway::ambiguity_text(probability, names));
   } else {
-    line(Mood::kPlain, "it seems: ", gateway::hypotheses_text(probability, names));
+    line(Mood::kPlain, "likely: ", gateway::hypotheses_text(probability, names));
   }
   const std::string kind = gateway::drift_kind_text(probability);
   line(Mood::kPlain, "the drifts: ", kind);
@@ -383,7 +383,7 @@ std::string layouts_line(const Json& counters) {
                                  count_of(counters, "layout_frames_valid"));
   if (const auto beyond = count_of(counters, "layout_out_of_range"); beyond > 0)
     text += fmt::format(", {} rates beyond what they can carry", beyond);
-  if (withheld > 0) text += fmt::format(", {} times silent while no rate was valid", withheld);
+  if (withheld > 0) text += fmt::format(", {} withheld while no rate was valid", withheld);
   return text + '\n';
 }
 

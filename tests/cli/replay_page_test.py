@@ -270,7 +270,7 @@ class BadOutput(Page):
     def test_nothing_to_draw_is_an_error(self):
         self.write("in.log", "(1700000000.000000) can0 555#00\n")
         said = self.bad("replay", "-q", "--config", "vgyro.toml", "-o", "out.log", "--html", "a.html", "in.log")
-        self.assertIn("a.html: there is nothing to draw: no pair of samples came together", said)
+        self.assertIn("a.html: there is nothing to draw: no pair of samples was formed", said)
         self.assertIn("no frame of gyro left", said)
         self.assertFalse((self.folder / "a.html").exists())
 

@@ -111,7 +111,7 @@ class VgyroFleet(unittest.TestCase):
         lost = self.kept("resumed")[3]
         lost.unlink()
         again = self.run_tool("resumed")
-        self.assertIn(f"{DRIVES} of {DRIVES + 1} drives are there from an earlier run", again.stderr)
+        self.assertIn(f"{DRIVES} of {DRIVES + 1} drives were done in an earlier run", again.stderr)
         self.assertEqual(self.result("resumed"), whole)
         for path, stamp in before.items():
             if path != lost:

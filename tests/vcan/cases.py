@@ -783,7 +783,7 @@ class ShortMemoryCase(SlowReloadCase):
     limits = ["sh", "-c", 'ulimit -v 60000; exec "$@"', "limited"]
 
     def check_outcome(self, run):
-        require("there is not memory enough to read the configuration" in run.said, run.said)
+        require("there is not enough memory to read the configuration" in run.said, run.said)
         require(run.said.count("the new configuration is refused") == 2, run.said)
 
 
