@@ -347,7 +347,7 @@ class OnTheBus(Bench):
         self.assertRegex(done.stdout, r"(?m)^can0 +up +active +4321 +0 +0  bus off 3$")
         self.assertRegex(done.stdout, r"(?m)^can1 +not there ")
         self.assertIn("layouts: 1000 frames, 900 with a valid rate, 3 rates beyond what they can carry, "
-                      "5 times silent while no rate was valid\n", done.stdout)
+                      "5 withheld while no rate was valid\n", done.stdout)
         self.assertRegex(done.stdout, r"(?m)^frames not used: accelerometer 4, speed 2$")
         # Columns are aligned, even after characters of several bytes.
         lines = done.stdout.splitlines()

@@ -98,7 +98,7 @@ TEST_F(ReporterTest, TellsEachChangeOfHealthOnceWithItsCause) {
     reporter.check_state(status);
   });
   EXPECT_EQ(count_of("\n", said), 2U) << said;
-  EXPECT_EQ(count_of("gyro right is well again (was stuck)", said), 1U) << said;
+  EXPECT_EQ(count_of("gyro right is healthy again (was stuck)", said), 1U) << said;
   EXPECT_EQ(count_of("the gyros disagree", said), 1U) << said;
 }
 
@@ -346,10 +346,10 @@ TEST_F(ReporterTest, SaysWhoseBiasesItTookUpAndWhenTheyAreConfirmed) {
   status.restored_bias_sigma_dps = 0.0002;
   status.gyros[0].bias_dps = 0.0331;
   status.gyros[1].bias_dps = -0.0074;
-  EXPECT_NE(second().find("took up the biases of 3 h ago: left +0.03310, right -0.00740 deg/s; the "
+  EXPECT_NE(second().find("restored the biases saved 3 h ago: left +0.03310, right -0.00740 deg/s; the "
                           "rate ± 0.00020"),
             std::string::npos);
-  EXPECT_NE(last_line.find("on biases of 3 h before the start"), std::string::npos);
+  EXPECT_NE(last_line.find("with biases saved 3 h before the start"), std::string::npos);
   EXPECT_EQ(second(), "");
   status.restored = gateway::Restored::kConfirmed;
   EXPECT_NE(second().find("a stop has confirmed the biases"), std::string::npos);

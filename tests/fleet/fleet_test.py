@@ -202,7 +202,7 @@ class Merging(FleetBench):
         other = json.loads(lines[0])
         other["seconds"] = 299.0
         (self.folder / "other.json").write_text(lines[0] + json.dumps(other) + "\n")
-        self.assertIn("judged twice", self.run_fleet("other.json", out="other", good=False).stderr)
+        self.assertIn("has two different evidences", self.run_fleet("other.json", out="other", good=False).stderr)
 
     def test_tells_what_is_wrong_with_a_file(self):
         rng = np.random.default_rng([SEED, 8])

@@ -152,7 +152,7 @@ def kill_nine(run):
     """Killed: started again, and valid from the first pair with the saved biases."""
     run.done("killed", "killed_play")
     run.require_shows("killed_show", ActiveState="active", NRestarts="1")
-    require("took up the biases" in run.text("killed_journal"), run.text("killed_journal"))
+    require("restored the biases" in run.text("killed_journal"), run.text("killed_journal"))
     return run.check_rates("killed_play", "reload_bad", calibrated=True)
 
 
@@ -194,7 +194,7 @@ def upgrades(run):
     run.done("upgrade", "upgraded_config", "upgraded_play")
     shown = run.require_shows("upgraded", ActiveState="active", SubState="running", UnitFileState="enabled")
     require(shown["MainPID"] != run.text("link_main").strip(), "the old process still runs")
-    require("took up the biases" in run.text("upgraded_journal"), run.text("upgraded_journal"))
+    require("restored the biases" in run.text("upgraded_journal"), run.text("upgraded_journal"))
     return run.check_rates("upgraded_play", "stop", calibrated=True)
 
 

@@ -873,7 +873,7 @@ class RestartCase:
         since = result["restarts_us"][0]
         run.inputs = [line for line in run.inputs if line.us >= since]
         run.outputs = [line for line in run.outputs if line.us >= since]
-        require("took up the biases of" in run.said, f"taking up was not logged\n{run.said}")
+        require("restored the biases saved" in run.said, f"taking up was not logged\n{run.said}")
         rates = check_against_replay(run, *self.more, "--state", str(folder / "kept.toml"))
         oracle = verdicts.Oracle(SOURCE / "dbc/vgyro.dbc")
         t, rate, state = verdicts.rates_of(run.of(0x610), oracle)
@@ -1287,7 +1287,7 @@ class UnitsRestartCase(UnitsCase):
         run.outputs = [line for line in run.outputs if line.us >= since]
         kept = tomllib.loads((folder / "kept.toml").read_text(encoding="ascii"))
         self.check_kept(kept)
-        require("took up the biases of" in run.said, f"taking up was not logged\n{run.said}")
+        require("restored the biases saved" in run.said, f"taking up was not logged\n{run.said}")
         replayed = run.replay("--state", str(folder / "kept.toml"))
         oracle = verdicts.Oracle(SOURCE / "dbc/vgyro_axes.dbc")
         for rate_id in self.ids[::3]:
