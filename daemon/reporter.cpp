@@ -165,7 +165,7 @@ void Reporter::axis_fault_changed(char axis, std::size_t gyro, const gateway::St
   } else {
     log_.tell(Severity::kNotice, {.gyro = names_[gyro], .cause = "well"},
               "axis {} of gyro {} is {} (was {})", axis, names_[gyro],
-              status.gyros[gyro].heard ? "well again" : "silent", to_string(*before));
+              status.gyros[gyro].heard ? "healthy again" : "silent", to_string(*before));
   }
 }
 

@@ -346,9 +346,10 @@ TEST_F(ReporterTest, SaysWhoseBiasesItTookUpAndWhenTheyAreConfirmed) {
   status.restored_bias_sigma_dps = 0.0002;
   status.gyros[0].bias_dps = 0.0331;
   status.gyros[1].bias_dps = -0.0074;
-  EXPECT_NE(second().find("restored the biases saved 3 h ago: left +0.03310, right -0.00740 deg/s; the "
-                          "rate ± 0.00020"),
-            std::string::npos);
+  EXPECT_NE(
+      second().find("restored the biases saved 3 h ago: left +0.03310, right -0.00740 deg/s; the "
+                    "rate ± 0.00020"),
+      std::string::npos);
   EXPECT_NE(last_line.find("with biases saved 3 h before the start"), std::string::npos);
   EXPECT_EQ(second(), "");
   status.restored = gateway::Restored::kConfirmed;
