@@ -10,8 +10,8 @@
 namespace vgyro::daemon {
 namespace {
 
-// The least one: 3 MB while a block is packed, and a few milliseconds for some seconds of traffic.
-// The next one takes 9 MB and twice the time for a twentieth less.
+// The least one: 4 MB while a block is packed, and a few milliseconds for some seconds of traffic.
+// The next one takes 10 MB and twice the time for a thirtieth less.
 constexpr std::uint32_t kXzPreset = 0;
 // The kernel's stamps are used in whole microseconds, as candump writes them.
 constexpr unsigned kFractionDigits = 6;

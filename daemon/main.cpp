@@ -31,7 +31,7 @@ constexpr int kBadInput = 1;
 constexpr int kWrongUsage = 2;
 constexpr int kSystemTrouble = 3;
 
-// Two gyros at 500 Hz fill 5 MB in ten minutes. A vehicle computer's memory card is written to only
+// Two gyros at 500 Hz fill 4 MB in ten minutes. A vehicle computer's memory card is written to only
 // for a capture, and keeps some weeks of them.
 constexpr double kCaptureMinutes = 10.0;
 constexpr double kCaptureMemory_mib = 16.0;
