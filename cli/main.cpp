@@ -389,7 +389,7 @@ CLI::App* add_recalibrate(CLI::App& app, WhichGateway& which) {
 
 CLI::App* add_capture(CLI::App& app, WhichGateway& which) {
   CLI::App* command = app.add_subcommand(
-      "capture", "Have the running gateway write the last minutes of its inputs to a file");
+      "capture", "Make the running gateway write the last minutes of its inputs");
   add_which(*command, which);
   command->footer(
       "For root only. Prints the folder with the recording. The gateway must run with --capture,\n"

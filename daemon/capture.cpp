@@ -47,7 +47,7 @@ Capture::~Capture() = default;
 
 Expected<void> Capture::open(TimePoint now) {
   bool other = false;
-  const Expected<void> opened = store_->open(other);
+  Expected<void> opened = store_->open(other);
   if (!opened && other) return opened;
   if (!opened) {
     told_of_failure_ = true;
@@ -71,7 +71,10 @@ void Capture::use(const gateway::Plan& plan, const std::string& fingerprint) {
     const std::string& bus = plan.buses[match.bus];
     match.bus = 0;
     match.bytes = 0;
-    inputs.push_back({bus, std::move(match)});
+    Input input{bus, std::move(match)};
+    // Both gyros may be in one message.
+    if (std::find(inputs.begin(), inputs.end(), input) == inputs.end())
+      inputs.push_back(std::move(input));
   }
   const bool all_stay = std::all_of(inputs_.begin(), inputs_.end(), [&](const Input& input) {
     return std::find(inputs.begin(), inputs.end(), input) != inputs.end();

@@ -10,8 +10,8 @@
 namespace vgyro::daemon {
 namespace {
 
-// The lowest preset packs some seconds of traffic in a few milliseconds, with 3 MB of memory.
-// Preset 1 takes 9 MB and twice the time, and its output is only a twentieth smaller.
+// The lowest preset packs some seconds of traffic in a few milliseconds, with 4 MB of memory.
+// Preset 1 takes 10 MB and twice the time, and its output is only a thirtieth smaller.
 constexpr std::uint32_t kXzPreset = 0;
 // The kernel's stamps are used in whole microseconds, as candump writes them.
 constexpr unsigned kFractionDigits = 6;

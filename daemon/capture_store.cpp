@@ -92,7 +92,8 @@ std::string host_name() {
 
 // Microseconds, as the recording has them.
 double seconds_of(TimePoint stamp) {
-  return static_cast<double>(to_ns(stamp) / 1000) * 1e-6;
+  const auto whole = std::chrono::floor<std::chrono::microseconds>(stamp.time_since_epoch());
+  return static_cast<double>(whole.count()) * 1e-6;
 }
 
 Json description_of(const CaptureNote& note, const CaptureRing::Blocks& blocks) {

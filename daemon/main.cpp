@@ -31,7 +31,7 @@ constexpr int kBadInput = 1;
 constexpr int kWrongUsage = 2;
 constexpr int kSystemTrouble = 3;
 
-// Two gyros at 500 Hz fill 5 MB in ten minutes. Only a capture writes to a vehicle computer's
+// Two gyros at 500 Hz fill 4 MB in ten minutes. Only a capture writes to a vehicle computer's
 // memory card, which keeps some weeks of captures.
 constexpr double kCaptureMinutes = 10.0;
 constexpr double kCaptureMemory_mib = 16.0;

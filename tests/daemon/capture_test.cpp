@@ -322,6 +322,14 @@ TEST_F(CaptureTest, ADirectoryThatCannotBeWrittenIsToldOnceCountedAndNeverFatal)
   EXPECT_TRUE(asked()) << "the next one finds it";
 }
 
+TEST_F(CaptureTest, ACauseWithoutFramesIsToldAsAFailure) {
+  begin();
+  status.contradictions = 1;
+  const std::string said =
+      said_during([&] { ASSERT_TRUE(until([&] { return capture->status().failed == 1; })); });
+  EXPECT_NE(said.find("there is nothing to write"), std::string::npos) << said;
+}
+
 TEST_F(CaptureTest, AnotherGatewaysDirectoryIsRefused) {
   begin();
   Capture second({.directory = directory,

@@ -148,6 +148,20 @@ def speaks_on_dbus(run):
     return run.check_rates("recalibrate_play", "save", calibrated=False)
 
 
+def records(run):
+    """What came in is written where the service may write, for root alone."""
+    run.done("capture", "capture_read", "capture_lines", "capture_said", "capture_modes")
+    require((run.out / "capture_refused.exit").read_text().strip() != "0" and "only root" in run.text("capture_refused"),
+            run.text("capture_refused"))
+    require(re.fullmatch(r"/var/lib/vgyro/captures/\d{8}T\d{6}Z-asked\n", run.text("capture")), run.text("capture"))
+    said = json.loads(run.text("capture_said"))
+    require(said["frames"] > 1000 and said["frames_dropped"] == 0 and len(said["inputs"]) == 2, f"{said}")
+    require({line.split()[1] for line in run.text("capture_lines").splitlines()} == {"vcan0"}, run.text("capture_lines"))
+    for line in run.text("capture_modes").splitlines():
+        require(line.split()[0] in ("600", "644", "700"), line)
+    return f"{said['frames']} frames"
+
+
 def kill_nine(run):
     """Killed: started again, and valid from the first pair with the saved biases."""
     run.done("killed", "killed_play")
@@ -241,7 +255,7 @@ def protection(run):
     return f"{len(run.frames)} frames"
 
 
-CHECKS = (network_examples, installs_and_waits, starts, sandbox, calibrates, speaks_on_dbus, kill_nine, reloads, watchdog, link_faults, upgrades, stops,
+CHECKS = (network_examples, installs_and_waits, starts, sandbox, calibrates, speaks_on_dbus, records, kill_nine, reloads, watchdog, link_faults, upgrades, stops,
           goes_away, protection)
 
 

@@ -71,7 +71,8 @@ step bad_start systemctl start vgyrod
 sleep 3  # it must not be started again
 step bad_started show
 
-# Configured.
+# Configured, and with recordings of the inputs, as the packaged file says.
+sed -i 's/^#VGYROD_OPTIONS=/VGYROD_OPTIONS=/' /etc/default/vgyrod
 cp $here/vgyro.toml /etc/vgyro/vgyro.toml
 cp $here/twin.dbc /usr/local/share/twin.dbc
 step start systemctl start vgyrod
@@ -104,6 +105,12 @@ step recalibrate vgyro recalibrate
 sleep 1
 step recalibrate_play play calibration
 step save busctl call "${gateway[@]}" org.vgyro.Gateway1 SaveState
+step capture_refused nobody vgyro capture
+step capture vgyro capture
+step capture_read vgyro convert -o /run/recorded.log "$(<$out/capture.txt)/recording.log.xz"
+step capture_lines sort -u -k 2,2 /run/recorded.log
+step capture_said cat "$(<$out/capture.txt)/capture.json"
+step capture_modes stat -L -c '%a %U %n' /var/lib/vgyro/captures/*
 
 # Killed, and started again with its saved biases.
 since=$(date +%s)
