@@ -6,6 +6,7 @@
 
 #include <fmt/core.h>
 
+#include "fleet/figures.h"
 #include "fleet/leave_one_out.h"
 #include "fleet/selection.h"
 #include "fleet/size_trends.h"
@@ -366,10 +367,10 @@ class Judge {
     effect.p_value = p;
     effect.drives = unit.drives;
     effect.units = 1;
-    unit.status = Status::kApart;
-    unit.why.push_back(
-        fmt::format("{}: {:.3g} ± {:.1g}; its type has {:.3g}, {:.0f} standard errors away",
-                    its.name, effect.size, effect.sigma, its.unit * mean, std::abs(z)));
+    set_status(unit, Status::kApart,
+               fmt::format("{}: {}; its type has {}, {:.0f} standard errors away", its.name,
+                           figure(effect.size, effect.sigma),
+                           rounded_figure(its.unit * mean, effect.sigma), std::abs(z)));
     unit.effects.push_back(std::move(effect));
   }
 

@@ -6,6 +6,7 @@
 
 #include <fmt/core.h>
 
+#include "fleet/figures.h"
 #include "fleet/trends.h"
 
 namespace vgyro::fleet {
@@ -140,10 +141,11 @@ void judge_size_trends(const Pool& pool, const KnownSizes& known, double thresho
     if (its.is_low_pass) continue;
     const SlopesJudgement judged = judge_slopes(slopes, threshold);
     for (const auto& [slope, type_per_year] : judged.apart)
-      set_status(units[slope.unit], Status::kTrend,
-                 fmt::format("{}: changes by {:.3g} ± {:.1g} a year, its type's by {:.2g}",
-                             its.name, its.unit * slope.per_year.value,
-                             its.unit * slope.per_year.sigma, its.unit * type_per_year));
+      set_status(
+          units[slope.unit], Status::kTrend,
+          fmt::format("{}: changes by {} a year, its type's by {}", its.name,
+                      figure(its.unit * slope.per_year.value, its.unit * slope.per_year.sigma),
+                      rounded_figure(its.unit * type_per_year, its.unit * slope.per_year.sigma)));
     if (judged.is_named || judged.varies)
       type.trends.push_back({shape, its.unit * judged.type.mean, its.unit * judged.type.sigma,
                              its.unit * judged.type.between, slopes.size(), !judged.is_named});

@@ -5,6 +5,7 @@
 
 #include <fmt/core.h>
 
+#include "fleet/figures.h"
 #include "fleet/statistics.h"
 #include "fleet/trends.h"
 
@@ -105,10 +106,12 @@ void judge_bias_trends(const Pool& pool, double threshold, std::vector<UnitJudge
   }
   const SlopesJudgement judged = judge_slopes(slopes, threshold);
   for (const auto& [slope, type_per_year] : judged.apart)
-    set_status(units[slope.unit], Status::kTrend,
-               fmt::format("its bias moves by {:.3g} ± {:.1g} deg/s a year, its type's by {:.2g}",
-                           slope.per_year.value * kBiasUnit_dps,
-                           slope.per_year.sigma * kBiasUnit_dps, type_per_year * kBiasUnit_dps));
+    set_status(
+        units[slope.unit], Status::kTrend,
+        fmt::format(
+            "its bias moves by {} deg/s a year, its type's by {}",
+            figure(slope.per_year.value * kBiasUnit_dps, slope.per_year.sigma * kBiasUnit_dps),
+            rounded_figure(type_per_year * kBiasUnit_dps, slope.per_year.sigma * kBiasUnit_dps)));
   if (judged.is_named || judged.varies)
     type.trends.push_back({model::kShapeCount, judged.type.mean * kBiasUnit_dps,
                            judged.type.sigma * kBiasUnit_dps, judged.type.between * kBiasUnit_dps,

@@ -6,6 +6,7 @@
 #include "cli/commands.h"
 #include "cli/exit_code.h"
 #include "cli/fleet/evidence_file.h"
+#include "cli/fleet/page.h"
 #include "cli/fleet/report.h"
 #include "cli/output/errors.h"
 #include "cli/output/progress.h"

@@ -46,6 +46,13 @@ def plain_pairs(rng, count, **first):
     return [(Unit(rng, "alpha", f"a{i}", **first), Unit(rng, "beta", f"b{i}")) for i in range(count)]
 
 
+def told_figure(words, sentence):
+    """Value and σ of "WORDS 0.0392 ± 0.0011" or "WORDS (392 ± 11)·10⁻⁶"."""
+    value, sigma, power = re.search(rf"{words} \(?(\S+) ± ([\d.]+)(?:\)·10(\S+))?", sentence).groups()
+    scale = 10.0 ** int((power or "0").translate(str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")))
+    return float(value) * scale, float(sigma) * scale
+
+
 class Truth(FleetBench):
     def test_names_what_no_drive_can_name(self):
         """|t| = 2 in each of 60 drives, for each kind in turn: right kind and type, and the size inside its interval."""
@@ -126,8 +133,8 @@ class Truth(FleetBench):
             for unit in found["units"]:
                 words, true = moves.get(unit["unit"], ("", 0.0))
                 if words and words in unit["why"]:
-                    value, sigma = re.search(rf"{words} (\S+) ± (\S+) ", unit["why"]).groups()
-                    self.assertLess(abs(float(value) - true), 5.0 * float(sigma), f"{unit['unit']}, seed {number}")
+                    value, sigma = told_figure(words, unit["why"])
+                    self.assertLess(abs(value - true), 5.0 * sigma, f"{unit['unit']}, seed {number}")
         print(f"seed {SEED}: {right} of {3 * SEEDS} moving units found, no other")
         self.assertGreaterEqual(right, 0.95 * 3 * SEEDS)
 
@@ -225,6 +232,33 @@ class Merging(FleetBench):
             self.assertIn(words, done.stderr)
             self.assertIn("bad.json", done.stderr)
             self.assertFalse((self.folder / "bad").exists())
+
+
+class Page(FleetBench):
+    def page(self, units=8, odd="<b>&odd", **errors):
+        rng = np.random.default_rng([SEED, 11])
+        pairs = plain_pairs(rng, units)
+        pairs[3] = (Unit(rng, "alpha", odd, **errors), pairs[3][1])
+        self.fleet(made_fleet.lines(rng, pairs, 6 * units))
+        return (self.folder / "out" / "report.html").read_text(encoding="utf-8")
+
+    def test_begins_with_the_verdict_and_links_to_each_unit_that_is_odd(self):
+        page = self.page(effects={"scale_factor": 4e-3})
+        self.assertIn("1 of 16 gyros is not as its type", page)
+        link = re.search(r'<a href="#(unit\d+)"><b>&lt;b&gt;&amp;odd</b></a>', page)
+        self.assertIn(f'<details id="{link.group(1)}" open>', page)
+        self.assertNotIn("<b>&odd", page)
+        self.assertLess(page.index("What to do next"), page.index("At a glance"))
+
+    def test_says_so_where_nothing_is_to_be_done(self):
+        page = self.page(odd="like")
+        self.assertIn("All 16 gyros are as their types", page)
+        self.assertIn("Nothing: all units are as their types", page)
+
+    def test_leaves_out_good_units_of_which_there_are_thousands(self):
+        page = self.page(units=600, effects={"scale_factor": 4e-3})
+        self.assertEqual(page.count("<details id="), 1001)
+        self.assertIn("199 more units, with nothing to tell, are in fleet.json", page)
 
 
 if __name__ == "__main__":
