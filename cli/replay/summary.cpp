@@ -197,6 +197,7 @@ Json axes_json(const ReplaySummary& summary) {
            {"open", status.stops_open}}},
          {"disagreements", status.disagreements},
          {"hypotheses", hypotheses_json(status)},
+         {"normalized_innovation", number(status.normalized_innovation)},
          {"pair", pair_json(status)}});
   }
   return axes;
@@ -295,6 +296,7 @@ Json to_json(const ReplaySummary& summary, const gateway::Plan& plan) {
        {{"learned", status.stops}, {"refused", status.stops_refused}, {"open", status.stops_open}}},
       {"hypotheses", hypotheses_json(status)},
       {"ambiguous", status.ambiguous},
+      {"normalized_innovation", number(status.normalized_innovation)},
       {"estimate_restarts", status.estimate_restarts},
       {"rates_too_far_apart", status.rates_too_far_apart},
       {"disagreements", status.disagreements},
@@ -405,6 +407,7 @@ void put_opinion(fmt::memory_buffer& text, const ReplaySummary& summary,
   line("stops", stops_text(gateway::steady_stretches(status)));
   line("at the end", status.ambiguous ? gateway::ambiguity_text(status.probability, names)
                                       : gateway::hypotheses_text(status.probability, names));
+  line("scatter", gateway::innovation_text(status.normalized_innovation));
   const std::string kind = gateway::drift_kind_text(status.probability);
   line("drifts", kind);
   if (!kind.empty()) {
