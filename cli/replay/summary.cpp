@@ -113,6 +113,11 @@ Json model_json(const ReplaySummary& summary, const gateway::Plan& plan) {
 }
 
 // As the recording ended; what is less likely than a twentieth is left out.
+Json stops_json(const gateway::Status& status) {
+  return {
+      {"learned", status.stops}, {"refused", status.stops_refused}, {"open", status.stops_open}};
+}
+
 Json hypotheses_json(const gateway::Status& status) {
   Json hypotheses = Json::object();
   for (std::size_t i = 0; i < status.probability.size(); ++i) {
@@ -191,10 +196,7 @@ Json axes_json(const ReplaySummary& summary) {
          {"mean_rate_dps", number(mean_of(axis.rate_sum_dps, axis.rates))},
          {"gyros", {axis_gyro_json(status.gyros[0]), axis_gyro_json(status.gyros[1])}},
          {"windows", {{"completed", status.windows}, {"skipped", status.windows_skipped}}},
-         {"stops",
-          {{"learned", status.stops},
-           {"refused", status.stops_refused},
-           {"open", status.stops_open}}},
+         {"stops", stops_json(status)},
          {"disagreements", status.disagreements},
          {"hypotheses", hypotheses_json(status)},
          {"normalized_innovation", number(status.normalized_innovation)},
@@ -292,8 +294,7 @@ Json to_json(const ReplaySummary& summary, const gateway::Plan& plan) {
       {"clock_steps", status.clock_steps},
       {"gaps", gaps_json(summary)},
       {"windows", {{"completed", status.windows}, {"skipped", status.windows_skipped}}},
-      {"stops",
-       {{"learned", status.stops}, {"refused", status.stops_refused}, {"open", status.stops_open}}},
+      {"stops", stops_json(status)},
       {"hypotheses", hypotheses_json(status)},
       {"ambiguous", status.ambiguous},
       {"normalized_innovation", number(status.normalized_innovation)},
