@@ -144,6 +144,7 @@ int append_axis(sd_bus_message* reply, const Snapshot& now, std::size_t place) {
     fields.put(("bias_" + number + "_dps").c_str(), status.gyros[k].bias_dps);
     fields.put(("health_" + number).c_str(), health_text(status.gyros[k]));
   }
+  fields.put("normalized_innovation", status.normalized_innovation);
   fields.put("misalignment_deg", now.status.misalignment_deg[axis]);
   fields.put("misalignment_sigma_deg", now.status.misalignment_sigma_deg[axis]);
   fields.put("stops", status.stops);
@@ -324,6 +325,10 @@ constexpr Property kProperties[] = {
      }},
     {"LastStopAgeS",
      [](sd_bus_message* m, const Snapshot& now) { return append_number(m, now.last_stop_age_s); }},
+    {"NormalizedInnovation",
+     [](sd_bus_message* m, const Snapshot& now) {
+       return append_number(m, now.status.normalized_innovation);
+     }},
     {"CalibratedS", [](sd_bus_message* m,
                        const Snapshot& now) { return append_number(m, now.status.calibrated_s); }},
     {"RestS", [](sd_bus_message* m,
@@ -362,6 +367,7 @@ const sd_bus_vtable Control::kInterface[] = {
     SD_BUS_PROPERTY("SigmaDps", "d", on_get, 0, SD_BUS_VTABLE_PROPERTY_EMITS_CHANGE),
     SD_BUS_PROPERTY("BiasSigmaDps", "d", on_get, 0, SD_BUS_VTABLE_PROPERTY_EMITS_CHANGE),
     SD_BUS_PROPERTY("LastStopAgeS", "d", on_get, 0, SD_BUS_VTABLE_PROPERTY_EMITS_CHANGE),
+    SD_BUS_PROPERTY("NormalizedInnovation", "d", on_get, 0, SD_BUS_VTABLE_PROPERTY_EMITS_CHANGE),
     SD_BUS_PROPERTY("CalibratedS", "d", on_get, 0, SD_BUS_VTABLE_PROPERTY_EMITS_CHANGE),
     SD_BUS_PROPERTY("RestS", "d", on_get, 0, 0),
     SD_BUS_PROPERTY("Gyros", "aa{sv}", on_get, 0, SD_BUS_VTABLE_PROPERTY_EMITS_CHANGE),

@@ -141,6 +141,11 @@ void add_counters(Text& text, const Snapshot& now) {
   text.family("vgyro_last_stop_age_seconds", "gauge",
               "Since the last stop that was learned from; NaN before the first one.");
   text.sample({}, now.last_stop_age_s);
+  text.family("vgyro_normalized_innovation", "gauge",
+              "Squared deviation of the last measurements of the drifts from their prediction, by "
+              "its expected variance: 1 where noise and drifts are as assumed; NaN before the "
+              "first.");
+  text.sample({}, status.normalized_innovation);
   text.family("vgyro_estimate_restarts_total", "counter",
               "Times that the estimate was not finite and was restarted: a fault of vgyro.");
   text.sample({}, status.estimate_restarts);

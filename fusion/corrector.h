@@ -6,6 +6,7 @@
 
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <optional>
 
@@ -82,6 +83,9 @@ struct Condition {
   std::uint64_t stops_open = 0;     ///< steady stretches that ended with both hypotheses likely
   std::uint64_t restarts = 0;       ///< restarts of an estimate that was not finite
   std::uint64_t disagreements = 0;  ///< times that `disagree` began
+  /// Squared deviation of the last measurements from their prediction, in units of the variance
+  /// that was expected of it: 1 where noise and drifts are as modelled. NaN before the first.
+  double normalized_innovation = std::numeric_limits<double>::quiet_NaN();
 };
 
 class Corrector {

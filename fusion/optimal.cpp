@@ -73,6 +73,10 @@ constexpr double kTurning_dps = 1.0;
 // The difference does not show which gyro jumped: least share of either.
 constexpr double kShareMin = 1.0 / 3.0;
 
+// Of the mean normalised innovation: its scatter is then 1/4, and a change shows within minutes.
+constexpr double kInnovationRows = 32.0;
+// No measurement counts for more: one jump must not be seen for an hour.
+constexpr double kInnovationMost = 100.0;
 // χ² per row from which a window's noise is enlarged.
 constexpr double kContradiction = 9.0;
 // Deviation of the bias difference, in standard deviations, from which a gyro may have stepped.
@@ -290,6 +294,7 @@ class OptimalCorrector final : public Corrector {
   };
   [[nodiscard]] Contradiction contradiction(const DriftMeasurement& measurement,
                                             double length_s) const;
+  void note_innovation(const Contradiction& found, const DriftMeasurement& measurement);
 
   // For each sample.
   void refresh();
@@ -388,6 +393,8 @@ class OptimalCorrector final : public Corrector {
   bool blind_before_ = false;  ///< one gyro counted as blind at the last block
 
   WindowCounts windows_;
+  double innovation_sum_ = 0.0;   ///< of squared innovations, the older the less
+  double innovation_rows_ = 0.0;  ///< how many they are
   Condition condition_;
   std::uint64_t edition_ = 1;  ///< of condition()
 };
@@ -976,7 +983,19 @@ void OptimalCorrector::learn_difference(double length_s) {
   } else {
     readings_.learn(length_s, doubted);
   }
+  note_innovation(found, measurement);
   ++windows_.completed;
+}
+
+// Before any doubt is added because of it: what the filters expected of the measurement.
+void OptimalCorrector::note_innovation(const Contradiction& found,
+                                       const DriftMeasurement& measurement) {
+  if (!std::isfinite(found.per_row)) return;  // begin_anew() counts that
+  const auto rows = static_cast<double>(measurement.values.size());
+  const double kept = std::exp(-rows / kInnovationRows);
+  innovation_sum_ = kept * innovation_sum_ + rows * std::min(found.per_row, kInnovationMost);
+  innovation_rows_ = kept * innovation_rows_ + rows;
+  condition_.normalized_innovation = innovation_sum_ / innovation_rows_;
 }
 
 DriftMeasurement OptimalCorrector::standing_measurement() const {
@@ -1049,6 +1068,7 @@ SteadyWindow OptimalCorrector::steady_window() {
 
 void OptimalCorrector::learn_steady() {
   const SteadyWindow window = steady_window();
+  const Contradiction found = contradiction(window.standing, window.length_s);
   const bool contradicted = has_before_ && learned_until_s_ - contradicted_s_ <= kCalm_s;
   if (run_ == Run::kMoving && contradicted && window_.present == Present::kBoth)
     readings_.add_back(before_, std::max(learned_until_s_ - before_s_, 0.0));
@@ -1059,6 +1079,7 @@ void OptimalCorrector::learn_steady() {
   run_open_ = std::min(standing, 1.0 - standing) > Readings::kWorthTelling;
   if (standing > 1.0 - Readings::kWorthTelling) {
     follow_still_vibration();
+    note_innovation(found, window.standing);
     has_before_ = false;
   }
 }

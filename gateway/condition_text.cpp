@@ -126,6 +126,15 @@ std::string hypotheses_text(const Probabilities& probability, const GyroNames& n
   return text;
 }
 
+std::string innovation_text(double normalized_innovation) {
+  if (!(normalized_innovation > kInnovationHigh)) return {};
+  return fmt::format(
+      "the measurements of the drifts scatter {:.1f} times more than expected (normalised "
+      "innovation {:.1f}, expected 1): more noise, faster drifts or larger scale factors than "
+      "assumed",
+      std::sqrt(normalized_innovation), normalized_innovation);
+}
+
 // If no other kind is likely, the method distinguishes none, so the random walk is no finding
 // either.
 std::string drift_kind_text(const Probabilities& probability) {

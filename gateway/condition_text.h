@@ -18,6 +18,9 @@ using Probabilities = std::array<double, fusion::kHypotheses>;
 /// Less likely hypotheses are not reported.
 inline constexpr double kWorthTelling = 0.05;
 
+/// A normalised innovation above this is reported: four times its scatter above the expected 1.
+inline constexpr double kInnovationHigh = 2.0;
+
 /// Stretches in which both gyros were steady. Each was either learned from or refused; `open`
 /// counts some of these.
 struct SteadyStretches {
@@ -52,6 +55,9 @@ std::string contradiction_advice();
 /// "its counter always goes from 14 back to 0: counter_max = 14?"; empty if it does not.
 std::string counter_text(const GyroStatus& gyro);
 std::string rates_too_far_apart_text();
+/// The data scatter far more than noise and drifts explain; empty where they do not, or where it is
+/// not known.
+std::string innovation_text(double normalized_innovation);
 /// Says that the estimate was restarted, which is a fault of vgyro itself.
 std::string restarts_text(std::uint64_t restarts);
 

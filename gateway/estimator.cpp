@@ -228,6 +228,7 @@ void Estimator::tell(Status& status) const {
   status.stops_refused = condition_.stops_refused;
   status.stops_open = condition_.stops_open;
   status.estimate_restarts = condition_.restarts;
+  status.normalized_innovation = condition_.normalized_innovation;
 }
 
 }  // namespace vgyro::gateway

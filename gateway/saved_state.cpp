@@ -500,6 +500,14 @@ Expected<SavedState> saved_state_from(std::string_view text, const std::string& 
   if (format != nullptr && format->get() == kFormatOfAxes) return axes_from(root, where);
   if (format != nullptr && format->get() == kFormat && root["drift"].is_table())
     return pair_from(root, where);
+  if (format != nullptr && format->get() > kFormatOfAxes) {
+    return fail(
+        where,
+        fmt::format("is of format {}, so a newer release has written it: only format {} and "
+                    "{} are known",
+                    format->get(), kFormat, kFormatOfAxes),
+        kRemedy);
+  }
   return fail(
       where,
       fmt::format("is of another version: only format {} and {} are known", kFormat, kFormatOfAxes),

@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <string_view>
 
@@ -173,6 +174,8 @@ struct Status {
   /// Of the hypotheses, by fusion::Hypothesis.
   std::array<double, fusion::kHypotheses> probability{};
   std::uint64_t estimate_restarts = 0;  ///< times that the estimate was lost and restarted
+  /// fusion::Condition::normalized_innovation.
+  double normalized_innovation = std::numeric_limits<double>::quiet_NaN();
 
   /// Of a platform of several axes: the rotation between its units, and its evidence.
   std::uint64_t misalignment_segments = 0;

@@ -576,6 +576,7 @@ void add_axis(const Status& axis, Status& all) {
   if (all.pair.contradiction == fusion::Contradiction::kNone) all.pair = axis.pair;
   all.ambiguous = all.ambiguous || axis.ambiguous;
   all.estimate_restarts += axis.estimate_restarts;
+  all.normalized_innovation = std::fmax(all.normalized_innovation, axis.normalized_innovation);
   all.rates_too_far_apart = all.rates_too_far_apart || axis.rates_too_far_apart;
 }
 

@@ -3,12 +3,13 @@
 BUILD_PACKAGES=(g++ cmake ninja-build pkg-config libeigen3-dev libfmt-dev libcli11-dev
   libtomlplusplus-dev libexpected-dev nlohmann-json3-dev liblzma-dev libsystemd-dev libnlopt-cxx-dev
   zlib1g-dev libzstd-dev libbz2-dev libsimdjson-dev nettle-dev libjs-dygraphs)
-PACKAGE_PACKAGES=(debhelper scdoc)
+PACKAGE_PACKAGES=(debhelper scdoc python3)
 RUN_PACKAGES=(gnuplot-nox fonts-dejavu-core can-utils iproute2 util-linux xz-utils)
 TEST_PACKAGES=(libgtest-dev libbenchmark-dev clang-format git python3 python3-numpy python3-can
   python3-yaml python3-canmatrix python3-distributed user-mode-linux kmod dbus lintian man-db systemd mmdebstrap uidmap genext2fs e2fsprogs)
 FUZZ_PACKAGES=(clang libclang-rt-14-dev)
 TIDY_PACKAGES=(clang-tidy)
+ARM64_PACKAGES=(g++-aarch64-linux-gnu qemu-user mmdebstrap binutils)
 
 LAYERS=(base can canlog dbc model simulation fusion analysis gap fleet gateway daemon cli)
 

@@ -113,6 +113,11 @@ Json model_json(const ReplaySummary& summary, const gateway::Plan& plan) {
   return {{"file", plan.model->file}, {"effects", effects}, {"waits_for", waits_for}};
 }
 
+Json stops_json(const gateway::Status& status) {
+  return {
+      {"learned", status.stops}, {"refused", status.stops_refused}, {"open", status.stops_open}};
+}
+
 // Hypotheses at the end of the recording; leaves out those up to kWorthTelling.
 Json hypotheses_json(const gateway::Status& status) {
   Json hypotheses = Json::object();
@@ -193,12 +198,10 @@ Json axes_json(const ReplaySummary& summary) {
          {"mean_rate_dps", number(mean_of(axis.rate_sum_dps, axis.rates))},
          {"gyros", {axis_gyro_json(status.gyros[0]), axis_gyro_json(status.gyros[1])}},
          {"windows", {{"completed", status.windows}, {"skipped", status.windows_skipped}}},
-         {"stops",
-          {{"learned", status.stops},
-           {"refused", status.stops_refused},
-           {"open", status.stops_open}}},
+         {"stops", stops_json(status)},
          {"disagreements", status.disagreements},
          {"hypotheses", hypotheses_json(status)},
+         {"normalized_innovation", number(status.normalized_innovation)},
          {"pair", pair_json(status)}});
   }
   return axes;
@@ -293,10 +296,10 @@ Json to_json(const ReplaySummary& summary, const gateway::Plan& plan) {
       {"clock_steps", status.clock_steps},
       {"gaps", gaps_json(summary)},
       {"windows", {{"completed", status.windows}, {"skipped", status.windows_skipped}}},
-      {"stops",
-       {{"learned", status.stops}, {"refused", status.stops_refused}, {"open", status.stops_open}}},
+      {"stops", stops_json(status)},
       {"hypotheses", hypotheses_json(status)},
       {"ambiguous", status.ambiguous},
+      {"normalized_innovation", number(status.normalized_innovation)},
       {"estimate_restarts", status.estimate_restarts},
       {"rates_too_far_apart", status.rates_too_far_apart},
       {"disagreements", status.disagreements},
@@ -407,6 +410,7 @@ void put_opinion(fmt::memory_buffer& text, const ReplaySummary& summary,
   line("stops", stops_text(gateway::steady_stretches(status)));
   line("at the end", status.ambiguous ? gateway::ambiguity_text(status.probability, names)
                                       : gateway::hypotheses_text(status.probability, names));
+  line("scatter", gateway::innovation_text(status.normalized_innovation));
   const std::string kind = gateway::drift_kind_text(status.probability);
   line("drifts", kind);
   if (!kind.empty()) {

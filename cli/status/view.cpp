@@ -275,6 +275,7 @@ std::string opinion(const Json& status, const Paint& paint) {
   }
   line(Mood::kPlain, "", gateway::stretches_text(stretches));
   line(Mood::kDoubtful, "", gateway::stretches_advice(stretches));
+  line(Mood::kDoubtful, "", gateway::innovation_text(number_of(status, "normalized_innovation")));
   return text;
 }
 

@@ -34,6 +34,7 @@ struct SampleGateway {
     now.plan = &plan;
     now.fingerprint = "0123456789abcdef";
     now.last_stop_age_s = 75.0;
+    now.status.normalized_innovation = 4.5;
     now.status.state = gateway::State::kRunning;
     now.status.quality = gateway::Quality::kTwoGyros;
     now.status.rate_dps = 50.25;

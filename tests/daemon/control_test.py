@@ -135,7 +135,7 @@ class OnTheBus(Bench):
         expected |= {f".{name}": ["property", "b"] for name in ("Valid", "Disagree", "Ambiguous", "RatesTooFarApart",
                                                                 "ConfigRefused", "Transmit")}
         expected |= {".Hypotheses": ["property", "a{sd}"]}
-        expected |= {f".{name}": ["property", "d"] for name in ("RateDps", "SigmaDps", "BiasSigmaDps", "CalibratedS", "LastStopAgeS",
+        expected |= {f".{name}": ["property", "d"] for name in ("RateDps", "SigmaDps", "BiasSigmaDps", "CalibratedS", "LastStopAgeS", "NormalizedInnovation",
                                                                 "RestS", "UptimeS")}
         self.assertEqual(members, expected)
 
@@ -143,6 +143,7 @@ class OnTheBus(Bench):
         self.assertEqual(self.get("State"), "running")
         self.assertEqual(self.get("Fingerprint"), "0123456789abcdef")
         self.assertEqual(self.get("LastStopAgeS"), 75.0)
+        self.assertEqual(self.get("NormalizedInnovation"), 4.5)
         self.assertEqual(self.get("Quality"), "two_gyros")
         self.assertIs(self.get("Valid"), True)
         self.assertEqual((self.get("RateDps") - 50.25) % 0.5, 0.0)
@@ -288,6 +289,11 @@ class OnTheBus(Bench):
         text = metrics.read_text(encoding="utf-8")
         self.assertRegex(text, r'(?m)^vgyro_build_info\{version="[0-9.]+[^"]*",fingerprint="0123456789abcdef",method="[a-z]+"\} 1$')
         self.assertIn("\nvgyro_last_stop_age_seconds 75\n", text)
+        self.assertIn("\nvgyro_normalized_innovation 4.5\n", text)
+
+    def test_a_scatter_beyond_what_is_expected_is_said(self):
+        self.assertIn("scatter 2.1 times more than expected (normalised innovation 4.5, expected 1)", self.vgyro("status").stdout)
+        self.assertEqual(json.loads(self.vgyro("status", "--json").stdout)["normalized_innovation"], 4.5)
 
     def test_shadow_mode_is_said_wherever_one_looks(self):
         self.assertIs(self.get("Transmit"), True)

@@ -252,7 +252,7 @@ TEST(SavedState, WhatCannotBeIsRefusedBehindARightChecksum) {
   const std::string content = content_of(to_text(plain_state()));
   ASSERT_TRUE(saved_state_from(sealed(content), kWhere));
   const Forgery forgeries[] = {
-      {"format = 1", "format = 3", "format 1"},
+      {"format = 1", "format = 3", "a newer release has written it: only format 1"},
       {"format = 1", "format = 2", "unknown key"},
       {"format = 1", "format = \"1\"", "format 1"},
       {"format = 1", "format = 5e19", "format 1"},

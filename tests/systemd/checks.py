@@ -209,7 +209,24 @@ def upgrades(run):
     shown = run.require_shows("upgraded", ActiveState="active", SubState="running", UnitFileState="enabled")
     require(shown["MainPID"] != run.text("link_main").strip(), "the old process still runs")
     require("restored the biases" in run.text("upgraded_journal"), run.text("upgraded_journal"))
-    return run.check_rates("upgraded_play", "stop", calibrated=True)
+    return run.check_rates("upgraded_play", "downgrade", calibrated=True)
+
+
+def downgrades(run):
+    """The older package again: the same biases, valid from the first pair."""
+    run.done("downgrade", "downgraded_play")
+    run.require_shows("downgraded", ActiveState="active", SubState="running", UnitFileState="enabled")
+    require("restored the biases" in run.text("downgraded_journal"), run.text("downgraded_journal"))
+    return run.check_rates("downgraded_play", "later_start", calibrated=True)
+
+
+def keeps_a_later_state(run):
+    """A state of a later format: refused with a line that says so, kept byte by byte, and the gateway calibrates."""
+    run.done("later_start", "later_play", "later_said", "later_kept")
+    run.require_shows("later_show", ActiveState="active", NRestarts="0")
+    require("newer release" in run.text("later_journal") and "state.toml.refused" in run.text("later_journal"), run.text("later_journal"))
+    _, rate, _ = verdicts.rates_of(run.sent(0x610, "later_play", "stop"), run.oracle)
+    require(len(rate) > 0 and not np.isfinite(rate).any(), "a valid rate without a calibration")
 
 
 def stops(run):
@@ -255,7 +272,7 @@ def protection(run):
     return f"{len(run.frames)} frames"
 
 
-CHECKS = (network_examples, installs_and_waits, starts, sandbox, calibrates, speaks_on_dbus, records, kill_nine, reloads, watchdog, link_faults, upgrades, stops,
+CHECKS = (network_examples, installs_and_waits, starts, sandbox, calibrates, speaks_on_dbus, records, kill_nine, reloads, watchdog, link_faults, upgrades, downgrades, keeps_a_later_state, stops,
           goes_away, protection)
 
 

@@ -168,6 +168,32 @@ step upgraded_config cmp /etc/vgyro/vgyro.toml $here/vgyro.toml
 step upgraded_play play rest
 step upgraded_journal journal $since
 
+# Back to the first version, with what the second one has kept.
+since=$(date +%s)
+step downgrade dpkg -i $here/vgyro.deb
+step downgraded show
+step downgraded_play play rest
+step downgraded_journal journal $since
+
+# A state that a later release has written, in a format of its own: sealed as its writer would, by gzip's CRC-32.
+systemctl stop vgyrod
+state=/var/lib/vgyro/state.toml
+cp -p $state /run/good.toml
+sed -e '/^\[checksum\]$/,$d' -e 's/^format = .*/format = 99/' $state | head -c -1 >/run/later.toml
+crc=$(gzip -c /run/later.toml | tail -c 8 | od -An -N4 -tx4 | tr -d ' ')
+printf '\n[checksum]\ncrc32 = "%s"\n' "$crc" >>/run/later.toml
+cat /run/later.toml >$state
+since=$(date +%s)
+step later_start systemctl start vgyrod
+step later_play play rest
+step later_said within 10 said 'format 99'
+step later_show show
+step later_kept cmp $state.refused /run/later.toml
+step later_journal journal $since
+systemctl stop vgyrod
+cp -p /run/good.toml $state
+systemctl start vgyrod
+
 # Stopped, removed, purged.
 step stop systemctl stop vgyrod
 step stopped show
