@@ -41,7 +41,7 @@ TRUE_TO_SCALE = {"fog": 0.2, "vibratory": 0.3, "mems": 1.0, "cheap mems": 1.0}
 LEAST_SHARE = 0.1
 LEAST = {"bandwidth": 2.0, "delay": 2e-4, "clock_skew": 2.0}
 # A seed goes on hiding what it hid: what the catalogue learns later hides in drives that ask for it (`kind`) alone.
-LATER = {"cross_axis", "temperature_hysteresis", "run_in", "bias_instability", "lever_arm", "second_order"}
+LATER = {"cross_axis", "temperature_hysteresis", "run_in", "bias_instability", "bandwidth_second_order"}
 HIDE = [k for k in kinds.KINDS if k not in LATER]
 FLICKER_TERMS = 3  # what a model file may hold
 LAG_KINDS = {"delay", "bandwidth", "clock_skew", "timestamp_jitter"}
@@ -214,7 +214,7 @@ def benign(world, case):
 def fits(kind, gyro, world, case):
     """Whether this kind can hide in this world and be looked for."""
     g = world.gyros[gyro - 1]
-    if kind == "bandwidth" and g.filters_hz:
+    if kind in ("bandwidth", "bandwidth_second_order") and g.filters_hz:
         return False
     if kind == "quantization" and g.rate_step > 1e-6:
         return False
