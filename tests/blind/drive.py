@@ -41,7 +41,8 @@ TRUE_TO_SCALE = {"fog": 0.2, "vibratory": 0.3, "mems": 1.0, "cheap mems": 1.0}
 LEAST_SHARE = 0.1
 LEAST = {"bandwidth": 2.0, "delay": 2e-4, "clock_skew": 2.0}
 # A seed goes on hiding what it hid: what the catalogue learns later hides in drives that ask for it (`kind`) alone.
-LATER = {"cross_axis", "temperature_hysteresis", "run_in", "bias_instability", "bandwidth_second_order"}
+# A low-pass of second order hides as the others do, where a gyro has no filter already.
+LATER = {"cross_axis", "temperature_hysteresis", "run_in", "bias_instability"}
 HIDE = [k for k in kinds.KINDS if k not in LATER]
 FLICKER_TERMS = 3  # what a model file may hold
 LAG_KINDS = {"delay", "bandwidth", "clock_skew", "timestamp_jitter"}
