@@ -23,6 +23,9 @@ constexpr std::size_t kPhases = 512;
 constexpr int kMoments = 6;
 // A step that is further from the median than this share of it is uneven.
 constexpr double kUneven = 0.02;
+// So many intervals for each sample are few enough to have a place each: with longer gaps places
+// are looked for.
+constexpr double kPlacesMost = 20.0;
 
 double bessel_i0(double x) {
   double sum = 1.0;
@@ -156,14 +159,34 @@ SampledCurve SampledCurve::with_values(std::vector<double> value) const {
 
 std::size_t SampledCurve::index_before(double t_s) const {
   const std::vector<double>& times_s = times_->t_s;
-  // Even sampling: the place is nearly known.
+  if (t_s <= times_s.front()) return 0;
+  if (t_s >= times_s.back()) return times_s.size() - 2;
+  if (times_->places.empty()) {
+    const auto after = std::upper_bound(times_s.begin(), times_s.end(), t_s);
+    return static_cast<std::size_t>(after - times_s.begin()) - 1;
+  }
   const double place = (t_s - times_s.front()) / times_->interval_s;
-  const auto i =
-      static_cast<std::size_t>(std::clamp(place, 0.0, static_cast<double>(times_s.size() - 2)));
-  if (times_s[i] <= t_s && t_s < times_s[i + 1]) return i;
-  const auto after = std::upper_bound(times_s.begin(), times_s.end(), t_s);
-  const auto index = static_cast<std::size_t>(after - times_s.begin());
-  return std::clamp<std::size_t>(index, 1, times_s.size() - 1) - 1;
+  const auto slot = std::min(static_cast<std::size_t>(place), times_->places.size() - 1);
+  std::size_t i = times_->places[slot];
+  while (times_s[i] > t_s)
+    --i;
+  while (times_s[i + 1] <= t_s)
+    ++i;
+  return i;
+}
+
+// A sample from which the one before an instant is a step or two away, after gaps too.
+void SampledCurve::Times::set_places() {
+  const double intervals = (t_s.back() - t_s.front()) / interval_s;
+  if (intervals > kPlacesMost * static_cast<double>(t_s.size())) return;
+  places.resize(static_cast<std::size_t>(intervals) + 1);
+  std::size_t i = 0;
+  for (std::size_t slot = 0; slot < places.size(); ++slot) {
+    const double begins_s = t_s.front() + interval_s * static_cast<double>(slot);
+    while (i + 2 < t_s.size() && t_s[i + 1] <= begins_s)
+      ++i;
+    places[slot] = static_cast<std::uint32_t>(i);
+  }
 }
 
 // The first of the points about an instant.
@@ -186,6 +209,7 @@ void SampledCurve::Times::measure_steps() {
     const int led = even_steps[i - 1] + 1;
     even_steps[i] = even ? static_cast<std::uint8_t>(std::min<int>(led, kPointsMax)) : 0;
   }
+  set_places();
 }
 
 bool SampledCurve::is_even_about(std::size_t before) const {

@@ -31,6 +31,10 @@ class SampledCurve {
   [[nodiscard]] std::span<const double> times_s() const { return times_->t_s; }
   [[nodiscard]] std::span<const double> values() const { return value_; }
 
+  /// Of the sample at or before an instant between the first and the last one; beyond the ends of
+  /// the outermost two.
+  [[nodiscard]] std::size_t index_before(double t_s) const;
+
   struct Point {
     double value = 0.0;
     double slope = 0.0;  ///< per second
@@ -57,7 +61,6 @@ class SampledCurve {
   [[nodiscard]] bool hole_at(double t_s, double reach_s) const;
 
  private:
-  [[nodiscard]] std::size_t index_before(double t_s) const;
   [[nodiscard]] std::size_t first_about(double t_s) const;
   [[nodiscard]] Point polynomial_at(double t_s) const;
   /// The samples about the interval behind `before` are evenly spaced.
@@ -67,8 +70,10 @@ class SampledCurve {
     std::vector<double> t_s;
     std::vector<std::uint8_t> even_steps;  ///< that led up to each sample, as far as it matters
     double interval_s = 0.0;               ///< median
+    std::vector<std::uint32_t> places;     ///< of each interval from the first sample on: a sample
     /// Sets the others from the times. Precondition: two or more.
     void measure_steps();
+    void set_places();
   };
   static const std::shared_ptr<const Times>& no_times();
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <ranges>
 #include <span>
 
 #include "model/catalogue.h"
@@ -164,18 +165,41 @@ Excitation excitation_of(const Observations& data, std::size_t gyro) {
   return excitation;
 }
 
-void set_surroundings(Observations& data, std::size_t gyro) {
+bool is_same(const SampledCurve& a, const SampledCurve& b) {
+  return std::ranges::equal(a.times_s(), b.times_s()) && std::ranges::equal(a.values(), b.values());
+}
+
+// Without a reference both gyros are judged by one motion.
+bool has_motion_of_first(const Observations& data, std::size_t gyro) {
+  return gyro == 1 && data.holds[0] &&
+         is_same(data.about.signals[0]->motion.curve(), data.about.signals[1]->motion.curve());
+}
+
+void set_motion(Observations& data, std::size_t gyro) {
   const Signals& signals = *data.about.signals[gyro];
   const std::size_t n = data.t_s.size();
+  const bool is_known = has_motion_of_first(data, gyro);
   data.rate[gyro].resize(n);
-  data.surroundings[gyro].resize(n);
   for (std::size_t i = 0; i < n; ++i) {
-    data.rate[gyro][i] = signals.motion.rate(data.t_s[i]);
-    data.surroundings[gyro][i] = signals.at(data.t_s[i]);
-    if (!signals.motion_by_other.curve().empty())
-      data.rate_by_other_dps[gyro].push_back(signals.motion_by_other.curve().value_at(data.t_s[i]));
+    const double t_s = data.t_s[i];
+    data.rate[gyro][i] = is_known ? data.rate[0][i] : signals.motion.rate(t_s);
+    data.surroundings[gyro][i].angle_rad =
+        is_known ? data.surroundings[0][i].angle_rad : signals.motion.angle_rad(t_s);
+  }
+  data.rate_by_other_dps[gyro].clear();
+  if (!signals.other_reading_dps.empty()) {
+    data.rate_by_other_dps[gyro].reserve(n);
+    for (const double t_s : data.t_s)
+      data.rate_by_other_dps[gyro].push_back(signals.other_reading_dps.value_at(t_s));
   }
   data.excitation[gyro] = excitation_of(data, gyro);
+}
+
+void set_surroundings(Observations& data, std::size_t gyro) {
+  data.surroundings[gyro].reserve(data.t_s.size());
+  for (const double t_s : data.t_s)
+    data.surroundings[gyro].push_back(data.about.signals[gyro]->without_motion_at(t_s));
+  set_motion(data, gyro);
 }
 
 bool is_moving(const Effect& effect) {
@@ -313,6 +337,7 @@ double Observations::most_of(const Limit& limit, std::size_t gyro) const {
 
 void Observations::learn_unseen_motion(const FastMotion& motion, const Effects& effects) {
   for (Block& block : layout.blocks) {
+    block.kept = block.count - 1;
     block.compared = about.with_reference || block.channel == Channel::kDifference;
     block.motion_power = block.compared ? motion.power(block.t_s) : 0.0;
   }
@@ -331,6 +356,26 @@ void Observations::learn_unseen_motion(const Effects& effects) {
   gap::learn_unseen_motion(columns, layout);
 }
 
+Observations Observations::with_motion(
+    const std::array<std::shared_ptr<const Signals>, 2>& signals) const {
+  Observations other = *this;
+  other.remembered_.clear();
+  other.forget_next_ = 0;
+  other.about.signals = signals;
+  for (std::size_t gyro = 0; gyro < 2; ++gyro) {
+    if (holds[gyro]) set_motion(other, gyro);
+  }
+  for (Block& block : other.layout.blocks) {
+    // At rest the rate is what it was.
+    if (block.channel != Channel::kDifference) continue;
+    block.rate_square = 0.0;
+    for (std::size_t i = block.first; i < block.first + block.count; ++i)
+      block.rate_square += other.rate[0][i].value * other.rate[0][i].value;
+    block.rate_square /= block.count;
+  }
+  return other;
+}
+
 Observations Observations::with_for_fit(const std::vector<Span>& spans) const {
   Observations other = *this;
   set_for_fit(other.layout.blocks, spans);
@@ -343,24 +388,30 @@ Drive Observations::whole() const {
 
 // What a gyro feels less the true rate, at each sample that holds it: what delay, low-passes and
 // clock skew make of the motion.
-Eigen::VectorXd Observations::lateness_dps(std::size_t gyro, const Effects& moving) const {
+Eigen::VectorXd Observations::lateness_dps(std::size_t gyro, const Effects& moving, By by) const {
   if (moving.empty()) return Eigen::VectorXd::Zero(size());
   const auto found =
-      std::find_if(remembered_.begin(), remembered_.end(),
-                   [&](const Remembered& one) { return one.gyro == gyro && one.moving == moving; });
+      std::find_if(remembered_.begin(), remembered_.end(), [&](const Remembered& one) {
+        return one.gyro == gyro && one.by == by && one.moving == moving;
+      });
   if (found != remembered_.end()) return found->values;
   Eigen::VectorXd lateness = Eigen::VectorXd::Zero(size());
   for (const Drive& drive : is_one() ? std::vector<Drive>{whole()} : drives) {
     const Prediction prediction(moving, *drive.signals[gyro]);
-    const bool by_other = &prediction.on_time() == &drive.signals[gyro]->motion_by_other;
+    const SampledCurve& other_dps = drive.signals[gyro]->other_reading_dps;
+    const bool by_other = by == By::kReadings && !prediction.passes_low() && !other_dps.empty();
+    // Of a low-pass what it makes of the motion is known to the prediction.
+    const SampledCurve* felt_dps = by_other ? &other_dps : &drive.signals[gyro]->motion.curve();
     for (std::size_t place = drive.first; place < drive.first + drive.count; ++place) {
       if (share_of(channel[place], gyro) == 0.0) continue;
+      const double at_s = t_s[place] - drive.from_s;
+      const double late_dps = prediction.passes_low() ? prediction.late_dps(at_s)
+                                                      : prediction.late_dps(at_s, *felt_dps);
       lateness[static_cast<Eigen::Index>(place)] =
-          prediction.late_dps(t_s[place] - drive.from_s) -
-          (by_other ? rate_by_other_dps[gyro][place] : rate[gyro][place].value);
+          late_dps - (by_other ? rate_by_other_dps[gyro][place] : rate[gyro][place].value);
     }
   }
-  Remembered one{gyro, moving, lateness};
+  Remembered one{gyro, by, moving, lateness};
   if (remembered_.size() < kRemembered) {
     remembered_.push_back(std::move(one));
   } else {
@@ -383,10 +434,14 @@ void Observations::add(std::size_t gyro, const Effects& added, const Eigen::Vect
 }
 
 Eigen::VectorXd Observations::contribution(std::size_t gyro, const Effects& effects) const {
+  return contribution(gyro, effects, By::kReadings);
+}
+
+Eigen::VectorXd Observations::contribution(std::size_t gyro, const Effects& effects, By by) const {
   Eigen::VectorXd sum = Eigen::VectorXd::Zero(size());
   if (!holds[gyro]) return sum;
   const Effects moving = only(effects, gyro, is_moving);
-  const Eigen::VectorXd lateness = lateness_dps(gyro, moving);
+  const Eigen::VectorXd lateness = lateness_dps(gyro, moving, by);
   if (!moving.empty()) {
     for (Eigen::Index i = 0; i < size(); ++i)
       sum[i] = share_of(channel[static_cast<std::size_t>(i)], gyro) * lateness[i];
@@ -396,21 +451,24 @@ Eigen::VectorXd Observations::contribution(std::size_t gyro, const Effects& effe
   return sum;
 }
 
-Eigen::VectorXd Observations::late_with(const Effects& others, const Effect& effect) const {
+Eigen::VectorXd Observations::late_with(const Effects& others, const Effect& effect, By by) const {
   Effects with = late_part(others, effect.gyro);
   with.push_back(effect);
-  return contribution(effect.gyro, with);
+  return contribution(effect.gyro, with, by);
 }
 
 // An offset or a response sees what is late already; what is late moves what responds to it.
 Eigen::VectorXd Observations::contribution_beside(const Effects& others,
                                                   const Effect& effect) const {
-  if (is_moving(effect))
-    return late_with(others, effect) - contribution(effect.gyro, late_part(others, effect.gyro));
+  if (is_moving(effect)) {
+    return late_with(others, effect, By::kReadings) -
+           contribution(effect.gyro, late_part(others, effect.gyro));
+  }
   Eigen::VectorXd sum = Eigen::VectorXd::Zero(size());
-  if (holds[effect.gyro])
-    add(effect.gyro, {effect}, lateness_dps(effect.gyro, only(others, effect.gyro, is_moving)),
-        sum);
+  if (holds[effect.gyro]) {
+    add(effect.gyro, {effect},
+        lateness_dps(effect.gyro, only(others, effect.gyro, is_moving), By::kReadings), sum);
+  }
   return sum;
 }
 
@@ -426,15 +484,24 @@ Eigen::VectorXd Observations::derivative(const Effects& others, const Effect& ef
   above.parameters[free.parameter] += step;
   below.parameters[free.parameter] -= step;
   const auto at = [&](const Effect& moved) {
-    return is_moving(moved) ? late_with(others, moved) : contribution_beside(others, moved);
+    return is_moving(moved) ? late_with(others, moved, By::kMotion)
+                            : contribution_beside(others, moved);
   };
   return (at(above) - at(below)) / (2.0 * step);
 }
 
 Eigen::VectorXd Observations::residual(const Effects& effects) const {
+  return residual(effects, By::kReadings);
+}
+
+Eigen::VectorXd Observations::residual_by_motion(const Effects& effects) const {
+  return residual(effects, By::kMotion);
+}
+
+Eigen::VectorXd Observations::residual(const Effects& effects, By by) const {
   Eigen::VectorXd residual = observed_dps;
   for (std::size_t gyro = 0; gyro < 2; ++gyro) {
-    if (holds[gyro]) residual -= contribution(gyro, effects);
+    if (holds[gyro]) residual -= contribution(gyro, effects, by);
   }
   return residual;
 }

@@ -88,6 +88,8 @@ class Observations {
 
   /// What is observed less what the effects say, of every sample.
   [[nodiscard]] Eigen::VectorXd residual(const Effects& effects) const;
+  /// The same, with lateness reckoned by the motion in the other gyro's readings, not by these.
+  [[nodiscard]] Eigen::VectorXd residual_by_motion(const Effects& effects) const;
   /// What effects of one gyro add to what is observed, in deg/s.
   [[nodiscard]] Eigen::VectorXd contribution(std::size_t gyro, const Effects& effects) const;
   /// What `effect` adds to it beside `others`.
@@ -102,19 +104,31 @@ class Observations {
   void learn_unseen_motion(const FastMotion& motion, const Effects& effects);
   /// Of blocks that know the motion's power.
   void learn_unseen_motion(const Effects& effects);
+  /// The same samples of the same gyros with another motion. Precondition: one recording without a
+  /// reference, or as before.
+  [[nodiscard]] Observations with_motion(
+      const std::array<std::shared_ptr<const Signals>, 2>& signals) const;
   /// With these seconds for the fit. `spans`: all such.
   [[nodiscard]] Observations with_for_fit(const std::vector<Span>& spans) const;
 
  private:
   [[nodiscard]] Drive whole() const;
-  [[nodiscard]] Eigen::VectorXd lateness_dps(std::size_t gyro, const Effects& moving) const;
-  [[nodiscard]] Eigen::VectorXd late_with(const Effects& others, const model::Effect& effect) const;
+  /// By what lateness is reckoned where the other gyro tells the motion: by its readings as they
+  /// are, whose noise is late with them; or by the motion in them, which is how a fit should move:
+  /// by the slopes of the noise its steps would be far too small.
+  enum class By { kReadings, kMotion };
+  [[nodiscard]] Eigen::VectorXd lateness_dps(std::size_t gyro, const Effects& moving, By by) const;
+  [[nodiscard]] Eigen::VectorXd contribution(std::size_t gyro, const Effects& effects, By by) const;
+  [[nodiscard]] Eigen::VectorXd residual(const Effects& effects, By by) const;
+  [[nodiscard]] Eigen::VectorXd late_with(const Effects& others, const model::Effect& effect,
+                                          By by) const;
   void add(std::size_t gyro, const Effects& added, const Eigen::VectorXd& lateness,
            Eigen::VectorXd& sum) const;
 
   /// The last answers of lateness_dps, which are dear and asked for again and again.
   struct Remembered {
     std::size_t gyro = 0;
+    By by = By::kReadings;
     Effects moving;
     Eigen::VectorXd values;
   };

@@ -155,6 +155,11 @@ double Regression::log_likelihood(const Effects& terms, const PairNoise& noise) 
   return gap::log_likelihood(residual(terms), data_->layout, noise, part_);
 }
 
+double Regression::log_likelihood_by_motion(const Effects& terms, const PairNoise& noise) const {
+  return gap::log_likelihood(data_->residual_by_motion(with_known(terms)), data_->layout, noise,
+                             part_);
+}
+
 // Gauss-Newton's steps, each from where the last one ended: what is left of the observations, and
 // what the free parameters move.
 class Regression::Descent {

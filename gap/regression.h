@@ -52,6 +52,9 @@ class Regression {
                                std::size_t left_out = kNone) const;
   [[nodiscard]] Matrix whitened(const Matrix& columns, const PairNoise& noise) const;
   [[nodiscard]] double log_likelihood(const Effects& terms, const PairNoise& noise) const;
+  /// With every lateness reckoned as that of a low-pass: by the motion, not by what the other gyro
+  /// reads.
+  [[nodiscard]] double log_likelihood_by_motion(const Effects& terms, const PairNoise& noise) const;
 
   /// Gauss-Newton over the free parameters at the fit's noise; sets the covariance.
   void improve(Fit& fit) const;

@@ -6,6 +6,7 @@
 
 #include <array>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "gap/recording.h"
@@ -31,6 +32,13 @@ class RestingSeconds {
   std::vector<std::uint8_t> rests_;
   double count_ = 0.0;
 };
+
+/// Takes off what one gyro reads where it should read `rest_dps`: the drift that its stops show,
+/// straight between them and level before the first and behind the last. What hurries on between
+/// two stops stays. Of stops shorter than three seconds nothing is told. Shape: one rate an
+/// instant.
+void take_off_drift_at_rest(const RestingSeconds& rest, std::span<const double> t_s,
+                            double rest_dps, std::vector<double>& rate_dps);
 
 /// Seconds in which both gyros rest, by analysis::RestFinder, of which no part of a second is left.
 /// Precondition: the transports are those of the recording.

@@ -59,6 +59,9 @@ constexpr double kLineShare = 0.05;
 constexpr double kHeldOutShare = 1.0 / 3.0;
 constexpr double kProofSigmas = 2.5;
 constexpr double kProofShare = 0.8;
+// Names that did not prove themselves, one after the other: beyond that what is there is not in the
+// catalogue, and only resembles one thing after another.
+constexpr std::size_t kBarredMax = 3;
 // A starting model's noise is known at best to a hundredth, and is written with as many digits.
 constexpr double kStartingNoiseDoubt = 0.01;
 // Shares of a timing effect's statistic that interpolation leaves behind.
@@ -72,6 +75,8 @@ constexpr int kMotionTurns = 3;
 // terms give contradicts them, and further turns would only lead farther off.
 constexpr double kTurnsAlike = 0.1;
 constexpr double kTurnFails = 500.0;
+// Of noise a low-pass takes off ω²τ², a delay of as long half of it.
+constexpr double kLowPassDoubts = 2.0;
 // What must be left of a bounded time: names are worth nothing before they were checked, which
 // takes about as long as finding them; and what was found must be scored and drawn.
 constexpr double kLeftToCheck = 0.5;
@@ -93,6 +98,10 @@ bool is_like_jitter(const Effect& effect) {
 
 bool is_timing(const Effect& effect) {
   return model::moves_in_time(effect.kind);
+}
+
+bool passes_low(const Effect& effect) {
+  return effect.kind == Kind::kBandwidth || effect.kind == Kind::kBandwidthSecondOrder;
 }
 
 bool has_any(const Effects& effects, std::size_t gyro, std::initializer_list<Kind> kinds) {
@@ -348,8 +357,9 @@ bool Search::is_left_of_timing(const Found& one) const {
   });
   const auto& findings = study_->findings();
   const bool of_jitter = std::any_of(findings.begin(), findings.end(), [&](const Finding& finding) {
-    return (is_quick || is_timing(effect)) && finding.effect.kind == Kind::kTimestampJitter &&
-           finding.effect.gyro == effect.gyro && one.statistic < kJitterLeaves * finding.statistic;
+    if (finding.effect.kind != Kind::kTimestampJitter) return false;
+    return (!knows_rate || finding.effect.gyro == effect.gyro) &&
+           one.statistic < kJitterLeaves * finding.statistic;
   });
   return of_found || of_jitter;
 }
@@ -407,21 +417,56 @@ void Search::look(std::size_t place, Round& round) {
   }
 }
 
+bool Search::is_barred(const Effect& effect) const {
+  return std::any_of(barred_.begin(), barred_.end(),
+                     [&](const Reading& one) { return same_reading(one, reading_of(effect)); });
+}
+
+// The likeliest that proves itself. What does not is left out until another name is found, beside
+// which it may.
 bool Search::add_round() {
   Round round;
   for (std::size_t place = 0; place < regressions_.size(); ++place) {
     if (!is_over(kLeftToCheck)) look(place, round);
   }
-  // The best of some of the proposals may be none of all of them.
-  if (is_over(kLeftToCheck)) {
-    leave_open("whether there are further effects");
-    return false;
+  barred_.clear();
+  while (barred_.size() < kBarredMax) {
+    // The best of some of the proposals may be none of all of them.
+    if (is_over(kLeftToCheck)) {
+      leave_open("whether there are further effects");
+      return false;
+    }
+    const auto best = likeliest(round.candidates);
+    if (best == round.candidates.end() || best->margin() < 0.0) return false;
+    const bool judged = is_timing(best->effect) && !study_->recording().has_reference;
+    Found taken = judged ? judge_timing(*best, round.timing) : *best;
+    // What is weaker than what interpolation leaves may be a piece of it.
+    if (is_left_of_timing(taken)) return false;
+    const Effect looked_likeliest = best->effect;
+    leave_out(taken.effect, round);
+    leave_out(looked_likeliest, round);
+    if (taken.margin() >= 0.0 && add(std::move(taken))) return true;
   }
-  const auto best = likeliest(round.candidates);
-  if (best == round.candidates.end() || best->margin() < 0.0) return false;
-  const bool judged = is_timing(best->effect) && !study_->recording().has_reference;
-  Found taken = judged ? judge_timing(*best, round.timing) : *best;
-  if (taken.margin() < 0.0 || is_left_of_timing(taken)) return false;
+  return false;
+}
+
+void Search::leave_out(const Effect& effect, Round& round) {
+  if (is_barred(effect)) return;
+  barred_.push_back(reading_of(effect));
+  const auto erase_from = [&](auto& list) {
+    list.erase(std::remove_if(list.begin(), list.end(),
+                              [&](const auto& one) { return is_barred(one.effect); }),
+               list.end());
+  };
+  erase_from(round.candidates);
+  erase_from(round.timing);
+}
+
+// False, and all as before, when it does not prove itself.
+bool Search::add(Found taken) {
+  const std::vector<Found> before = found_;
+  const std::shared_ptr<const Study> study = study_;
+  const PairNoise noise = noise_;
   if (taken.companion) {
     found_.push_back(taken);
     found_.back().effect = *taken.companion;
@@ -432,7 +477,13 @@ bool Search::add_round() {
   const bool is_step = row(found_.back().effect.kind).finder == Finder::kStep;
   settle();
   if (is_step) place_again();
-  return true;
+  const std::size_t last = found_.size() - 1;
+  if (found_.size() > before.size() + 1 || (keeps_its_size(last) && is_proven(last))) return true;
+  doubtful_.push_back(found_.back());
+  found_ = before;
+  noise_ = noise;
+  take(study);
+  return false;
 }
 
 // Of what goes with the temperature the zero is no gyro's own: where a line, or a line and a
@@ -484,8 +535,9 @@ void Search::drop_lone_references() {
 }
 
 // The terms with the motion that they give, each from the other in turn, on studies of their own.
-Fit Search::fit_with_motion(Effects terms) const {
-  Fit fitted;
+Search::Trial Search::fit_with_motion(Effects terms) const {
+  Trial tried;
+  Fit& fitted = tried.fit;
   fitted.terms = std::move(terms);
   std::shared_ptr<const Study> trial;
   for (int turn = 0; turn < kMotionTurns; ++turn) {
@@ -496,52 +548,67 @@ Fit Search::fit_with_motion(Effects terms) const {
     const double before = fitted.log_likelihood;
     fitted = regression.fit_beside(fitted.terms, noise_, Fit{{}, noise_, 0.0, {}});
     const double gained = fitted.log_likelihood - before;
+    tried.by_motion = regression.log_likelihood_by_motion(fitted.terms, fitted.noise);
     if (turn > 0 && (std::abs(gained) < kTurnsAlike || gained < -kTurnFails)) break;
   }
-  return fitted;
+  return tried;
 }
 
 // `scores`: the likeliest of each reading comes first.
-std::vector<Found> Search::timing_rivals(const Found& best,
-                                         const std::vector<Score>& scores) const {
-  std::vector<Found> rivals;
+std::vector<Search::Rival> Search::timing_rivals(const Found& best,
+                                                 const std::vector<Score>& scores) const {
+  std::vector<Rival> rivals;
   for (const Score& score : scores) {
-    const bool again = std::any_of(rivals.begin(), rivals.end(), [&](const Found& one) {
-      return same_reading(reading_of(one.effect), reading_of(score.effect));
+    const bool again = std::any_of(rivals.begin(), rivals.end(), [&](const Rival& one) {
+      return same_reading(reading_of(one.found.effect), reading_of(score.effect));
     });
     if (again || score.adjusted() < kTimingRivalShare * scores.front().adjusted()) continue;
     if (rivals.size() >= kRivalsMax) break;
     Effects with = terms(0);
     with.push_back(score.effect);
-    const Fit fitted = fit_with_motion(std::move(with));
-    Found rival = best;
-    rival.effect = fitted.terms.back();
-    rival.penalty = score.penalty;
-    rival.statistic = 2.0 * fitted.log_likelihood;
+    const Trial tried = fit_with_motion(std::move(with));
+    Rival rival{best, 0.0};
+    rival.found.effect = tried.fit.terms.back();
+    rival.found.penalty = score.penalty;
+    rival.found.statistic = 2.0 * tried.fit.log_likelihood;
+    rival.by_motion = 2.0 * tried.by_motion - score.penalty;
     rivals.push_back(std::move(rival));
   }
-  sort_by_weight(rivals);
+  std::sort(rivals.begin(), rivals.end(),
+            [](const Rival& a, const Rival& b) { return a.found.adjusted() > b.found.adjusted(); });
   return rivals;
+}
+
+// A delay is reckoned by what the other gyro reads, a low-pass by the motion in it: what these ways
+// differ by for one delay is noise that it takes off, no reason to prefer it to a low-pass; and a
+// low-pass takes off twice as much.
+bool Search::is_close_to(const Rival& first, const Rival& other, double gain) {
+  const bool one_way = passes_low(other.found.effect) == passes_low(first.found.effect);
+  const double doubt =
+      one_way ? 0.0
+              : kLowPassDoubts * std::max(std::abs(first.by_ways()), std::abs(other.by_ways()));
+  return is_close(other.found.adjusted(), first.found.adjusted() - doubt, gain);
 }
 
 // Without a reference the rate is a mean of readings, late ones among them: what is late, and how,
 // is judged by the rate that each answer gives.
 Found Search::judge_timing(Found best, const std::vector<Score>& scores) const {
-  const std::vector<Found> rivals = timing_rivals(best, scores);
+  const std::vector<Rival> rivals = timing_rivals(best, scores);
   if (rivals.empty()) return best;
   const double gain = best.adjusted();
-  const Found& first = rivals.front();
+  const Found& first = rivals.front().found;
   // Which of two clocks is the wrong one, no reading says.
   const bool is_clock = first.effect.kind == Kind::kClockSkew;
   if (is_clock) best.ambiguous_with.push_back(other_clock_of(first.effect));
   best.effect = first.effect;
   best.penalty = first.penalty;
   // At the motion of the present terms any other lateness looks great: each has its own.
-  best.statistic = first.statistic - 2.0 * fit_with_motion(terms(0)).log_likelihood;
+  best.statistic = first.statistic - 2.0 * fit_with_motion(terms(0)).fit.log_likelihood;
   for (std::size_t i = 1; i < rivals.size(); ++i) {
-    const bool other_clock = is_clock && rivals[i].effect.kind == Kind::kClockSkew;
-    if (!other_clock && is_close(rivals[i].adjusted(), first.adjusted(), gain))
-      best.ambiguous_with.push_back(reading_of(rivals[i].effect));
+    const Effect& effect = rivals[i].found.effect;
+    const bool other_clock = is_clock && effect.kind == Kind::kClockSkew;
+    if (!other_clock && is_close_to(rivals.front(), rivals[i], gain))
+      best.ambiguous_with.push_back(reading_of(effect));
   }
   return best;
 }
@@ -623,6 +690,7 @@ void Search::replace(std::size_t index) {
   for (const Found& other : refitted(place, null, noise_, rivals, kRivalsMax)) {
     const Reading reading = reading_of(other.effect);
     if (same_reading(reading, reading_of(own.effect)) || !is_plausible(other.effect)) continue;
+    if (is_left_of_timing(other)) continue;
     if (same_reading(reading, reading_of(mine.effect))) continue;
     if (!replaced && other.adjusted() > own.adjusted() + kBetter) {
       mine = other;
@@ -651,20 +719,24 @@ void Search::delete_backward() {
   }
 }
 
+bool Search::keeps_its_size(std::size_t index) const {
+  const Found& one = found_[index];
+  if (!row(one.effect.kind).keeps_size) return true;
+  const std::size_t place = place_of(one.effect);
+  const Effects all = terms(place);
+  const auto at =
+      static_cast<std::size_t>(std::find(all.begin(), all.end(), one.effect) - all.begin());
+  return !change_over_time(regressions_[place], all, at, noise_).is_beyond_chance(one.statistic);
+}
+
 // What is in the catalogue keeps its size throughout; what only resembles it does not.
 void Search::reject_unsteady() {
   std::vector<bool> wrong = pieces_of_something_else(found_);
   for (std::size_t i = 0; i < found_.size(); ++i) {
     const Found& one = found_[i];
     if (is_over(kLeftToScore)) found_[i].unchecked = true;
-    if (wrong[i] || !one.is_name() || found_[i].unchecked || !row(one.effect.kind).keeps_size)
-      continue;
-    const std::size_t place = place_of(one.effect);
-    const Effects all = terms(place);
-    const auto index =
-        static_cast<std::size_t>(std::find(all.begin(), all.end(), one.effect) - all.begin());
-    wrong[i] =
-        change_over_time(regressions_[place], all, index, noise_).is_beyond_chance(one.statistic);
+    if (wrong[i] || !one.is_name() || found_[i].unchecked) continue;
+    wrong[i] = !keeps_its_size(i);
   }
   if (std::none_of(wrong.begin(), wrong.end(), [](bool one) { return one; })) return;
   std::vector<Found> kept;
@@ -700,14 +772,17 @@ bool Search::is_sure_by_residual(std::size_t index) {
 
 // A name foretells samples that had no part in it: of what the fit gains a third, for they are a
 // quarter of all. One that does not, within what chance does to such a gain, is none.
+bool Search::is_proven(std::size_t index) {
+  const double expected = found_[index].statistic * kHeldOutShare;
+  const double chance = 2.0 * kProofSigmas * std::sqrt(std::max(0.0, expected));
+  const double needed = std::max(0.0, expected - std::max(chance, kProofShare * expected));
+  return is_sure_by_residual(index) && held_out_gain(index) >= needed;
+}
+
 void Search::reject_unproven() {
   bool any = false;
   for (std::size_t i = 0; i < found_.size();) {
-    const double expected = found_[i].statistic * kHeldOutShare;
-    const double chance = 2.0 * kProofSigmas * std::sqrt(std::max(0.0, expected));
-    const double needed = std::max(0.0, expected - std::max(chance, kProofShare * expected));
-    if (!found_[i].is_name() || is_noise(found_[i]) ||
-        (is_sure_by_residual(i) && held_out_gain(i) >= needed)) {
+    if (!found_[i].is_name() || is_noise(found_[i]) || is_proven(i)) {
       ++i;
       continue;
     }
@@ -718,6 +793,18 @@ void Search::reject_unproven() {
     i = 0;
   }
   if (any) replace_round();
+}
+
+// What was left out when it was tried, and is in nothing that was found since.
+void Search::keep_doubtful() {
+  for (const Found& one : doubtful_) {
+    const auto is_it = [&](const Found& other) {
+      return same_reading(reading_of(other.effect), reading_of(one.effect));
+    };
+    if (std::none_of(found_.begin(), found_.end(), is_it) &&
+        std::none_of(rejected_.begin(), rejected_.end(), is_it) && is_barred(one.effect))
+      rejected_.push_back(one);
+  }
 }
 
 void Search::noise_rounds() {
@@ -806,6 +893,7 @@ void Search::run() {
     if (!add_round()) break;
     if (found().size() > 1) replace_round();
   }
+  keep_doubtful();
   tell("weighing rivals", kShareRivals);
   check();
   tell("fitting the noise", kShareNoise);

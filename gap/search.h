@@ -61,6 +61,19 @@ class Search {
     std::vector<Score> timing;  ///< all that is late, by the linear look
   };
 
+  /// A fit with the motion that its terms give; its log-likelihood with lateness by the motion.
+  struct Trial {
+    Fit fit;
+    double by_motion = 0.0;
+  };
+  /// One reading of what is late. Its statistic, and `by_motion` less the penalty, count from one
+  /// zero for all.
+  struct Rival {
+    Found found;
+    double by_motion = 0.0;
+    [[nodiscard]] double by_ways() const { return found.adjusted() - by_motion; }
+  };
+
   void start();
   [[nodiscard]] Effects noise_effects(const PairNoise& noise) const;
   [[nodiscard]] bool is_over(double needed) const;
@@ -85,12 +98,19 @@ class Search {
   void look_at_temperature(std::size_t place, const Fit& null, const PairNoise& start,
                            std::vector<Found>& found) const;
   bool add_round();
+  bool add(Found taken);
+  [[nodiscard]] bool is_barred(const model::Effect& effect) const;
+  void leave_out(const model::Effect& effect, Round& round);
+  [[nodiscard]] bool keeps_its_size(std::size_t index) const;
+  bool is_proven(std::size_t index);
+  void keep_doubtful();
   void free_reference();
   void drop_lone_references();
   [[nodiscard]] bool is_left_of_timing(const Found& one) const;
-  [[nodiscard]] Fit fit_with_motion(Effects terms) const;
-  [[nodiscard]] std::vector<Found> timing_rivals(const Found& best,
+  [[nodiscard]] Trial fit_with_motion(Effects terms) const;
+  [[nodiscard]] std::vector<Rival> timing_rivals(const Found& best,
                                                  const std::vector<Score>& scores) const;
+  [[nodiscard]] static bool is_close_to(const Rival& first, const Rival& other, double gain);
   [[nodiscard]] Found judge_timing(Found best, const std::vector<Score>& scores) const;
   void place_again();
   void replace_round();
@@ -115,6 +135,8 @@ class Search {
   Effects known_;
   std::vector<Found> found_;
   std::vector<Found> rejected_;
+  std::vector<Reading> barred_;          ///< that a round has tried
+  std::vector<Found> doubtful_;          ///< that did not prove themselves when they were tried
   std::array<bool, 2> unknown_noise_{};  ///< the model says nothing of it
   Effects starting_noise_;               ///< of such gyros, once it is fitted
   Effects first_starting_;

@@ -181,11 +181,10 @@ const std::vector<double>& Motion::angle_deg() const {
 
 double Motion::angle_rad(double t_s) const {
   const std::span<const double> times_s = rate_dps_.times_s();
-  const auto after = std::upper_bound(times_s.begin(), times_s.end(), t_s);
-  if (after == times_s.begin()) {
+  if (t_s < times_s.front()) {
     return kDegree * (angle_deg().front() + rate_dps_.values().front() * (t_s - times_s.front()));
   }
-  const auto i = static_cast<std::size_t>(after - times_s.begin()) - 1;
+  const std::size_t i = t_s < times_s.back() ? rate_dps_.index_before(t_s) : times_s.size() - 1;
   const double step_s = t_s - times_s[i];
   return kDegree * (angle_deg()[i] + rate_dps_.value_at(times_s[i] + 0.5 * step_s) * step_s);
 }
@@ -390,8 +389,11 @@ Prediction::Prediction(std::span<const model::Effect> effects, const Signals& si
 }
 
 double Prediction::late_dps(double t_s) const {
-  const SampledCurve& felt = (low_passed_ ? *low_passed_ : on_time()).curve();
-  return equation_.late_rate_dps([&](double felt_at_s) { return felt.value_at(felt_at_s); },
+  return late_dps(t_s, (low_passed_ ? *low_passed_ : on_time()).curve());
+}
+
+double Prediction::late_dps(double t_s, const SampledCurve& felt_dps) const {
+  return equation_.late_rate_dps([&](double felt_at_s) { return felt_dps.value_at(felt_at_s); },
                                  equation_.true_time_s(t_s));
 }
 

@@ -54,10 +54,13 @@ class Motion {
 
 struct Signals {
   Motion motion;  ///< as this gyro is judged against
-  /// As the other gyro alone tells it; empty where the motion is known otherwise. A delay is
-  /// reckoned by it: of a mean of both, the noise that is late and that which is not would add up
-  /// at high frequencies. A low-pass is not: it would take the other's noise off.
+  /// As the other gyro alone tells it; empty where the motion is known otherwise.
   Motion motion_by_other;
+  /// What the other gyro alone reads, with its noise, at any instant; empty where the motion is
+  /// known otherwise. What a comparison of both readings gains by lateness is reckoned by it: a
+  /// part of the noise that is late beside a part that is not is less noise than either, and any
+  /// lateness would seem to take some off. A low-pass is not: it would take the other's noise off.
+  SampledCurve other_reading_dps;
   /// By which what the equation says of lateness is reckoned.
   [[nodiscard]] const Motion& on_time(const model::Equation& equation) const {
     const bool passes_low = !equation.cutoffs_hz().empty() || !equation.second_orders().empty();
@@ -100,6 +103,9 @@ class Prediction {
   [[nodiscard]] const Motion& on_time() const { return signals_.on_time(equation_); }
   /// Ω' of what is stamped `t_s`.
   [[nodiscard]] double late_dps(double t_s) const;
+  /// The same along another curve; no low-pass.
+  [[nodiscard]] double late_dps(double t_s, const SampledCurve& felt_dps) const;
+  [[nodiscard]] bool passes_low() const { return low_passed_ != nullptr; }
   /// The reading that is stamped `t_s`.
   [[nodiscard]] double at(double t_s) const;
 

@@ -277,7 +277,7 @@ Expected<std::shared_ptr<const Study>> Study::begin(const Recording& recording,
     known.push_back(finding.effect);
   study->facts_ = std::move(facts);
   study->learn_motion(known);
-  study->observe(known);
+  study->observe(study->observed(), known);
   return std::shared_ptr<const Study>(study);
 }
 
@@ -390,7 +390,7 @@ std::shared_ptr<const Study> Study::with_motion(const Effects& effects) const {
   }
   const std::shared_ptr<Study> study(new Study(*this));
   if (!recording().has_reference) study->learn_motion(effects);
-  study->observe(effects);
+  study->observe(study->observed_with_motion(), effects);
   return study;
 }
 
@@ -405,7 +405,7 @@ std::shared_ptr<const Study> Study::on_trial(const Effects& effects, bool anew) 
   if (joint_) return with_motion(effects);
   const std::shared_ptr<Study> study(new Study(*this));
   study->learn_motion(effects, anew);
-  std::vector<Observations> list = study->observed();
+  std::vector<Observations> list = study->observed_with_motion();
   for (std::size_t place = 0; place < list.size(); ++place) {
     list[place].layout = observations_[place]->layout;
     study->observations_[place] = std::make_shared<Observations>(std::move(list[place]));
@@ -436,6 +436,12 @@ class Beside {
     surroundings_.reserve(t_s.size());
     for (const double at_s : t_s)
       surroundings_.push_back(signals.without_motion_at(equation_.true_time_s(at_s)));
+  }
+
+  // Lateness is reckoned by the other gyro's motion.
+  [[nodiscard]] bool is_by_other() const {
+    return equation_.is_late() && equation_.cutoffs_hz().empty() &&
+           equation_.second_orders().empty();
   }
 
   // The readings without it. Of the first guess, which knows no motion, without the offsets.
@@ -506,25 +512,42 @@ void Study::learn_motion_of_pair(const Effects& effects, bool anew) {
   const auto motion_of = [&](std::vector<double>& rate_dps, double variance) {
     for (std::size_t i = 0; i < t_s.size(); ++i)
       if (facts_->rest.at(t_s[i])) rate_dps[i] = recording().rest_rate_dps;
-    return Motion{without_noise(SampledCurve(t_s, rate_dps), variance)};
+    return Motion{without_noise(facts_->readings[0].with_values(rate_dps), variance)};
   };
   const double same_dps = std::max(kMotionSame_dps, kMotionSameShare * std::sqrt(quiet));
   std::vector<double> rate_dps;
   for (int round = 0; round < kMotionRounds; ++round) {
     std::array<std::vector<double>, 2> told;
-    for (std::size_t gyro = 0; gyro < 2; ++gyro)
+    for (std::size_t gyro = 0; gyro < 2; ++gyro) {
       told[gyro] = beside[gyro].taken_off(readings[gyro], *signals[gyro]);
+      // The rate is set to the known one at rest: a drift would be an edge there, which looks late.
+      // What a coarse gyro reads at rest is not what it reads too much elsewhere.
+      if (!is_coarse(gyro))
+        take_off_drift_at_rest(facts_->rest, t_s, recording().rest_rate_dps, told[gyro]);
+    }
     std::vector<double> next_dps(t_s.size());
     for (std::size_t i = 0; i < t_s.size(); ++i)
       next_dps[i] = weight[0] * told[0][i] + weight[1] * told[1][i];
     const Motion motion = motion_of(next_dps, quiet);
+    const bool settled = round > 0 && greatest_change(next_dps, rate_dps) < same_dps;
+    const bool is_last = settled || round + 1 == kMotionRounds;
     for (std::size_t gyro = 0; gyro < 2; ++gyro) {
       signals[gyro]->motion = motion;
-      signals[gyro]->motion_by_other = motion_of(told[1 - gyro], facts_->quiet[1 - gyro]);
+      if (is_last || beside[gyro].is_by_other())
+        signals[gyro]->motion_by_other = motion_of(told[1 - gyro], facts_->quiet[1 - gyro]);
     }
-    const bool settled = round > 0 && greatest_change(next_dps, rate_dps) < same_dps;
     rate_dps = std::move(next_dps);
-    if (settled) break;
+    if (!is_last) continue;
+    // As motion_of() left them: at rest they stand on the known rate.
+    const std::array<SampledCurve, 2> read{facts_->readings[0].with_values(told[0]),
+                                           facts_->readings[0].with_values(told[1])};
+    const std::array<double, 3>& noise = facts_->quiet;
+    const std::size_t judge = noise[0] <= noise[1] ? 0 : 1;
+    // There half of what the readings could tell of a lateness is told by their difference.
+    const double least = noise[judge] + noise[0] * noise[1] / (noise[0] + noise[1]);
+    for (std::size_t gyro = 0; gyro < 2; ++gyro)
+      signals[gyro]->other_reading_dps = where_it_moves(read[1 - gyro], read[judge], least);
+    break;
   }
 }
 
@@ -592,8 +615,15 @@ std::vector<Observations> Study::observed() const {
   return {against_reference(0), against_reference(1)};
 }
 
-void Study::observe(const Effects& effects) {
-  std::vector<Observations> list = observed();
+// What is observed already, by the motion as it is now: a reference's is always the same.
+std::vector<Observations> Study::observed_with_motion() const {
+  std::vector<Observations> list;
+  for (const auto& data : observations_)
+    list.push_back(recording().has_reference ? *data : data->with_motion(signals_));
+  return list;
+}
+
+void Study::observe(std::vector<Observations> list, const Effects& effects) {
   observations_.clear();
   for (std::size_t place = 0; place < list.size(); ++place) {
     list[place].learn_unseen_motion(facts_->fast[place], effects);

@@ -78,8 +78,9 @@ class Study {
   static std::shared_ptr<const Study> joined(std::vector<std::shared_ptr<const Study>> parts,
                                              std::shared_ptr<const Joint> joint,
                                              const Effects& effects);
-  void observe(const Effects& effects);
+  void observe(std::vector<Observations> list, const Effects& effects);
   [[nodiscard]] std::vector<Observations> observed() const;
+  [[nodiscard]] std::vector<Observations> observed_with_motion() const;
   void set_signals(const Recording& recording);
   void learn_motion(const Effects& effects, bool anew = true);
   void learn_motion_of_reference();

@@ -27,6 +27,8 @@ constexpr double kWindowSquare = 0.375;
 constexpr std::size_t kReach = 10;
 constexpr double kAbove = 1.5;
 constexpr double kLine = 20.0;
+// Samples between which a cubic loses nothing of what lies below half the sampling rate.
+constexpr std::size_t kFiner = 4;
 // Of a step: an instant of the even grid is a sample's.
 constexpr double kSameInstant = 2e-4;
 
@@ -52,9 +54,7 @@ struct Line {
   double middle = 0.0;
   double slope = 0.0;
 
-  [[nodiscard]] double at(std::size_t i) const {
-    return middle + slope * (static_cast<double>(i) - 0.5 * (kStretch - 1.0));
-  }
+  [[nodiscard]] double at(double i) const { return middle + slope * (i - 0.5 * (kStretch - 1.0)); }
 };
 
 Line line_through(const double* value) {
@@ -71,9 +71,21 @@ Line line_through(const double* value) {
   return line;
 }
 
-// Frequencies weighed by how far they stand above the noise.
-void weigh(std::vector<std::complex<double>>& spectrum, double white_power) {
+// Of so many samples, the first of which stands `first` sampling intervals behind its beginning.
+std::vector<double> hann(std::size_t samples, double first) {
+  std::vector<double> window(samples);
+  for (std::size_t i = 0; i < samples; ++i)
+    window[i] = 0.5 - 0.5 * std::cos(2.0 * std::numbers::pi * (static_cast<double>(i) + first) /
+                                     static_cast<double>(samples));
+  return window;
+}
+
+// What a stretch's spectrum holds at a frequency over the noise in it, that at the least which
+// chance makes of it; 1 or less: nothing but noise.
+void set_levels(const std::vector<std::complex<double>>& spectrum, double white_power,
+                std::vector<double>& levels) {
   const std::size_t half = spectrum.size() - 1;
+  levels.resize(half + 1);
   std::vector<double> power(half + 1);
   for (std::size_t i = 0; i <= half; ++i)
     power[i] = std::norm(spectrum[i]);
@@ -88,42 +100,110 @@ void weigh(std::vector<std::complex<double>>& spectrum, double white_power) {
     if (i > kReach) sum -= power[i - kReach - 1], --count;
     const double mean = sum / static_cast<double>(count);
     // A line stands far above its neighbours, and is all motion.
-    const double level = power[i] > kLine * noise ? power[i] : mean;
-    spectrum[i] *= level > noise ? 1.0 - noise / level : 0.0;
+    levels[i] = (power[i] > kLine * noise ? power[i] : mean) / noise;
   }
 }
+
+// A curve on an even grid, cut into stretches that overlap.
+class Stretches {
+ public:
+  explicit Stretches(const SampledCurve& curve)
+      : from_s_(curve.from_s()),
+        step_s_(curve.interval_s()),
+        count_(static_cast<std::size_t>((curve.to_s() - curve.from_s()) / step_s_) + 1) {
+    std::vector<double> t_s(count_);
+    for (std::size_t i = 0; i < count_; ++i)
+      t_s[i] = from_s_ + step_s_ * static_cast<double>(i);
+    value_ = on_grid(curve, t_s);
+    transform_.SetFlag(Eigen::FFT<double>::HalfSpectrum);
+  }
+
+  /// Mean of the spectra's squares, by frequency.
+  [[nodiscard]] std::vector<double> mean_power() {
+    const std::vector<double> window = hann(kStretch, 0.5);
+    std::vector<double> power(kStretch / 2 + 1, 0.0);
+    double stretches = 0.0;
+    for (std::size_t from = kStretch; from + kStretch <= kStretch + count_; from += kHop) {
+      transform(from, window, 1);
+      for (std::size_t i = 0; i < power.size(); ++i)
+        power[i] += std::norm(spectrum_[i]);
+      stretches += 1.0;
+    }
+    for (double& one : power)
+      one /= std::max(1.0, stretches);
+    return power;
+  }
+
+  /// The curve when `weigh_spectrum` has weighed the spectrum of each stretch; `finer`: samples out
+  /// for each one in.
+  template <class Weigh>
+  [[nodiscard]] SampledCurve filtered(std::size_t finer, const Weigh& weigh_spectrum) {
+    // Behind the transform as before it, at the instants of the samples and at those between them.
+    const std::vector<double> window = hann(kStretch * finer, 0.5 * static_cast<double>(finer));
+    std::vector<double> sum(value_.size() * finer, 0.0);
+    std::vector<double> out(kStretch * finer);
+    for (std::size_t from = 0; from + kStretch <= value_.size(); from += kHop) {
+      const Line line = transform(from, window, finer);
+      weigh_spectrum(spectrum_);
+      spectrum_.resize(kStretch * finer / 2 + 1);
+      transform_.inv(out, spectrum_, static_cast<Eigen::Index>(kStretch * finer));
+      for (std::size_t i = 0; i < out.size(); ++i) {
+        const double at = static_cast<double>(i) / static_cast<double>(finer);
+        const double back = out[i] * static_cast<double>(finer) + window[i] * line.at(at);
+        sum[from * finer + i] += window[i] * back / kWindows;
+      }
+    }
+    const std::size_t last = (count_ - 1) * finer + 1;
+    std::vector<double> fine_s(last);
+    for (std::size_t i = 0; i < last; ++i)
+      fine_s[i] = from_s_ + step_s_ / static_cast<double>(finer) * static_cast<double>(i);
+    return {fine_s, std::span(sum).subspan(kStretch * finer, last)};
+  }
+
+ private:
+  // Of what is left of a stretch without its line, which is returned. `window`: `finer` places for
+  // each sample.
+  Line transform(std::size_t from, const std::vector<double>& window, std::size_t finer) {
+    const Line line = line_through(&value_[from]);
+    for (std::size_t i = 0; i < kStretch; ++i)
+      part_[i] = window[i * finer] * (value_[from + i] - line.at(static_cast<double>(i)));
+    transform_.fwd(spectrum_, part_);
+    return line;
+  }
+
+  double from_s_;
+  double step_s_;
+  std::size_t count_;
+  std::vector<double> value_;
+  Eigen::FFT<double> transform_;
+  std::vector<double> part_ = std::vector<double>(kStretch);
+  std::vector<std::complex<double>> spectrum_;
+};
 
 }  // namespace
 
 SampledCurve without_noise(const SampledCurve& curve, double noise_variance) {
   if (curve.empty()) return curve;
-  const double step_s = curve.interval_s();
-  const auto n = static_cast<std::size_t>((curve.to_s() - curve.from_s()) / step_s) + 1;
-  std::vector<double> t_s(n);
-  for (std::size_t i = 0; i < n; ++i)
-    t_s[i] = curve.from_s() + step_s * static_cast<double>(i);
-  const std::vector<double> value = on_grid(curve, t_s);
-  std::vector<double> window(kStretch);
-  for (std::size_t i = 0; i < kStretch; ++i)
-    window[i] = 0.5 - 0.5 * std::cos(2.0 * std::numbers::pi * (static_cast<double>(i) + 0.5) /
-                                     static_cast<double>(kStretch));
   const double white_power = noise_variance * kWindowSquare * kStretch;
-  Eigen::FFT<double> transform;
-  transform.SetFlag(Eigen::FFT<double>::HalfSpectrum);
-  std::vector<double> sum(value.size(), 0.0);
-  std::vector<double> part(kStretch);
-  std::vector<std::complex<double>> spectrum;
-  for (std::size_t from = 0; from + kStretch <= value.size(); from += kHop) {
-    const Line line = line_through(&value[from]);
-    for (std::size_t i = 0; i < kStretch; ++i)
-      part[i] = window[i] * (value[from + i] - line.at(i));
-    transform.fwd(spectrum, part);
-    weigh(spectrum, white_power);
-    transform.inv(part, spectrum, static_cast<Eigen::Index>(kStretch));
-    for (std::size_t i = 0; i < kStretch; ++i)
-      sum[from + i] += window[i] * (part[i] + window[i] * line.at(i)) / kWindows;
-  }
-  return {t_s, std::span(sum).subspan(kStretch, n)};
+  std::vector<double> levels;
+  return Stretches(curve).filtered(1, [&](std::vector<std::complex<double>>& spectrum) {
+    set_levels(spectrum, white_power, levels);
+    for (std::size_t i = 0; i < spectrum.size(); ++i)
+      spectrum[i] *= levels[i] > 1.0 ? 1.0 - 1.0 / levels[i] : 0.0;
+  });
+}
+
+SampledCurve where_it_moves(const SampledCurve& curve, const SampledCurve& judge,
+                            double least_variance) {
+  if (curve.empty()) return curve;
+  const double least = least_variance * kWindowSquare * kStretch;
+  const std::vector<double> mean_power = Stretches(judge).mean_power();
+  return Stretches(curve).filtered(kFiner, [&](std::vector<std::complex<double>>& spectrum) {
+    for (std::size_t i = 0; i < spectrum.size(); ++i)
+      if (mean_power[i] < least) spectrum[i] = 0.0;
+    // What lies on half the sampling rate has no phase, and none between the samples.
+    spectrum.back() = 0.0;
+  });
 }
 
 }  // namespace vgyro::gap

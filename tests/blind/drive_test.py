@@ -178,6 +178,20 @@ class Strength(unittest.TestCase):
         direct = np.sum(slope**2) / (5e-3**2 * 100.0)
         self.assertLess(abs(np.log(see.lateness().sum() / direct)), np.log(1.5))
 
+    def test_what_came_later_to_the_catalogue_hides_only_where_it_is_asked_for(self):
+        self.assertLessEqual(drive.LATER, set(drive.kinds.KINDS))
+        pairs = [Case("pair", 28 + i, reference=False, short=True, strength=8.0, world="drive") for i in range(40)]
+        for case in pairs:
+            kinds = drive._chosen(case, np.random.default_rng(case.seed))
+            self.assertFalse(drive.LATER & set(kinds))
+
+    def test_a_second_order_filter_hides_in_no_gyro_that_has_one(self):
+        for seed in range(12):
+            case, world = world_of(50 + seed)
+            for gyro in (1, 2):
+                if world.gyros[gyro - 1].filters_hz:
+                    self.assertFalse(drive.fits("bandwidth_second_order", gyro, world, case))
+
     def test_sizes_stay_what_a_sensor_may_have(self):
         for seed in range(12):
             case, world = world_of(50 + seed)

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <numbers>
+#include <numeric>
 #include <random>
 
 #include <gtest/gtest.h>
@@ -111,6 +112,25 @@ TEST(SampledCurve, KnowsItsHolesAndEnds) {
   EXPECT_EQ(curve.at(-1.0).value, 0.0);
   EXPECT_EQ(curve.at(5.0).value, 99.0);
   EXPECT_DOUBLE_EQ(curve.linear(0.005), 0.5);
+}
+
+// With pauses of seconds and of hours, and stamps that are not quite even.
+TEST(SampledCurve, FindsItsPlaceAfterPausesToo) {
+  std::mt19937_64 random(72);
+  std::uniform_real_distribution<double> uniform(-0.3, 0.3);
+  for (const double pause_s : {2.0, 7200.0}) {
+    std::vector<double> t_s;
+    for (int i = 0; i < 3000; ++i)
+      t_s.push_back(kInterval_s * (i + uniform(random)) + pause_s * (i / 1000));
+    const SampledCurve curve(t_s, t_s);
+    EXPECT_EQ(curve.index_before(t_s.front() - 1.0), 0U);
+    EXPECT_EQ(curve.index_before(t_s.back() + 1.0), t_s.size() - 2);
+    for (std::size_t i = 0; i + 1 < t_s.size(); ++i) {
+      ASSERT_EQ(curve.index_before(t_s[i]), i) << "seed 72, pause " << pause_s;
+      ASSERT_EQ(curve.index_before(std::midpoint(t_s[i], t_s[i + 1])), i);
+      ASSERT_EQ(curve.index_before(std::nextafter(t_s[i + 1], 0.0)), i);
+    }
+  }
 }
 
 }  // namespace

@@ -188,5 +188,40 @@ TEST(Rest, IsNoneWhereNothingIsSteady) {
   EXPECT_EQ(rest_of(recording).count(), 0.0);
 }
 
+TEST(Rest, ShowsADriftThatIsTakenOffBetweenStopsToo) {
+  std::vector<std::uint8_t> seconds(kSeconds, 0);
+  for (std::size_t second = 0; second < kSeconds; ++second)
+    seconds[second] = second < 60 || second >= 120 ? 1 : 0;
+  const RestingSeconds rest(seconds);
+  constexpr double kRest_dps = 0.003;
+  constexpr double kSlope_dps_s = 5e-4;
+  std::vector<double> t_s;
+  std::vector<double> rate_dps;
+  for (std::size_t i = 0; i < 100 * kSeconds; ++i) {
+    t_s.push_back(0.01 * static_cast<double>(i));
+    rate_dps.push_back(kRest_dps + kSlope_dps_s * t_s.back() + to_and_fro(t_s.back(), 60.0, 120.0));
+  }
+  take_off_drift_at_rest(rest, t_s, kRest_dps, rate_dps);
+  // Straight between the middles of pieces of ten seconds, level before the first: five seconds.
+  for (std::size_t i = 0; i < t_s.size(); ++i) {
+    const double left_dps = rate_dps[i] - to_and_fro(t_s[i], 60.0, 120.0) - kRest_dps;
+    EXPECT_LE(std::abs(left_dps), 7.0 * kSlope_dps_s) << t_s[i];
+    if (t_s[i] > 10.0 && t_s[i] < 170.0) {
+      EXPECT_NEAR(left_dps, 0.0, 1e-9) << t_s[i];
+    }
+  }
+}
+
+TEST(Rest, OfAMomentShowsNoDrift) {
+  std::vector<std::uint8_t> seconds(10, 0);
+  seconds[5] = seconds[6] = 1;
+  std::vector<double> t_s;
+  for (int i = 0; i < 1000; ++i)
+    t_s.push_back(0.01 * i);
+  std::vector<double> rate_dps(t_s.size(), 0.7);
+  take_off_drift_at_rest(RestingSeconds(seconds), t_s, 0.0, rate_dps);
+  EXPECT_EQ(rate_dps, std::vector<double>(t_s.size(), 0.7));
+}
+
 }  // namespace
 }  // namespace vgyro::gap

@@ -196,6 +196,59 @@ TEST(Search, WithoutReferenceNamesADelayRightlyOrNotAtAll) {
   expect_of_one_motion(search, made.recording(), noise_effects(making));
 }
 
+// A vehicle that turns slowly and stops every minute, two cheap gyros of unequal noise, nothing
+// known of either: what the one is late by, and drifts, is seen beside the noise of both.
+double stop_and_go_dps(double t_s) {
+  constexpr double kStart_s = 60.0;
+  constexpr double kGo_s = 40.0;
+  const double in_cycle_s = std::fmod(t_s - kStart_s, 60.0);
+  if (t_s < kStart_s || in_cycle_s > kGo_s) return 0.0;
+  if (in_cycle_s >= 5.0 && in_cycle_s < 12.0)
+    return 15.0 * std::sin(kPi * (in_cycle_s - 5.0) / 7.0);
+  if (in_cycle_s >= 20.0 && in_cycle_s < 30.0)
+    return -10.0 * std::sin(kPi * (in_cycle_s - 20.0) / 10.0);
+  return 0.3 * std::sin(2.0 * kPi * in_cycle_s / 7.0) * std::sin(kPi * in_cycle_s / kGo_s);
+}
+
+TEST(Search, FromNothingFindsRampAndDelayOfTwoCheapGyros) {
+  constexpr double kDelay_s = 0.0031;
+  constexpr double kSlope_dps_s = 5e-4;
+  Making making = making_of(51, 400.0);
+  making.white_dps_rthz = {5e-3, 2e-3};
+  making.error = [&](std::size_t gyro, double t_s, double rate_dps) {
+    return gyro == 0 ? 0.35 + stop_and_go_dps(t_s) - rate_dps
+                     : -0.8 + kSlope_dps_s * t_s + stop_and_go_dps(t_s - kDelay_s) - rate_dps;
+  };
+  const MadeStudy made(without_reference(make_recording(making)), {});
+  ASSERT_NE(made.study(), nullptr);
+  Search search(made.study(), {});
+  search.run();
+  const std::vector<Found> found = search.found();
+  bool has_ramp = false;
+  bool has_lateness = false;
+  for (const Found& one : found) {
+    EXPECT_EQ(one.effect.gyro, 1U) << "seed 51: " << names_of(found);
+    if (one.effect.kind == Kind::kBiasRamp) {
+      has_ramp = true;
+      EXPECT_NEAR(one.effect.parameters[0], kSlope_dps_s, kSigmas * one.sigma[0]);
+      continue;
+    }
+    // So slow a motion hardly tells a delay from a low-pass that delays as much.
+    has_lateness = true;
+    const bool is_delay = one.effect.kind == Kind::kDelay;
+    EXPECT_TRUE(is_delay || one.effect.kind == Kind::kBandwidth) << names_of(found);
+    const double late_s =
+        is_delay ? one.effect.parameters[0] : 1.0 / (2.0 * kPi * one.effect.parameters[0]);
+    EXPECT_NEAR(late_s / kDelay_s, 1.0, 0.2) << "seed 51: " << names_of(found);
+    EXPECT_TRUE(is_delay || std::any_of(one.ambiguous_with.begin(), one.ambiguous_with.end(),
+                                        [](const Reading& other) {
+                                          return other.kind == Kind::kDelay && other.gyro == 1;
+                                        }))
+        << names_of(found);
+  }
+  EXPECT_TRUE(has_ramp && has_lateness) << "seed 51: " << names_of(found);
+}
+
 // Stamps that come late at random leave what looks like a small delay, which is then no name: the
 // search ends within a round, on the motion that goes with what it has named.
 TEST(Search, KeepsStudyAndEffectsTogetherWhereALateGyroComesToNothing) {
