@@ -335,7 +335,7 @@ CLI::App* add_gap(CLI::App& app, GapOptions& options) {
 
 CLI::App* add_fleet(CLI::App& app, FleetOptions& options) {
   CLI::App* command = app.add_subcommand(
-      "fleet", "Pool the evidence of many drives: properties of types, units that degrade");
+      "fleet", "Pool the evidence of many drives: what types have, which units degrade");
   command
       ->add_option("EVIDENCE", options.evidence,
                    "files that vgyro gap, vgyro allan or vgyro fleet left;\nof a folder all *.json")

@@ -278,8 +278,8 @@ TEST_F(Forms, NameWhatIsNotRead) {
   EXPECT_EQ(error("%PDF-1.7\n").find("text: is a PDF document"), 0U);
   EXPECT_EQ(error("PK\x03\x04zip").find("text: is a ZIP archive"), 0U);
   EXPECT_EQ(error(std::string("\xFF\xFE(\0", 4)).find("text: is UTF-16 text"), 0U);
-  EXPECT_EQ(error("Dear diary,\n").find("text: is text, but no log of CAN frames"), 0U);
-  EXPECT_EQ(error("\x01\x02\x03").find("text: is no log of CAN frames"), 0U);
+  EXPECT_EQ(error("Dear diary,\n").find("text: is text, but not a known log of CAN frames"), 0U);
+  EXPECT_EQ(error("\x01\x02\x03").find("text: is not a known log of CAN frames"), 0U);
 }
 
 // Comments, NUL bytes and byte-order marks before the first frame do not hide the form.

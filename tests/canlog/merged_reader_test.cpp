@@ -74,7 +74,7 @@ TEST(MergedReader, RefusesLogsThatAreYearsApart) {
   constexpr double kDay = 86'400;
   EXPECT_EQ(merged({line(1.6e9, "can0 001#"), line(1.6e9 + 400 * kDay, "can0 002#")}),
             (Lines{"(1600000000.000000) can0 001#",
-                   "1.log: begins 400 days after all that came before it has ended: these are no "
+                   "1.log: begins 400 days after all that came before it has ended: these are not "
                    "logs of one drive; give each drive a run of its own"}));
   EXPECT_EQ(merged({line(1.6e9, "can0 001#"), line(1.6e9 + 100 * kDay, "can0 002#")}).size(), 2U);
 }

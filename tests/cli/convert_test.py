@@ -34,7 +34,7 @@ class Convert(bench.Bench):
         self.assertEqual(self.converted("out.blf"), LOG)
         blf = (self.folder / "out.blf").read_bytes()
         self.assertEqual(self.converted("-", stdin=blf), LOG)
-        self.assertIn("packed in itself", self.bad("convert", "-o", "out.blf.gz", "in.log"))
+        self.assertIn("already compressed", self.bad("convert", "-o", "out.blf.gz", "in.log"))
 
     def test_the_pipeline_makes_the_same_of_a_blf_file(self):
         self.write("drive.log", "".join(bench.two_gyros(5)))

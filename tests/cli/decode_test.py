@@ -160,7 +160,7 @@ class Decode(bench.Bench):
         self.write("prose.log", "hello\n")
         self.write("no.dbc", "hello\n")
         self.assertIn("holds no CAN frame", self.bad("decode", "--dbc", "bench.dbc", "empty.log"))
-        self.assertIn("no log of CAN frames", self.bad("decode", "--dbc", "bench.dbc", "prose.log"))
+        self.assertIn("not a known log of CAN frames", self.bad("decode", "--dbc", "bench.dbc", "prose.log"))
         self.assertIn("nowhere.log", self.bad("decode", "--dbc", "bench.dbc", "nowhere.log"))
         self.assertIn("nowhere.dbc", self.bad("decode", "--dbc", "nowhere.dbc", "empty.log"))
         self.assertIn("no.dbc", self.bad("decode", "--dbc", "no.dbc", "empty.log"))

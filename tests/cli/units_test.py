@@ -421,7 +421,7 @@ class BadInput(Units):
     def test_a_rounded_mount_is_taken_and_told(self):
         self.write("u.toml", config(more_a="mount = [0.707, -0.707, 0, 0.707, 0.707, 0, 0, 0, 1]"))
         said = self.good("check", "u.toml").stdout.decode()
-        self.assertIn("as given up to 0.00011 from a rotation", said)
+        self.assertIn("as given; its elements differ from a rotation by up to 0.00011", said)
         self.assertIn("vehicle's x = +0.707107 x -0.707107 y +0.000000 z", said)
 
     def test_one_axis_and_three(self):

@@ -187,7 +187,7 @@ TEST_F(CaptureTest, AContradictionIsWrittenWithWhatCameBeforeAndAfter) {
   EXPECT_EQ(recording(folder).size(), 2U * (kBefore_s + Capture::kAftermathSeconds));
   EXPECT_EQ(description(folder)["text"], "b moves -1.00 times a: sign = -1?");
   EXPECT_EQ(description(folder)["instance"], "front");
-  EXPECT_NE(said.find(folder + ": 80 frames of the inputs, because: b moves"), std::string::npos)
+  EXPECT_NE(said.find(folder + ": capture of 80 input frames; cause: b moves"), std::string::npos)
       << said;
 }
 

@@ -329,7 +329,7 @@ class OnTheBus(Bench):
             self.assertEqual(self.vgyro("recalibrate", "--instance", "front").returncode, 0)
             states = [one["state"] for one in json.loads(self.vgyro("status", "--all", "--json").stdout)["gateways"]]
             self.assertEqual(states, ["running", "calibrating", "running"])
-            self.assertEqual(self.vgyro("recalibrate", "--all").stdout.count("has forgotten its biases"), 3)
+            self.assertEqual(self.vgyro("recalibrate", "--all").stdout.count("discarded its biases"), 3)
         # node_exporter merges all files, so no two samples may have the same name and labels.
         self.assertTrue(until(front.exists))
         samples = parse_metrics(front.read_text())[1]

@@ -108,7 +108,7 @@ TEST(PlanLoader, MemoryThatRunsShortIsARefusal) {
   loader.ask();
   const LoadResult result = result_of(loader);
   ASSERT_FALSE(result);
-  EXPECT_NE(result.error().front().message().find("not memory enough"), std::string::npos);
+  EXPECT_NE(result.error().front().message().find("not enough memory"), std::string::npos);
 }
 
 TEST(PlanLoader, WhateverIsThrownIsARefusal) {

@@ -97,7 +97,7 @@ TEST_F(StateKeeperTest, AStateThatWouldBeRefusedIsNotWritten) {
     keeper.keep(state(1.0));
     keeper.finish(state(std::numeric_limits<double>::quiet_NaN()));
   });
-  EXPECT_NE(said.find("not written: bias_dps holds nan"), std::string::npos) << said;
+  EXPECT_NE(said.find("not written: bias_dps is nan"), std::string::npos) << said;
   EXPECT_EQ(loaded_bias(), 1.0);
 }
 

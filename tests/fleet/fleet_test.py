@@ -223,7 +223,7 @@ class Merging(FleetBench):
                            (good.replace('"began_s": ', '"began_s": 1e999'), "not a line of JSON"),
                            (good.replace('"score": [', '"score": [null, '), '"score" is not a number'),
                            (good.replace('"score": [', '"score": [1, '), '"score" has 18 entries'),
-                           (good.replace('"alpha"', '"\\u0007"'), '"type" is no plain word'),
+                           (good.replace('"alpha"', '"\\u0007"'), '"type" is not a plain name'),
                            (good.replace('"alpha"', '"\xff"'), "not a line of JSON"),
                            ("[" * 100_000, "not a line of JSON"),
                            (good.replace('"white_dps_rthz": ', '"white_dps_rthz": -'), "white_dps_rthz")):

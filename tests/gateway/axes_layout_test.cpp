@@ -297,14 +297,15 @@ TEST_F(AxesLayoutTime, AClockThatIsSetBackLeavesNoRateOfATimeToCome) {
 
 TEST(AxesLayout, RefusesWhatCannotBeMeant) {
   const std::string whole = kWhole;
-  expect_error(whole + "rate = \"X\"\n", {"rate stands beside rate_x", "rate_z for the axis"});
-  expect_error(whole + "sigma = \"SigmaZ\"\n", {"sigma stands beside rate_x", "sigma_z"});
+  expect_error(whole + "rate = \"X\"\n",
+               {"rate cannot be combined with rate_x", "rate_z for the axis"});
+  expect_error(whole + "sigma = \"SigmaZ\"\n", {"sigma cannot be combined with rate_x", "sigma_z"});
   expect_error("dbc = \"rig.dbc\"\nmessage = \"Whole\"\nrate = \"Z\"\naxis = \"z\"\nsign_x = -1\n",
                {"sign_x without rate_x", "rate_x = \"SIGNAL\""});
-  expect_error(whole + "axis = \"z\"\n", {"axis stands beside rate_x", "leave it out"});
+  expect_error(whole + "axis = \"z\"\n", {"axis cannot be combined with rate_x", "leave it out"});
   expect_error(whole + "sign_y = 2\n", {"sign_y is 2", "-1 to flip"});
   expect_error(whole + "sign = 0\n", {"sign is 0", "-1 to flip"});
-  expect_error(whole + "valid_y = \"Status\"\n", {"\"Status\" is no comparison", "valid_y = "});
+  expect_error(whole + "valid_y = \"Status\"\n", {"\"Status\" is not a comparison", "valid_y = "});
   expect_error(whole + "valid_y = \"Status == 1\"\nvalid_z = \"Status == 1\"\n",
                {"valid_z shares bits of Whole"});
   expect_error(whole + "invalid_y = 1\n", {"invalid_y without valid_y"});

@@ -555,7 +555,7 @@ TEST_F(Config, WarnsOfMessagesThatHaveAnIdentifierOfOurs) {
   ASSERT_TRUE(loaded);
   ASSERT_EQ(loaded->warnings.size(), 1U);
   const std::string warning = loaded->warnings[0].message();
-  EXPECT_NE(warning.find("message RADAR has the identifier 0x620, with which VG_Rate goes out"),
+  EXPECT_NE(warning.find("message RADAR has the identifier 0x620, with which VG_Rate is sent"),
             std::string::npos)
       << warning;
   EXPECT_NE(warning.find("rate_id"), std::string::npos) << warning;
@@ -720,14 +720,14 @@ TEST_F(Config, RefusesConditionsThatAreNoComparison) {
   for (const char* text : {"Status", "Status = 0", "== 0", "Status == ", "Status == zero",
                            "Status == nan", "Status == 0 1", ""}) {
     expect_error("\"Status == 0\"", fmt::format("\"{}\"", text), "valid",
-                 {"is no comparison", "valid = \"Status == 0\""});
+                 {"is not a comparison", "valid = \"Status == 0\""});
   }
 }
 
 // A counter of one bit, or a float, cannot count.
 TEST_F(Config, RefusesCountersThatCannotCount) {
   expect_error("sign = -1\ncounter = \"Counter\"", "sign = -1\ncounter = \"Flag\"",
-               "counter = \"Flag\"", {"Flag is no alive counter", "2 to 31 bits"});
+               "counter = \"Flag\"", {"Flag cannot be an alive counter", "2 to 31 bits"});
 }
 
 constexpr const char* kRightCounter = "sign = -1\ncounter = \"Counter\"";
@@ -768,7 +768,7 @@ TEST_F(Config, ReadsHowMessagesProveThemselves) {
 // If only half of a protection is configured, the error asks for the other half.
 TEST_F(Config, RefusesProtectionsThatAreHalfSaid) {
   expect_error(kRightCounter, right_with("crc = \"Crc\""),
-               "crc = ", {"nothing says how", "profile_1a", "toyota"});
+               "crc = ", {"kind of this check value", "profile_1a", "toyota"});
   expect_error(kRightCounter, right_with("e2e = \"crc8_j1850\""),
                "e2e = ", {"without a check value", "crc = \"NAME\""});
   expect_error(kRightCounter, right_with("e2e = \"profile_1a\"\ncrc = \"Crc\""),

@@ -646,7 +646,7 @@ TEST_F(OutputLayoutTest, RefusesWhatCannotBeMeant) {
   expect_error(guarded + "source_address = 1\n", {"for a J1939 message"});
   expect_error(guarded + "max_delta_counter = 1\ncounter = \"Counter\"\n", {"is for inputs"});
   expect_error(guarded + "fill = { Rate = 1 }\n", {"Rate is written by another key"});
-  expect_error(guarded + "fill = { Start = 99 }\n", {"Start cannot say this value"});
+  expect_error(guarded + "fill = { Start = 99 }\n", {"Start cannot carry this value"});
   expect_error(guarded + "fill = { Strat = 9 }\n", {"did you mean \"Start\""});
   expect_error(guarded + "ratte = 1\n", {"unknown key \"ratte\""});
   expect_error(guarded + "crc = \"Crc\"\ne2e = \"profile_11c\"\ndata_id = 1\n",
@@ -719,7 +719,7 @@ TEST_F(OutputLayoutTest, WarnsOfTheIdentifierOfAnotherMessage) {
   };
   const std::string taken = warnings_of("bus = \"can0\"\nid = 0x123\n", "");
   EXPECT_NE(
-      taken.find("message Guarded has the identifier 0x123, with which Upside goes out on can0; "
+      taken.find("message Guarded has the identifier 0x123, with which Upside is sent on can0; "
                  "another id or bus for the [[output.layout]]"),
       std::string::npos)
       << taken;
