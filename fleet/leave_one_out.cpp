@@ -173,10 +173,11 @@ std::vector<RandomEffects> random_effects_of_others(const std::vector<Estimate>&
   }
   for (std::size_t i = 0; i < units.size(); ++i) {
     std::optional<Sums> left;
-    if (!others[i].anew)
+    if (!others[i].anew) {
       left = curve->at(others[i].between2)
                  .without(1.0 / (moved[i].sigma * moved[i].sigma + others[i].between2),
                           moved[i].value);
+    }
     if (!left) {
       result[i] = summed_anew(units, i);
       continue;

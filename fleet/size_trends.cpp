@@ -35,10 +35,12 @@ class UnitCourses {
  public:
   UnitCourses(const Pool& pool, const KnownSizes& known, const std::vector<UnitJudgement>& units)
       : known_(known), units_(units), courses_(units.size()) {
-    for (const auto& [who, sums] : pool.groups)
-      for (std::size_t slot = 0; slot < who.size(); ++slot)
+    for (const auto& [who, sums] : pool.groups) {
+      for (std::size_t slot = 0; slot < who.size(); ++slot) {
         if (const UnitJudgement* unit = find(who[slot]))
           add(who, sums, slot, courses_[static_cast<std::size_t>(unit - units_.data())]);
+      }
+    }
   }
 
   /// Slopes of the units whose drives cover enough time.
@@ -118,6 +120,7 @@ void set_trend_of_effect(std::size_t shape, const std::vector<UnitSlope>& slopes
                          TypeJudgement& type) {
   if (slopes.empty()) return;
   std::vector<Estimate> estimates;
+  estimates.reserve(slopes.size());
   for (const UnitSlope& slope : slopes)
     estimates.push_back(slope.per_year);
   for (PooledEffect& effect : type.effects) {
@@ -140,15 +143,17 @@ void judge_size_trends(const Pool& pool, const KnownSizes& known, double thresho
     // A low-pass has no size that could change in proportion.
     if (its.is_low_pass) continue;
     const SlopesJudgement judged = judge_slopes(slopes, threshold);
-    for (const auto& [slope, type_per_year] : judged.apart)
+    for (const auto& [slope, type_per_year] : judged.apart) {
       set_status(
           units[slope.unit], Status::kTrend,
           fmt::format("{}: changes by {} a year, its type's by {}", its.name,
                       figure(its.unit * slope.per_year.value, its.unit * slope.per_year.sigma),
                       rounded_figure(its.unit * type_per_year, its.unit * slope.per_year.sigma)));
-    if (judged.is_named || judged.varies)
+    }
+    if (judged.is_named || judged.varies) {
       type.trends.push_back({shape, its.unit * judged.type.mean, its.unit * judged.type.sigma,
                              its.unit * judged.type.between, slopes.size(), !judged.is_named});
+    }
   }
 }
 

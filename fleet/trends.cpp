@@ -41,6 +41,7 @@ bool spread_is_named(const std::vector<UnitSlope>& slopes, double threshold) {
   constexpr double kShare = 0.25;     // of the units, as for a spread of sizes
   constexpr double kByChance = 0.11;  // |t| > 2 with the 5 degrees of freedom of few drives
   std::vector<double> values;
+  values.reserve(slopes.size());
   for (const UnitSlope& slope : slopes)
     values.push_back(slope.per_year.value);
   const double middle = median(values);
@@ -54,10 +55,11 @@ bool spread_is_named(const std::vector<UnitSlope>& slopes, double threshold) {
 
 SlopesJudgement judge_alone(const std::vector<UnitSlope>& slopes, double threshold) {
   SlopesJudgement judgement;
-  for (const UnitSlope& slope : slopes)
+  for (const UnitSlope& slope : slopes) {
     if (is_beyond_chance(t_of(slope.per_year.value, slope.per_year.sigma), slope.freedom,
                          threshold))
       judgement.apart.push_back({slope, 0.0});
+  }
   return judgement;
 }
 
@@ -66,6 +68,7 @@ SlopesJudgement judge_alone(const std::vector<UnitSlope>& slopes, double thresho
 SlopesJudgement judge_slopes(const std::vector<UnitSlope>& slopes, double threshold) {
   if (slopes.size() < kTrendUnitsMin) return judge_alone(slopes, threshold);
   std::vector<Estimate> estimates;
+  estimates.reserve(slopes.size());
   for (const UnitSlope& slope : slopes)
     estimates.push_back(slope.per_year);
   SlopesJudgement judgement;

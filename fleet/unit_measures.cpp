@@ -105,17 +105,19 @@ void judge_bias_trends(const Pool& pool, double threshold, std::vector<UnitJudge
     slopes.push_back({i, {bias.slope(), bias.slope_sigma()}, bias.n() - 2.0});
   }
   const SlopesJudgement judged = judge_slopes(slopes, threshold);
-  for (const auto& [slope, type_per_year] : judged.apart)
+  for (const auto& [slope, type_per_year] : judged.apart) {
     set_status(
         units[slope.unit], Status::kTrend,
         fmt::format(
             "its bias moves by {} deg/s a year, its type's by {}",
             figure(slope.per_year.value * kBiasUnit_dps, slope.per_year.sigma * kBiasUnit_dps),
             rounded_figure(type_per_year * kBiasUnit_dps, slope.per_year.sigma * kBiasUnit_dps)));
-  if (judged.is_named || judged.varies)
+  }
+  if (judged.is_named || judged.varies) {
     type.trends.push_back({model::kShapeCount, judged.type.mean * kBiasUnit_dps,
                            judged.type.sigma * kBiasUnit_dps, judged.type.between * kBiasUnit_dps,
                            slopes.size(), !judged.is_named});
+  }
 }
 
 double middle_of(const std::vector<UnitJudgement>& units, double UnitJudgement::*value) {

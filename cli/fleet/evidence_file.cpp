@@ -29,9 +29,10 @@ Understood understood(const std::string& line, JsonReader& reader) {
   try {
     const JsonValue json = reader.parse(line);
     if (const std::uint64_t format = count_of(member(json, "format"), "format");
-        format != kEvidenceFormat)
+        format != kEvidenceFormat) {
       return Fault{
           fmt::format("its format is {}, and this version reads {}", format, kEvidenceFormat)};
+    }
     const std::string_view what = text_of(member(json, "evidence"), "evidence");
     if (what == "drive") return drive_of(json, line);
     if (what == "pool") return pool_of(json);
@@ -103,9 +104,10 @@ Expected<bool> add(const Understood& line, fleet::Pool& pool) {
 
 Expected<std::size_t> add_evidence(const std::string& path, fleet::Pool& pool) {
   std::error_code code;
-  if (!std::filesystem::is_regular_file(path, code))
+  if (!std::filesystem::is_regular_file(path, code)) {
     return fail(path, code ? "cannot be read: " + code.message() : "is no file",
                 "a file that vgyro gap --evidence or vgyro fleet wrote");
+  }
   Lines lines(path);
   if (!lines.is_open()) return fail(path, "cannot be read: " + system_reason());
   std::size_t again = 0;
