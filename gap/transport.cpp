@@ -39,6 +39,10 @@ constexpr std::size_t kUnevenOneIn = 1000;
 // holds more than half of what is missing.
 constexpr std::size_t kLostMin = 3;
 constexpr double kPauseShare = 0.5;
+// A silence as long as this, and as many frames, is a pause of the recording: a bus that loses
+// frames lets one of so many through.
+constexpr double kPause_s = 1.0;
+constexpr double kPauseFrames = 20.0;
 // A model without lost frames says that one in so many is lost.
 constexpr double kFramesForALoss = 1e6;
 
@@ -501,12 +505,19 @@ class Check {
 
   void find_lost() {
     double lost = 0.0;
+    double paused = 0.0;
     std::size_t events = 0;
     double longest = 0.0;
+    double longest_pause = 0.0;
     Curve marks{"frames missing at once", {}, {}, {}, true};
     for (std::size_t i = 1; i < n_; ++i) {
       const double missing = number_[i] - number_[i - 1] - 1.0;
       if (missing < 1.0) continue;
+      if (missing >= kPauseFrames && series_.t_s[i] - series_.t_s[i - 1] >= kPause_s) {
+        paused += missing;
+        longest_pause = std::max(longest_pause, missing);
+        continue;
+      }
       lost += missing;
       longest = std::max(longest, missing);
       ++events;
@@ -515,13 +526,15 @@ class Check {
     }
     const double sent = lost + static_cast<double>(n_);
     const double share = lost / sent;
-    result_.lost_share = share;
-    if (lost == 0.0 || knows(known_, Kind::kDroppedFrames)) return;
-    if (events < kLostMin || longest > kPauseShare * lost) {
+    result_.lost_share = (lost + paused) / (sent + paused);
+    if (lost + paused == 0.0 || knows(known_, Kind::kDroppedFrames)) return;
+    const bool is_property = events >= kLostMin && longest <= kPauseShare * lost;
+    if (paused > 0.0 || !is_property) {
       result_.notes.push_back(fmt::format("{}: {:.0f} frames are missing, {:.0f} of them at once",
-                                          series_.name, lost, longest));
-      return;
+                                          series_.name, lost + paused,
+                                          std::max(longest, longest_pause)));
     }
+    if (!is_property) return;
     const double frames = static_cast<double>(n_);
     add({.kind = Kind::kDroppedFrames,
          .parameters = {share},

@@ -27,7 +27,9 @@ constexpr double kWindowSquare = 0.375;
 constexpr std::size_t kReach = 10;
 constexpr double kAbove = 1.5;
 constexpr double kLine = 20.0;
-// Samples between which a cubic loses nothing of what lies below half the sampling rate.
+// What moves at more than this share of the sampling rate is read between samples at four times the
+// rate: there the curve's own sinc is no longer flat.
+constexpr double kPlainShare = 0.4;
 constexpr std::size_t kFiner = 4;
 // Of a step: an instant of the even grid is a sample's.
 constexpr double kSameInstant = 2e-4;
@@ -197,13 +199,18 @@ SampledCurve where_it_moves(const SampledCurve& curve, const SampledCurve& judge
                             double least_variance) {
   if (curve.empty()) return curve;
   const double least = least_variance * kWindowSquare * kStretch;
-  const std::vector<double> mean_power = Stretches(judge).mean_power();
-  return Stretches(curve).filtered(kFiner, [&](std::vector<std::complex<double>>& spectrum) {
-    for (std::size_t i = 0; i < spectrum.size(); ++i)
+  std::vector<double> mean_power = Stretches(judge).mean_power();
+  // What lies on half the sampling rate has no phase, and none between the samples.
+  mean_power.pop_back();
+  constexpr auto kPlain = static_cast<std::ptrdiff_t>(kPlainShare * kStretch);
+  const bool is_plain = std::all_of(mean_power.begin() + kPlain, mean_power.end(),
+                                    [&](double power) { return power < least; });
+  const auto keep_what_moves = [&](std::vector<std::complex<double>>& spectrum) {
+    for (std::size_t i = 0; i < mean_power.size(); ++i)
       if (mean_power[i] < least) spectrum[i] = 0.0;
-    // What lies on half the sampling rate has no phase, and none between the samples.
     spectrum.back() = 0.0;
-  });
+  };
+  return Stretches(curve).filtered(is_plain ? 1 : kFiner, keep_what_moves);
 }
 
 }  // namespace vgyro::gap

@@ -9,10 +9,10 @@ namespace vgyro::gap {
 /// that of one sample where nothing moves. Even steps of the median interval; phases are kept.
 SampledCurve without_noise(const SampledCurve& curve, double noise_variance);
 
-/// The curve at four times the rate, with all that it holds, noise too, at the frequencies at which
-/// there is motion: where the mean power of `judge`, which reads the same at the same instants, is
-/// that of white noise of `least_variance` or more. Nothing at the others. What is read from it
-/// between two samples scatters as it does at the samples.
+/// The curve with all that it holds, noise too, at the frequencies at which there is motion: where
+/// the mean power of `judge`, which reads the same at the same instants, is that of white noise of
+/// `least_variance` or more. Nothing at the others. What is read from it between two samples
+/// scatters as it does at the samples.
 SampledCurve where_it_moves(const SampledCurve& curve, const SampledCurve& judge,
                             double least_variance);
 

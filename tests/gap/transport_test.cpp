@@ -441,6 +441,33 @@ TEST(Frames, OnePauseIsTold) {
   EXPECT_NEAR(transport.lost_share, 500.0 / kSamples_d, 1e-12);
 }
 
+// A recording of segments: what was not recorded is no property of the bus, and what is lost beside
+// it is counted by itself.
+TEST(Frames, OfManyPausesAreNotLost) {
+  for (const double share : {0.0, 0.01}) {
+    GyroSeries series = clean(65);
+    series.counter.clear();
+    series.counter_modulus = 0;
+    std::mt19937_64 random(65);
+    std::bernoulli_distribution lost(share);
+    std::size_t single = 0;
+    const std::size_t missing = lose(series, [&](std::size_t i) {
+      if (i % 2000 >= 1800) return true;
+      const bool is_lost = lost(random);
+      if (is_lost) ++single;
+      return is_lost;
+    });
+    const Transport transport = check_transport(series, 0, {});
+    EXPECT_NEAR(transport.lost_share, static_cast<double>(missing) / kSamples_d, 0.01);
+    const Finding* const finding = found(transport, Kind::kDroppedFrames);
+    ASSERT_EQ(finding != nullptr, share > 0.0) << "seed 65";
+    if (finding != nullptr) {
+      EXPECT_NEAR(finding->effect.parameters[0], share, 0.002) << single << " lost, seed 65";
+    }
+    ASSERT_EQ(transport.notes.size(), 1U);
+  }
+}
+
 // Without a counter time tells.
 TEST(Frames, AreCountedByTimeWhereThereIsNoCounter) {
   GyroSeries series = clean(62);
