@@ -16,6 +16,10 @@ target_compile_options(vgyro_flags INTERFACE
   -ffp-contract=off
   # Nobody reads errno after mathematics; without it rounding is one instruction.
   -fno-math-errno)
+if(NOT CMAKE_SYSTEM_PROCESSOR MATCHES "^(x86_64|AMD64|i.86)$")
+  # Elsewhere a char may have no sign, and a byte beyond ASCII would be another number.
+  target_compile_options(vgyro_flags INTERFACE -fsigned-char)
+endif()
 if(CMAKE_BUILD_TYPE STREQUAL "Release")
   # A frame on the bus can be anything: what a mistake of ours would let it overwrite is noticed.
   target_compile_options(vgyro_flags INTERFACE -fstack-protector-strong -D_FORTIFY_SOURCE=2)
