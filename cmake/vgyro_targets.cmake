@@ -17,6 +17,10 @@ target_compile_options(vgyro_flags INTERFACE
   -ffp-contract=off
   # No code reads errno after mathematics; without it, rounding is one instruction.
   -fno-math-errno)
+if(NOT CMAKE_SYSTEM_PROCESSOR MATCHES "^(x86_64|AMD64|i.86)$")
+  # Elsewhere a char may have no sign, and a byte beyond ASCII would be another number.
+  target_compile_options(vgyro_flags INTERFACE -fsigned-char)
+endif()
 if(CMAKE_BUILD_TYPE STREQUAL "Release")
   # A frame on the bus can hold anything: if a bug lets it overwrite memory, these checks stop the program.
   target_compile_options(vgyro_flags INTERFACE -fstack-protector-strong -D_FORTIFY_SOURCE=2)
