@@ -316,7 +316,7 @@ CLI::App* add_gap(CLI::App& app, GapOptions& options) {
       ->required();
   command
       ->add_option("--accept", options.accept,
-                   "which explanation of an ambiguous effect to apply: gyro=N or gyro=NAME,\n"
+                   "explanation of an ambiguous effect to apply: gyro=N or gyro=NAME,\n"
                    "kind=KIND, both with a comma between, or likeliest; may be repeated")
       ->allow_extra_args(false)
       ->check(wrong_acceptance);

@@ -846,7 +846,7 @@ TEST_F(Config, RefusesNamesThatAreNotPrintable) {
   expect_error("name = \"left\"", "name = \"l\\u001b[2J\"", "name = \"l",
                {"the name \"l\\x1b[2J\" is not printable"});
   expect_error("name = \"left\"", "name = \"l\\neft\"", "name = \"l", {"l\\x0aeft"});
-  expect_error("bus = \"can2\"", "bus = \"can\\t2\"", "bus = \"can\\t", {"no interface name"});
+  expect_error("bus = \"can2\"", "bus = \"can\\t2\"", "bus = \"can\\t", {"not an interface name"});
 }
 
 // Numbers outside their limits: the error states the limits.
@@ -887,9 +887,9 @@ TEST_F(Config, RefusesColludingIdentifiers) {
 // Linux limits interface names to 15 characters.
 TEST_F(Config, RefusesInterfaceNamesThatCannotBe) {
   expect_error("bus = \"can1\"", "bus = \"a_name_of_16_chr\"", "a_name_of_16_chr",
-               {"no interface name", "15 characters"});
+               {"not an interface name", "15 characters"});
   expect_error("[output]\nbus = \"can0\"", "[output]\nbus = \"a_name_of_16_chr\"",
-               "a_name_of_16_chr", {"no interface name", "15 characters"});
+               "a_name_of_16_chr", {"not an interface name", "15 characters"});
 }
 
 // Without J1939, source_address would have no effect.
