@@ -156,7 +156,7 @@ def records(run):
     require(re.fullmatch(r"/var/lib/vgyro/captures/\d{8}T\d{6}Z-asked\n", run.text("capture")), run.text("capture"))
     said = json.loads(run.text("capture_said"))
     require(said["frames"] > 1000 and said["frames_dropped"] == 0 and len(said["inputs"]) == 2, f"{said}")
-    require({line.split()[1] for line in run.text("capture_lines").splitlines()} == {"vcan0"}, run.text("capture_lines"))
+    require(run.text("capture_lines").splitlines() == ["vcan0 101", "vcan1 102"], run.text("capture_lines"))
     for line in run.text("capture_modes").splitlines():
         require(line.split()[0] in ("600", "644", "700"), line)
     return f"{said['frames']} frames"

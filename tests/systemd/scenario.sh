@@ -108,7 +108,7 @@ step save busctl call "${gateway[@]}" org.vgyro.Gateway1 SaveState
 step capture_refused nobody vgyro capture
 step capture vgyro capture
 step capture_read vgyro convert -o /run/recorded.log "$(<$out/capture.txt)/recording.log.xz"
-step capture_lines sort -u -k 2,2 /run/recorded.log
+step capture_lines sh -c "cut -d' ' -f2,3 /run/recorded.log | cut -d'#' -f1 | sort -u"
 step capture_said cat "$(<$out/capture.txt)/capture.json"
 step capture_modes stat -L -c '%a %U %n' /var/lib/vgyro/captures/*
 
